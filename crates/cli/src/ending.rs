@@ -1,14 +1,14 @@
 //! How the program ends where it could not do what it was asked.
 
 use crate::failure::Failure;
-use crate::{manner, output};
+use crate::{output, output_options};
 use serde_json::json;
 use std::process::ExitCode;
 
 /// Says it, with `--json` as an object where none was printed yet.
 pub fn failed(failure: &Failure) -> ExitCode {
     let Some(code) = failure.say() else { return ExitCode::SUCCESS };
-    if manner::json() && !output::has_told() {
+    if output_options::json() && !output::has_told() {
         // A reader that has gone away is told nothing.
         let _ = output::print_json(&failure.json());
     }

@@ -1,7 +1,7 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use crate::{manner, standard_error};
+use crate::{output_options, standard_error};
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
@@ -55,7 +55,7 @@ impl Failure {
     fn of_findings(findings: &Findings) -> Self {
         Failure {
             code: Code::BadInput,
-            message: findings.render(manner::warns_in_colour()),
+            message: findings.render(output_options::warns_in_colour()),
             findings: Some(json!(findings.list)),
             manner: Manner::Rendered,
         }
@@ -156,7 +156,7 @@ impl From<SessionError> for Failure {
             ErrorKind::Interrupted => Code::Interrupted,
         };
         match error {
-            SessionError::Exists { .. } if manner::replaces() => {
+            SessionError::Exists { .. } if output_options::replaces() => {
                 Failure::new(code, format!("{error}, or replace it with `--force`"))
             }
             SessionError::Campaign(error) => Failure::of_campaign(error),

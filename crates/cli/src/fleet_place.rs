@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::wall::SystemWall;
-use crate::{interrupt, manner, registry};
+use crate::{interrupt, output_options, registry};
 use mapper_core::Wall;
 use mapper_fleet::{Engine, Fleet, FleetError, Kind, Machine};
 use mapper_session::Registry;
@@ -31,7 +31,8 @@ pub fn in_fleet<T>(
 ) -> Result<T, Failure> {
     on_this_machine(|registry, kinds, machine| {
         let fleet = Fleet::open(directory, &mapper_studies::program(registry))?;
-        let (kind, stop, progress) = (fleet.kind(kinds)?, interrupt::stop_flag()?, manner::progress());
+        let (kind, stop, progress) =
+            (fleet.kind(kinds)?, interrupt::stop_flag()?, output_options::progress());
         let told = |done, of| progress.pieces(done, of);
         let result = then(&fleet, kind, &Engine { jobs, stop: &stop, told: &told }, machine);
         progress.clear();

@@ -11,8 +11,8 @@ mod failure;
 mod fleet_place;
 mod given;
 mod interrupt;
-mod manner;
 mod output;
+mod output_options;
 mod registry;
 mod rig_states;
 mod shown;
@@ -29,7 +29,7 @@ use std::process::ExitCode;
 #[command(name = "mapper", version, after_help = exit_code::HELP, arg_required_else_help = true)]
 struct Arguments {
     #[command(flatten)]
-    manner: manner::MannerArguments,
+    manner: output_options::OutputOptions,
     /// What to do.
     #[command(subcommand)]
     command: commands::Command,
@@ -37,13 +37,13 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let raw: Vec<OsString> = std::env::args_os().collect();
-    let (json, colour) = manner::of_raw(&raw);
+    let (json, colour) = output_options::of_raw(&raw);
     let read = Arguments::command().color(colour).try_get_matches_from(raw);
     let read = read.and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)));
     match read {
         Ok((arguments, matches)) => {
-            manner::keep(&arguments.manner, &matches);
-            manner::keep_commands(Arguments::command);
+            output_options::keep(&arguments.manner, &matches);
+            output_options::keep_commands(Arguments::command);
             match arguments.command.run() {
                 Ok(()) => ExitCode::SUCCESS,
                 Err(failure) => ending::failed(&failure),

@@ -1,6 +1,6 @@
 //! How much of identified points is shown.
 
-use crate::manner;
+use crate::output_options;
 use clap::Args;
 use mapper_terminal::Shown;
 
@@ -17,6 +17,6 @@ pub struct ShownArguments {
 
 impl ShownArguments {
     pub fn shown(&self) -> Shown {
-        Shown { full: self.full, truth: self.truth, paint: manner::paint() }
+        Shown { full: self.full, truth: self.truth, paint: output_options::paint() }
     }
 }

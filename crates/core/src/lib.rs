@@ -37,6 +37,7 @@ mod plausible;
 mod recording;
 mod redundant;
 mod reference_state;
+mod run_down;
 mod sample;
 mod schema;
 mod settle_bands;
@@ -48,7 +49,6 @@ mod surge;
 mod thermal_model;
 mod timing;
 mod visit_order;
-mod way_down;
 mod window_rule;
 mod with_unit;
 

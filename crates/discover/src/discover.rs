@@ -1,15 +1,15 @@
 //! From a diagnosis that leaves something to the laws that account for it, and to where it is missing.
 
 use crate::balance::Balance;
-use crate::begun::begun;
 use crate::candidate::{Bench, Candidate, keep_determined, worth};
 use crate::columns::{Base, Products};
 use crate::force::{Force, forces};
 use crate::held_out::shrink;
 use crate::library::library;
+use crate::onset::begun;
 use crate::script::script;
 use crate::select::{Choice, choices};
-use crate::sentence::{Told, tell};
+use crate::sentence::{LawDescription, tell};
 use mapper_gap::additions::additions;
 use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
@@ -77,7 +77,7 @@ pub fn discover(
         && let Some(best) = diagnosed.fits.first()
         && let Some(both) = beside(&mut bench, diagnosed, best, &training, &everywhere)
     {
-        let score = |found: &Found| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
+        let score = |found: &FittedLaws| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
         let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARE_BESIDE);
         found = if better { Some(both) } else { found };
     }
@@ -118,7 +118,7 @@ pub fn wanted(diagnosed: &Diagnosed) -> bool {
 }
 
 /// Laws that were fitted.
-struct Found {
+struct FittedLaws {
     /// On the steps that count for the search, best first.
     trained: Vec<Candidate>,
     /// The best of these on all steps, best first.
@@ -139,7 +139,7 @@ fn beside(
     best: &Fit,
     training: &Selection,
     everywhere: &Selection,
-) -> Option<Found> {
+) -> Option<FittedLaws> {
     let Diagnosed { study, linearised, .. } = diagnosed;
     let there = linearised.at(study, &best.hypothesis).ok()?;
     let base = Base::beside(study, &there, best);
@@ -153,7 +153,7 @@ fn found(
     training: &Selection,
     everywhere: &Selection,
     adequate: &dyn Fn(&Fit) -> bool,
-) -> Option<Found> {
+) -> Option<FittedLaws> {
     let changes = base.changes(&bench.library);
     let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
     let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
@@ -178,10 +178,10 @@ fn found(
     });
     let stability = again.count() as f64 / folds.len().max(1) as f64;
     if adequate(&fitted_best.fit) {
-        return Some(Found { trained: found.0, fitted: found.1, stability, adequate: true });
+        return Some(FittedLaws { trained: found.0, fitted: found.1, stability, adequate: true });
     }
     // What none of them explains may have begun in the middle.
-    let alone = Found { trained: found.0, fitted: found.1, stability, adequate: false };
+    let alone = FittedLaws { trained: found.0, fitted: found.1, stability, adequate: false };
     let Some((later, stability)) = begun(base, &mut bench.library, &on_training, &training.steps, &folds)
     else {
         return Some(alone);
@@ -192,7 +192,7 @@ fn found(
     Some(match fits {
         Some((trained, fitted)) if fitted.first()?.score() > alone.fitted.first()?.score() => {
             let adequate = adequate(&fitted.first()?.fit);
-            Found { trained, fitted, stability, adequate }
+            FittedLaws { trained, fitted, stability, adequate }
         }
         _ => alone,
     })
@@ -230,7 +230,7 @@ fn propose(
     diagnosed: &Diagnosed,
     calibration: &Calibration,
     bench: &Bench,
-    found: Option<&Found>,
+    found: Option<&FittedLaws>,
     training: &Selection,
 ) -> Vec<Law> {
     let Some(found) = found else { return Vec::new() };
@@ -275,8 +275,8 @@ fn propose(
         .sum::<f64>()
         + ((inside - best.score() - PRIOR_LAW.ln()) / calibration.temperature).exp();
     let say = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
-    let Told { sentence, terms, sink_k } = say(best);
-    let told = Told { sentence: sentence.clone(), terms: terms.clone(), sink_k };
+    let LawDescription { sentence, terms, sink_k } = say(best);
+    let told = LawDescription { sentence: sentence.clone(), terms: terms.clone(), sink_k };
     let equivalent = found.fitted.iter().skip(1).filter(near).take(MAX_EQUIVALENT).map(|c| say(c).sentence);
     vec![Law {
         submodel: bench.library[best.choice.terms[0]].submodel().name().to_owned(),
@@ -308,7 +308,7 @@ const PRIOR_LAW: f64 = 0.15;
 fn places(
     diagnosed: &Diagnosed,
     bench: &Bench,
-    found: Option<&Found>,
+    found: Option<&FittedLaws>,
     forces: &[Force],
     null: &Fit,
     bend: f64,

@@ -7,7 +7,7 @@ pub const PRIOR_STEPS: f64 = 10.0;
 
 /// What some terms make of the projected products: logarithm of the evidence over nothing, and the coefficients in steps.
 #[derive(Debug, Clone)]
-pub struct Weighed {
+pub struct LinearEvidence {
     /// Logarithm of the evidence, over that of nothing.
     pub gain: f64,
     /// Coefficients, steps.
@@ -16,7 +16,7 @@ pub struct Weighed {
 
 /// Weighs the terms at `places` of the projected products, whose last row and column are the residual's; `prior_sigma` in
 /// steps.
-pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Option<Weighed> {
+pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Option<LinearEvidence> {
     let last = products.nrows() - 1;
     let k = places.len();
     let mut matrix = DMatrix::from_fn(k, k, |i, j| products[(places[i], places[j])]);
@@ -28,7 +28,7 @@ pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Opt
     let coefficients = cholesky.solve(&right);
     let half_ln_determinant: f64 = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
     let gain = 0.5 * right.dot(&coefficients) - half_ln_determinant - k as f64 * prior_sigma.ln();
-    Some(Weighed { gain, coefficients })
+    Some(LinearEvidence { gain, coefficients })
 }
 
 /// The same for coefficients of a common prior covariance `scale^2 shape`.

@@ -1,7 +1,7 @@
 //! A formula that is computed and written from one place.
 
-use crate::course::Course;
 use crate::quantity::Quantity;
+use crate::time_history::Course;
 use mapper_physics::hooks::Site;
 use std::fmt::{Display, Formatter, Result};
 

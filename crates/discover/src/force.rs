@@ -6,10 +6,10 @@
 
 use crate::balance::Balance;
 use crate::columns::{Base, Products};
-use crate::course::{Course, Shape};
 use crate::evidence::{Posterior, weigh_process};
 use crate::expression::Expression;
 use crate::term::{Role, Term};
+use crate::time_history::{Course, Shape};
 use mapper_core::Channel;
 use mapper_gap::nuisance::OUTPUTS;
 use mapper_gap::study::{PointState, Study};

@@ -4,10 +4,8 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod balance;
-pub mod begun;
 pub mod candidate;
 pub mod columns;
-pub mod course;
 pub mod discover;
 pub mod evidence;
 pub mod expression;
@@ -15,9 +13,11 @@ pub mod force;
 pub mod held_out;
 pub mod law_effect;
 pub mod library;
+pub mod onset;
 pub mod quantity;
 pub mod script;
 pub mod select;
 pub mod sentence;
 pub mod signatures;
 pub mod term;
+pub mod time_history;

@@ -3,18 +3,18 @@
 use crate::balance::Balance;
 use crate::candidate::Candidate;
 use crate::expression::Expression;
-use crate::sentence::{Told, sink};
+use crate::sentence::{LawDescription, sink};
 use crate::term::Term;
 use std::fmt::Write as _;
 
 /// The script; `None` where a term cannot be written as one.
-pub fn script(library: &[Term], candidate: &Candidate, told: &Told) -> Option<String> {
+pub fn script(library: &[Term], candidate: &Candidate, told: &LawDescription) -> Option<String> {
     let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
     script_of(&terms, told)
 }
 
 /// The script of some terms.
-pub fn script_of(terms: &[&Term], told: &Told) -> Option<String> {
+pub fn script_of(terms: &[&Term], told: &LawDescription) -> Option<String> {
     let submodel = terms.first()?.submodel().name();
     let mut parameters = String::new();
     // Each balance with the sum that acts on it.

@@ -1,6 +1,6 @@
 //! Which few terms of the library the recording asks for, in closed form.
 
-use crate::evidence::{PRIOR_STEPS, Weighed, weigh};
+use crate::evidence::{LinearEvidence, PRIOR_STEPS, weigh};
 use crate::term::{Role, Term};
 use nalgebra::DMatrix;
 
@@ -24,7 +24,9 @@ pub struct Choice {
 pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> Vec<Choice> {
     let mut found: Vec<Choice> = Vec::new();
     let mut offer = |places: &[usize], rarity: f64| {
-        let Some(Weighed { gain, coefficients }) = weigh(products, places, PRIOR_STEPS) else { return };
+        let Some(LinearEvidence { gain, coefficients }) = weigh(products, places, PRIOR_STEPS) else {
+            return;
+        };
         let terms: Vec<usize> = places.iter().map(|place| usable[*place]).collect();
         let wrong =
             terms.iter().zip(coefficients.iter()).any(|(term, c)| library[*term].positive && *c < 0.0);

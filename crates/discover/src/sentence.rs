@@ -32,7 +32,7 @@ impl Uncertain {
 
 /// A law's numbers and its sentence.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct LawDescription {
     /// The sentence.
     pub sentence: String,
     /// Its numbers.
@@ -42,7 +42,7 @@ pub struct Told {
 }
 
 /// Tells a law; `interval_factor` widens its standard errors.
-pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> Told {
+pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> LawDescription {
     let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
     let values = candidate.coefficients();
     let covariance = &candidate.fit.covariance;
@@ -81,7 +81,7 @@ pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> To
             row(format!("conductance from {from}"), numbers[slope], terms[slope].unit),
             row("temperature of what it goes to".to_owned(), sink, "K"),
         ];
-        return Told { sentence, terms: told, sink_k: Some(sink.value) };
+        return LawDescription { sentence, terms: told, sink_k: Some(sink.value) };
     }
     let sentences: Vec<String> = terms
         .iter()
@@ -93,7 +93,7 @@ pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> To
         .zip(&numbers)
         .map(|(term, number)| row(term.words.replacen("{}", "x", 1), *number, term.unit))
         .collect();
-    Told { sentence: sentences.join(", and "), terms: told, sink_k: None }
+    LawDescription { sentence: sentences.join(", and "), terms: told, sink_k: None }
 }
 
 /// Places of slope and level where the law is heat to something of unknown temperature.

@@ -8,15 +8,15 @@ mod common;
 use common::{Visits, declared};
 use mapper_discover::balance::Balance;
 use mapper_discover::columns::Base;
-use mapper_discover::course::{Course, Shape};
 use mapper_discover::discover::discover;
 use mapper_discover::expression::Expression;
 use mapper_discover::force::forces;
 use mapper_discover::law_effect::LawEffect;
 use mapper_discover::library::library;
 use mapper_discover::script::script_of;
-use mapper_discover::sentence::{Told, sink};
+use mapper_discover::sentence::{LawDescription, sink};
 use mapper_discover::term::{Role, Term};
+use mapper_discover::time_history::{Course, Shape};
 use mapper_effects::ScriptEffect;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
@@ -153,7 +153,7 @@ fn every_term_can_be_written_and_its_script_does_the_same() {
     let short = Visits { speeds_rpm: &[90e3, 130e3, 60e3], dwell_s: 20.0 };
     let study = study(&short, Vec::new());
     let nothing = study.predict(&study.nothing()).unwrap();
-    let told = Told { sentence: "a term".to_owned(), terms: Vec::new(), sink_k: None };
+    let told = LawDescription { sentence: "a term".to_owned(), terms: Vec::new(), sink_k: None };
     let terms = library();
     let complaints = parallel::map(&terms, |term| {
         let text = script_of(&[term], &told).unwrap();

@@ -1,10 +1,10 @@
 //! Every cause with every course it may take, as hypotheses of one likelihood.
 
 use crate::cause::Cause;
-use crate::course::{Course, CourseKind};
 use crate::low_rank::LowRank;
 use crate::readings::Readings;
 use crate::request::Unsolvable;
+use crate::time_history::{Course, CourseKind};
 use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors};
 use nalgebra::DMatrix;
 

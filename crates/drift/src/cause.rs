@@ -1,6 +1,6 @@
 //! What may drift.
 
-use crate::course::CourseKind;
+use crate::time_history::CourseKind;
 use mapper_core::{Channel, Dimension, with_unit};
 use mapper_observe::sensor_fault::drifts;
 use mapper_physics::bearing_friction::at_150_krpm;

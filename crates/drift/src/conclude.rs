@@ -2,12 +2,12 @@
 
 use crate::cause::{Cause, CauseKind};
 use crate::corrected::{corrected_points, identified};
-use crate::course::CourseKind;
-use crate::decide::{Decision, Found};
+use crate::decide::{Decision, FoundDrifts};
 use crate::fit::Fit;
 use crate::refine::Refined;
 use crate::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
 use crate::request::DriftRequest;
+use crate::time_history::CourseKind;
 use crate::visits::group;
 use mapper_core::{IdentifiedPoint, Recording};
 
@@ -38,7 +38,7 @@ pub(crate) fn conclude(
     }
 }
 
-fn drift(found: &Found, fit: &Fit) -> FoundDrift {
+fn drift(found: &FoundDrifts, fit: &Fit) -> FoundDrift {
     FoundDrift {
         cause: found.cause,
         probability: found.probability,

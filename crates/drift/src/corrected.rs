@@ -7,7 +7,7 @@ use crate::fit::Fit;
 use crate::refine::Refined;
 use crate::report::CorrectedPoint;
 use crate::request::DriftRequest;
-use crate::take_off::without_drifts;
+use crate::subtract_drift::without_drifts;
 use mapper_core::{Channel, IdentifiedPoint, Recording};
 use mapper_identify::identify_each;
 use mapper_observe::mean::mean_between;

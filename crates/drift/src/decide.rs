@@ -2,12 +2,12 @@
 
 use crate::candidates::Candidates;
 use crate::cause::Cause;
-use crate::course::{Course, CourseKind};
-use crate::leftovers::{inflate, leave_out};
 use crate::low_rank::LowRank;
 use crate::readings::Readings;
 use crate::report::{Alternative, DetectionLimit};
 use crate::request::{DriftError, Unsolvable};
+use crate::residuals::{inflate, leave_out};
+use crate::time_history::{Course, CourseKind};
 use mapper_inference::hypotheses::Member;
 use nalgebra::DMatrix;
 
@@ -16,7 +16,7 @@ const ONSETS: usize = 36;
 
 /// A cause that is found, before its course is fitted closely.
 #[derive(Debug, Clone)]
-pub(crate) struct Found {
+pub(crate) struct FoundDrifts {
     pub cause: Cause,
     pub course: Course,
     /// Its probability against the others and against none in its place.
@@ -35,7 +35,7 @@ impl Decision {
 /// What is found.
 pub(crate) struct Decision {
     /// Nothing where nothing drifts.
-    pub found: Vec<Found>,
+    pub found: Vec<FoundDrifts>,
     /// No drift and each cause by itself, most probable first.
     pub alone: Vec<Alternative>,
     pub limits: Vec<DetectionLimit>,
@@ -84,7 +84,7 @@ pub(crate) fn decide(
     })
 }
 
-fn found(candidates: &Candidates, member: &Member) -> Found {
+fn found(candidates: &Candidates, member: &Member) -> FoundDrifts {
     let cause = candidates.cause(member.index);
     let others = member
         .alternatives
@@ -92,7 +92,7 @@ fn found(candidates: &Candidates, member: &Member) -> Found {
         .map(|(family, relative)| (Some(candidates.causes[*family]), relative.ln()));
     let all = probabilities(others.chain([(Some(cause), 0.0), (None, -member.ln_odds)]).collect());
     let (own, alternatives): (Vec<_>, Vec<_>) = all.into_iter().partition(|one| one.cause == Some(cause));
-    Found {
+    FoundDrifts {
         cause,
         course: candidates.all[member.index].course,
         probability: own.first().map_or(0.0, |own| own.probability),

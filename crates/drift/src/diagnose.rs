@@ -12,7 +12,7 @@ use crate::usable::usable;
 use mapper_core::{Channel, Recording};
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::declared::Declared;
-use mapper_observe::knob::Knob;
+use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 
 /// Stretches closer to the surge line are left out: there a hundredth of P2 is a third of the flow, and no parameter's
@@ -128,7 +128,7 @@ fn own_covariances(recordings: &[&Recording], readings: &Readings, declared: &De
                 declared.noise_sigma(OUTPUTS[*column]).powi(2) * (ratio + MODEL_FLOOR * MODEL_FLOOR);
         }
         for channel in DRIVERS {
-            let Some(answer) = readings.answer(Knob::Input(channel)) else { continue };
+            let Some(answer) = readings.answer(Perturbation::Input(channel)) else { continue };
             let of_block = DVector::from_column_slice(&answer.readings[index * count..(index + 1) * count]);
             covariance.ger(declared.noise_sigma(channel).powi(2) * ratio, &of_block, &of_block, 1.0);
         }

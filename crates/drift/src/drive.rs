@@ -5,13 +5,13 @@ use crate::knobs::{KNOBS, difference_step};
 use crate::planted::Planted;
 use crate::prediction::Prediction;
 use crate::request::DriftError;
-use crate::stretch::{Followed, LEFT_OUT_S, Place, Stretch, carried, read_state};
+use crate::segment::{Followed, LEFT_OUT_S, Place, Stretch, carried, read_state};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::parallel;
 use mapper_observe::averaged_inputs::AveragedInputs;
 use mapper_observe::channels::OUTPUTS;
-use mapper_observe::knob::{Knob, Shifted};
 use mapper_observe::mean::{BEFORE_S, mean_between};
+use mapper_observe::perturbation::{Perturbation, Shifted};
 use mapper_observe::start::state_as_read;
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::inputs::Inputs;
@@ -88,7 +88,7 @@ impl<'a> Drive<'a> {
     fn predict(
         &self,
         planted: &[Planted],
-        turned: Option<(Knob, f64)>,
+        turned: Option<(Perturbation, f64)>,
     ) -> Result<Prediction, (usize, DriveError)> {
         let mut state = self.start;
         if let Some((knob, by)) = turned {

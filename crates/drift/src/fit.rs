@@ -2,10 +2,10 @@
 
 use crate::candidates::{courses, mean_of};
 use crate::cause::Cause;
-use crate::course::Course;
 use crate::low_rank::LowRank;
 use crate::readings::Readings;
 use crate::request::{DriftError, Unsolvable};
+use crate::time_history::Course;
 use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
 

@@ -13,13 +13,11 @@ mod cause;
 mod conclude;
 mod constant;
 mod corrected;
-mod course;
 mod decide;
 mod diagnose;
 mod drive;
 mod fit;
 mod knobs;
-mod leftovers;
 mod low_rank;
 mod nuisance;
 mod planted;
@@ -29,17 +27,19 @@ mod refine;
 mod repeats;
 mod report;
 mod request;
-mod stretch;
-mod take_off;
+mod residuals;
+mod segment;
+mod subtract_drift;
+mod time_history;
 mod usable;
 mod visits;
 
 pub use cause::{Cause, CauseKind};
-pub use course::{Course, CourseKind};
 pub use diagnose::diagnose;
 pub use report::{
     Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, FoundDrift, RateOrStep,
     RepeatGroup, Visit, VisitChannel,
 };
 pub use request::{DriftError, DriftRequest, RecordedRun, Unsolvable};
-pub use take_off::without_drift;
+pub use subtract_drift::without_drift;
+pub use time_history::{Course, CourseKind};

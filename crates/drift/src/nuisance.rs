@@ -7,14 +7,14 @@ use crate::readings::Readings;
 use mapper_core::Channel;
 use mapper_observe::channels::OUTPUTS;
 use mapper_observe::declared::Declared;
-use mapper_observe::knob::Knob;
+use mapper_observe::perturbation::Perturbation;
 
 /// Deviations of each operating point from the smooth model, shared by its repeats: one standard deviation.
-const OWN_DEVIATIONS: [(Knob, f64); 4] = [
-    (Knob::Efficiency, 0.005),
-    (Knob::Flow, 0.004),
-    (Knob::TurbineEfficiency, 0.006),
-    (Knob::CompressorConvection, 0.03),
+const OWN_DEVIATIONS: [(Perturbation, f64); 4] = [
+    (Perturbation::Efficiency, 0.005),
+    (Perturbation::Flow, 0.004),
+    (Perturbation::TurbineEfficiency, 0.006),
+    (Perturbation::CompressorConvection, 0.03),
 ];
 
 /// The same of each channel at each operating point, which no law of the model gives.
@@ -34,7 +34,7 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Constan
     let mut constants = Vec::new();
     for (knob, answer) in KNOBS.iter().zip(&readings.answers) {
         let sigma = match knob {
-            Knob::Input(channel) => {
+            Perturbation::Input(channel) => {
                 let declared = declared.of(*channel);
                 declared.offset_sigma.hypot(declared.gain_sigma_ratio * readings.input_level(*channel))
             }
@@ -43,7 +43,7 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Constan
         if sigma <= 0.0 {
             continue;
         }
-        let of_runs = matches!(knob, Knob::StartTc | Knob::StartTt);
+        let of_runs = matches!(knob, Perturbation::StartTc | Perturbation::StartTt);
         for run in 0..if of_runs { readings.runs } else { 1 } {
             let holds = |step: usize| !of_runs || readings.steps[step].run == run;
             constants.push(scaled(readings, answer, sigma, &holds));
@@ -108,7 +108,7 @@ fn wander(readings: &Readings, constants: &mut Vec<Constant>) {
                 .collect();
             Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] }
         };
-        if let Some(ambient) = readings.answer(Knob::Ambient) {
+        if let Some(ambient) = readings.answer(Perturbation::Ambient) {
             constants.push(course(&|row, _| AMBIENT_WANDER_K * ambient.readings[row]));
         }
         for (channel, sigma) in TURBINE_WANDER {

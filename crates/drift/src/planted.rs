@@ -2,9 +2,9 @@
 //! that never changed.
 
 use crate::cause::{Cause, FOULING_FLOW_SHARE};
-use crate::course::Course;
+use crate::time_history::Course;
 use mapper_observe::channels::DRIVERS;
-use mapper_observe::knob::Knob;
+use mapper_observe::perturbation::Perturbation;
 use mapper_physics::params::{BoundaryConditions, Params};
 
 /// A cause with its course, and its rate or step.
@@ -36,10 +36,10 @@ impl Planted {
         let now = self.size * self.course.mean(from_s, to_s);
         match self.cause {
             Cause::Fouling => {
-                Knob::Efficiency.turn(params, now);
-                Knob::Flow.turn(params, FOULING_FLOW_SHARE * now);
+                Perturbation::Efficiency.turn(params, now);
+                Perturbation::Flow.turn(params, FOULING_FLOW_SHARE * now);
             }
-            Cause::BearingFriction => Knob::Friction.turn(params, now),
+            Cause::BearingFriction => Perturbation::Friction.turn(params, now),
             Cause::Sensors(_) => {}
         }
     }
@@ -47,7 +47,7 @@ impl Planted {
     /// Takes the drift of a sensor off the input that was read with it.
     pub fn undrift(&self, boundary: &mut BoundaryConditions, t_s: f64) {
         for channel in self.cause.channels().iter().filter(|channel| DRIVERS.contains(channel)) {
-            Knob::Input(*channel).shift(boundary, -self.size * self.course.at(t_s));
+            Perturbation::Input(*channel).shift(boundary, -self.size * self.course.at(t_s));
         }
     }
 }

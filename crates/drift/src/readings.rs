@@ -7,7 +7,7 @@ use crate::knobs::{KNOBS, difference_step};
 use crate::prediction::Prediction;
 use mapper_core::Channel;
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
-use mapper_observe::knob::Knob;
+use mapper_observe::perturbation::Perturbation;
 
 /// All readings beside the model.
 pub(crate) struct Readings {
@@ -34,7 +34,7 @@ pub(crate) struct Readings {
 }
 
 impl Readings {
-    pub fn answer(&self, knob: Knob) -> Option<&Constant> {
+    pub fn answer(&self, knob: Perturbation) -> Option<&Constant> {
         KNOBS.iter().position(|other| *other == knob).and_then(|index| self.answers.get(index))
     }
 
@@ -62,9 +62,12 @@ impl Readings {
             }
             Cause::Fouling => {
                 let of = |knob, factor| Some(self.answer(knob)?.times(factor));
-                self.sum([of(Knob::Efficiency, 1.0)?, of(Knob::Flow, FOULING_FLOW_SHARE)?].into_iter())
+                self.sum(
+                    [of(Perturbation::Efficiency, 1.0)?, of(Perturbation::Flow, FOULING_FLOW_SHARE)?]
+                        .into_iter(),
+                )
             }
-            Cause::BearingFriction => self.answer(Knob::Friction).cloned(),
+            Cause::BearingFriction => self.answer(Perturbation::Friction).cloned(),
         }
     }
 
@@ -82,7 +85,7 @@ impl Readings {
     fn of_sensor(&self, channel: Channel) -> Option<Constant> {
         // An input that reads too high drives the model too high: the truth lies below.
         if DRIVERS.contains(&channel) {
-            return Some(self.answer(Knob::Input(channel))?.times(-1.0));
+            return Some(self.answer(Perturbation::Input(channel))?.times(-1.0));
         }
         let output = OUTPUTS.iter().position(|output| *output == channel)?;
         let column = self.columns.iter().position(|column| *column == output)?;

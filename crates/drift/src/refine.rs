@@ -4,7 +4,6 @@
 use crate::candidates::mean_of;
 use crate::cause::Cause;
 use crate::constant::Constant;
-use crate::course::Course;
 use crate::decide::{Decision, decide};
 use crate::drive::{Drive, predict};
 use crate::fit::{FINE_ONSETS, Fit, Fits, fit};
@@ -12,6 +11,7 @@ use crate::nuisance;
 use crate::planted::Planted;
 use crate::readings::Readings;
 use crate::request::DriftError;
+use crate::time_history::Course;
 use mapper_observe::declared::Declared;
 use nalgebra::DMatrix;
 

@@ -1,7 +1,7 @@
 //! The answer, as it is printed and written as JSON.
 
 use crate::cause::Cause;
-use crate::course::{Course, CourseKind};
+use crate::time_history::{Course, CourseKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

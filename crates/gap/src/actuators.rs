@@ -3,8 +3,8 @@
 use mapper_core::{Channel, Recording};
 use mapper_observe::declared::Declared;
 use mapper_observe::lagged_command::{Response, measured_p3_response, measured_valve_response};
+use mapper_observe::step_timing::{Times, as_told};
 use mapper_observe::table::Table;
-use mapper_observe::told::{Times, as_told};
 
 /// How often response and times are read off beside each other at most.
 const TIMED_TURNS: usize = 3;

@@ -40,7 +40,7 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
         *right -= nuisance;
     }
     let rows = (0..study.steps.len()).map(|step| rows_of_step(study, step)).collect();
-    let look = Look { study, linearised, projector: &projector, base, right_residual, rows };
+    let look = FitNeighbourhood { study, linearised, projector: &projector, base, right_residual, rows };
     let used: Vec<usize> = members(&base.hypothesis).iter().map(|member| study.family(*member)).collect();
     let effects: Vec<usize> = (0..study.catalogue).filter(|effect| !used.contains(effect)).collect();
     let found = parallel::map(&effects, |effect| match study.effects[*effect].info().parameters.as_slice() {
@@ -50,7 +50,7 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
     found.into_iter().flatten().collect()
 }
 
-struct Look<'a> {
+struct FitNeighbourhood<'a> {
     study: &'a Study,
     linearised: &'a Linearised,
     projector: &'a Projector<'a>,
@@ -60,7 +60,7 @@ struct Look<'a> {
     rows: Vec<Range<usize>>,
 }
 
-impl Look<'_> {
+impl FitNeighbourhood<'_> {
     fn with(&self, effect: usize, values: Vec<f64>) -> Hypothesis {
         let mut start = self.base.hypothesis.clone();
         start.effects.push((effect, values));

@@ -5,12 +5,12 @@ use crate::nuisance::NuisanceKind;
 use crate::selection::dot_over;
 use crate::study::Study;
 use crate::whiten::{Linearised, rows_of_step};
-use mapper_observe::knob::Knob;
+use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 
 /// Whether a nuisance is the metal's temperature at the start.
 pub(crate) fn is_start(kind: NuisanceKind) -> bool {
-    matches!(kind, NuisanceKind::Knob(Knob::StartTc | Knob::StartTt))
+    matches!(kind, NuisanceKind::Perturbation(Perturbation::StartTc | Perturbation::StartTt))
 }
 
 /// A fit whose start is read from the first step, all else as it is. Without it a step that was held out would count what nobody

@@ -6,25 +6,25 @@
 //! smoothing it would ask for how it runs. Each recording is driven by its own inputs, so that other weather is no change.
 
 use crate::actuators::Actuators;
-use crate::another_machine::another_machine;
+use crate::baseline_assumptions::{Lacking, Since};
 use crate::errors_of_change::{covariance_of_errors, elsewhere, errors_of_change};
 use crate::first_step::is_start;
 use crate::fit::MAX_SIGMAS;
 use crate::gap_error::GapError;
 use crate::hypothesis::Hypothesis;
+use crate::machine_mismatch::another_machine;
 use crate::normal::nuisance_products;
 use crate::nuisance::OUTPUTS;
 use crate::problem::Problem;
 use crate::same_steps::same_steps;
 use crate::selection::{Selection, dot_over};
-use crate::since::{Lacking, Since};
 use crate::study::{Group, PredictError, Study};
 use crate::usable::usable;
 use crate::whiten::{Linearised, dot};
 use mapper_core::{Channel, Recording};
 use mapper_observe::declared::Declared;
+use mapper_observe::step_timing::as_told;
 use mapper_observe::table::Table;
-use mapper_observe::told::as_told;
 use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;

@@ -1,10 +1,10 @@
 //! How far the gap shrinks, on steps that were not used to fit.
 
 use crate::adequacy::misfit_of_steps;
-use crate::carried::{StepMisfit, carried};
 use crate::first_step::{is_start, with_start_read};
 use crate::fit::{Effort, Fit, fit};
 use crate::folds::Folds;
+use crate::gap_distribution::{StepMisfit, carried};
 use crate::nuisance::{NuisanceKind, OUTPUTS};
 use crate::report::{ChannelGap, Gap, PointGap, Strained};
 use crate::selection::{Selection, dot_over};

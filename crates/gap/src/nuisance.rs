@@ -5,7 +5,7 @@ use crate::shape::{SHAPE_SUM, SHAPES};
 use mapper_core::{Channel, Dimension};
 use mapper_observe::channels::{self, DRIVERS};
 use mapper_observe::declared::Declared;
-use mapper_observe::knob::Knob;
+use mapper_observe::perturbation::Perturbation;
 use mapper_physics::effect::Rig;
 
 /// What the model predicts and a sensor reads, in the order of the residuals.
@@ -24,7 +24,7 @@ pub enum NuisanceKind {
     /// Gain of the compressor's flow meter.
     FlowMeterGain,
     /// One quantity of machine, cell or start.
-    Knob(Knob),
+    Perturbation(Perturbation),
     /// Drop of the gas temperature through the turbine against the power at the shaft.
     TurbineDrop,
     /// One smooth deviation of the efficiency map.
@@ -41,14 +41,16 @@ impl std::fmt::Display for NuisanceKind {
             NuisanceKind::CommonOffset(Dimension::Pressure) => f.write_str("common offset of the pressures"),
             NuisanceKind::CommonOffset(_) => f.write_str("common offset of the temperatures"),
             NuisanceKind::FlowMeterGain => f.write_str("flow_meter_gain"),
-            NuisanceKind::Knob(Knob::Flow) => f.write_str("flow_map"),
-            NuisanceKind::Knob(Knob::Efficiency) => f.write_str("compressor_efficiency"),
-            NuisanceKind::Knob(Knob::TurbineEfficiency) => f.write_str("turbine_efficiency"),
-            NuisanceKind::Knob(Knob::ValveArea) => f.write_str("valve_area"),
-            NuisanceKind::Knob(Knob::CompressorConvection) => f.write_str("convection"),
-            NuisanceKind::Knob(Knob::ExternalConvection) => f.write_str("external_convection"),
-            NuisanceKind::Knob(Knob::OilConductance) => f.write_str("oil_conductance"),
-            NuisanceKind::Knob(knob) => write!(f, "{knob:?}"),
+            NuisanceKind::Perturbation(Perturbation::Flow) => f.write_str("flow_map"),
+            NuisanceKind::Perturbation(Perturbation::Efficiency) => f.write_str("compressor_efficiency"),
+            NuisanceKind::Perturbation(Perturbation::TurbineEfficiency) => f.write_str("turbine_efficiency"),
+            NuisanceKind::Perturbation(Perturbation::ValveArea) => f.write_str("valve_area"),
+            NuisanceKind::Perturbation(Perturbation::CompressorConvection) => f.write_str("convection"),
+            NuisanceKind::Perturbation(Perturbation::ExternalConvection) => {
+                f.write_str("external_convection")
+            }
+            NuisanceKind::Perturbation(Perturbation::OilConductance) => f.write_str("oil_conductance"),
+            NuisanceKind::Perturbation(knob) => write!(f, "{knob:?}"),
             NuisanceKind::TurbineDrop => f.write_str("turbine_drop"),
             NuisanceKind::Shape(i) => write!(f, "efficiency_shape {i}"),
             NuisanceKind::Delay(output) => write!(f, "delay of {}", OUTPUTS[*output]),
@@ -85,20 +87,20 @@ const DELAY_SIGMA_S: f64 = 0.02;
 pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     use NuisanceKind as K;
     let t = &declared.tolerances;
-    let knob = |knob: Knob| (K::Knob(knob), knob.tolerance(t));
+    let knob = |knob: Perturbation| (K::Perturbation(knob), knob.tolerance(t));
     let mut all: Vec<(NuisanceKind, f64)> = vec![
         (K::FlowMeterGain, declared.of(Channel::CompressorFlow).gain_sigma_ratio),
-        knob(Knob::Flow),
-        knob(Knob::Efficiency),
-        knob(Knob::TurbineEfficiency),
+        knob(Perturbation::Flow),
+        knob(Perturbation::Efficiency),
+        knob(Perturbation::TurbineEfficiency),
         (K::TurbineDrop, TURBINE_DROP_RATIO),
-        knob(Knob::ValveArea),
-        knob(Knob::CompressorConvection),
-        knob(Knob::ExternalConvection),
-        knob(Knob::OilConductance),
-        knob(Knob::Ambient),
-        knob(Knob::StartTc),
-        knob(Knob::StartTt),
+        knob(Perturbation::ValveArea),
+        knob(Perturbation::CompressorConvection),
+        knob(Perturbation::ExternalConvection),
+        knob(Perturbation::OilConductance),
+        knob(Perturbation::Ambient),
+        knob(Perturbation::StartTc),
+        knob(Perturbation::StartTt),
     ];
     // Together they have the declared size.
     all.extend((0..SHAPES).map(|i| (K::Shape(i), t.efficiency_shape_ratio / SHAPE_SUM)));
@@ -118,7 +120,7 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Circumstances {
     /// What is added to the ambient temperature and to the start, in the unit of each.
-    pub knobs: Vec<(Knob, f64)>,
+    pub knobs: Vec<(Perturbation, f64)>,
     /// Drop of temperature through the turbine larger by, ratio.
     pub t4_drop_ratio: f64,
     /// Coefficients of the efficiency map's shape.
@@ -146,9 +148,11 @@ pub fn apply(
         K::Offset(channel) => rig.instruments.path_mut(channel).offset += value,
         K::FlowMeterGain => rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *= 1.0 + value,
         // The cell's temperature is read too high by it, so that the model is driven with less.
-        K::Knob(Knob::Ambient) => circumstances.knobs.push((Knob::Ambient, -value)),
-        K::Knob(knob @ (Knob::StartTc | Knob::StartTt)) => circumstances.knobs.push((knob, value)),
-        K::Knob(knob) => knob.turn(&mut rig.model.params, value),
+        K::Perturbation(Perturbation::Ambient) => circumstances.knobs.push((Perturbation::Ambient, -value)),
+        K::Perturbation(knob @ (Perturbation::StartTc | Perturbation::StartTt)) => {
+            circumstances.knobs.push((knob, value))
+        }
+        K::Perturbation(knob) => knob.turn(&mut rig.model.params, value),
         K::TurbineDrop => circumstances.t4_drop_ratio += value,
         K::Shape(i) => circumstances.shape[i] += value,
         K::Delay(i) => circumstances.delay_s[i] += value,

@@ -1,7 +1,7 @@
 //! What a diagnosis says, as machines read it.
 
+use crate::baseline_assumptions::Since;
 use crate::experiment::{Beside, Experiment};
-use crate::since::Since;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -38,7 +38,7 @@ const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: crate::
 
 /// All sets that were fitted.
 #[derive(Debug)]
-pub struct Found {
+pub struct SearchResult {
     /// Nothing but tolerances.
     pub null: Fit,
     /// Sets of effects, most probable first.
@@ -51,7 +51,7 @@ pub struct Found {
 ///
 /// # Errors
 /// [`PredictError`] where the nominal model cannot follow the recording.
-pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Found, PredictError> {
+pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<SearchResult, PredictError> {
     let Search { study, linearised, selection, .. } = search;
     let null = fit(study, linearised, &study.nothing(), selection, Effort::default())?;
     progress(0.15, "single effects");
@@ -77,7 +77,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Found,
     }
     progress(0.4, "several effects");
     extend(&search, &mut known, LIMITS);
-    Ok(Found { null, fits: known.ranked(&search), refound })
+    Ok(SearchResult { null, fits: known.ranked(&search), refound })
 }
 
 /// Adds sets with effects that begin with a step, for which the study has candidates by now.

@@ -1,24 +1,24 @@
 //! One recording made ready: residuals' layout, whitening, and the model's prediction for any hypothesis.
 
 use crate::actuators::Actuators;
-use crate::course::Course;
+use crate::effect_timing::Course;
 pub use crate::hypothesis::{EffectValues, Hypothesis, members};
+use crate::initial_state::{rested, with_metal_held};
 use crate::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
 pub use crate::point_state::PointState;
-use crate::rest::{rested, with_metal_held};
 use crate::shape::{SHAPES, ShapedMap};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::block::{Block, block_mean, blocks};
 use mapper_observe::channels::DRIVERS;
 use mapper_observe::declared::Declared;
-use mapper_observe::knob::{Knob, Shifted};
 use mapper_observe::lagged_command::{LaggedCommand, Response};
 use mapper_observe::mean::mean_reading;
+use mapper_observe::perturbation::{Perturbation, Shifted};
 use mapper_observe::schedule::Schedule;
 use mapper_observe::smoothed_inputs::SmoothedInputs;
 use mapper_observe::start::state_as_read;
+use mapper_observe::step_timing::{Times, as_told};
 use mapper_observe::table::Table;
-use mapper_observe::told::{Times, as_told};
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::effect::{Effect, EffectError, EffectParameter, Rig, add};
 use mapper_physics::inputs::Inputs;
@@ -280,7 +280,8 @@ impl Study {
                 Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
         }
         // A sensor that reads too high drives the model too high: the truth lies below.
-        let read = DRIVERS.map(|channel| (Knob::Input(channel), -rig.instruments.path(channel).offset));
+        let read =
+            DRIVERS.map(|channel| (Perturbation::Input(channel), -rig.instruments.path(channel).offset));
         circumstances.knobs.extend(read);
         Ok((rig, circumstances))
     }

@@ -3,7 +3,7 @@
 use crate::adequacy::Adequacy;
 use crate::calibration::Calibration;
 use crate::coordinate::{coordinates, parameters};
-use crate::course::Course;
+use crate::effect_timing::Course;
 use crate::fit::Fit;
 use crate::in_words;
 use crate::next::{Rivals, SETTLED};
@@ -13,7 +13,7 @@ use mapper_core::half_width_95;
 use std::collections::BTreeMap;
 
 /// Scores turned into probabilities.
-pub(crate) struct Weighed {
+pub(crate) struct CauseProbabilities {
     /// Causes, best first; what only adds to a better one is not among them.
     pub candidates: Vec<Candidate>,
     /// The fit of each candidate, by its place.
@@ -65,7 +65,7 @@ pub(crate) fn weigh(
     null: &Fit,
     fits: &[Fit],
     left: &Adequacy,
-) -> Weighed {
+) -> CauseProbabilities {
     let scores: Vec<f64> =
         std::iter::once(null).chain(fits).map(|fit| weight(calibration, study, fit)).collect();
     let top = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -109,7 +109,7 @@ pub(crate) fn weigh(
             }
         })
         .collect();
-    Weighed { candidates, shown, none, outside, named }
+    CauseProbabilities { candidates, shown, none, outside, named }
 }
 
 fn ids(study: &Study, fit: &Fit) -> Vec<String> {
@@ -190,7 +190,11 @@ pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> 
 }
 
 /// Where no cause is named but one is more probable than nothing: the causes, and nothing among them, most probable first.
-pub(crate) fn suspicions<'a>(weighed: &Weighed, fits: &'a [Fit], null: &'a Fit) -> Option<Rivals<'a>> {
+pub(crate) fn suspicions<'a>(
+    weighed: &CauseProbabilities,
+    fits: &'a [Fit],
+    null: &'a Fit,
+) -> Option<Rivals<'a>> {
     if weighed.candidates.first()?.probability <= weighed.none {
         return None;
     }
@@ -204,7 +208,7 @@ pub(crate) fn suspicions<'a>(weighed: &Weighed, fits: &'a [Fit], null: &'a Fit) 
 }
 
 /// The causes that are still open, best first; `None` where the first is settled.
-pub(crate) fn rivals<'a>(weighed: &Weighed, fits: &'a [Fit]) -> Option<Rivals<'a>> {
+pub(crate) fn rivals<'a>(weighed: &CauseProbabilities, fits: &'a [Fit]) -> Option<Rivals<'a>> {
     let probabilities: Vec<f64> = weighed.candidates.iter().map(|candidate| candidate.probability).collect();
     let total: f64 = probabilities.iter().sum();
     (probabilities.len() > 1 && probabilities[0] < SETTLED * total)

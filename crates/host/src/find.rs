@@ -28,7 +28,7 @@ pub enum At {
 
 /// A driver that is there.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
+pub struct DriverLocation {
     /// Name in campaigns.
     pub name: String,
     /// Where.
@@ -67,14 +67,14 @@ impl Places {
     }
 
     /// All drivers, by name; the one that would be used where there are several.
-    pub fn all(&self) -> Vec<Found> {
-        let mut found: Vec<Found> = Vec::new();
+    pub fn all(&self) -> Vec<DriverLocation> {
+        let mut found: Vec<DriverLocation> = Vec::new();
         let inside = |place: &PathBuf| place.read_dir().into_iter().flatten().flatten();
         for entry in self.sockets.iter().flat_map(inside) {
             let file = entry.file_name();
             let Some(name) = file.to_str().and_then(|file| file.strip_suffix(SOCKET)) else { continue };
             if file_name(name).is_some() && is_socket(&entry.path()) {
-                found.push(Found { name: name.to_owned(), at: At::Socket(entry.path()) });
+                found.push(DriverLocation { name: name.to_owned(), at: At::Socket(entry.path()) });
             }
         }
         for entry in self.programs.iter().flat_map(inside) {
@@ -83,7 +83,7 @@ impl Places {
             let name = name.strip_suffix(std::env::consts::EXE_SUFFIX).unwrap_or(name);
             let there = found.iter().any(|found| found.name == name);
             if !there && file_name(name).is_some_and(|whole| *whole == *file) && is_program(&entry.path()) {
-                found.push(Found { name: name.to_owned(), at: At::Program(entry.path()) });
+                found.push(DriverLocation { name: name.to_owned(), at: At::Program(entry.path()) });
             }
         }
         found.sort_by(|a, b| a.name.cmp(&b.name));

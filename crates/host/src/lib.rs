@@ -14,5 +14,5 @@ mod secrets;
 
 pub use driver::{Driver, PATIENCE, Patience};
 pub use error::DriverError;
-pub use find::{At, Found, PREFIX, Places};
+pub use find::{At, DriverLocation, PREFIX, Places};
 pub use known::KNOWN;

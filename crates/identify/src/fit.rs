@@ -2,7 +2,7 @@
 //! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio, read through the declared probe.
 
 use crate::IdentifyConfig;
-use crate::followed::{Followed, Probe};
+use crate::probe_reading::{Followed, Probe};
 use crate::samples::Samples;
 use mapper_core::InletConvection;
 use mapper_physics::air::Air;

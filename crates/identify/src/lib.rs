@@ -10,7 +10,6 @@ mod bias;
 mod cleaning;
 mod commands;
 mod config;
-mod course;
 mod covariance;
 mod dynamic;
 mod end_state;
@@ -20,7 +19,6 @@ mod faults;
 mod findings;
 mod fit;
 mod flow_drift;
-mod followed;
 mod identify;
 mod joint;
 mod needs;
@@ -28,9 +26,11 @@ mod nominal_rig;
 mod objections;
 mod one_fit;
 mod probe;
+mod probe_reading;
 mod relaxation;
 mod samples;
 mod steady;
+mod t2_course;
 mod taps;
 mod two_parameter;
 mod width;
@@ -39,7 +39,6 @@ mod zero;
 mod zero_outcome;
 
 pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
-pub use course::{T2Course, t2_course};
 pub use error::{IdentifyError, StepError};
 pub use expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use faults::found::{FoundFault, Suspect};
@@ -56,6 +55,7 @@ pub use needs::{method_for, needs};
 pub use nominal_rig::NominalRig;
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
+pub use t2_course::{T2Course, t2_course};
 pub use two_parameter::TwoParameter;
 pub use zero::{
     IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, isothermal_zero_with_a_fault,

@@ -3,7 +3,7 @@
 use crate::dynamic::Estimate;
 use crate::end_state::end_state;
 use crate::findings::Findings;
-use crate::joint::explained::Explained;
+use crate::joint::input_noise_spline::Explained;
 use crate::joint::parameters::{ALPHA, ETA, LN_DEVIATION, PROBE_MM2};
 use crate::joint::solve::{FULLY, Problem};
 use crate::joint::start;

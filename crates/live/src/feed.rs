@@ -1,7 +1,7 @@
 //! From what the session tells to what browsers are shown.
 
 use crate::live_run::LiveRun;
-use crate::pressed::Pressed;
+use crate::operator_commands::Pressed;
 use crate::state::{EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units};
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};

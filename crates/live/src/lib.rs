@@ -1,6 +1,6 @@
 //! The page of a run while it goes on.
 //!
-//! [`Onlookers`] are told what the session tells, and the page keeps a bounded state of it, which it serves to browsers: the page itself,
+//! [`Observers`] are told what the session tells, and the page keeps a bounded state of it, which it serves to browsers: the page itself,
 //! a stream of server-sent events, and four requests for the operator's buttons. A browser that is slow, gone or hostile costs
 //! its own connection and never the run. `docs/decisions/0032-live-page.md` says why the server is what it is.
 
@@ -13,8 +13,8 @@ mod hub;
 mod live;
 mod live_error;
 mod live_run;
-mod onlookers;
-mod pressed;
+mod observers;
+mod operator_commands;
 mod request;
 mod server;
 mod state;
@@ -24,7 +24,7 @@ mod viewers;
 
 pub use live_error::LiveError;
 pub use live_run::LiveRun;
-pub use onlookers::{Asked, Onlookers};
+pub use observers::{Asked, Observers};
 pub use tls::{TlsError, TlsFiles};
 #[cfg(feature = "foxglove")]
 pub use viewers::{Viewers, ViewersError};

@@ -5,7 +5,7 @@ use crate::feed::Feed;
 use crate::hub::Hub;
 use crate::live_error::LiveError;
 use crate::live_run::LiveRun;
-use crate::pressed::Pressed;
+use crate::operator_commands::Pressed;
 use crate::server::{Served, serve};
 use crate::tls::{Tls, TlsFiles, read};
 use mapper_page::live_page;

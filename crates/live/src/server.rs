@@ -3,7 +3,7 @@
 use crate::access::Access;
 use crate::connections::{Connection, Connections};
 use crate::hub::Hub;
-use crate::pressed::Pressed;
+use crate::operator_commands::Pressed;
 use crate::request::{ARRIVES_WITHIN, Request, read_request};
 use crate::tls::{Punctual, Tls};
 use std::io::{ErrorKind, Read, Write};

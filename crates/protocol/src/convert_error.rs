@@ -6,7 +6,7 @@ use mapper_core::BackendError;
 /// What a driver says of its failure.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-struct Said(String);
+struct ReportedError(String);
 
 /// Key in `set`, name for people, unit.
 const SETPOINTS: [(&str, &str, &str); 4] = [
@@ -50,7 +50,7 @@ pub fn rig_error(failure: Failure, backend: &str, call: &'static str, now_s: f64
     let t_s = failure.t_s.filter(|t_s| t_s.is_finite()).unwrap_or(now_s);
     let key = failure.setpoint.as_deref();
     let which = SETPOINTS.iter().find(|(name, ..)| Some(*name) == key);
-    let source = Box::new(Said(failure.message));
+    let source = Box::new(ReportedError(failure.message));
     match (failure.code, which) {
         (Code::OutOfOrder, _) => {
             let (state, needed) = ("in another state", "where its driver accepts the call");

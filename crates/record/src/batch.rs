@@ -59,7 +59,7 @@ impl Batch {
         sink: &S,
         known: impl Fn(u16) -> bool + Sync,
         max_chunk_bytes: u64,
-    ) -> Vec<Opened<S::Told>> {
+    ) -> Vec<Opened<S::SinkMessage>> {
         let Batch { chunks, .. } = std::mem::take(self);
         let parts: Vec<&[(u64, Vec<u8>)]> = chunks.chunks(chunks.len().div_ceil(PARTS).max(1)).collect();
         let open = |part: &&[(u64, Vec<u8>)]| {
@@ -74,7 +74,7 @@ impl Batch {
     }
 }
 
-fn items<S: Sink>(mut rest: &[u8], sink: &S, known: impl Fn(u16) -> bool) -> Vec<Item<S::Told>> {
+fn items<S: Sink>(mut rest: &[u8], sink: &S, known: impl Fn(u16) -> bool) -> Vec<Item<S::SinkMessage>> {
     let mut items = Vec::new();
     while !rest.is_empty() {
         let Some((opcode, body, after)) = split_record(rest) else {

@@ -37,7 +37,7 @@ impl Topic {
 }
 
 /// What a message says.
-pub(crate) enum Told {
+pub(crate) enum SinkMessage {
     /// A value for each output of its topic, in the units used inside.
     Samples(Vec<FieldValue>),
     Step(StepMessage),
@@ -135,7 +135,7 @@ impl<'a> RigSink<'a> {
 }
 
 impl Sink for RigSink<'_> {
-    type Told = Told;
+    type SinkMessage = SinkMessage;
 
     fn define(&mut self, definition: &ChannelDefinition) {
         self.topic_names.insert(definition.topic.clone());
@@ -154,7 +154,7 @@ impl Sink for RigSink<'_> {
         self.topics.insert(definition.id, topic);
     }
 
-    fn read(&self, channel_id: u16, data: &[u8]) -> Option<Told> {
+    fn read(&self, channel_id: u16, data: &[u8]) -> Option<SinkMessage> {
         let told = match self.topics.get(&channel_id)? {
             Topic::Mapped(mapped, _) => {
                 let mut values = Vec::new();
@@ -164,20 +164,22 @@ impl Sink for RigSink<'_> {
                         Some(other) => *other,
                         None => FieldValue::Absent,
                     };
-                    Told::Samples(mapped.outputs.iter().map(inside).collect())
+                    SinkMessage::Samples(mapped.outputs.iter().map(inside).collect())
                 })
             }
-            Topic::Step => serde_json::from_slice(data).map(Told::Step).ok(),
-            Topic::Provenance => read_origins(data).map(|origins| Told::Origins(origins, data.len())),
-            Topic::Event => serde_json::from_slice(data).map(|event| Told::Event(event, data.len())).ok(),
+            Topic::Step => serde_json::from_slice(data).map(SinkMessage::Step).ok(),
+            Topic::Provenance => read_origins(data).map(|origins| SinkMessage::Origins(origins, data.len())),
+            Topic::Event => {
+                serde_json::from_slice(data).map(|event| SinkMessage::Event(event, data.len())).ok()
+            }
         };
-        Some(told.unwrap_or(Told::Damaged))
+        Some(told.unwrap_or(SinkMessage::Damaged))
     }
 
-    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: Told) {
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: SinkMessage) {
         let Some(topic) = self.topics.get(&channel_id) else { return };
         match (told, topic) {
-            (Told::Samples(values), Topic::Mapped(_, builders)) => {
+            (SinkMessage::Samples(values), Topic::Mapped(_, builders)) => {
                 for (value, builder) in values.iter().zip(builders) {
                     let Some((_, builder)) = self.series.get_mut(*builder) else { continue };
                     match value {
@@ -191,19 +193,19 @@ impl Sink for RigSink<'_> {
                     self.kept += 1;
                 }
             }
-            (Told::Step(step), _) => {
+            (SinkMessage::Step(step), _) => {
                 self.kept += values_of(size_of::<StepMessage>());
                 self.steps.push((log_time_ns, step));
             }
-            (Told::Origins(origins, bytes), _) => {
+            (SinkMessage::Origins(origins, bytes), _) => {
                 self.kept += values_of(bytes);
                 self.origins.push((log_time_ns, origins));
             }
-            (Told::Event(event, bytes), _) => {
+            (SinkMessage::Event(event, bytes), _) => {
                 self.kept += values_of(size_of::<Event>() + bytes);
                 self.events.push((log_time_ns, event));
             }
-            (Told::Damaged | Told::Samples(_), topic) => {
+            (SinkMessage::Damaged | SinkMessage::Samples(_), topic) => {
                 *self.damaged.entry(topic.name().to_owned()).or_default() += 1;
             }
         }

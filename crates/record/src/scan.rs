@@ -155,7 +155,13 @@ impl Scanned {
         }
     }
 
-    fn item<S: Sink>(&mut self, offset: u64, item: Item<S::Told>, options: &ReadOptions, sink: &mut S) {
+    fn item<S: Sink>(
+        &mut self,
+        offset: u64,
+        item: Item<S::SinkMessage>,
+        options: &ReadOptions,
+        sink: &mut S,
+    ) {
         match item {
             Item::Record { opcode, body } => self.record(offset, opcode, &body, options, sink),
             Item::Cut if self.goes_on(options, sink) => {

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 /// Takes what a recording holds.
 pub(crate) trait Sink: Sync {
     /// What a message says.
-    type Told: Send;
+    type SinkMessage: Send;
     /// A topic, before its first message.
     fn define(&mut self, definition: &ChannelDefinition);
     /// Reads a message on a defined topic; `None` where the topic is not wanted. Several are read at a time.
-    fn read(&self, channel_id: u16, data: &[u8]) -> Option<Self::Told>;
+    fn read(&self, channel_id: u16, data: &[u8]) -> Option<Self::SinkMessage>;
     /// Takes what a message says, in the order of the file.
-    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: Self::Told);
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: Self::SinkMessage);
     /// A metadata record.
     fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
     /// An attachment.

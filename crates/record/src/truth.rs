@@ -66,7 +66,7 @@ struct TruthSink {
 }
 
 impl Sink for TruthSink {
-    type Told = Vec<FieldValue>;
+    type SinkMessage = Vec<FieldValue>;
 
     fn define(&mut self, definition: &ChannelDefinition) {
         if definition.topic != TRUTH_TOPIC || definition.encoding != "json" {

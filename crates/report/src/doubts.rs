@@ -16,22 +16,22 @@ pub struct Doubt<'a> {
 /// What is said of the points, in order of the first step of each. Sentences that differ in their numbers alone are one, with
 /// the range of each number: what a single step says stands with its point.
 pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
-    let mut said: Vec<Said<'a>> = Vec::new();
+    let mut said: Vec<DoubtText<'a>> = Vec::new();
     for point in points {
         let step = step_number(point.step);
         for warning in &point.warnings {
             let (code, pieces) = (warning.code.as_ref(), pieces(&warning.message));
             match said.iter_mut().find(|known| known.code == code && are_alike(&known.pieces, &pieces)) {
                 Some(known) => known.add(step, &pieces),
-                None => said.push(Said { steps: vec![step], code, pieces }),
+                None => said.push(DoubtText { steps: vec![step], code, pieces }),
             }
         }
     }
-    said.into_iter().map(Said::doubt).collect()
+    said.into_iter().map(DoubtText::doubt).collect()
 }
 
 /// A sentence in pieces, and the steps that say it.
-struct Said<'a> {
+struct DoubtText<'a> {
     steps: Vec<usize>,
     code: &'a str,
     pieces: Vec<Piece<'a>>,
@@ -45,7 +45,7 @@ enum Piece<'a> {
     Number(&'a str, &'a str),
 }
 
-impl<'a> Said<'a> {
+impl<'a> DoubtText<'a> {
     fn add(&mut self, step: usize, pieces: &[Piece<'a>]) {
         if self.steps.last() != Some(&step) {
             self.steps.push(step);
@@ -164,12 +164,12 @@ mod tests {
 
     /// The sentence of all steps, as it would be said of them one after the other.
     fn said(sentences: &[&'static str]) -> Vec<String> {
-        let mut said: Vec<Said<'_>> = Vec::new();
+        let mut said: Vec<DoubtText<'_>> = Vec::new();
         for (step, sentence) in sentences.iter().enumerate() {
             let pieces = pieces(sentence);
             match said.iter_mut().find(|known| are_alike(&known.pieces, &pieces)) {
                 Some(known) => known.add(step, &pieces),
-                None => said.push(Said { steps: vec![step], code: "", pieces }),
+                None => said.push(DoubtText { steps: vec![step], code: "", pieces }),
             }
         }
         said.into_iter().map(|said| said.doubt().message).collect()

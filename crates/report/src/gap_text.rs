@@ -3,10 +3,10 @@
 use crate::gap_next::next_text;
 use crate::number::four_figures;
 use mapper_core::{step_number, with_unit};
+use mapper_gap::baseline_assumptions::Since;
 use mapper_gap::report::{
     Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
 };
-use mapper_gap::since::Since;
 use std::collections::BTreeMap;
 
 /// Causes shown.

@@ -4,6 +4,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod auxiliary_instruments;
 mod batch_watch;
 mod deadline;
 mod drift_watch;
@@ -19,6 +20,7 @@ mod reader_watch;
 mod rig_watch;
 mod run;
 mod run_error;
+mod safe_shutdown;
 mod signal_watch;
 mod soak;
 mod source;
@@ -26,9 +28,8 @@ mod speed_control;
 mod stopping;
 mod surge_search;
 mod surge_watch;
-mod way_out;
-mod with_readers;
 
+pub use auxiliary_instruments::{Reader, RigWithInstruments};
 pub use batch_watch::BatchWatch;
 pub use deadline::{Deadlined, Deadlines};
 pub use drift_watch::DriftWatch;
@@ -47,4 +48,3 @@ pub use source::{PlanSteps, StepSource, StepSourceError};
 pub use speed_control::{ResponseAt, SpeedControl, SpeedControlLimits};
 pub use surge_search::{Held, Hold, SurgeSearch};
 pub use surge_watch::SurgeWatch;
-pub use with_readers::{Reader, WithReaders};

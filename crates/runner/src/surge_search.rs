@@ -6,7 +6,7 @@ use mapper_core::{
     Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
     StepKind, StepMarker, SurgeSeek,
 };
-use mapper_surge::{Look, Move, SurgeEstimate, Why, next_move};
+use mapper_surge::{Move, SurgeEstimate, SurgeReading, Why, next_move};
 
 /// Time at the end of a line before the first look, s: the machine comes from elsewhere on the map.
 const ARRIVE_S: f64 = 40.0;
@@ -60,7 +60,7 @@ pub struct SurgeSearch<'a> {
 struct Approach {
     end: PlanStep,
     stage: Stage,
-    looks: Vec<Look>,
+    looks: Vec<SurgeReading>,
     /// What is read at the current step.
     readings: Recording,
     nominal_margin_ratio: Option<f64>,
@@ -73,8 +73,8 @@ struct Approach {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     Arrive,
-    /// Look at this opening.
-    Look(f64),
+    /// SurgeReading at this opening.
+    SurgeReading(f64),
     Return,
     Over,
 }
@@ -144,7 +144,7 @@ impl<'a> SurgeSearch<'a> {
                 "surge search: {speed_rpm:.0} rpm cannot be held any further within the limits; the line is left"
             ));
             approach.stage = match approach.stage {
-                Stage::Look(_) => Stage::Return,
+                Stage::SurgeReading(_) => Stage::Return,
                 _ => Stage::Over,
             };
         }
@@ -170,7 +170,7 @@ impl Approach {
         let safe = self.end.to.valve_opening_ratio;
         let (opening, dwell_s) = match self.stage {
             Stage::Arrive => (safe, ARRIVE_S),
-            Stage::Look(opening) => (opening, seek.dwell_s),
+            Stage::SurgeReading(opening) => (opening, seek.dwell_s),
             Stage::Return => (safe, RETURN_S),
             Stage::Over => return None,
         };
@@ -238,16 +238,16 @@ impl Approach {
                     marker.valve_opening_ratio
                 )),
             ),
-            Stage::Arrive => (Stage::Look(safe), None),
-            Stage::Look(_) => {
-                self.looks.extend(Look::of(&self.readings, marker, reference));
+            Stage::Arrive => (Stage::SurgeReading(safe), None),
+            Stage::SurgeReading(_) => {
+                self.looks.extend(SurgeReading::of(&self.readings, marker, reference));
                 match next_move(&self.looks, seek, self.nominal_margin_ratio) {
-                    Move::To(opening) => (Stage::Look(opening), None),
+                    Move::To(opening) => (Stage::SurgeReading(opening), None),
                     Move::Done(why) => (Stage::Return, Some(format!("{}: {}", line(), self.found(why)))),
                 }
             }
         };
-        if !self.surged && matches!(self.stage, Stage::Arrive | Stage::Look(_)) {
+        if !self.surged && matches!(self.stage, Stage::Arrive | Stage::SurgeReading(_)) {
             self.trim(marker.end_s);
         }
         self.stage = stage;
@@ -323,7 +323,7 @@ impl StepSource for SurgeSearch<'_> {
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(approach) = &mut self.approach else { return self.inner.after_step(marker) };
         self.surges +=
-            usize::from(approach.surged && matches!(approach.stage, Stage::Arrive | Stage::Look(_)));
+            usize::from(approach.surged && matches!(approach.stage, Stage::Arrive | Stage::SurgeReading(_)));
         let note = approach.conclude(marker, &self.seek, self.reference);
         self.notes.extend(note);
         Ok(())
@@ -335,7 +335,7 @@ impl StepSource for SurgeSearch<'_> {
             // The valve opens: a guard has the say over how far a line is followed.
             Some(approach) => {
                 approach.stage = match approach.stage {
-                    Stage::Look(_) | Stage::Arrive => Stage::Return,
+                    Stage::SurgeReading(_) | Stage::Arrive => Stage::Return,
                     _ => Stage::Over,
                 };
                 Ok(())

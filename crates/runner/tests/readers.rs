@@ -8,7 +8,7 @@ use mapper_core::{
 };
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_runner::{Reader, WithReaders};
+use mapper_runner::{Reader, RigWithInstruments};
 use std::time::Duration;
 
 /// Gives its own time as T_amb, so many times a second; later by so much; lost at a time.
@@ -65,10 +65,10 @@ impl Backend for Beside {
     }
 }
 
-fn rig(beside: Beside) -> WithReaders {
+fn rig(beside: Beside) -> RigWithInstruments {
     let lab = VirtualLab::new(LabSettings::ideal(Model::nominal(), BoundaryConditions::default()));
     let reader = Reader { name: "cell".to_owned(), backend: Box::new(beside), channels: vec![Channel::TAmb] };
-    let mut rig = WithReaders::new(Box::new(lab), vec![reader], Duration::from_secs(5)).unwrap();
+    let mut rig = RigWithInstruments::new(Box::new(lab), vec![reader], Duration::from_secs(5)).unwrap();
     rig.arm().unwrap();
     rig.set(&Setpoints {
         mode: RigMode::Running,
@@ -178,7 +178,7 @@ fn nobody_waits_for_a_reader_in_real_time() {
     let hangs = Hangs(held, Beside { simulated_time: false, ..beside(10.0) });
     let reader = Reader { name: "cell".to_owned(), backend: Box::new(hangs), channels: vec![Channel::TAmb] };
     // To connect, on a machine that is busy with other tests; letting go waits for it twice.
-    let mut rig = WithReaders::new(Box::new(lab), vec![reader], Duration::from_secs(1)).unwrap();
+    let mut rig = RigWithInstruments::new(Box::new(lab), vec![reader], Duration::from_secs(1)).unwrap();
     assert!(!rig.describe().simulated_time);
     rig.arm().unwrap();
     rig.set(&Setpoints {

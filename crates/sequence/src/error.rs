@@ -145,13 +145,18 @@ pub(crate) fn throw(message: String, remedy: &str) -> Box<EvalAltResult> {
 const REMEDY_MARK: char = '\n';
 
 fn words(error: EvalAltResult) -> (String, String) {
-    use crate::sandbox::{CALL_DEPTH_LIMIT, Ended, OPERATION_LIMIT};
+    use crate::sandbox::{CALL_DEPTH_LIMIT, OPERATION_LIMIT, ScriptEnd};
     match error {
         EvalAltResult::ErrorRuntime(thrown, _) => thrown_words(thrown),
-        EvalAltResult::ErrorTerminated(why, _) if why.clone().try_cast() == Some(Ended::OutOfOperations) => (
-            format!("the sequence script took more than {OPERATION_LIMIT} operations and was stopped"),
-            "look for a loop that does not end, or that goes through all points for each point".to_owned(),
-        ),
+        EvalAltResult::ErrorTerminated(why, _)
+            if why.clone().try_cast() == Some(ScriptEnd::OutOfOperations) =>
+        {
+            (
+                format!("the sequence script took more than {OPERATION_LIMIT} operations and was stopped"),
+                "look for a loop that does not end, or that goes through all points for each point"
+                    .to_owned(),
+            )
+        }
         EvalAltResult::ErrorTerminated(..) => {
             ("the sequence script was ended from outside".to_owned(), String::new())
         }

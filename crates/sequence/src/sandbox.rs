@@ -39,7 +39,7 @@ pub(crate) struct Budget {
 
 /// Why a script was ended from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Ended {
+pub(crate) enum ScriptEnd {
     /// It used up its operations.
     OutOfOperations,
     /// Whoever runs it does not want it any more.
@@ -53,12 +53,12 @@ impl Budget {
     }
 
     /// Counts one operation.
-    fn operation(&self) -> Option<Ended> {
+    fn operation(&self) -> Option<ScriptEnd> {
         if self.cancelled.load(Ordering::Relaxed) {
-            return Some(Ended::Cancelled);
+            return Some(ScriptEnd::Cancelled);
         }
         let before = self.operations.fetch_add(1, Ordering::Relaxed);
-        (before >= OPERATION_LIMIT).then_some(Ended::OutOfOperations)
+        (before >= OPERATION_LIMIT).then_some(ScriptEnd::OutOfOperations)
     }
 }
 

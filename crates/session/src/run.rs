@@ -1,13 +1,10 @@
 //! A whole run: plan, drive the rig, record, identify, assemble, report.
 
-use crate::aside::{Aside, Placed};
 use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
-use crate::ended::{Ended, doubt, sentence};
 use crate::estimates::Estimates;
 use crate::files::{json_text, write_new};
 use crate::guards::{check_guards, drift_watch};
-use crate::held::Held;
 use crate::journal::{Entry, Identity, Journal, rig_sha256};
 use crate::observers::{Recorder, Teller};
 use crate::planning::{fingerprint, nominal_model, plan};
@@ -18,11 +15,14 @@ use crate::rehearsal::rehearse;
 use crate::replayed::going_on;
 use crate::results::{Results, RunPart};
 use crate::resume::{BrokenOff, MissingSteps, depends_on_readings};
+use crate::rig_lease::RigLease;
 use crate::rig_state::RigStates;
+use crate::run_outcome::{Ended, doubt, sentence};
 use crate::scripted_steps::ScriptedSteps;
 use crate::sources::Sources;
 use crate::stored_plan::stored_plan;
 use crate::surge::hold_near_surge;
+use crate::threaded_observer::{Placed, ThreadedObserver};
 use crate::{Session, SessionError, SessionEvent, run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
@@ -280,13 +280,13 @@ impl PreparedRun<'_> {
     }
 
     /// The rig and its readers, where they can be had but once.
-    fn hold(&self, rig: &RigDescription) -> Result<Held, SessionError> {
+    fn hold(&self, rig: &RigDescription) -> Result<RigLease, SessionError> {
         let usual = self.request.parent.join(".rigs");
         let states = RigStates::new(self.request.rig_states.unwrap_or(&usual));
         let resumes = self.request.resume.as_ref().map(|broken_off| broken_off.directory.as_path());
         let place = rig.reached_at.iter().map(|place| format!("at {place}"));
         let shared: Vec<String> = self.sources.exclusive.iter().cloned().chain(place).collect();
-        Held::take(&states, rig.exclusive.as_deref(), &shared, resumes)
+        RigLease::take(&states, rig.exclusive.as_deref(), &shared, resumes)
     }
 
     /// The directory of the run: a new one with what the run is made from, or that of the run that goes on.
@@ -371,7 +371,7 @@ impl PreparedRun<'_> {
             let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
             let mut estimates = session.estimates.then(begin);
             let mut recorder = match pace.each_sample {
-                true => Placed::Aside(Aside::begin(scope, recorder)),
+                true => Placed::ThreadedObserver(ThreadedObserver::begin(scope, recorder)),
                 false => Placed::Here(recorder),
             };
             let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut teller];

@@ -5,7 +5,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::ReaderChoice;
 use mapper_core::{Backend, BackendError, Channel, RigDescription};
 use mapper_physics::model::Model;
-use mapper_runner::{ReadChannel, Reader, WithReaders};
+use mapper_runner::{ReadChannel, Reader, RigWithInstruments};
 use std::time::Duration;
 
 /// Time that a reader has to connect, as a rig has.
@@ -74,7 +74,8 @@ impl Registry {
             exclusive.extend(rig.exclusive);
             readers.push(Reader { name: choice.name.clone(), backend, channels });
         }
-        let backend = WithReaders::new(rig, readers, CONNECTS_WITHIN).map_err(SessionError::Backend)?;
+        let backend =
+            RigWithInstruments::new(rig, readers, CONNECTS_WITHIN).map_err(SessionError::Backend)?;
         Ok(Sources { backend: Box::new(backend), read, exclusive })
     }
 }

@@ -1,8 +1,8 @@
 //! The surge flow, as far as the looks so far tell.
 
-use crate::growth::{GrowthLaw, Read, excess, log_likelihood};
-use crate::look::{LOOKED_AT, Look};
+use crate::growth_law::{GrowthLaw, Read, excess, log_likelihood};
 use crate::smooth::Smoothed;
+use crate::surge_reading::{LOOKED_AT, SurgeReading};
 use mapper_numerics::statistics::mean;
 
 /// Exponents by which the variance grows with the inverse of the margin, with their weights before anything was read: theory
@@ -45,18 +45,18 @@ pub struct SurgeEstimate {
 
 impl SurgeEstimate {
     /// The estimate from looks at ever smaller openings; `None` below four of them.
-    pub fn of(looks: &[Look]) -> Option<Self> {
+    pub fn of(looks: &[SurgeReading]) -> Option<Self> {
         if looks.len() < 4 {
             return None;
         }
         let Smoothed { flows_kg_s, flow_error_ratio } = Smoothed::of(looks)?;
         let closest_flow_kg_s = flows_kg_s.iter().copied().fold(f64::INFINITY, f64::min);
         let levels: Vec<Option<f64>> = (0..LOOKED_AT.len()).map(|channel| level(looks, channel)).collect();
-        let stands_out = |look: &Look| {
+        let stands_out = |look: &SurgeReading| {
             let channels = look.variations.iter().zip(&levels);
             channels.filter_map(|(read, level)| Some(excess((*read)?, (*level)?))).sum::<f64>() > STANDS_OUT
         };
-        let well_grown = |look: &Look| {
+        let well_grown = |look: &SurgeReading| {
             let mut channels = look.variations.iter().zip(&levels);
             channels.any(|(read, level)| {
                 read.zip(*level).is_some_and(|(read, level)| read.variance >= WELL_GROWN_RATIO * level)
@@ -119,7 +119,7 @@ impl SurgeEstimate {
 }
 
 /// The variance of a channel while surge is far.
-fn level(looks: &[Look], channel: usize) -> Option<f64> {
+fn level(looks: &[SurgeReading], channel: usize) -> Option<f64> {
     let quiet: Vec<f64> =
         looks.iter().take(QUIET).filter_map(|look| Some(look.variations[channel]?.variance)).collect();
     mean(&quiet)

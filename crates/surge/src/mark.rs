@@ -1,7 +1,7 @@
 //! The surge marks of a recording: one for each line whose surge was sought.
 
 use crate::estimate::SurgeEstimate;
-use crate::look::Look;
+use crate::surge_reading::SurgeReading;
 use mapper_core::{
     Channel, DeclaredUncertainty, EventKind, Recording, ReferenceState, StepKind, StepMarker, SurgeFoundBy,
     SurgeMark,
@@ -53,12 +53,12 @@ pub fn surge_marks(recording: &Recording, reference: ReferenceState, errors: Sur
         };
         let surged = approach.iter().find(entered);
         found.surges += usize::from(surged.is_some());
-        let looks: Vec<Look> = approach
+        let looks: Vec<SurgeReading> = approach
             .iter()
             // The first step brings the machine to the end of the line.
             .skip(1)
             .take_while(|step| surged.is_none_or(|surged| step.start_s < surged.start_s))
-            .filter_map(|step| Look::of(recording, step, reference))
+            .filter_map(|step| SurgeReading::of(recording, step, reference))
             .collect();
         let target_speed_rpm = approach.first().and_then(|step| step.to).map_or(0.0, |to| to.speed_rpm);
         match mark(&looks, target_speed_rpm, surged.map(|step| step.valve_opening_ratio), errors) {
@@ -94,7 +94,7 @@ fn approaches(steps: &[StepMarker]) -> Vec<Vec<StepMarker>> {
 
 /// The mark of one approach; `surged_at_ratio` is the opening at which the compressor went into surge.
 fn mark(
-    looks: &[Look],
+    looks: &[SurgeReading],
     target_speed_rpm: f64,
     surged_at_ratio: Option<f64>,
     errors: SurgeErrors,
@@ -134,10 +134,10 @@ fn mark(
 }
 
 /// Pressure ratio carried on along the last looks as a straight line in flow, and what that may be off by.
-fn pressure_ratio_at(looks: &[Look], last: &Look, flow_kg_s: f64) -> (f64, f64) {
+fn pressure_ratio_at(looks: &[SurgeReading], last: &SurgeReading, flow_kg_s: f64) -> (f64, f64) {
     const TAKEN: usize = 5;
     let taken = &looks[looks.len().saturating_sub(TAKEN)..];
-    let point = |look: &Look| {
+    let point = |look: &SurgeReading| {
         let factor = last.speed_corrected_rpm / look.speed_corrected_rpm;
         let (flow, ratio) =
             mapper_physics::similarity::at_speed(look.flow_corrected_kg_s, look.pressure_ratio, factor);

@@ -1,7 +1,7 @@
 //! How far the valve may be closed by what is known.
 
 use crate::estimate::SurgeEstimate;
-use crate::look::Look;
+use crate::surge_reading::SurgeReading;
 use mapper_core::SurgeSeek;
 
 /// What to do at the end of a look.
@@ -54,7 +54,7 @@ pub fn expected_looks(margin_ratio: f64, seek: &SurgeSeek) -> usize {
 
 /// The next move after these looks, at least one. `nominal_margin_ratio`: surge margin that the nominal machine has at the
 /// last opening; `None` where it is not known.
-pub fn next_move(looks: &[Look], seek: &SurgeSeek, nominal_margin_ratio: Option<f64>) -> Move {
+pub fn next_move(looks: &[SurgeReading], seek: &SurgeSeek, nominal_margin_ratio: Option<f64>) -> Move {
     let Some(last) = looks.last() else { return Move::Done(Why::Steps) };
     if looks.len() >= seek.most_steps {
         return Move::Done(Why::Steps);

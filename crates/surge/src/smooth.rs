@@ -1,6 +1,6 @@
 //! Flows of the looks, freed of the noise that single means have: flow is a smooth function of the opening.
 
-use crate::look::Look;
+use crate::surge_reading::SurgeReading;
 use nalgebra::{Matrix3, Vector3};
 
 /// Flows and pressure ratios at one speed, in the order of the looks.
@@ -18,13 +18,14 @@ const REACH_RATIO: f64 = 1.7;
 impl Smoothed {
     /// Flows brought to the speed of the last look by similarity, through which the logarithm of flow goes as a parabola of
     /// that of the opening. As measured where there are fewer than five looks.
-    pub(crate) fn of(looks: &[Look]) -> Option<Self> {
+    pub(crate) fn of(looks: &[SurgeReading]) -> Option<Self> {
         let last = looks.last()?;
-        let to_speed =
-            |look: &Look| look.flow_corrected_kg_s * last.speed_corrected_rpm / look.speed_corrected_rpm;
+        let to_speed = |look: &SurgeReading| {
+            look.flow_corrected_kg_s * last.speed_corrected_rpm / look.speed_corrected_rpm
+        };
         let measured: Vec<f64> = looks.iter().map(to_speed).collect();
-        let place = |look: &Look| (look.valve_opening_ratio / last.valve_opening_ratio).ln();
-        let taken = |look: &Look| place(look).abs() < REACH_RATIO.ln();
+        let place = |look: &SurgeReading| (look.valve_opening_ratio / last.valve_opening_ratio).ln();
+        let taken = |look: &SurgeReading| place(look).abs() < REACH_RATIO.ln();
         let (mut square, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let mut count = 0usize;
         for (look, flow) in looks.iter().zip(&measured).filter(|(look, _)| taken(look)) {
@@ -36,7 +37,7 @@ impl Smoothed {
         let unsmoothed = Smoothed { flows_kg_s: measured.clone(), flow_error_ratio: 0.0 };
         let (true, Some(inverse)) = (count >= 5, square.try_inverse()) else { return Some(unsmoothed) };
         let parabola = inverse * right;
-        let flow = |look: &Look| row(place(look)).dot(&parabola);
+        let flow = |look: &SurgeReading| row(place(look)).dot(&parabola);
         let pairs = || looks.iter().zip(&measured).filter(|(look, _)| taken(look));
         let left: f64 = pairs().map(|(look, measured)| (measured.ln() - flow(look)).powi(2)).sum();
         let sigma_ratio = (left / (count - 3).max(1) as f64).sqrt();

@@ -1,7 +1,7 @@
 //! The settings of the driver, and the rig that they ask for.
 
+use crate::command_log::CommandLog;
 use crate::real_time::RealTime;
-use crate::told::Told;
 use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
 use mapper_session::{Registry, nominal_model};
@@ -35,7 +35,7 @@ enum LabError {
     #[error("{0}")]
     Campaign(String),
     #[error("failed to write {}: {source}", path.display())]
-    Told { path: PathBuf, source: std::io::Error },
+    CommandLog { path: PathBuf, source: std::io::Error },
 }
 
 /// The lab of a campaign.
@@ -59,8 +59,8 @@ pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
         None => Ok(lab),
         Some(path) => {
             let file = std::fs::File::create(&path);
-            let file = file.map_err(|source| wrong("told", LabError::Told { path, source }))?;
-            Ok(Box::new(Told::new(lab, file)))
+            let file = file.map_err(|source| wrong("told", LabError::CommandLog { path, source }))?;
+            Ok(Box::new(CommandLog::new(lab, file)))
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::{drivers, output, registry, rig_states};
 use clap::{Args, Subcommand};
 use mapper_conformance::{Candidate, judge};
 use mapper_core::{RigMode, Setpoints};
-use mapper_host::{At, Found, KNOWN};
+use mapper_host::{At, DriverLocation, KNOWN};
 use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -48,7 +48,7 @@ impl Backend {
 
     fn list(&self) -> Result<(), Failure> {
         let found = drivers::places().all();
-        let driver = |found: &Found| {
+        let driver = |found: &DriverLocation| {
             let known = KNOWN.iter().find(|(name, ..)| *name == found.name);
             let summary = known.map_or("driver", |(_, summary, _)| summary);
             match &found.at {

@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{interrupt, manner, output, registry};
+use crate::{interrupt, output_options, output, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_report::{declared_sensors_text, duration, lines_text};
@@ -65,7 +65,7 @@ impl Check {
             }));
         }
         if warnings.count() > 0 {
-            output::warn(&warnings.render(manner::warns_in_colour()));
+            output::warn(&warnings.render(output_options::warns_in_colour()));
         }
         let forecast = match &campaign.sequence {
             Some(_) => " by its script on the nominal machine",

@@ -1,7 +1,7 @@
 //! `mapper completions`.
 
 use crate::failure::Failure;
-use crate::{manner, output};
+use crate::{output_options, output};
 use clap::Args;
 use clap_complete::Shell;
 
@@ -15,7 +15,7 @@ pub struct Completions {
 impl Completions {
     pub fn run(&self) -> Result<(), Failure> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut manner::commands(), "mapper", &mut script);
+        clap_complete::generate(self.shell, &mut output_options::commands(), "mapper", &mut script);
         output::print(&String::from_utf8_lossy(&script))
     }
 }

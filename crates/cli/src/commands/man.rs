@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{manner, output};
+use crate::{output_options, output};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ impl Man {
         let failed =
             |error| Failure::new(Code::Failure, format!("failed to write {}: {error}", self.out.display()));
         std::fs::create_dir_all(&self.out).map_err(failed)?;
-        clap_mangen::generate_to(manner::commands(), &self.out).map_err(failed)?;
+        clap_mangen::generate_to(output_options::commands(), &self.out).map_err(failed)?;
         match self.json {
             true => output::print_json(&json!({ "directory": self.out })),
             false => output::print(&format!("manual pages in {}\n", self.out.display())),

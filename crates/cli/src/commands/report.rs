@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
 use crate::output::Replace;
-use crate::{manner, output, registry};
+use crate::{output_options, output, registry};
 use clap::Args;
 use mapper_record::ChannelMap;
 use mapper_session::{Gap, Recorded, Registry, Session, SessionError};
@@ -64,7 +64,7 @@ fn diagnosed(
 ) -> Result<Gap, Failure> {
     let campaign = mapper_campaign::load(file).map_err(Failure::of_campaign)?;
     let effects = registry.effects_with(&[])?;
-    let progress = manner::progress();
+    let progress = output_options::progress();
     let on_event = |event: &_| progress.show(event);
     let session = Session { on_event: &on_event, ..Session::new(registry) };
     let gap = session.diagnose_gap(recorded, &campaign, map, effects, None);

@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{manner, output};
+use crate::{output_options, output};
 use clap::Args;
 use mapper_reproduce::{FIGURES, picture_path};
 use serde_json::json;
@@ -22,7 +22,7 @@ pub struct Reproduce {
 impl Reproduce {
     /// Makes the page and its pictures, and says in a line per statement what came out.
     pub fn run(&self) -> Result<(), Failure> {
-        let progress = manner::progress();
+        let progress = output_options::progress();
         let mut done = 0;
         progress.pieces(0, FIGURES.len());
         let results = mapper_reproduce::reproduce(|_| {

@@ -4,11 +4,11 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::shown::ShownArguments;
 use crate::wall::SystemWall;
-use crate::{interrupt, manner, output, registry, rig_states};
+use crate::{interrupt, output_options, output, registry, rig_states};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
-use mapper_live::{Asked, LiveError, LiveRun, Onlookers, TlsFiles};
+use mapper_live::{Asked, LiveError, LiveRun, Observers, TlsFiles};
 use mapper_report::plan_text;
 use mapper_session::{
     BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
@@ -75,7 +75,7 @@ impl Run {
         }
         let parent = self.out.clone().unwrap_or_else(|| PathBuf::from(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
-        let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, manner::progress());
+        let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, output_options::progress());
         progress.begin("planning");
         let states = rig_states::directory(None);
         let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
@@ -138,9 +138,9 @@ impl Run {
         self.tell(&campaign, outcome)
     }
 
-    fn onlookers(&self) -> Result<Onlookers<'_>, LiveError> {
+    fn onlookers(&self) -> Result<Observers<'_>, LiveError> {
         let tls = self.live_cert.clone().zip(self.live_key.clone());
-        Onlookers::open(Asked {
+        Observers::open(Asked {
             page: self.live.as_deref(),
             tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
             #[cfg(feature = "foxglove")]

@@ -1,9 +1,9 @@
 //! The diagnosis of one side of a machine from a log without steps.
 
-use super::asked::{audible, smallest};
-use super::calm::calm;
 use super::compressor::CompressorSide;
 use super::compressor_sensors::compressor_sensors;
+use super::denoise::calm;
+use super::detectable::{audible, smallest};
 use super::diagnosis::{Cause, Course, Diagnosis, Unknown, Word};
 use super::fit::{Fit, Question};
 use super::held_out::{beyond, held_out, ids, off_k};

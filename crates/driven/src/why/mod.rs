@@ -1,9 +1,9 @@
 //! Which cause explains what is judged on a side that its measured neighbours drive: gap diagnosis without steps.
 
-mod asked;
-mod calm;
 mod compressor;
 mod compressor_sensors;
+mod denoise;
+mod detectable;
 mod diagnose;
 mod diagnosis;
 mod fit;

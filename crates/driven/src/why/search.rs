@@ -11,7 +11,7 @@ use mapper_numerics::parallel;
 use mapper_physics::effect::EffectInfo;
 
 /// What was fitted.
-pub(crate) struct Found {
+pub(crate) struct SearchResult {
     /// Nothing but what is not known.
     pub(crate) null: Fit,
     /// Singles and pairs, likeliest first.
@@ -71,7 +71,7 @@ pub(crate) fn search<S: Side>(
     asked: &[usize],
     counts: &[bool],
     calibration: &Calibration,
-) -> Option<Found> {
+) -> Option<SearchResult> {
     let search = Search { question, asked, counts, calibration };
     let null = question.fit(&question.nothing(), counts)?;
     let mut known = Known::default();
@@ -82,7 +82,7 @@ pub(crate) fn search<S: Side>(
     if best - null.score > calibration.threshold {
         extend(&search, &mut known, LIMITS);
     }
-    Some(Found { null, fits: known.ranked(&search) })
+    Some(SearchResult { null, fits: known.ranked(&search) })
 }
 
 struct Search<'a, S> {
@@ -149,7 +149,7 @@ impl<S: Side> Causes for Search<'_, S> {
 }
 
 /// Scores turned into probabilities.
-pub(crate) struct Weighed {
+pub(crate) struct CauseProbabilities {
     /// Of nothing.
     pub(crate) none: f64,
     /// Of something outside the catalogue.
@@ -163,7 +163,7 @@ pub(crate) struct Weighed {
 }
 
 /// Weighs what was found.
-pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &Found) -> Weighed {
+pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &SearchResult) -> CauseProbabilities {
     let all: Vec<&Fit> = std::iter::once(&found.null).chain(&found.fits).collect();
     let inside = |fit: &Fit| weight(calibration, asked, fit) + (1.0 - PRIOR_OUTSIDE).ln();
     let beyond = |fit: &Fit| fit.score_outside + prior(calibration, asked, fit) + PRIOR_OUTSIDE.ln();
@@ -200,7 +200,13 @@ pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &Found) -> W
         causes.splice(..open, [cause]);
         open = 1;
     }
-    Weighed { none: share(inside(&found.null)) / total, outside: outside / total, named, open, causes }
+    CauseProbabilities {
+        none: share(inside(&found.null)) / total,
+        outside: outside / total,
+        named,
+        open,
+        causes,
+    }
 }
 
 /// How many causes, from the first, have what settles it of all together.
@@ -215,6 +221,6 @@ fn open_ones(causes: &[(usize, f64)]) -> usize {
     causes.iter().take_while(before).count()
 }
 
-fn best_weight(calibration: &Calibration, asked: usize, found: &Found) -> f64 {
+fn best_weight(calibration: &Calibration, asked: usize, found: &SearchResult) -> f64 {
     found.fits.first().map_or(f64::NEG_INFINITY, |fit| weight(calibration, asked, fit))
 }

@@ -7,7 +7,7 @@
 //! declared kind the same way: smoothing, model, probe, whitening.
 
 use crate::IdentifyConfig;
-use crate::joint::explained::Explained;
+use crate::joint::input_noise_spline::Explained;
 use crate::joint::model::Setting;
 use crate::joint::parameters::{PROBE_MM2, SHARED, SharedVector};
 use crate::joint::rows::{Row, StepRows};

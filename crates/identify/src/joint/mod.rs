@@ -7,9 +7,9 @@
 
 pub(crate) mod common_part;
 pub(crate) mod expected;
-pub(crate) mod explained;
 pub(crate) mod inlet;
 pub(crate) mod input_noise;
+pub(crate) mod input_noise_spline;
 pub(crate) mod judge;
 pub(crate) mod model;
 pub(crate) mod parameters;

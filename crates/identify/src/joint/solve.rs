@@ -1,7 +1,7 @@
 //! Levenberg-Marquardt on the joint fit's normal equations, whose matrix has the shape of an arrow: each step's own
 //! parameters touch only themselves and the shared ones, so they are eliminated step by step.
 
-use crate::joint::explained::Explained;
+use crate::joint::input_noise_spline::Explained;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,

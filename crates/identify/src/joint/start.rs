@@ -4,8 +4,8 @@ use crate::cleaning::cleaned;
 use crate::dynamic::{self, Estimate};
 use crate::end_state::EndState;
 use crate::findings::{Findings, code};
-use crate::joint::explained::Explained;
 use crate::joint::inlet;
+use crate::joint::input_noise_spline::Explained;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
     ALPHA, ALPHA_SIGMA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_COEFFICIENT,

@@ -1,7 +1,7 @@
 //! The lab's boundary conditions: what the cell gives, and what the actuators make of the commands.
 
 use super::actuator::{Actuator, ActuatorDynamics};
-use super::weather::Weather;
+use super::boundary_wander::Weather;
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
 

@@ -20,7 +20,7 @@ mod settings;
 mod settings_file;
 mod tolerances;
 mod truth;
-mod weather;
+mod boundary_wander;
 
 pub use actuator::ActuatorDynamics;
 pub use drift::{Drifting, LabDrift};
@@ -36,7 +36,7 @@ pub use setting_problem::{SettingProblem, within};
 pub use settings::{LabSettings, Start};
 pub use settings_file::read_settings;
 pub use tolerances::draw_tolerances;
-pub use weather::Weather;
+pub use boundary_wander::Weather;
 
 use mapper_core::{Backend, BackendError};
 use mapper_physics::backend_plugin::BackendPlugin;

@@ -7,7 +7,7 @@ use super::precursor::SurgePrecursor;
 use super::running::{Lumped, Structure};
 use super::second_order::SecondOrder;
 use super::sensor::SensorErrors;
-use super::weather::Weather;
+use super::boundary_wander::Weather;
 use mapper_core::Channel;
 use mapper_physics::effect::Rig;
 use mapper_physics::instruments::Instruments;

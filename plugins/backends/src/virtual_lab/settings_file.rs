@@ -11,7 +11,7 @@ use super::sensor::SensorErrors;
 use super::setting_problem::{SettingProblem, within};
 use super::settings::{LabSettings, Start};
 use super::tolerances::draw_tolerances;
-use super::weather::Weather;
+use super::boundary_wander::Weather;
 use mapper_core::{BackendError, Channel};
 use mapper_physics::effect::Rig;
 use mapper_physics::instruments::Instruments;

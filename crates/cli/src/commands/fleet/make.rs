@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::fleet_place::on_this_machine;
-use crate::{manner, output};
+use crate::{output_options, output};
 use clap::Args;
 use mapper_fleet::{Made, kind_of, open_study};
 use mapper_studies::program;
@@ -28,7 +28,7 @@ impl Make {
         on_this_machine(|registry, kinds, machine| {
             let study = open_study(&self.study).map_err(mapper_fleet::FleetError::from)?;
             let kind = kind_of(&study, kinds)?;
-            let progress = manner::progress();
+            let progress = output_options::progress();
             progress.begin("making items");
             let made = Made::make(&study, kind, &self.out, &program(registry), machine.name);
             progress.clear();

@@ -4,7 +4,7 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::channel_map;
 use crate::output::Replace;
-use crate::{manner, output, registry};
+use crate::{output_options, output, registry};
 use clap::Args;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::Diagnosed;
@@ -64,7 +64,7 @@ impl Diagnose {
         let healthy = self.healthy.as_ref().map(read).transpose()?;
         let mut gaps = Vec::with_capacity(recordings.len());
         for recording in recordings {
-            let progress = manner::progress();
+            let progress = output_options::progress();
             progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
             let recorded = read(recording)?;
             let on_event = |event: &_| progress.show(event);

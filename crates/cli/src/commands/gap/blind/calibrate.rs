@@ -3,7 +3,7 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::output::Replace;
-use crate::{interrupt, manner, output, registry};
+use crate::{interrupt, output_options, output, registry};
 use clap::Args;
 use mapper_blind::calibrate::{Plan, calibrate};
 use mapper_blind::reliability::{calibrated_text, reliabilities};
@@ -48,7 +48,7 @@ impl Calibrate {
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let plan = Plan { seed: self.seed, nulls: self.nulls, others: self.cases };
-        let (stop, progress) = (interrupt::stop_flag()?, manner::progress());
+        let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
         let told = |done, of| progress.pieces(done, of);
         let engine = Engine { jobs: self.jobs, stop: &stop, told: &told };
         let made_by = plan.command(&self.campaign);

@@ -1,7 +1,7 @@
 //! `mapper gap blind make`.
 
 use crate::failure::Failure;
-use crate::{manner, output, registry};
+use crate::{output_options, output, registry};
 use clap::Args;
 use mapper_blind::{CaseKind, Draw, Laboratory, OutsideUse};
 use serde_json::json;
@@ -57,7 +57,7 @@ impl Make {
             sigma_range: [self.least_sigma, self.most_sigma],
             ..Draw::new(self.seed, self.cases, outside)
         };
-        let progress = manner::progress();
+        let progress = output_options::progress();
         progress.pieces(0, self.cases);
         let done = |done| progress.pieces(done, self.cases);
         let made = mapper_blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);

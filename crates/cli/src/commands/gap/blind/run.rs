@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{interrupt, manner, output};
+use crate::{interrupt, output_options, output};
 use clap::Args;
 use mapper_blind::{MANIFEST_NAME, Manifest};
 use mapper_fleet::{Engine, cores};
@@ -34,7 +34,7 @@ impl Run {
         let failure = |message: String| Failure::new(Code::Failure, message);
         let manifest = Manifest::read(&self.directory.join(MANIFEST_NAME))?;
         let program = std::env::current_exe().map_err(|error| failure(error.to_string()))?;
-        let (stop, progress) = (interrupt::stop_flag()?, manner::progress());
+        let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
         let told = |done, of| progress.pieces(done, of);
         let engine = Engine { jobs: self.jobs, stop: &stop, told: &told };
         let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();

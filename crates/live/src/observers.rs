@@ -24,7 +24,7 @@ pub struct Asked<'a> {
 }
 
 /// Nobody, or some.
-pub struct Onlookers<'a> {
+pub struct Observers<'a> {
     page: Option<Live>,
     #[cfg(feature = "foxglove")]
     viewers: OnceLock<Viewers>,
@@ -33,14 +33,14 @@ pub struct Onlookers<'a> {
     asked: Asked<'a>,
 }
 
-impl<'a> Onlookers<'a> {
+impl<'a> Observers<'a> {
     /// Takes the page's address; nothing is served yet.
     ///
     /// # Errors
     /// [`LiveError`] where it is none, or is taken, or certificate and key are of no use.
     pub fn open(asked: Asked<'a>) -> Result<Self, LiveError> {
         let page = asked.page.map(|address| Live::open(address, asked.tls.as_ref())).transpose()?;
-        Ok(Onlookers {
+        Ok(Observers {
             page,
             #[cfg(feature = "foxglove")]
             viewers: OnceLock::new(),

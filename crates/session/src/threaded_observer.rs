@@ -10,7 +10,7 @@ use std::thread::{Scope, ScopedJoinHandle};
 const WAITING_MAX: usize = 32;
 
 /// What an observer is told.
-enum Told {
+enum ObserverMessage {
     StepStart(StepMarker),
     Batch(SampleBatch),
     Event(Event),
@@ -26,13 +26,13 @@ struct Gone;
 
 /// Passes what it is told on to an observer elsewhere, in order, until that one fails. Its error is told by the next call; after
 /// that every call fails.
-pub(crate) struct Aside<'scope, O> {
-    to_thread: SyncSender<Told>,
+pub(crate) struct ThreadedObserver<'scope, O> {
+    to_thread: SyncSender<ObserverMessage>,
     thread: ScopedJoinHandle<'scope, O>,
     failed: Receiver<ObserverError>,
 }
 
-impl<'scope, O: RunObserver + Send + 'scope> Aside<'scope, O> {
+impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
     /// Begins.
     pub(crate) fn begin<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
         let (to_thread, told) = sync_channel(WAITING_MAX);
@@ -44,7 +44,7 @@ impl<'scope, O: RunObserver + Send + 'scope> Aside<'scope, O> {
             }
             observer
         });
-        Aside { to_thread, thread, failed }
+        ThreadedObserver { to_thread, thread, failed }
     }
 
     /// Waits until the observer has seen everything, and gives it back, with its error where no call has told that.
@@ -55,8 +55,8 @@ impl<'scope, O: RunObserver + Send + 'scope> Aside<'scope, O> {
     }
 }
 
-impl<O> Aside<'_, O> {
-    fn tell(&mut self, told: Told) -> Result<(), ObserverError> {
+impl<O> ThreadedObserver<'_, O> {
+    fn tell(&mut self, told: ObserverMessage) -> Result<(), ObserverError> {
         match self.to_thread.send(told) {
             Ok(()) => Ok(()),
             Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(Gone))),
@@ -64,40 +64,40 @@ impl<O> Aside<'_, O> {
     }
 }
 
-fn observe(observer: &mut impl RunObserver, told: Told) -> Result<(), ObserverError> {
+fn observe(observer: &mut impl RunObserver, told: ObserverMessage) -> Result<(), ObserverError> {
     match told {
-        Told::StepStart(marker) => observer.on_step_start(&marker),
-        Told::Batch(batch) => observer.on_batch(&batch),
-        Told::Event(event) => observer.on_event(&event),
-        Told::StepAbandoned(marker) => observer.on_step_abandoned(&marker),
-        Told::StepEnd(marker) => observer.on_step_end(&marker),
-        Told::StepHeld(marker) => observer.on_step_held(&marker),
+        ObserverMessage::StepStart(marker) => observer.on_step_start(&marker),
+        ObserverMessage::Batch(batch) => observer.on_batch(&batch),
+        ObserverMessage::Event(event) => observer.on_event(&event),
+        ObserverMessage::StepAbandoned(marker) => observer.on_step_abandoned(&marker),
+        ObserverMessage::StepEnd(marker) => observer.on_step_end(&marker),
+        ObserverMessage::StepHeld(marker) => observer.on_step_held(&marker),
     }
 }
 
-impl<O> RunObserver for Aside<'_, O> {
+impl<O> RunObserver for ThreadedObserver<'_, O> {
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(Told::StepStart(*marker))
+        self.tell(ObserverMessage::StepStart(*marker))
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        self.tell(Told::Batch(batch.clone()))
+        self.tell(ObserverMessage::Batch(batch.clone()))
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        self.tell(Told::Event(event.clone()))
+        self.tell(ObserverMessage::Event(event.clone()))
     }
 
     fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(Told::StepAbandoned(*marker))
+        self.tell(ObserverMessage::StepAbandoned(*marker))
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(Told::StepEnd(*marker))
+        self.tell(ObserverMessage::StepEnd(*marker))
     }
 
     fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(Told::StepHeld(*marker))
+        self.tell(ObserverMessage::StepHeld(*marker))
     }
 }
 
@@ -106,7 +106,7 @@ pub(crate) enum Placed<'scope, O> {
     /// Where time is simulated: nothing can be late, and handing each second of it over would take longer than the second.
     Here(O),
     /// Beside a rig.
-    Aside(Aside<'scope, O>),
+    ThreadedObserver(ThreadedObserver<'scope, O>),
 }
 
 impl<'scope, O: RunObserver + Send + 'scope> Placed<'scope, O> {
@@ -114,15 +114,15 @@ impl<'scope, O: RunObserver + Send + 'scope> Placed<'scope, O> {
     pub(crate) fn observer(&mut self) -> &mut dyn RunObserver {
         match self {
             Placed::Here(observer) => observer,
-            Placed::Aside(aside) => aside,
+            Placed::ThreadedObserver(aside) => aside,
         }
     }
 
-    /// As [`Aside::end`].
+    /// As [`ThreadedObserver::end`].
     pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
         match self {
             Placed::Here(observer) => (observer, Ok(())),
-            Placed::Aside(aside) => aside.end(),
+            Placed::ThreadedObserver(aside) => aside.end(),
         }
     }
 }
@@ -158,7 +158,7 @@ mod tests {
     fn all_is_seen_in_order_before_the_end() {
         let times: Vec<f64> = (0..1000).map(f64::from).collect();
         let (observer, error) = scope(|scope| {
-            let mut aside = Aside::begin(scope, Counts { told: Vec::new(), fails_at: usize::MAX });
+            let mut aside = ThreadedObserver::begin(scope, Counts { told: Vec::new(), fails_at: usize::MAX });
             times.iter().for_each(|t_s| aside.on_event(&event(*t_s)).unwrap());
             aside.end()
         });
@@ -171,7 +171,7 @@ mod tests {
     fn an_error_is_told_and_nothing_after_it_passes() {
         for fails_at in [0, 1, 50, 99] {
             let (observer, errors) = scope(|scope| {
-                let mut aside = Aside::begin(scope, Counts { told: Vec::new(), fails_at });
+                let mut aside = ThreadedObserver::begin(scope, Counts { told: Vec::new(), fails_at });
                 let told: Vec<_> = (0..100).map(|t_s| aside.on_event(&event(f64::from(t_s)))).collect();
                 let (observer, untold) = aside.end();
                 let errors = told.into_iter().chain([untold]).skip_while(Result::is_ok).collect::<Vec<_>>();
@@ -198,7 +198,7 @@ mod tests {
         }
         let ended = std::panic::catch_unwind(|| {
             scope(|scope| {
-                let mut aside = Aside::begin(scope, Panics);
+                let mut aside = ThreadedObserver::begin(scope, Panics);
                 let refused = (0..1000).any(|t_s| aside.on_event(&event(f64::from(t_s))).is_err());
                 assert!(refused, "a thousand events for nobody");
                 aside.end().1

@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// What a run holds.
 #[derive(Default)]
-pub(crate) struct Held {
+pub(crate) struct RigLease {
     /// The rig, where it is one that can be had but once.
     rig: Option<Claim>,
     /// Readers, and where the rig is reached: a lock each. A runner that died with one leaves nothing behind: the rig's own
@@ -14,7 +14,7 @@ pub(crate) struct Held {
     readers: Vec<Claim>,
 }
 
-impl Held {
+impl RigLease {
     /// Takes the rig and the readers by their names. `resumes`: the run that goes on.
     pub(crate) fn take(
         states: &RigStates,
@@ -24,7 +24,7 @@ impl Held {
     ) -> Result<Self, SessionError> {
         let rig = rig.map(|name| states.claim(name, resumes)).transpose()?;
         let readers = readers.iter().map(|name| states.claim(name, resumes)).collect::<Result<_, _>>()?;
-        Ok(Held { rig, readers })
+        Ok(RigLease { rig, readers })
     }
 
     /// Writes down who has the rig.
@@ -65,11 +65,13 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         let place = ["at 10.0.0.3:502 unit 255".to_owned()];
-        let first = Held::take(&states, Some("cell 3"), &place, None).unwrap();
-        let refused = Held::take(&states, Some("cell three"), &place, None).map(drop).unwrap_err();
+        let first = RigLease::take(&states, Some("cell 3"), &place, None).unwrap();
+        let refused = RigLease::take(&states, Some("cell three"), &place, None).map(drop).unwrap_err();
         assert!(matches!(refused, SessionError::RigInUse { .. }), "{refused}");
-        assert!(Held::take(&states, Some("cell 4"), &["at 10.0.0.4:502 unit 255".to_owned()], None).is_ok());
+        assert!(
+            RigLease::take(&states, Some("cell 4"), &["at 10.0.0.4:502 unit 255".to_owned()], None).is_ok()
+        );
         first.give_back(None, Path::new("runs/a")).unwrap();
-        assert!(Held::take(&states, Some("cell three"), &place, None).is_ok());
+        assert!(RigLease::take(&states, Some("cell three"), &place, None).is_ok());
     }
 }

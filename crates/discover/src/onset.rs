@@ -1,12 +1,12 @@
 //! Laws that begin in the middle of a recording.
 
 use crate::columns::{Base, Products};
-use crate::course::{Course, Shape};
 use crate::evidence::{PRIOR_STEPS, weigh};
 use crate::expression::{Expression, product};
 use crate::force::APART;
 use crate::select::Choice;
 use crate::term::{Role, Term};
+use crate::time_history::{Course, Shape};
 use mapper_core::step_number;
 use mapper_gap::whiten::rows_of_step;
 use nalgebra::DMatrix;

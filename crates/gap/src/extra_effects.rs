@@ -1,6 +1,6 @@
 //! Effects that a study gets on its way: laws, and causes that begin with a step.
 
-use crate::course::Course;
+use crate::effect_timing::Course;
 use crate::study::Study;
 use mapper_physics::effect::Effect;
 use std::sync::Arc;

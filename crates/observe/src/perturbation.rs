@@ -8,7 +8,7 @@ use mapper_physics::params::{BoundaryConditions, Params};
 
 /// One quantity of model, inputs or initial state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Knob {
+pub enum Perturbation {
     /// A boundary condition, by the channel that reads it; in its unit.
     Input(Channel),
     /// Ambient temperature, K.
@@ -44,48 +44,51 @@ const AMBIENT_SIGMA_K: f64 = 1.0;
 /// The rig may not have rested before the recording, K.
 const START_SIGMA_K: f64 = 5.0;
 
-impl Knob {
+impl Perturbation {
     /// One standard deviation of what it may be off by, in its unit, as the campaign declares it. 0 for what has no
     /// tolerance: inputs, whose sensors are declared, and friction, which the nominal model has none of.
     ///
     /// A campaign declares no tolerance of the turbine's flow and of its convection: those of the compressor stand for them.
     pub fn tolerance(self, declared: &ModelTolerances) -> f64 {
         match self {
-            Knob::Input(_) | Knob::Friction => 0.0,
-            Knob::Ambient => AMBIENT_SIGMA_K,
-            Knob::Efficiency => declared.compressor_efficiency_ratio,
-            Knob::Flow | Knob::TurbineFlow => declared.flow_map_ratio,
-            Knob::TurbineEfficiency => declared.turbine_efficiency_ratio,
-            Knob::ValveArea => declared.valve_area_ratio,
-            Knob::CompressorConvection | Knob::TurbineConvection => declared.convection_ratio,
-            Knob::ExternalConvection => declared.external_convection_ratio,
-            Knob::OilConductance => declared.oil_conductance_ratio,
-            Knob::StartTc | Knob::StartTt => START_SIGMA_K,
+            Perturbation::Input(_) | Perturbation::Friction => 0.0,
+            Perturbation::Ambient => AMBIENT_SIGMA_K,
+            Perturbation::Efficiency => declared.compressor_efficiency_ratio,
+            Perturbation::Flow | Perturbation::TurbineFlow => declared.flow_map_ratio,
+            Perturbation::TurbineEfficiency => declared.turbine_efficiency_ratio,
+            Perturbation::ValveArea => declared.valve_area_ratio,
+            Perturbation::CompressorConvection | Perturbation::TurbineConvection => declared.convection_ratio,
+            Perturbation::ExternalConvection => declared.external_convection_ratio,
+            Perturbation::OilConductance => declared.oil_conductance_ratio,
+            Perturbation::StartTc | Perturbation::StartTt => START_SIGMA_K,
         }
     }
 
     /// Turns the machine.
     pub fn turn(self, params: &mut Params, by: f64) {
         match self {
-            Knob::Efficiency => params.compressor.efficiency_scale_ratio *= 1.0 + by,
-            Knob::Flow => params.compressor.flow_scale_ratio *= 1.0 + by,
-            Knob::TurbineEfficiency => params.turbine.peak_efficiency *= 1.0 + by,
-            Knob::TurbineFlow => params.turbine.choked_flow_kg_s *= 1.0 + by,
-            Knob::ValveArea => params.outlet.valve_area_m2 *= 1.0 + by,
-            Knob::CompressorConvection => params.compressor.nusselt_coefficient *= 1.0 + by,
-            Knob::TurbineConvection => params.turbine.nusselt_coefficient *= 1.0 + by,
-            Knob::ExternalConvection => params.external_convection_ratio *= 1.0 + by,
-            Knob::OilConductance => params.bearing.oil_conductance_w_k *= 1.0 + by,
-            Knob::Friction => params.bearing_friction_w_s2 += by,
-            Knob::Input(_) | Knob::Ambient | Knob::StartTc | Knob::StartTt => {}
+            Perturbation::Efficiency => params.compressor.efficiency_scale_ratio *= 1.0 + by,
+            Perturbation::Flow => params.compressor.flow_scale_ratio *= 1.0 + by,
+            Perturbation::TurbineEfficiency => params.turbine.peak_efficiency *= 1.0 + by,
+            Perturbation::TurbineFlow => params.turbine.choked_flow_kg_s *= 1.0 + by,
+            Perturbation::ValveArea => params.outlet.valve_area_m2 *= 1.0 + by,
+            Perturbation::CompressorConvection => params.compressor.nusselt_coefficient *= 1.0 + by,
+            Perturbation::TurbineConvection => params.turbine.nusselt_coefficient *= 1.0 + by,
+            Perturbation::ExternalConvection => params.external_convection_ratio *= 1.0 + by,
+            Perturbation::OilConductance => params.bearing.oil_conductance_w_k *= 1.0 + by,
+            Perturbation::Friction => params.bearing_friction_w_s2 += by,
+            Perturbation::Input(_)
+            | Perturbation::Ambient
+            | Perturbation::StartTc
+            | Perturbation::StartTt => {}
         }
     }
 
     /// Turns the boundary conditions.
     pub fn shift(self, boundary: &mut BoundaryConditions, by: f64) {
         let channel = match self {
-            Knob::Input(channel) => channel,
-            Knob::Ambient => Channel::TAmb,
+            Perturbation::Input(channel) => channel,
+            Perturbation::Ambient => Channel::TAmb,
             _ => return,
         };
         if let Some(value) = boundary_condition(boundary, channel) {
@@ -96,11 +99,11 @@ impl Knob {
     /// Turns the state at the start.
     pub fn start(self, state: &mut State, by_k: f64) {
         match self {
-            Knob::StartTc => {
+            Perturbation::StartTc => {
                 state.tc_k += by_k;
                 state.inner_k += by_k;
             }
-            Knob::StartTt => state.tt_k += by_k,
+            Perturbation::StartTt => state.tt_k += by_k,
             _ => {}
         }
     }
@@ -112,7 +115,7 @@ pub struct Shifted<'a, I> {
     /// As recorded.
     pub inputs: &'a I,
     /// What is added to each, in its unit.
-    pub shifts: &'a [(Knob, f64)],
+    pub shifts: &'a [(Perturbation, f64)],
 }
 
 impl<I: Inputs> Inputs for Shifted<'_, I> {
@@ -141,17 +144,17 @@ impl<I: Inputs> Inputs for Shifted<'_, I> {
 mod tests {
     use super::*;
 
-    const MACHINE: [Knob; 10] = [
-        Knob::Efficiency,
-        Knob::Flow,
-        Knob::TurbineEfficiency,
-        Knob::TurbineFlow,
-        Knob::ValveArea,
-        Knob::CompressorConvection,
-        Knob::TurbineConvection,
-        Knob::ExternalConvection,
-        Knob::OilConductance,
-        Knob::Friction,
+    const MACHINE: [Perturbation; 10] = [
+        Perturbation::Efficiency,
+        Perturbation::Flow,
+        Perturbation::TurbineEfficiency,
+        Perturbation::TurbineFlow,
+        Perturbation::ValveArea,
+        Perturbation::CompressorConvection,
+        Perturbation::TurbineConvection,
+        Perturbation::ExternalConvection,
+        Perturbation::OilConductance,
+        Perturbation::Friction,
     ];
 
     /// A knob that turned nothing would fit nothing, and nobody would see it.
@@ -168,7 +171,7 @@ mod tests {
         let mut boundary = BoundaryConditions::default();
         for channel in crate::channels::DRIVERS {
             let before = boundary;
-            Knob::Input(channel).shift(&mut boundary, 1.0);
+            Perturbation::Input(channel).shift(&mut boundary, 1.0);
             assert_ne!(boundary, before, "{channel}");
         }
     }
@@ -176,7 +179,7 @@ mod tests {
     #[test]
     fn shifted_inputs_differ_by_what_is_added() {
         let recorded = BoundaryConditions::default();
-        let shifts = [(Knob::Input(Channel::P1), -50.0), (Knob::Ambient, 2.0)];
+        let shifts = [(Perturbation::Input(Channel::P1), -50.0), (Perturbation::Ambient, 2.0)];
         let shifted = Shifted { inputs: &recorded, shifts: &shifts }.at(3.0);
         assert_eq!(shifted.p1_pa, recorded.p1_pa - 50.0);
         assert_eq!(shifted.ambient_temperature_k, recorded.ambient_temperature_k + 2.0);

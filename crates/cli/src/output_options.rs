@@ -1,4 +1,4 @@
-//! How the program speaks: colours, progress, JSON. Said once on the command line, for all commands.
+//! How the program speaks: colours, progress, JSON. ChosenOptions once on the command line, for all commands.
 
 use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 /// Options of every command.
 #[derive(Debug, Args)]
-pub struct MannerArguments {
+pub struct OutputOptions {
     /// When to colour; `auto`: on a terminal, unless NO_COLOR is set
     #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t, help_heading = "Manner")]
     color: ColorChoice,
@@ -20,7 +20,7 @@ pub struct MannerArguments {
 
 /// What was said.
 #[derive(Debug, Clone, Copy, Default)]
-struct Said {
+struct ChosenOptions {
     colour: ColourChoice,
     progress: Option<ProgressManner>,
     json: bool,
@@ -30,14 +30,14 @@ struct Said {
 /// All commands with their options, as `main` has them.
 static COMMANDS: OnceLock<fn() -> clap::Command> = OnceLock::new();
 
-static SAID: OnceLock<Said> = OnceLock::new();
+static SAID: OnceLock<ChosenOptions> = OnceLock::new();
 
-fn said() -> Said {
+fn said() -> ChosenOptions {
     SAID.get().copied().unwrap_or_default()
 }
 
 /// Keeps what was said, for all that is printed later.
-pub fn keep(arguments: &MannerArguments, matches: &ArgMatches) {
+pub fn keep(arguments: &OutputOptions, matches: &ArgMatches) {
     let colour = match arguments.color {
         ColorChoice::Auto => ColourChoice::Auto,
         ColorChoice::Always => ColourChoice::Always,
@@ -49,7 +49,7 @@ pub fn keep(arguments: &MannerArguments, matches: &ArgMatches) {
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
     let replaces = command.is_some_and(|of| of.try_contains_id("force").is_ok());
     // It is kept once: `main` alone calls this.
-    let _ = SAID.set(Said { colour, progress, json, replaces });
+    let _ = SAID.set(ChosenOptions { colour, progress, json, replaces });
 }
 
 /// Whether arguments that could not be read ask for JSON and for no colours.

@@ -39,7 +39,7 @@ struct Source {
 }
 
 /// See the module.
-pub struct WithReaders {
+pub struct RigWithInstruments {
     description: RigDescription,
     rig: Box<dyn Backend>,
     sources: Vec<Source>,
@@ -57,7 +57,7 @@ struct ReaderFailed {
     words: String,
 }
 
-impl WithReaders {
+impl RigWithInstruments {
     /// `rig` with `readers` beside it. In simulated time a reader is asked whenever the rig is; otherwise each is asked on a thread of
     /// its own, and has `deadline` to connect.
     ///
@@ -86,7 +86,7 @@ impl WithReaders {
                 lost: false,
             })
         };
-        Ok(WithReaders {
+        Ok(RigWithInstruments {
             description: RigDescription { channels, simulated_time, ..own },
             rig,
             sources: readers.into_iter().map(source).collect::<Result<_, BackendError>>()?,
@@ -181,7 +181,7 @@ impl Source {
     }
 }
 
-impl Backend for WithReaders {
+impl Backend for RigWithInstruments {
     fn describe(&self) -> RigDescription {
         self.description.clone()
     }

@@ -9,7 +9,7 @@ pub const LOOKED_AT: [Channel; 3] = [Channel::P2, Channel::CompressorFlow, Chann
 
 /// Means and variation at one opening.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct SurgeReading {
     /// Valve opening relative to the nominal area.
     pub valve_opening_ratio: f64,
     /// Run time of its end, s.
@@ -28,7 +28,7 @@ pub struct Look {
     pub variations: [Option<Variation>; LOOKED_AT.len()],
 }
 
-impl Look {
+impl SurgeReading {
     /// The look at a step, from [`SurgeSeek::SETTLE_S`] after its start on. `None` where a mean cannot be formed or nothing
     /// is known of any variation: the step was too short, or a channel is missing.
     pub fn of(recording: &Recording, step: &StepMarker, reference: ReferenceState) -> Option<Self> {
@@ -44,7 +44,7 @@ impl Look {
             let (t_s, values) = samples(channel)?;
             Variation::of(&t_s, &values)
         });
-        variations.iter().any(Option::is_some).then_some(Look {
+        variations.iter().any(Option::is_some).then_some(SurgeReading {
             valve_opening_ratio: step.valve_opening_ratio,
             end_s: step.end_s,
             speed_corrected_rpm: reference.corrected_speed_rpm(speed_rpm, t1_k),

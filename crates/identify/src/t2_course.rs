@@ -2,7 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::fit::{Geometry, rows, t2_k};
-use crate::followed::Followed;
+use crate::probe_reading::Followed;
 use crate::samples::Samples;
 use mapper_core::{IdentifiedPoint, Recording};
 use mapper_numerics::statistics::mean;

@@ -5,16 +5,16 @@ use std::fs::File;
 use std::io::Write;
 
 /// Another backend, with a file.
-pub(crate) struct Told {
+pub(crate) struct CommandLog {
     inner: Box<dyn Backend>,
     file: File,
     now_s: f64,
 }
 
-impl Told {
+impl CommandLog {
     /// Writes what `inner` is told into `file`.
     pub(crate) fn new(inner: Box<dyn Backend>, file: File) -> Self {
-        Told { inner, file, now_s: 0.0 }
+        CommandLog { inner, file, now_s: 0.0 }
     }
 
     fn write(&mut self, words: &str) {
@@ -23,7 +23,7 @@ impl Told {
     }
 }
 
-impl Backend for Told {
+impl Backend for CommandLog {
     fn describe(&self) -> RigDescription {
         self.inner.describe()
     }

@@ -1,4 +1,4 @@
-//! Tells the tests whether there is a Python with an OPC UA server, as `cargo xtask test` has prepared it.
+//! Sets a flag for the tests if there is a Python with an OPC UA server, as `cargo xtask test` prepares it.
 
 fn main() {
     println!("cargo::rerun-if-env-changed=MAPPER_TEST_PYTHON");

@@ -1,8 +1,8 @@
-"""Drivers for mapper in Python: one file, the standard library alone. docs/protocol.md says what goes over the pipes.
+"""Drivers for mapper in Python: one file, only the standard library. docs/protocol.md describes the messages.
 
-An author writes a class with the methods of Rig and calls serve(). Frames, hello, lease, and the safe trajectory when nobody is there any
-more (lease over, input closed, SIGTERM) are done here, over pipes or at a socket. A call that hangs keeps the rig from becoming safe:
-whatever a rig reads or writes needs a deadline of its own. Messages are JSON: their numbers are SI, and None is "no reading".
+An author writes a class with the methods of Rig and calls serve(). Frames, hello, lease, and the safe trajectory without a host
+(lease over, input closed, SIGTERM) are done here, over pipes or at a socket. A call that hangs keeps the rig from becoming safe:
+every read or write of a rig needs its own deadline. Messages are JSON: their numbers are SI, and None is "no reading".
 """
 
 import hashlib
@@ -21,15 +21,15 @@ MAGIC = "mapper-backend"
 VERSION = {"major": 1, "minor": 1}
 FRAME_LIMIT_BYTES = 1 << 20
 LEASE_S = 2.0
-STEP_S = 0.1  # between two setpoints on the way into the safe state
+STEP_S = 0.1  # between two setpoints of the safe trajectory
 HEATER_OFF_K = 293.15
 ATMOSPHERE_PA = 105e3
-PATIENCE_S = 20.0  # how long a driver that nobody listens to goes on behind the longest way
-WAITING = 256  # messages for a host that does not read; samples beyond are dropped, which the host sees
-KEPT = 64  # places beyond those for answers and remarks alone: a rig is in doubt as long as its answer has not come
+PATIENCE_S = 20.0  # how long a driver without a host keeps trying after the longest trajectory
+WAITING = 256  # queue for a host that does not read; further samples are dropped, which the host detects
+KEPT = 64  # extra places for answers and remarks: a rig is in doubt until its answer arrives
 ROWS = 500  # samples in one message
-LATEST_S = 1e9  # run time that a simulated rig is polled for: beyond it the steps of a way down are lost in rounding
-TERMINATE = object()  # among what comes: a signal asks to end
+LATEST_S = 1e9  # maximum run time of a simulated rig: beyond it the steps of a run-down are lost to rounding
+TERMINATE = object()  # queue entry: a signal requests termination
 
 UNITS = {
     "N": "rpm", "m_c": "kg/s", "P1": "Pa", "T1": "K", "P2": "Pa", "T2": "K", "Tc": "K", "m_t": "kg/s", "P3": "Pa", "T3": "K",
@@ -39,7 +39,7 @@ UNITS = {
 
 
 class Refused(Exception):
-    """A request that is refused: code of docs/protocol.md, one sentence, and what belongs to the code."""
+    """A refused request: code of docs/protocol.md, one sentence, and the data of the code."""
 
     def __init__(self, code, message, **more):
         super().__init__(message)
@@ -47,25 +47,25 @@ class Refused(Exception):
 
 
 class Rig:
-    """What an author writes. Times are seconds since arming."""
+    """The interface that an author implements. Times are seconds since arming."""
 
     def describe(self):
         """A dict as `description` of docs/protocol.md; see description()."""
         raise NotImplementedError
 
     def arm(self):
-        """Takes the rig; time 0."""
+        """Arms the rig; time 0."""
 
     def set(self, setpoints):
-        """New setpoints: mode, p3_pa, t3_k, valve_opening_ratio, oil_temperature_k. What is outside `accepts` never comes here."""
+        """New setpoints: mode, p3_pa, t3_k, valve_opening_ratio, oil_temperature_k. They are always within `accepts`."""
         raise NotImplementedError
 
     def hold(self):
-        """Stay at the setpoints that were set last: somebody looks. Nothing to do where the rig keeps them by itself."""
+        """Hold the last setpoints while an operator checks the rig. Nothing to do if the rig keeps them by itself."""
 
     def poll(self, until_s):
-        """Samples since the last poll, up to until_s: (times, {channel: values}, [(t_s, kind, message)]). In real time it is called at the
-        rate of the rig, for the newest sample."""
+        """Samples since the last poll, up to until_s: (times, {channel: values}, [(t_s, kind, message)]). In real time it is called at
+        the rate of the rig, for the newest sample."""
         raise NotImplementedError
 
     def make_safe(self):
@@ -73,7 +73,7 @@ class Rig:
         raise NotImplementedError
 
     def disarm(self):
-        """Gives the rig back."""
+        """Disarms the rig."""
 
 
 def description(channels, sample_rate_hz, simulated_time, accepts, safe, needs_guarded=(), exclusive=None):
@@ -98,7 +98,7 @@ def secret(setting):
 
 
 def check(setpoints, accepts):
-    """Refuses setpoints outside of what the rig accepts, and those that are not numbers."""
+    """Refuses setpoints that are outside the accepted ranges or not numbers."""
     for key in ("p3_pa", "t3_k", "valve_opening_ratio", "oil_temperature_k"):
         value, (low, high) = setpoints.get(key), accepts[key]
         if not isinstance(value, (int, float)) or not low <= value <= high:
@@ -108,7 +108,7 @@ def check(setpoints, accepts):
 
 
 class Server:
-    """What a driver does at each message and at each tick; time is an argument."""
+    """The driver's reaction to each message and each tick; time is an argument."""
 
     def __init__(self, name, version, open_rig):
         self.name, self.version, self.open_rig = name, version, open_rig
@@ -121,7 +121,7 @@ class Server:
         return self.leaving and self.armed is None
 
     def begin(self, now_s):
-        """Arming may take seconds: time and lease begin with the first word or tick after it."""
+        """Arming may take seconds: time and lease begin with the first message or tick after it."""
         if self.armed and self.armed.pop("fresh", False):
             self.armed["at_s"], self.armed["lease_s"] = now_s, now_s + LEASE_S
 
@@ -218,13 +218,13 @@ class Server:
     def on_disarm(self, _, __):
         armed = self.held()
         if armed["told"] or armed["descent"]:
-            self.on_make_safe(None, None)  # a rig that does not confirm it is not let go
+            self.on_make_safe(None, None)  # a rig is not disarmed before it confirms
         self.rig.disarm()
         self.armed = None
         return {}
 
     def measure(self, until_s):
-        """Polls the rig and sends what it gave, in pieces."""
+        """Polls the rig and sends its samples in pieces."""
         times, columns, events = self.rig.poll(until_s)
         for start in range(0, len(times), ROWS) if times else ([0] if events else []):
             end = start + ROWS
@@ -242,7 +242,7 @@ class Server:
         self.out.append({"method": "note", "params": {"message": words}})
 
     def leave(self, now_s):
-        """Nobody is there any more: the rig becomes safe, then it is over."""
+        """The host has disconnected: makes the rig safe, then ends."""
         self.begin(now_s)
         if not self.leaving:
             self.leaving = True
@@ -258,7 +258,7 @@ class Server:
             armed["descent"] = (armed["told"], self.run_s(now_s))
 
     def tick(self, now_s):
-        """What is due; gives the time until something is due next, s, or None."""
+        """Does what is due; returns the time to the next task, s, or None."""
         self.begin(now_s)
         armed = self.armed
         if not armed:
@@ -267,7 +267,7 @@ class Server:
             self.say("nothing was heard for the time of the lease; the rig flies its safe trajectory")
             self.begin_descent(now_s)
         next_s = max(0.0, armed["lease_s"] - now_s) if not armed["ended"] else 1.0
-        # A rig that does not confirm its safe state is not polled, so that what watches the driver acts.
+        # A rig that does not confirm its safe state is not polled, so that the watchdog on the driver acts.
         if not self.about["simulated_time"] and not armed.get("in_doubt"):
             period_s = 1.0 / self.about["sample_rate_hz"]
             due = max(0, int((now_s - armed["at_s"]) / period_s + 5e-7))
@@ -287,7 +287,7 @@ class Server:
             try:
                 self.rig.disarm()
             except Exception:
-                pass  # nobody can be told
+                pass  # no host to report to
             self.armed = None
         return max(0.0, next_s)
 
@@ -310,7 +310,7 @@ class Server:
                         self.rig.poll(armed["polled_s"])
                     return 0.0 if simulated else STEP_S
             except Exception:
-                pass  # then at once
+                pass  # cut the air at once
             armed["cut"] = True
         if self.cut_air():
             armed["descent"], armed["told"], armed["in_doubt"] = None, None, False
@@ -321,11 +321,11 @@ class Server:
             if simulated:
                 armed["polled_s"] += STEP_S
             if self.leaving and after_s > safe["within_s"] + PATIENCE_S:
-                armed["descent"] = None  # nobody listens, and the rig does not answer
+                armed["descent"] = None  # no host, and the rig does not answer
         return STEP_S
 
     def on_the_way(self, told, safe, after_s):
-        """What the rig is told after_s into the way; None: the air is cut."""
+        """Setpoints of the safe trajectory after_s from its start; None: cut the air."""
         slew_pa_s = safe.get("p3_slew_pa_s")
         if not (told and told.get("mode") == "running" and slew_pa_s and after_s <= safe["within_s"]):
             return None
@@ -355,7 +355,7 @@ class Server:
 
 
 def read_frame(stream):
-    """The next message; None at the end of the stream, or where it is not one."""
+    """The next message; None at the end of the stream, or for an invalid frame."""
     head = stream.read(4)
     if len(head) < 4:
         return None
@@ -367,10 +367,10 @@ def read_frame(stream):
 
 
 def serve(name, version, open_rig):
-    """Serves one host on standard input and output, or with `--socket PATH` those that come to that socket, one after the other. open_rig(settings)
+    """Serves one host on standard input and output, or with `--socket PATH` hosts that connect there, one after the other. open_rig(settings)
     makes the Rig; the file of the driver is mapper-backend-NAME."""
     news = queue.Queue(WAITING)
-    # What a print() of the author or a library in C writes goes to standard error: it must not get between the frames.
+    # Output of the author's print() or a C library goes to standard error: it must not get between the frames.
     frames = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     sys.stdout = sys.stderr
@@ -390,7 +390,7 @@ def serve(name, version, open_rig):
 
 
 def serve_at(path, name, version, open_rig, news):
-    """Serves the hosts that come to a socket, which is its user's alone. Who comes while another is served is told so."""
+    """Serves the hosts of a socket that only the user can access. A host that connects while another is served is refused."""
     try:
         listener = listen_at(path)
     except OSError as error:
@@ -425,7 +425,7 @@ def serve_at(path, name, version, open_rig, news):
 
 
 def listen_at(path):
-    """A socket that listens at this path. What a driver left there that was killed is taken away."""
+    """A socket that listens at this path. Removes the socket of a killed driver."""
     os.makedirs(os.path.dirname(os.path.abspath(path)), mode=0o700, exist_ok=True)
     listener = socket.socket(socket.AF_UNIX)
     if os.path.lexists(path):
@@ -445,11 +445,11 @@ def hang_up(host):
     try:
         host.shutdown(socket.SHUT_RDWR)
     except OSError:
-        pass  # it is gone already
+        pass  # already disconnected
 
 
 def turn_away(host):
-    """Answers the first request with why there is no more."""
+    """Answers the first request with a refusal."""
     try:
         host.settimeout(1.0)
         with host, host.makefile("rb") as stdin:
@@ -458,11 +458,11 @@ def turn_away(host):
             body = json.dumps({"id": identity, "error": {"code": "refused", "message": words}}).encode()
             host.sendall(struct.pack(">I", len(body)) + body)
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        pass  # whoever it was, he says nothing that could be answered
+        pass  # disconnected, or not a valid request
 
 
 def serve_one(server, stdin, write, news):
-    """Serves this host until it is gone and the rig is safe; write() takes a frame. Whether a signal asked to end meanwhile."""
+    """Serves this host until it disconnects and the rig is safe; write() takes a frame. Returns whether a signal requested termination."""
     to_write = queue.Queue(WAITING + KEPT)
     asked_to_end = False
 
@@ -471,7 +471,7 @@ def serve_one(server, stdin, write, news):
             while (body := read_frame(stdin)) and (message := json.loads(body)) is not None:
                 news.put(message)
         except (OSError, ValueError, RecursionError):
-            pass  # gone, or nobody knows where the next frame begins
+            pass  # disconnected, or the start of the next frame is unknown
         news.put(None)
 
     def tell():
@@ -496,19 +496,19 @@ def serve_one(server, stdin, write, news):
     def send():
         for message in server.out:
             if message.get("method") in ("samples", "lost") and to_write.qsize() >= WAITING:
-                continue  # it will be missed by its number, or comes again
+                continue  # the host detects the gap, or it is sent later
             try:
                 to_write.put_nowait(json.dumps(message, allow_nan=False).encode())
             except queue.Full:
-                pass  # it will be missed by the deadline of who asked
-            except Exception as error:  # numpy's numbers, say: json does not know them
+                pass  # the request times out at the host
+            except Exception as error:  # e.g. numpy's numbers, which json does not support
                 print(f"not sent: {error!r}; give plain numbers and texts", file=sys.stderr)
         server.out.clear()
 
     try:
         while not server.over():
             try:
-                while True:  # what has come while the rig was busy has come in time
+                while True:  # messages that arrived while the rig was busy count as in time
                     heed(news.get_nowait())
             except queue.Empty:
                 pass
@@ -522,15 +522,15 @@ def serve_one(server, stdin, write, news):
                 pass
             send()
     finally:
-        # Whatever failed above: no rig is left driven.
+        # After any failure above, the air is cut.
         if server.armed:
             server.cut_air()
             try:
                 server.rig.disarm()
             except Exception:
-                pass  # nobody can be told
+                pass  # no host to report to
         try:
             to_write.put_nowait(None)
         except queue.Full:
-            pass  # who writes ends with the pipe
+            pass  # the writer ends with the pipe
     return asked_to_end

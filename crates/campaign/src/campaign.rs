@@ -1,5 +1,5 @@
-//! The campaign as a whole: how the file is written, and what it becomes, units resolved and defaults filled in. Its
-//! elements stand in `elements`, one file each.
+//! The complete campaign: the form of the file, and the result with units resolved and defaults filled in. Its
+//! elements are in `elements`, one file each.
 
 use crate::elements::backend::backend;
 use crate::elements::boundary::BoundaryFile;
@@ -44,81 +44,81 @@ pub use crate::elements::report::Report;
 pub use crate::elements::sequence::SequenceSource;
 pub use crate::elements::several_sensors::SensorDeclaration;
 
-/// Everything a run needs to know, without mistakes that can be known beforehand.
+/// Everything that a run needs. All mistakes that can be found in advance have been excluded.
 ///
 /// Its JSON is canonical (keys in order, SI values): the planner hashes it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Campaign {
     /// Name; letters, digits, `_`, `-` and `.` only, at most 64.
     pub name: String,
-    /// What it is for.
+    /// Its purpose.
     pub description: Option<String>,
     /// The machine.
     pub machine: Machine,
-    /// Boundary conditions. `p3_pa` and `valve_opening_ratio` are not the campaign's: they are
+    /// Boundary conditions. `p3_pa` and `valve_opening_ratio` are not set by the campaign: they are
     /// the turbine outlet pressure (no flow) and 1 until the plan sets them.
     pub boundary: BoundaryConditions,
-    /// What is held at the compressor's outlet temperature of each point instead.
+    /// Conditions that are held at the compressor's outlet temperature of each point instead.
     pub follow_outlet: FollowOutlet,
     /// Declared uncertainty of each channel that has a sensor.
     pub sensors: BTreeMap<Channel, SensorDeclaration>,
-    /// Declared tolerances of the nominal model; the usual ones where the file gives none.
+    /// Declared tolerances of the nominal model; the defaults if the file gives none.
     pub tolerances: ModelTolerances,
-    /// Whether the file gives any: only then the machine is declared to be like its nominal map.
+    /// Whether the file gives any tolerances: only then does the campaign declare that the machine matches its nominal map.
     pub tolerances_declared: bool,
     /// The rig.
     pub backend: BackendChoice,
-    /// Further sources of channels, which are read and never told anything.
+    /// Auxiliary instruments: further sources of channels, which are read and never commanded.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub readers: Vec<ReaderChoice>,
     /// The grid in the order of the file, no point twice: `points` as listed, or for each opening all speeds, or line by
     /// line from choke to surge.
     pub points: Vec<OperatingPoint>,
-    /// The speed lines that the points were resolved from; none where the file gives openings.
+    /// The speed lines that the points were resolved from; none if the file gives openings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<LineRequest>,
-    /// How long things take.
+    /// Durations.
     pub timing: Timing,
-    /// The rest before the warm-up, for a zero of the sensors, if there is one.
+    /// The soak before the warm-up, for a zero of the sensors, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zero: Option<Soak>,
     /// How points are identified.
     pub identification: Identification,
     /// Order of the points.
     pub order: VisitOrder,
-    /// The script that says which step comes next, if there is one.
+    /// The script that chooses the next step, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<SequenceSource>,
-    /// The jump that is repeated, if any.
+    /// The repeated jump, if there is one.
     pub repeats: Option<Repeats>,
-    /// Whether the first point, which no jump leads to, is visited once more at the end of the plan.
+    /// Whether the first point, which no jump leads to, is visited again at the end of the plan.
     pub return_to_first: bool,
-    /// What is done when repeats differ by more than is declared; `None`: they are not watched.
+    /// Reaction to repeats that differ by more than declared; `None`: they are not monitored.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_drift: Option<OnDrift>,
-    /// How the shaft speed of each step is held; `None`: P3 stays as planned.
+    /// Control of the shaft speed of each step; `None`: P3 stays as planned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_control: Option<SpeedControlSettings>,
-    /// How surge is sought after all other steps, if it is.
+    /// The search for surge after all other steps, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surge_search: Option<SurgeSeek>,
     /// Seed of the search and of simulated rigs.
     pub seed: u64,
-    /// What the run must never leave.
+    /// Limits of the run.
     pub limits: Limits,
-    /// The guards that the file declares; [`Campaign::guard_set`] has those that hold.
+    /// The guards that the file declares; [`Campaign::guard_set`] has those in force.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guards: Option<GuardSet>,
-    /// The way into the safe state; `None`: the rig's own.
+    /// The safe shutdown; `None`: the rig's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub safe_state: Option<SafeTrajectory>,
-    /// State to which the results' corrected quantities refer.
+    /// Reference state of the results' corrected quantities.
     pub reference: ReferenceState,
-    /// What is written.
+    /// Output settings.
     pub outputs: Outputs,
-    /// What a test report needs.
+    /// Additional information for a test report.
     pub report: Report,
-    /// Units shown to people.
+    /// Display units.
     pub display: DisplayUnits,
 }
 
@@ -148,81 +148,81 @@ pub(crate) struct CampaignFile {
     /// Name of the campaign; run directories begin with it. Letters, digits, `_`, `-` and `.`, at most 64, the first a letter or digit.
     #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"turbo_a")]
     campaign: String,
-    /// What the campaign is for, in your own words.
+    /// Purpose of the campaign, in your own words.
     description: Option<String>,
     /// The turbocharger under test.
     machine: MachineFile,
-    /// What the rig and the cell hold constant.
+    /// Conditions that the rig and the cell hold constant.
     boundary: BoundaryFile,
     /// Declared uncertainty of each measured channel, by its symbol.
     sensors: SensorsFile,
-    /// Declared tolerances of the nominal model; the defaults where none are given.
+    /// Declared tolerances of the nominal model; the defaults if none are given.
     #[serde(default, deserialize_with = "TolerancesElement::declared")]
     #[schemars(with = "TolerancesElement")]
     tolerances: Option<ModelTolerances>,
-    /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. What stands there is checked by the backend.
+    /// The rig, by the name of its backend, with the backend's own settings below it, e.g. `virtual_lab: {}`. The backend checks its settings.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"virtual_lab": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
-    /// Further sources of channels by a name of your own, e.g. a flow meter that the PLC does not know: read beside the rig, never told anything.
+    /// Auxiliary instruments by a name of your own, e.g. a flow meter unknown to the PLC: read alongside the rig, never commanded.
     #[serde(default)]
     #[schemars(extend("maxProperties" = 16), example = serde_json::json!({"flow_meter": {"backend": {"ak": {}}}}))]
     readers: BTreeMap<String, ReaderFile>,
     /// The operating points: `speeds` and `openings`, or `lines`, or `points`.
     pub(crate) grid: GridFile,
-    /// How long things take.
+    /// Durations of the campaign's parts.
     timing: TimingFile,
-    /// The isothermal zero before the first point; none where it is left out.
+    /// The isothermal zero before the first point; no zero if it is left out.
     zero: Option<ZeroFile>,
-    /// How efficiency and heat-transfer coefficient are found.
+    /// Method that identifies efficiency and heat-transfer coefficient.
     identification: Option<IdentificationFile>,
     /// Order of the points. `thermal_gradient`, the default, maximises the sum of the housing's temperature changes (Burke et al., figure 13 b), `min_gradient` the smallest of them; `speed_lines` follows speed lines (figure 13 a), `conventional` too, and holds each point until it no longer drifts; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
-    /// A rhai script that says which step comes next, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md says what it may call.
+    /// A rhai script that chooses the next step, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md lists the functions it may call.
     #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
     sequence: Option<String>,
-    /// A jump that is repeated, so that drift shows: at least twice, and every 12 steps where nothing else is said; `off` for none. A sequence script makes its own repeats.
+    /// A jump that is repeated to show drift: by default at least twice, and every 12 steps; `off` for none. A sequence script makes its own repeats.
     #[schemars(example = &"off")]
     repeats: Option<RepeatsFile>,
-    /// Whether the first point is visited once more at the end, with a jump that leads to it: without one it has no transient to identify. `true` if it is left out; the method `steady` and sequence scripts make no such visit.
+    /// Whether the first point is visited again at the end, with a jump that leads to it: without a jump it has no transient to identify. `true` if it is left out; the method `steady` and sequence scripts make no such visit.
     #[schemars(example = true)]
     return_to_first: Option<bool>,
-    /// Watches the repeats while the campaign runs: one that differs from its first visit by more than is declared is made again, and what differs again is drift.
+    /// Monitors the repeats while the campaign runs: a repeat that differs from its first visit by more than declared is made again; a second difference counts as drift.
     drift: Option<DriftFile>,
-    /// Holds the shaft speed of each step at its target by P3, on top of what the plan has for the nominal machine; `off` leaves P3 as planned.
+    /// Holds the shaft speed of each step at its target by adjusting the planned P3; `off` leaves P3 as planned.
     #[schemars(example = &"off")]
     speed_control: Option<SpeedControlFile>,
-    /// Seeks the surge line after all other steps; it is not sought where this is left out.
+    /// Searches for the surge line after all other steps; no search if it is left out.
     surge_search: Option<SurgeSearchFile>,
     /// Seed of the search and of simulated rigs: same seed, same bytes. A whole number from 0.
     #[schemars(example = 1)]
     seed: Option<u64>,
-    /// What the run must never leave.
+    /// Limits that the run must never exceed.
     limits: LimitsFile,
-    /// What ends a run, or a step, before harm is done; every limit is guarded without it.
+    /// Guards that end a run, or a step, before damage is done; every limit is guarded even if none are given.
     guards: Option<GuardsFile>,
-    /// The way into the safe state; the rig's own if it is left out.
+    /// The safe shutdown; the rig's own if it is left out.
     safe_state: Option<SafeStateFile>,
     /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE if none is given.
     #[schemars(example = &"SAE")]
     reference: Option<ReferenceFile>,
-    /// What is written, and where.
+    /// Formats and directory of the results.
     #[serde(default)]
     outputs: Outputs,
-    /// What a test report needs and no sensor measures.
+    /// Information for the test report that no sensor measures.
     #[serde(default)]
     report: Report,
-    /// Units in which people are shown results; files keep SI.
+    /// Display units of the results; files keep SI.
     #[serde(default)]
     display: DisplayUnits,
 }
 
 impl CampaignFile {
-    /// The campaign of a file without mistakes, and for each of its points the place in the file it came from. Of each
-    /// line it has one point so far: the others need the nominal model.
+    /// The campaign of a file without mistakes, and for each of its points the place in the file it came from. Each line
+    /// has only one point so far: the others need the nominal model.
     ///
     /// # Errors
-    /// Only where the map file or the sequence script can no longer be read.
+    /// Only if the map file or the sequence script can no longer be read.
     pub(crate) fn campaign(
         self,
         origin: &Path,
@@ -283,5 +283,5 @@ impl CampaignFile {
     }
 }
 
-/// Seed where the file names none.
+/// Seed if the file gives none.
 const USUAL_SEED: u64 = 1;

@@ -1,4 +1,4 @@
-//! What the checks of the elements read and write with.
+//! Access to the file and its findings for the checks of the elements.
 //!
 //! Works on the tree and skips what is missing or unreadable, so that one mistake does not hide another.
 
@@ -16,7 +16,7 @@ pub(crate) fn beside(origin: &Path, file: &str) -> PathBuf {
     origin.parent().unwrap_or(Path::new("")).join(file)
 }
 
-/// A file as far as it could be read, and where its mistakes go.
+/// A file as far as it could be read, and its list of mistakes.
 pub(crate) struct Check<'a> {
     pub source: &'a Source,
     pub root: &'a Node,
@@ -25,7 +25,7 @@ pub(crate) struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    /// What stands at a path.
+    /// The node at a path.
     pub fn get(&self, steps: &[Step]) -> Option<&'a Node> {
         self.root.get(steps)
     }
@@ -35,7 +35,7 @@ impl<'a> Check<'a> {
         self.root.get(steps)?.text()
     }
 
-    /// The value in the unit used inside, and its text.
+    /// The value in the internal unit, and its text.
     pub fn quantity(&self, kind: Kind, steps: &[Step]) -> Option<(f64, &'a str)> {
         let text = self.text(steps)?;
         Some((units::parse(kind, text).ok()?, text))
@@ -46,7 +46,7 @@ impl<'a> Check<'a> {
         self.root.get(steps)?.number()
     }
 
-    /// Entries of a list; 0 for what is none.
+    /// Number of entries of a list; 0 if it is not a list.
     pub fn count(&self, steps: &[Step]) -> usize {
         self.root.get(steps).map_or(0, |node| node.items().len())
     }
@@ -65,7 +65,7 @@ impl<'a> Check<'a> {
         self.notes.push(finding);
     }
 
-    /// A mistake at a key, which is there although its value may be right.
+    /// A mistake at a key, if the key itself is wrong and not its value.
     pub fn note_key(&mut self, kind: FindingKind, parent: &[Step], key: &str, message: String, remedy: &str) {
         let place = self.root.key_place(parent, key);
         let path = format!("{}.{key}", path_text(parent));

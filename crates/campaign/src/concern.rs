@@ -1,17 +1,17 @@
-//! What is to be feared of a campaign, at its place.
+//! Concerns about a campaign, with their places.
 
 use mapper_yaml::Step;
 
-/// Something in a campaign that dooms it, or makes one wonder.
+/// An unusual setting in a campaign that prevents the run or calls for a warning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concern {
-    /// Whether the campaign cannot be run; otherwise it is a warning.
+    /// Whether the campaign cannot be run; otherwise this is a warning.
     pub grave: bool,
-    /// The key it stands at.
+    /// The key it refers to.
     pub at: Vec<Step>,
     /// What is wrong, with values and units.
     pub message: String,
-    /// What to do.
+    /// The remedy.
     pub remedy: String,
 }
 
@@ -23,7 +23,7 @@ impl Concern {
     }
 }
 
-/// Millimetres without digits that nobody wrote.
+/// Millimetres without insignificant digits.
 pub(crate) fn mm(length_m: f64) -> f64 {
     (1e7 * length_m).round() / 1e4
 }

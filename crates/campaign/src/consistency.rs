@@ -1,5 +1,5 @@
-//! What no schema can say: statements of one file that must fit each other, and the files it names. Each element has its
-//! own check; here they are called, in the order in which findings are told.
+//! Checks beyond the schema: consistency between values of one file, and the files it names. Each element has its
+//! own check; here they are called, in the order in which findings are reported.
 
 use crate::checking::{Check, Files};
 use crate::elements;

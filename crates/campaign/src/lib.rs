@@ -1,8 +1,8 @@
 //! Campaign files: YAML text -> a checked [`Campaign`], or all its mistakes, each with its place and remedy.
 //!
-//! The text becomes a tree that keeps positions; the tree is checked against the JSON schema that
-//! [`json_schema`] also gives to editors, units and ranges included; then against itself (grid, limits, window,
-//! files). Only a text without mistakes is deserialised, and only then points are judged for reachability.
+//! The text becomes a tree that keeps positions. The tree is checked against the JSON schema that
+//! [`json_schema`] also gives to editors, units and ranges included; then for consistency (grid, limits, window,
+//! files). Only a text without mistakes is deserialised, and only then are points checked for reachability.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

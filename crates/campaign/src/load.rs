@@ -1,4 +1,4 @@
-//! From a text, or a file, to a campaign or all its mistakes.
+//! Reads a campaign from a text or a file, or returns all its mistakes.
 
 use crate::campaign::{Campaign, CampaignFile};
 use crate::concern::Concern;
@@ -11,7 +11,7 @@ use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, ReadError, Sourc
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What messages call a campaign file.
+/// Name of a campaign file in messages.
 pub(crate) static DOCUMENT: Document = Document { name: "campaign", example: "campaigns/turbo_a.yaml" };
 
 /// Largest campaign file that is read, bytes.
@@ -39,7 +39,7 @@ pub enum CampaignError {
 /// Reads and checks a campaign file and the files it names.
 ///
 /// # Errors
-/// [`CampaignError::Read`] where the file cannot be read, [`CampaignError::Mistakes`] with all its mistakes.
+/// [`CampaignError::Read`] if the file cannot be read, [`CampaignError::Mistakes`] with all its mistakes.
 pub fn load(path: &Path) -> Result<Campaign, CampaignError> {
     let mistakes = |findings| CampaignError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, FILE_SIZE_LIMIT)
@@ -48,13 +48,13 @@ pub fn load(path: &Path) -> Result<Campaign, CampaignError> {
     check(&text, path, &read_text).map_err(mistakes)
 }
 
-/// Checks a campaign's text. `origin` names it in messages and is where relative paths start; `files` reads the
+/// Checks a campaign's text. `origin` names it in messages and is the base of relative paths; `files` reads the
 /// files it names.
 ///
-/// Points are judged by the steady states of the nominal model; see [`check_with`] for another judge.
+/// The steady states of the nominal model determine which points can be reached; see [`check_with`] for another criterion.
 ///
 /// # Errors
-/// All mistakes of the text in one go.
+/// All mistakes of the text together.
 pub fn check(
     text: &str,
     origin: &Path,
@@ -68,10 +68,10 @@ pub fn check(
     })
 }
 
-/// As [`check`], with the caller's own judgement of which points can be reached.
+/// As [`check`], with the caller's own criterion for reachable points.
 ///
 /// # Errors
-/// All mistakes of the text in one go; points are judged only where there are no others.
+/// All mistakes of the text together; points are checked only if there are no others.
 pub fn check_with(
     text: &str,
     origin: &Path,
@@ -101,10 +101,10 @@ pub fn check_with(
     Err(Findings::new(source, notes))
 }
 
-/// A mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
+/// Reports a mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
 ///
 /// `at`: keys down to the backend's name, e.g. `backend.virtual_lab`; `setting`: the path below it, e.g. `machine.alpha_area`. A
-/// path that the text does not have points at what there is of it. A `hidden` value is shown as asterisks: terminals are logged.
+/// path that the text does not have points at its nearest existing parent. A `hidden` value is shown as asterisks: terminals are logged.
 pub fn backend_mistake(
     text: &str,
     origin: &Path,
@@ -120,7 +120,7 @@ pub fn backend_mistake(
     let steps: Vec<Step> = keys.filter(|key| !key.is_empty()).map(Step::from).collect();
     let span = root.map_or(0..0, |root| root.place(&steps));
     if let (true, Some(value)) = (hidden, text.get(span.clone())) {
-        // As long as it was, so that all places stay.
+        // The same length, so that all places stay valid.
         let asterisks = value.bytes().map(|byte| if byte == b'\n' { '\n' } else { '*' }).collect::<String>();
         source =
             Source::new(&DOCUMENT, origin, &[&text[..span.start], &asterisks, &text[span.end..]].concat());
@@ -131,7 +131,7 @@ pub fn backend_mistake(
     Findings::new(source, notes)
 }
 
-/// A format of the map that nobody writes, at its place in the campaign's text. `known`: the names that can be written.
+/// An unknown format of the map, at its place in the campaign's text. `known`: the supported names.
 pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -> Findings {
     let source = Source::new(&DOCUMENT, origin, text);
     let mut notes = Notes::default();
@@ -148,7 +148,7 @@ pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -
     Findings::new(source, notes)
 }
 
-/// What in a campaign without mistakes is rarely meant, each at its place in the text. `more`: what others know of it.
+/// Unusual settings in a campaign without mistakes, each at its place in the text. `more`: findings of other crates.
 pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concern>) -> Findings {
     let source = Source::new(&DOCUMENT, origin, text);
     let mut notes = Notes::default();
@@ -198,7 +198,7 @@ fn finish(
     let (mut campaign, mut point_paths) = match file.campaign(&source.origin, files) {
         Ok(built) => built,
         Err(error) => {
-            // Both were there a moment ago; the map is the usual one.
+            // Both were present a moment ago; the map is the default one.
             let map = steps!["machine", "map", "file"];
             let sequence = steps!["sequence"];
             let steps: &[Step] = if root.get(&map).is_some() { &map } else { &sequence };
@@ -239,7 +239,7 @@ fn finish(
 /// A file that a campaign names, or a campaign itself, as text.
 ///
 /// # Errors
-/// What the system says; [`io::ErrorKind::FileTooLarge`] for a file beyond what is read, [`io::ErrorKind::InvalidData`] for one that
+/// The system's error; [`io::ErrorKind::FileTooLarge`] for a file above the size limit, [`io::ErrorKind::InvalidData`] for one that
 /// is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(mapper_yaml::read_limited(path, MAP_SIZE_LIMIT)?)

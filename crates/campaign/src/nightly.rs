@@ -1,4 +1,4 @@
-//! The nightly campaign: which campaigns are run by which methods with which seeds, and where the history is.
+//! The nightly campaign: campaigns with their methods and seeds, and the history.
 
 use crate::load::FILE_SIZE_LIMIT;
 use mapper_yaml::{
@@ -9,12 +9,12 @@ use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// What messages call the file.
+/// Name of the file in messages.
 static DOCUMENT: Document = Document { name: "nightly campaign", example: "campaigns/nightly.yaml" };
 
 /// Maximum number of runs that one nightly campaign may ask for.
 const RUNS_LIMIT: usize = 10_000;
-/// Nights that make a band where the file does not say.
+/// Default number of nights that make a band.
 const DEFAULT_NIGHTS: usize = 14;
 
 /// Why there is no nightly campaign.
@@ -33,10 +33,10 @@ pub enum NightlyError {
     Mistakes(Box<Findings>),
 }
 
-/// What is run every night.
+/// The runs of every night.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Nightly {
-    /// Name; nights of other names are never compared.
+    /// Name; only nights of the same name are compared.
     pub name: String,
     /// The history's file, relative to the working directory as written.
     pub history: PathBuf,
@@ -51,7 +51,7 @@ pub struct Nightly {
 pub struct NightlyGroup {
     /// The campaign file, resolved from the nightly file's directory.
     pub campaign: PathBuf,
-    /// Methods, as the key `method` of a campaign writes them; empty: the campaign's own.
+    /// Methods, in the syntax of the key `method` of a campaign; empty: the campaign's own.
     pub methods: Vec<String>,
     /// Seeds; empty: the campaign's own.
     pub seeds: Vec<u64>,
@@ -73,24 +73,24 @@ impl NightlyGroup {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct NightlyFile {
-    /// Name; nights of other names are never compared.
+    /// Name; only nights of the same name are compared.
     #[schemars(regex(pattern = r"\S"), example = &"turbo_a")]
     nightly: String,
     /// File of the history, relative to the working directory; `runs/history.db` if none is given.
     #[schemars(example = &"runs/history.db")]
     history: Option<PathBuf>,
-    /// How the band of earlier nights is made.
+    /// Settings of the band of earlier nights.
     band: Option<BandFile>,
     /// Campaigns with their methods and seeds.
     #[schemars(extend("examples" = [[{"campaign": "nightly/turbo_a.yaml"}]]))]
     runs: Vec<GroupFile>,
 }
 
-/// How the band of earlier nights is made.
+/// Settings of the band of earlier nights.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BandFile {
-    /// Nights that make the band, a whole number from 1; 14 are usual.
+    /// Number of nights that make the band, a whole number from 1; 14 are usual.
     #[schemars(range(min = 1), example = 14)]
     nights: usize,
 }
@@ -119,8 +119,8 @@ struct GroupFile {
 /// Reads a nightly campaign. The campaigns it names are not read.
 ///
 /// # Errors
-/// [`NightlyError::Read`] where the file cannot be read; [`NightlyError::Mistakes`] where it has unknown or missing
-/// keys, or asks for no run, the same run twice, or more than 10 000.
+/// [`NightlyError::Read`] if the file cannot be read; [`NightlyError::Mistakes`] if it has unknown or missing
+/// keys, or requests no run, the same run twice, or more than 10 000.
 pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
     let mistakes = |findings| NightlyError::Mistakes(Box::new(findings));
     let text = mapper_yaml::open(&DOCUMENT, path, FILE_SIZE_LIMIT)
@@ -156,7 +156,7 @@ fn check(text: &str, path: &Path) -> Result<Nightly, Findings> {
     Err(Findings::new(source, notes))
 }
 
-/// What no schema can say.
+/// Checks beyond the schema.
 struct Mistake {
     steps: Vec<Step>,
     kind: FindingKind,

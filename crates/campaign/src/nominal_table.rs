@@ -6,13 +6,13 @@ use mapper_yaml::units::{
     FoundColumn, HeadingError, Kind, TableText, WantedColumn, find_columns, with_units_row,
 };
 
-/// What the four columns measure.
+/// Quantities of the four columns.
 const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
 
-/// Why a file is no nominal map.
+/// Why a file is not a nominal map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NominalTableError {
-    /// The columns cannot be told by their heading.
+    /// The heading does not identify the columns.
     #[error(
         "line {line}: {source}; or leave the heading out and give rpm, kg/s, pressure ratio and efficiency in this order"
     )]
@@ -22,14 +22,14 @@ pub enum NominalTableError {
         /// What is wrong with it.
         source: HeadingError,
     },
-    /// A row that is none.
+    /// An invalid row.
     #[error(
         "line {line} of the map: `{text}` does not hold the four numbers of a point (speed, flow, pressure ratio, efficiency)"
     )]
     Row {
         /// Line of the file, from 1.
         line: usize,
-        /// What stands there, shortened.
+        /// Its text, shortened.
         text: String,
     },
     /// The numbers are not those of a compressor.
@@ -38,7 +38,7 @@ pub enum NominalTableError {
 }
 
 /// Reads separated text (`,`, or `;` or tab with decimal point or comma). A first line without numbers names the columns and their
-/// units, in any order and among others; units may have a line of their own below it. Without names they are corrected rpm, corrected
+/// units, in any order and among others; units may be on a line of their own below it. Without names they are corrected rpm, corrected
 /// kg/s, pressure ratio and efficiency. `#` starts a comment.
 ///
 /// # Errors
@@ -126,7 +126,7 @@ mod tests {
         let (named, bare) = (read(&text).unwrap(), read(SAMPLE).unwrap());
         for pr in [1.25, 1.3, 1.5, 1.6] {
             let (a, b) = (named.evaluate(60e3, pr), bare.evaluate(60e3, pr));
-            // Written and read through another unit: rounding alone.
+            // Written and read through another unit: only rounding differs.
             assert!((a.flow_corrected_kg_s / b.flow_corrected_kg_s - 1.0).abs() < 1e-12);
             assert!((a.efficiency / b.efficiency - 1.0).abs() < 1e-12);
         }

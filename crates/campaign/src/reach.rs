@@ -1,4 +1,4 @@
-//! Whether the nominal model can reach each point within the limits.
+//! Checks that the nominal model can reach each point within the limits.
 
 use crate::campaign::{Campaign, MapSource};
 use crate::nominal_table::{NominalTableError, nominal_table};
@@ -16,14 +16,14 @@ pub struct Unreachable {
     pub point: usize,
     /// Why, with values and units.
     pub reason: String,
-    /// What to do.
+    /// The remedy.
     pub remedy: String,
 }
 
 /// The nominal model of a campaign, on its map.
 ///
 /// # Errors
-/// [`NominalTableError`] where the map file's text is not a map; a checked campaign has none.
+/// [`NominalTableError`] if the map file's text is not a map; this cannot happen in a checked campaign.
 pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
     let params = campaign.machine.params;
     let map: Arc<dyn CompressorCharacteristic> = match &campaign.machine.map {
@@ -35,7 +35,7 @@ pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
     Ok(Model::new(params, map))
 }
 
-/// The points that cannot be measured, each with everything that is in its way; see [`mapper_physics::reach`].
+/// The points that cannot be measured, each with all reasons; see [`mapper_physics::reach`].
 pub fn unreachable_points(campaign: &Campaign, model: &Model) -> Vec<Unreachable> {
     let complaint = |(index, point): (usize, &OperatingPoint)| {
         let (boundary, limits) = (&campaign.boundary, &campaign.limits);

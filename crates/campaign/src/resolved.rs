@@ -1,4 +1,4 @@
-//! Speed lines of a campaign: their points on its nominal machine, and what people are shown of them.
+//! Speed lines of a campaign: their points on its nominal machine, and their display form.
 
 use crate::campaign::Campaign;
 use crate::concern::Concern;
@@ -10,7 +10,7 @@ use mapper_physics::params::BoundaryConditions;
 use mapper_yaml::{Step, steps};
 use serde::Serialize;
 
-/// Puts the points of the lines into the campaign; mistakes stand at their lines.
+/// Puts the points of the lines into the campaign; mistakes are reported at their lines.
 pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<Concern>> {
     let (mut points, mut concerns) = (Vec::new(), Vec::new());
     for (index, line) in campaign.lines.iter().enumerate() {
@@ -52,12 +52,12 @@ pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<
     Ok(())
 }
 
-/// The speed that a line has under the campaign's T1, rpm.
+/// The physical speed of a line under the campaign's T1, rpm.
 fn physical_speed_rpm(line: &LineRequest, campaign: &Campaign) -> f64 {
     line.reference.physical_speed_rpm(line.speed_corrected_rpm, campaign.boundary.t1_k)
 }
 
-/// Where each point stands in the file: at the line that has its speed.
+/// The place of each point in the file: the line that has its speed.
 pub(crate) fn places(campaign: &Campaign) -> Vec<Vec<Step>> {
     let line_of = |point: &OperatingPoint| {
         campaign.lines.iter().position(|line| physical_speed_rpm(line, campaign) == point.speed_rpm)
@@ -93,7 +93,7 @@ pub struct ResolvedPoint {
     pub surge_margin_ratio: f64,
 }
 
-/// The lines of a campaign; none where its file gives openings. A point that the machine does not rest at is left out: a
+/// The lines of a campaign; none if its file gives openings. A point without a steady state is left out; a
 /// checked campaign has none.
 pub fn resolved_lines(campaign: &Campaign, model: &Model) -> Vec<ResolvedLine> {
     let boundary = &campaign.boundary;

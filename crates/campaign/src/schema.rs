@@ -12,7 +12,7 @@ pub fn json_schema() -> Value {
     mapper_yaml::json_schema_of::<CampaignFile>()
 }
 
-/// The same, ready to check files against; made once.
+/// The compiled schema for validation; made once.
 pub(crate) static SCHEMA: LazyLock<Schema> = LazyLock::new(Schema::of::<CampaignFile>);
 
 #[cfg(test)]
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn a_validator_without_the_own_keyword_accepts_turbo_a_and_sees_mistakes() {
-        // What an editor does.
+        // Validates as an editor does.
         let validator = jsonschema::validator_for(&json_schema()).unwrap();
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/turbo_a.yaml");
         let text = std::fs::read_to_string(path).unwrap();

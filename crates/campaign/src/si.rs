@@ -1,17 +1,17 @@
-//! From a value written with its unit straight into a field in SI.
+//! Converts a value with its unit to a field in SI.
 
 use crate::units::{Dimension, Quantity};
 use serde::{Deserialize, Deserializer};
 
-/// For `deserialize_with`: a key that has to be there, or whose default the struct knows.
+/// For `deserialize_with`: a required key, or one whose default is in the struct.
 ///
 /// # Errors
-/// The deserialiser's, where the text is not a value of the dimension.
+/// The deserialiser's error, if the text is not a value of the dimension.
 pub(crate) fn si<'de, D: Dimension, S: Deserializer<'de>>(deserializer: S) -> Result<f64, S::Error> {
     Quantity::<D>::deserialize(deserializer).map(|quantity| quantity.inside)
 }
 
-/// For `deserialize_with`, beside `default`: a key that may be left out.
+/// For `deserialize_with`, together with `default`: an optional key.
 ///
 /// # Errors
 /// As [`si`].
@@ -26,7 +26,7 @@ pub(crate) fn or<D: Dimension>(quantity: Option<Quantity<D>>, default: f64) -> f
     quantity.map_or(default, |quantity| quantity.inside)
 }
 
-/// Overwrites a default with what the file says.
+/// Overrides a default with the value of the file.
 pub(crate) fn set<D: Dimension>(target: &mut f64, quantity: Option<Quantity<D>>) {
     *target = or(quantity, *target);
 }

@@ -1,4 +1,4 @@
-//! Elements read from a text, for their tests.
+//! Reads elements from a text, for their tests.
 
 use crate::load::DOCUMENT;
 use mapper_yaml::{Notes, Source};

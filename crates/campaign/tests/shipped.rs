@@ -30,7 +30,11 @@ fn every_shipped_campaign_is_right() {
 #[test]
 fn turbo_a_is_the_machine_of_appendix_a() {
     let campaign = load(&directory().join("turbo_a.yaml")).unwrap();
-    assert_eq!(campaign.machine.params, Params::default());
+    let mut params = campaign.machine.params;
+    // The campaign is run at 50 % of humidity, Appendix A's machine in dry air.
+    assert!((params.compressor.humidity_kg_kg - 0.01).abs() < 1e-3);
+    params.compressor.humidity_kg_kg = 0.0;
+    assert_eq!(params, Params::default());
     assert_eq!(campaign.boundary, BoundaryConditions::default());
     assert_eq!(campaign.machine.map, MapSource::ClosedForm);
     assert_eq!(campaign.reference, ReferenceState::SAE);

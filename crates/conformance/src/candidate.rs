@@ -1,35 +1,35 @@
-//! A backend that is put to the test.
+//! A backend under test.
 
 use mapper_core::{Backend, BackendError, SampleBatch, Setpoints};
 
-/// Nothing, or what a rule found, in words.
+/// Success, or the finding of a rule.
 pub type Checked = Result<(), String>;
 
-/// How a backend is made and driven.
+/// Creates and drives the backend under test.
 pub struct Candidate<'a> {
-    /// Its name, as it describes itself.
+    /// Its name, from its description.
     pub name: &'a str,
-    /// Makes it again, each time the same.
+    /// Creates a fresh instance, the same each time.
     pub make: &'a dyn Fn() -> Result<Box<dyn Backend>, BackendError>,
-    /// Setpoints that it can follow.
+    /// Setpoints that the backend can follow.
     pub setpoints: Setpoints,
-    /// Run time after which it has nothing more to give, s; `None` for a rig that goes on.
+    /// Run time after which the backend has no more samples, s; `None` for a rig without end.
     pub lasts_s: Option<f64>,
 }
 
 impl Candidate<'_> {
-    /// A backend that has not been armed.
+    /// An unarmed backend.
     ///
     /// # Errors
-    /// What the backend says, in words.
+    /// The backend's error message.
     pub fn new_one(&self) -> Result<Box<dyn Backend>, String> {
         (self.make)().map_err(|error| error.to_string())
     }
 
-    /// A backend that is armed and has its first setpoints.
+    /// An armed backend with its first setpoints.
     ///
     /// # Errors
-    /// What the backend says, in words.
+    /// The backend's error message.
     pub fn running(&self) -> Result<Box<dyn Backend>, String> {
         let mut rig = self.new_one()?;
         fine("arm", rig.arm())?;
@@ -38,12 +38,12 @@ impl Candidate<'_> {
     }
 }
 
-/// An answer that has to be a good one.
+/// Requires success.
 pub(crate) fn fine<T>(call: &str, answer: Result<T, BackendError>) -> Result<T, String> {
     answer.map_err(|error| format!("`{call}` failed: {error}"))
 }
 
-/// An answer that has to be a refusal for the place in the life cycle.
+/// Requires a refusal because the call is out of order in the life cycle.
 pub(crate) fn out_of_order<T>(call: &str, answer: Result<T, BackendError>) -> Checked {
     match answer {
         Err(BackendError::OutOfOrder { .. }) => Ok(()),
@@ -52,10 +52,10 @@ pub(crate) fn out_of_order<T>(call: &str, answer: Result<T, BackendError>) -> Ch
     }
 }
 
-/// First sequence number, times, and columns of a batch, to the bit.
+/// First sequence number, times, and columns of a batch as bits.
 type Bits = (u64, Vec<u64>, Vec<(String, Vec<u64>)>);
 
-/// What a batch holds, to the bit: NaN is equal to NaN here.
+/// The content of a batch as bits: NaN equals NaN here.
 pub(crate) fn bits(batch: &SampleBatch) -> Bits {
     let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
     let columns = batch.columns.iter().map(|column| (column.channel.to_string(), bits(&column.values)));

@@ -1,6 +1,6 @@
-//! The conformance kit of the seam [`Backend`](mapper_core::Backend): rules that every backend keeps, as checks that anybody can
-//! run ([`RULES`], `mapper backend check NAME`), and a backend that misbehaves on demand ([`Misbehaving`]), so that what drives
-//! a rig can be tried against every fault.
+//! The conformance kit of the interface [`Backend`](mapper_core::Backend). Its rules are checks that every backend must pass
+//! ([`RULES`], `mapper backend check NAME`). A backend with faults on demand ([`Misbehaving`]) tests software that drives a rig
+//! against every fault.
 
 mod candidate;
 mod misbehaving;

@@ -1,55 +1,55 @@
-//! A backend that misbehaves on demand.
+//! A backend with faults on demand, for tests.
 
 use mapper_core::{
     Backend, BackendError, Channel, Event, EventKind, Provenance, Quality, RigDescription, RigMode,
     SampleBatch, Setpoints,
 };
 
-/// What goes wrong, from its time on.
+/// A fault, active from its start time on.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fault {
-    /// A sensor reads the same to the last bit.
+    /// A sensor repeats its last reading to the last bit.
     Frozen(Channel),
     /// A sensor reads NaN.
     Nan(Channel),
-    /// A sensor reads this.
+    /// A sensor reads this value.
     Reads(Channel, f64),
-    /// A channel is gone.
+    /// A channel is missing.
     Absent(Channel),
-    /// A sensor's readings are bad by the rig's own word.
+    /// The rig reports a sensor's readings as bad.
     Bad(Channel),
-    /// A sensor's readings are as old as this fault.
+    /// A sensor's readings keep the source time at which the fault began.
     Old(Channel),
-    /// No samples for so long, s; the connection is alive. They are gone.
+    /// No samples for this time, s, over a live connection. The samples are lost.
     Mute(f64),
-    /// Samples that are held back for so long, s, and come together then.
+    /// Samples are delayed by this time, s, and arrive together.
     Late(f64),
-    /// A batch comes twice.
+    /// A batch arrives twice.
     Doubled,
-    /// Samples of a batch in the wrong order.
+    /// The samples of a batch are out of order.
     Reordered,
-    /// Times go back by so much, s.
+    /// Times jump back by this amount, s.
     Backward(f64),
-    /// A column has fewer values than there are times.
+    /// A column has fewer values than the batch has times.
     Torn(Channel),
     /// Setpoints are refused.
     Refuses,
-    /// Setpoints are taken and not followed.
+    /// Setpoints are accepted but not followed.
     Ignores,
-    /// The rig cuts its air by itself; whether it says so.
+    /// The rig cuts its air by itself, with or without a report.
     Trips {
-        /// By an event.
+        /// Whether an event reports it.
         says_so: bool,
     },
-    /// The connection is lost for good.
+    /// The connection is lost permanently.
     Lost,
     /// A call panics.
     Panics,
-    /// Becoming safe fails so many times.
+    /// This number of safe-state commands fail.
     NotSafe(usize),
 }
 
-/// A fault of the kit, as a backend's own error.
+/// An injected fault, as the backend's own error.
 #[derive(Debug)]
 struct Demanded(&'static str);
 
@@ -61,34 +61,34 @@ impl std::fmt::Display for Demanded {
 
 impl std::error::Error for Demanded {}
 
-/// Another backend, with faults that begin at their times.
+/// Wraps another backend, and injects faults at their start times.
 pub struct Misbehaving<B> {
     inner: B,
-    /// Begin, s of run time, and what.
+    /// Start time, s of run time, and fault.
     faults: Vec<(f64, Fault)>,
     now_s: f64,
-    /// The last readings before a sensor froze.
-    held: Vec<(Channel, f64)>,
-    /// What is held back.
-    back: Vec<SampleBatch>,
+    /// The last reading before a sensor froze.
+    frozen: Vec<(Channel, f64)>,
+    /// Delayed batches.
+    delayed: Vec<SampleBatch>,
     tripped: bool,
-    /// Every safe command that arrived, with the run time of the last poll, s.
+    /// Times of the safe-state commands, as the run time of the last poll, s.
     pub safe_at_s: Vec<f64>,
-    /// When it was told to hold, s.
+    /// Times of the hold commands, s.
     pub held_at_s: Vec<f64>,
-    /// Every setpoint that arrived, with the same.
+    /// Setpoints received, with their times, s.
     pub told: Vec<(f64, Setpoints)>,
 }
 
 impl<B: Backend> Misbehaving<B> {
-    /// `inner` with these faults.
+    /// Wraps `inner` with these faults.
     pub fn new(inner: B, faults: Vec<(f64, Fault)>) -> Self {
         Misbehaving {
             inner,
             faults,
             now_s: 0.0,
-            held: Vec::new(),
-            back: Vec::new(),
+            frozen: Vec::new(),
+            delayed: Vec::new(),
             tripped: false,
             safe_at_s: Vec::new(),
             held_at_s: Vec::new(),
@@ -104,7 +104,7 @@ impl<B: Backend> Misbehaving<B> {
         BackendError::Lost { t_s: self.now_s, source: Box::new(Demanded("the connection is gone")) }
     }
 
-    /// What a sensor fault makes of a batch.
+    /// Applies a sensor fault to a batch.
     fn on_sensor(&mut self, begin_s: f64, fault: &Fault, batch: &mut SampleBatch) {
         let (Fault::Frozen(channel)
         | Fault::Nan(channel)
@@ -138,11 +138,11 @@ impl<B: Backend> Misbehaving<B> {
                 let value = match fault {
                     Fault::Nan(_) => f64::NAN,
                     Fault::Reads(_, value) => *value,
-                    Fault::Frozen(_) => match self.held.iter().find(|(held, _)| held == channel) {
+                    Fault::Frozen(_) => match self.frozen.iter().find(|(frozen, _)| frozen == channel) {
                         Some((_, value)) => *value,
                         None => {
                             let value = column.values.first().copied().unwrap_or(f64::NAN);
-                            self.held.push((*channel, value));
+                            self.frozen.push((*channel, value));
                             value
                         }
                     },
@@ -156,16 +156,16 @@ impl<B: Backend> Misbehaving<B> {
         }
     }
 
-    /// What a fault of the stream makes of a batch. A fault of one batch alone is over with it.
+    /// Applies a stream fault to a batch. A fault that affects a single batch ends with it.
     fn on_stream(&mut self, begin_s: f64, fault: &Fault, batch: SampleBatch) -> SampleBatch {
         match fault {
             Fault::Mute(duration_s) if self.now_s < begin_s + duration_s => SampleBatch::default(),
             Fault::Late(duration_s) if self.now_s < begin_s + duration_s => {
-                self.back.push(batch);
+                self.delayed.push(batch);
                 SampleBatch::default()
             }
-            Fault::Late(_) if !self.back.is_empty() => {
-                let mut all = std::mem::take(&mut self.back).into_iter().chain([batch]);
+            Fault::Late(_) if !self.delayed.is_empty() => {
+                let mut all = std::mem::take(&mut self.delayed).into_iter().chain([batch]);
                 let mut whole = all.next().unwrap_or_default();
                 for more in all {
                     whole.t_s.extend(more.t_s);
@@ -252,7 +252,7 @@ impl<B: Backend> Backend for Misbehaving<B> {
             self.on_sensor(begin_s, &fault, &mut batch);
             batch = self.on_stream(begin_s, &fault, batch);
             if fault == Fault::Doubled && batch.first_sequence > 0 {
-                // As if the one before had come again.
+                // The batch looks like a repeat of the previous one.
                 batch.first_sequence -= 1;
             }
         }

@@ -1,13 +1,13 @@
-//! The rules of the seam `Backend`, one function each.
+//! The rules of the interface `Backend`, one function each.
 
 use crate::candidate::{Candidate, Checked, bits, fine, out_of_order};
 use mapper_core::{BackendError, RigMode, Setpoints};
 use std::collections::BTreeSet;
 
-/// A rule, and how it is checked.
+/// A rule: its text and its check.
 pub type Rule = (&'static str, fn(&Candidate<'_>) -> Checked);
 
-/// All of them.
+/// All rules.
 #[rustfmt::skip]
 pub const RULES: &[Rule] = &[
     ("it describes itself before it is armed, and the same afterwards", describes_itself),
@@ -21,11 +21,11 @@ pub const RULES: &[Rule] = &[
     ("a setpoint that means nothing is refused by a typed error, and changes nothing", refuses_wild_setpoints),
     ("told to hold, it keeps the setpoints that it was told", holds),
     ("it may be made safe at any time after arming, and twice", is_made_safe),
-    ("a disarmed rig can be armed again, and starts at time 0", starts_anew),
+    ("a disarmed rig can be armed again, and starts at time 0", can_be_restarted),
     ("the end of what it has is the loss of the rig, after which it can be made safe", ends_with_its_loss),
 ];
 
-/// A rig that nobody can take hold of: no rule says anything of it, and those that ask for nothing would seem to be kept.
+/// The rig cannot be armed, so that no rule can be judged. Rules without a call to the rig would otherwise seem to be met.
 #[derive(Debug, thiserror::Error)]
 #[error("`{name}` cannot be armed, so that none of its {} rules was judged: {why}", RULES.len())]
 pub struct NotArmed {
@@ -33,32 +33,32 @@ pub struct NotArmed {
     why: String,
 }
 
-/// What each rule found, once the rig has been armed and given back.
+/// Checks all rules, after one trial of arming and disarming.
 ///
 /// # Errors
-/// [`NotArmed`] with what the rig said.
+/// [`NotArmed`] with the rig's error.
 pub fn judge(candidate: &Candidate<'_>) -> Result<Vec<(&'static str, Checked)>, NotArmed> {
     let armed = (candidate.make)().and_then(|mut rig| {
         rig.arm()?;
-        // Whether it can be given back is for the rules.
+        // Whether it can be disarmed is checked by the rules.
         let _ = rig.disarm();
         Ok(())
     });
-    let said = armed.err().map(|error| match error {
-        // It was never had, so that it cannot have been lost.
+    let failure = armed.err().map(|error| match error {
+        // The rig was never armed, so its error is not a loss.
         BackendError::Lost { source, .. } => source.to_string(),
         other => other.to_string(),
     });
-    match said {
+    match failure {
         Some(why) => Err(NotArmed { name: candidate.name.to_owned(), why }),
         None => Ok(RULES.iter().map(|(rule, check)| (*rule, settled(candidate, *check))).collect()),
     }
 }
 
-/// How often a rule that a rig in real time breaks is looked at before it is said.
+/// Number of attempts for a rule that fails on a rig in real time.
 const LOOKS: usize = 3;
 
-/// A computer that is busy makes a rig in real time late, now and then; a rule that is not kept is broken each time.
+/// A busy computer may delay a rig in real time by chance; a real violation fails every attempt.
 fn settled(candidate: &Candidate<'_>, check: fn(&Candidate<'_>) -> Checked) -> Checked {
     let looks = if in_real_time(candidate).unwrap_or(false) { LOOKS } else { 1 };
     (1..looks).find_map(|_| check(candidate).ok()).map_or_else(|| check(candidate), Ok)
@@ -124,7 +124,7 @@ fn keeps_the_life_cycle(candidate: &Candidate<'_>) -> Checked {
             fine("poll", rig.poll(1.0))?;
             fine("disarm", rig.disarm())?;
         }
-        // No samples after disarming, in particular.
+        // In particular, no samples after disarming.
         out_of_order("poll", rig.poll(2.0))?;
         out_of_order("set", rig.set(&candidate.setpoints))?;
         out_of_order("hold", rig.hold())?;
@@ -158,7 +158,7 @@ fn batches_are_whole(candidate: &Candidate<'_>) -> Checked {
 fn time_goes_forward(candidate: &Candidate<'_>) -> Checked {
     let mut rig = candidate.running()?;
     let (mut last_s, mut next) = (f64::NEG_INFINITY, 0);
-    // Also to times that have passed, and that were never.
+    // Also polls times in the past and invalid times.
     for until_s in [-1.0, 0.0, 2.0, 1.0, -1.0, 2.0, f64::NAN, 2.05, 6.0] {
         let batch = fine("poll", rig.poll(until_s))?;
         let first = batch.first_sequence;
@@ -180,7 +180,7 @@ fn polls_to_the_time_asked_for(candidate: &Candidate<'_>) -> Checked {
         let batch = fine("poll", rig.poll(until_s))?;
         let Some(last_s) = batch.t_s.last() else { continue };
         ensure!(*last_s <= until_s, "a sample at {last_s} s, asked for {until_s} s");
-        // The sample after it would lie beyond.
+        // The next sample would lie beyond the requested time.
         ensure!(
             until_s - last_s < 1.001 * sample_s,
             "asked for {until_s} s, the last sample is at {last_s} s"
@@ -191,7 +191,7 @@ fn polls_to_the_time_asked_for(candidate: &Candidate<'_>) -> Checked {
     Ok(())
 }
 
-/// Whether time is on the wall: nothing reads the same twice, and there may be one such rig alone.
+/// Whether the rig runs in real time: its readings do not repeat, and only one instance may exist.
 fn in_real_time(candidate: &Candidate<'_>) -> Result<bool, String> {
     Ok(!candidate.new_one()?.describe().simulated_time)
 }
@@ -213,8 +213,8 @@ fn polling_changes_nothing(candidate: &Candidate<'_>) -> Checked {
         let cut = pieces.iter().flat_map(|piece| of_piece(piece).unwrap_or_default());
         let scale = column.values.iter().map(|value| value.abs()).fold(0.0, f64::max);
         for ((t_s, cut), whole) in times.iter().zip(cut).zip(&column.values) {
-            // A solver ends its step where a poll ends. Pressures and speeds then agree to its relative tolerance of 1e-6 or two;
-            // the flow of a machine that just leaves standstill is some hundred times as steep in pressure, relatively.
+            // A solver step ends at each poll, so pressures and speeds agree only to about its relative tolerance of 1e-6.
+            // Near standstill a relative change of pressure changes the flow some hundred times as much.
             let agrees = (cut - whole).abs() <= 3e-4 * scale || (cut.is_nan() && whole.is_nan());
             ensure!(agrees, "{} at {t_s} s: {cut} in pieces, {whole} in one", column.channel);
         }
@@ -262,7 +262,7 @@ fn refuses_wild_setpoints(candidate: &Candidate<'_>) -> Checked {
     Ok(())
 }
 
-/// What it says that it was told stays so, and a simulation goes on as if nobody had said a word.
+/// A held rig keeps its setpoints, and a simulation continues as without the call.
 fn holds(candidate: &Candidate<'_>) -> Checked {
     use mapper_core::Channel;
     const COMMANDS: [Channel; 4] =
@@ -272,8 +272,8 @@ fn holds(candidate: &Candidate<'_>) -> Checked {
     fine("hold", rig.hold())?;
     fine("hold", rig.hold())?;
     let after = fine("poll", rig.poll(2.0))?;
-    let told = if rig.describe().controls { &COMMANDS[..] } else { &[] };
-    for channel in told.iter().copied() {
+    let commands = if rig.describe().controls { &COMMANDS[..] } else { &[] };
+    for channel in commands.iter().copied() {
         let Some((before, after)) = before.last(channel).zip(after.last(channel)) else { continue };
         ensure!(before == after, "{channel} was {before} and is {after}");
     }
@@ -290,7 +290,7 @@ fn holds(candidate: &Candidate<'_>) -> Checked {
 }
 
 fn is_made_safe(candidate: &Candidate<'_>) -> Checked {
-    // Before it has any setpoints, and after.
+    // Before the first setpoints, and after.
     for running in [false, true] {
         let mut rig = candidate.new_one()?;
         fine("arm", rig.arm())?;
@@ -308,7 +308,7 @@ fn is_made_safe(candidate: &Candidate<'_>) -> Checked {
     Ok(())
 }
 
-fn starts_anew(candidate: &Candidate<'_>) -> Checked {
+fn can_be_restarted(candidate: &Candidate<'_>) -> Checked {
     let mut rig = candidate.running()?;
     let first = fine("poll", rig.poll(2.0))?;
     fine("disarm", rig.disarm())?;
@@ -324,7 +324,7 @@ fn starts_anew(candidate: &Candidate<'_>) -> Checked {
 fn ends_with_its_loss(candidate: &Candidate<'_>) -> Checked {
     let Some(lasts_s) = candidate.lasts_s else { return Ok(()) };
     let mut rig = candidate.running()?;
-    // What there is comes whole, then the loss is told, each time.
+    // All remaining samples arrive first; then every poll reports the loss.
     let batch = fine("poll", rig.poll(lasts_s + 1.0))?;
     ensure!(batch.t_s.last() == Some(&lasts_s), "its last sample is at {:?} s", batch.t_s.last());
     for _ in 0..2 {

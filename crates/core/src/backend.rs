@@ -1,4 +1,4 @@
-//! The one seam between a real and a simulated gas stand.
+//! The interface between the program and a gas stand, real or simulated.
 
 use crate::{Channel, GuardName, SafeTrajectory, SampleBatch, with_unit};
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ pub enum RigMode {
     Running,
 }
 
-/// Everything a rig can be told.
+/// All setpoints of a rig.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Setpoints {
     /// Air on or off.
@@ -28,7 +28,7 @@ pub struct Setpoints {
     pub oil_temperature_k: f64,
 }
 
-/// What a rig says of itself before it is armed.
+/// A rig's description before it is armed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RigDescription {
     /// Name of the backend, e.g. `virtual_lab`.
@@ -41,23 +41,23 @@ pub struct RigDescription {
     pub sample_rate_hz: f64,
     /// Whether time is simulated: a simulated rig is never paced by the wall clock.
     pub simulated_time: bool,
-    /// Whether setpoints have an effect: not on a recording that is played back.
+    /// Whether setpoints have an effect; false for a recording that is played back.
     pub controls: bool,
-    /// Name of the one rig that this is, e.g. its address: no two runs may have it at once. `None` for a simulation, of
+    /// Unique name of a physical rig, e.g. its address: two runs cannot use it at once. `None` for a simulation, of
     /// which each run has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exclusive: Option<String>,
-    /// Where it is reached, e.g. host and port of its controller: no two runs may be there at once either, whatever they call
+    /// Network address, e.g. host and port of its controller: two runs cannot use it at once either, whatever the name of
     /// the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reached_at: Option<String>,
-    /// Guards that must be there, and end the run, before it is armed.
+    /// Guards that must be present, and end the run, before it is armed.
     #[serde(default)]
     pub needs_guarded: Vec<GuardName>,
-    /// Setpoints that it accepts; `None`: it says so only when they are sent.
+    /// Accepted setpoints; `None` if the rig only reports them when they are sent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accepts: Option<SetpointRanges>,
-    /// Its own way into the safe state; a campaign may declare another.
+    /// Its own safe shutdown; a campaign may declare another.
     #[serde(default)]
     pub safe: SafeTrajectory,
 }
@@ -85,7 +85,7 @@ pub struct SetpointRanges {
 }
 
 impl SetpointRanges {
-    /// Refuses setpoints outside the ranges, and those that are not numbers.
+    /// Rejects setpoints outside the ranges, and those that are not numbers.
     ///
     /// # Errors
     /// [`BackendError::SetpointOutOfRange`] for the first one outside.
@@ -111,31 +111,31 @@ impl SetpointRanges {
 /// [`set`](Backend::set), [`hold`](Backend::hold) and [`poll`](Backend::poll), then [`disarm`](Backend::disarm).
 /// [`make_safe`](Backend::make_safe) is allowed at any time after arming, also after an error.
 pub trait Backend: Send {
-    /// What the rig is and measures.
+    /// Describes the rig and its measurements.
     fn describe(&self) -> RigDescription;
 
     /// Takes control of the rig; run time 0 starts here.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] where it is armed already, [`BackendError::Lost`] where it cannot be reached.
+    /// [`BackendError::OutOfOrder`] if it is armed already, [`BackendError::Lost`] if it cannot be reached.
     fn arm(&mut self) -> Result<(), BackendError>;
 
     /// Sends new setpoints, effective from the time of the last poll on.
     ///
     /// # Errors
     /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::SetpointOutOfRange`],
-    /// [`BackendError::Simulation`] or [`BackendError::Lost`] where the rig cannot follow.
+    /// [`BackendError::Simulation`] or [`BackendError::Lost`] if the rig cannot follow.
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError>;
 
     /// Lets the rig run until `until_s` (seconds since arming) and returns the samples since the last poll.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] before it is armed and told its setpoints, [`BackendError::Simulation`] and
+    /// [`BackendError::OutOfOrder`] before it is armed and has setpoints, [`BackendError::Simulation`] and
     /// [`BackendError::Lost`] with the time at which it stopped.
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError>;
 
-    /// Tells the rig to stay at the setpoints that it was told last, because somebody looks before the run goes on. A rig that keeps them by
-    /// itself has nothing to do; one behind a controller writes them once more, which shows whether it still takes them.
+    /// Holds the last setpoints while an operator inspects the run. A rig that keeps them by itself does nothing;
+    /// one behind a controller sends them again, which shows whether the controller still accepts them.
     ///
     /// # Errors
     /// As those of [`set`](Backend::set).
@@ -146,20 +146,20 @@ pub trait Backend: Send {
     /// Brings the rig into its safe state: air off, valve open.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] where it cannot be reached.
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] if it cannot be reached.
     fn make_safe(&mut self) -> Result<(), BackendError>;
 
-    /// Gives control of the rig back.
+    /// Releases control of the rig.
     ///
     /// # Errors
-    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] where it cannot be reached.
+    /// [`BackendError::OutOfOrder`] before it is armed, [`BackendError::Lost`] if it cannot be reached.
     fn disarm(&mut self) -> Result<(), BackendError>;
 }
 
-/// Why a backend could not do what it was asked.
+/// Why a call of a backend failed.
 #[derive(Debug, thiserror::Error)]
 pub enum BackendError {
-    /// A call came outside its place in the life cycle.
+    /// A call out of order in the life cycle.
     #[error("the rig is {state}; `{call}` needs it to be {needed}: a fault of the program that drives it")]
     OutOfOrder {
         /// The call.
@@ -169,7 +169,7 @@ pub enum BackendError {
         /// State the call needs.
         needed: &'static str,
     },
-    /// A setpoint outside what the rig can do.
+    /// A setpoint outside the range of the rig.
     #[error(
         "{quantity} = {} is outside what the rig can do ({low} to {})",
         with_unit(value, unit),
@@ -178,7 +178,7 @@ pub enum BackendError {
     SetpointOutOfRange {
         /// Which setpoint.
         quantity: &'static str,
-        /// Value asked for.
+        /// Requested value.
         value: f64,
         /// Unit of the three values.
         unit: &'static str,
@@ -194,10 +194,10 @@ pub enum BackendError {
         backend: String,
         /// Key path below `backend.settings`.
         path: String,
-        /// What is wrong and what would be right.
+        /// What is wrong, and the remedy.
         source: BackendCause,
     },
-    /// A simulation could not go on.
+    /// A simulation could not continue.
     #[error("the simulation stopped at {t_s:.3} s: {source}")]
     Simulation {
         /// Run time, s.
@@ -205,15 +205,15 @@ pub enum BackendError {
         /// Why.
         source: BackendCause,
     },
-    /// A call did not come back in its time.
+    /// A call did not return in time.
     #[error("the rig did not answer `{call}` within {limit_s} s")]
     Deadline {
         /// The call.
         call: &'static str,
-        /// Time it had, s.
+        /// Time limit, s.
         limit_s: f64,
     },
-    /// The rig, or what stands for it, went away.
+    /// The connection to the rig was lost.
     #[error("the rig was lost at {t_s:.3} s: {source}")]
     Lost {
         /// Run time, s.
@@ -223,5 +223,5 @@ pub enum BackendError {
     },
 }
 
-/// What a backend says of its own failure. Its error type is its own: the seam knows no backend.
+/// The backend's own error. Each backend has its own error type, which this interface does not know.
 pub type BackendCause = Box<dyn std::error::Error + Send + Sync>;

@@ -1,4 +1,4 @@
-//! The one table of everything a rig measures or is told: symbol, unit, place, description.
+//! The table of all measured and commanded quantities of a rig: symbol, unit, place, description.
 
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +66,7 @@ pub enum Group {
     Turbine,
     /// The test cell.
     Ambient,
-    /// What the rig was told.
+    /// Commands to the rig.
     Command,
 }
 
@@ -85,7 +85,7 @@ impl Group {
     }
 }
 
-/// Physical dimension of a channel; decides which units a user may write for it.
+/// Physical dimension of a channel; determines the units that a user may write for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Dimension {
@@ -102,7 +102,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// The unit used inside the program.
+    /// The internal unit.
     pub fn unit(self) -> &'static str {
         match self {
             Dimension::RotationalSpeed => "rpm",
@@ -165,7 +165,7 @@ pub const CHANNELS: [ChannelInfo; 19] = {
 impl Channel {
     /// The channel's row in [`CHANNELS`].
     pub fn info(self) -> &'static ChannelInfo {
-        // The table is in declaration order; a test holds it so.
+        // The table is in declaration order; a test checks it.
         &CHANNELS[self as usize]
     }
 
@@ -186,11 +186,11 @@ impl std::fmt::Display for Channel {
     }
 }
 
-/// A symbol that names no channel.
+/// A symbol without a channel.
 #[derive(Debug, Clone, thiserror::Error, PartialEq, Eq)]
 #[error("no channel is called `{symbol}`; the channels are {}", list_symbols())]
 pub struct UnknownChannel {
-    /// What was given.
+    /// The given text.
     pub symbol: String,
 }
 

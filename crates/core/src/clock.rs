@@ -1,8 +1,8 @@
 //! Time as an argument: the run's clock.
 
-/// Paces a run. The backend owns the time of its samples; the clock decides when to ask for them.
+/// Paces a run. The backend owns the time of its samples; the clock decides when to request them.
 pub trait Clock {
-    /// Returns when the run may go on to `t_s` (seconds since arming).
+    /// Returns when the run may continue to `t_s` (seconds since arming).
     fn wait_until(&mut self, t_s: f64);
 
     /// Whether time passes without [`wait_until`](Self::wait_until), as on a rig. By default it does not.
@@ -19,28 +19,28 @@ impl Clock for UnpacedClock {
     fn wait_until(&mut self, _t_s: f64) {}
 }
 
-/// A clock on the wall, and a way to wait for it: whoever starts the program has one.
+/// A wall clock and a way to wait for it, provided by the main program.
 pub trait Wall {
     /// Time since any fixed instant, s; never goes back.
     fn now_s(&self) -> f64;
 
-    /// Returns after so long, s.
+    /// Returns after this time, s.
     fn wait_s(&self, duration_s: f64);
 }
 
-/// Paces a run by a clock on the wall: in real time, or so many times faster.
+/// Paces a run by a wall clock: in real time, or faster by a factor.
 #[derive(Debug, Clone)]
 pub struct PacedClock<W> {
     wall: W,
-    /// Run time over time on the wall, > 0.
+    /// Run time over wall-clock time, > 0.
     speed_ratio: f64,
-    /// On the wall, when the run began.
+    /// Wall-clock time at the start of the run.
     start_s: Option<f64>,
 }
 
 impl<W: Wall> PacedClock<W> {
-    /// A clock that begins with the first wait. `speed_ratio`: run time over time on the wall, 1 for real time; what is not
-    /// above 0 is real time.
+    /// A clock that begins with the first wait. `speed_ratio`: run time over wall-clock time, 1 for real time; values that are
+    /// not above 0 mean real time.
     pub fn new(wall: W, speed_ratio: f64) -> Self {
         let speed_ratio = if speed_ratio > 0.0 { speed_ratio } else { 1.0 };
         PacedClock { wall, speed_ratio, start_s: None }
@@ -56,7 +56,7 @@ impl<W: Wall> Clock for PacedClock<W> {
         let now_s = self.wall.now_s();
         let start_s = *self.start_s.get_or_insert(now_s);
         let left_s = start_s + t_s / self.speed_ratio - now_s;
-        // What is late is not waited for: a slow disk delays one poll, not all that follow.
+        // A late call does not wait: a slow disk delays one poll, not all later ones.
         if left_s > 0.0 {
             self.wall.wait_s(left_s);
         }
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
     use std::cell::Cell;
 
-    /// A wall that passes only while somebody waits.
+    /// A wall clock that advances only during waits.
     struct Idle(Cell<f64>);
 
     impl Wall for &Idle {
@@ -91,7 +91,7 @@ mod tests {
         let wall = Idle(Cell::new(0.0));
         let mut clock = PacedClock::new(&wall, 1.0);
         clock.wait_until(0.0);
-        // Something took 5 s: the run is late, and then in time again.
+        // A call took 5 s: the run is late, and then on time again.
         (&wall).wait_s(5.0);
         [1.0, 2.0, 6.0].into_iter().for_each(|t_s| clock.wait_until(t_s));
         assert!(((&wall).now_s() - 6.0).abs() < 1e-9);

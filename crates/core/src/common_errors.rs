@@ -1,19 +1,19 @@
-//! Errors that the points of one recording share: they hit or miss all of them together.
+//! Errors that all points of one recording share.
 
 use serde::{Deserialize, Serialize};
 
-/// What the common errors of a recording do to one of its points, with sign.
+/// Signed effects of a recording's common errors on one of its points.
 ///
-/// Entry `k` of a list is what one standard deviation of error `k` changes; error `k` is the same at every point of the
+/// Entry `k` of a list is the change due to one standard deviation of error `k`; error `k` is the same at every point of the
 /// recording, and errors of different `k` are independent. So the covariance of two points is the sum of the products of
-/// their entries, and the variance of one point is the sum of the squares of its entries plus its own part, which no other
+/// their entries. The variance of one point is the sum of the squares of its entries plus its own part, which no other
 /// point shares. The lists of `eta` and of `h` number their errors independently.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CommonErrors {
-    /// Changes of `eta`, fraction; empty where nothing is known to be shared.
+    /// Changes of `eta`, fraction; empty if no shared errors are known.
     pub eta_changes: Vec<f64>,
-    /// Changes of `h`, W/(m2 K); empty where nothing is known to be shared.
+    /// Changes of `h`, W/(m2 K); empty if no shared errors are known.
     pub h_changes_w_m2k: Vec<f64>,
     /// Standard error that all corrected flows share (gain and offset of the flow meter, offsets of P1 and T1), ratio to
     /// the flow.
@@ -23,7 +23,7 @@ pub struct CommonErrors {
 }
 
 impl CommonErrors {
-    /// Standard error of `eta` from what points share, fraction.
+    /// Standard error of `eta` from shared errors, fraction.
     pub fn eta_standard_error(&self) -> f64 {
         root_sum_of_squares(&self.eta_changes)
     }
@@ -34,7 +34,7 @@ impl CommonErrors {
         self.eta_changes.iter().zip(&other.eta_changes).map(|(one, other)| one * other).sum()
     }
 
-    /// Standard error of `h` from what points share, W/(m2 K).
+    /// Standard error of `h` from shared errors, W/(m2 K).
     pub fn h_standard_error_w_m2k(&self) -> f64 {
         root_sum_of_squares(&self.h_changes_w_m2k)
     }

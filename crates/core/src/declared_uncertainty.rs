@@ -1,4 +1,4 @@
-//! What a campaign declares of a sensor.
+//! Declared uncertainty of a sensor.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! What happened during a run, apart from samples.
+//! Events of a run, apart from samples.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,31 +6,31 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EventKind {
-    /// The compressor went past its surge line.
+    /// The compressor crossed its surge line.
     SurgeEntered,
-    /// The compressor came back from the surge side.
+    /// The compressor returned from the surge side.
     SurgeLeft,
-    /// The shaft went above the overspeed limit.
+    /// The shaft exceeded the overspeed limit.
     OverspeedEntered,
-    /// The shaft came back below the overspeed limit.
+    /// The shaft fell below the overspeed limit again.
     OverspeedLeft,
-    /// The machine was put to rest for a zero of its sensors.
+    /// A soak for a zero of the sensors began.
     SoakStarted,
-    /// That rest is over.
+    /// The soak ended.
     SoakEnded,
-    /// A step has ended off the speed that it was asked for.
+    /// A step ended away from its target speed.
     SpeedNotReached,
     /// A guard of the runner tripped.
     GuardTripped,
-    /// A guard tripped that does not end the run: what was done stands in the message.
+    /// A guard tripped that does not end the run; the message contains the reaction.
     GuardActed,
-    /// The rig has tripped by itself: it no longer follows its setpoints.
+    /// The rig tripped by itself: it no longer follows its setpoints.
     RigTripped,
     /// The rig was put into its safe state.
     SafeState,
-    /// The safe state was not reached, or the rig is in doubt: no other run begins before that is acknowledged.
+    /// The safe state was not reached, or the state of the rig is uncertain: an operator must acknowledge this before another run.
     Latched,
-    /// The run goes on after it was broken off.
+    /// The run continues after an interruption.
     Resumed,
     /// The run was stopped by its operator.
     Interrupted,
@@ -43,7 +43,7 @@ pub enum EventKind {
 pub struct Event {
     /// Run time, s.
     pub t_s: f64,
-    /// What kind of thing happened.
+    /// Kind of the event.
     pub kind: EventKind,
     /// One sentence with values and units.
     pub message: String,

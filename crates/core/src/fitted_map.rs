@@ -18,9 +18,9 @@ pub struct FittedNode {
     pub flow_standard_error_kg_s: f64,
     /// Standard error across the line: its part along the pressure ratio.
     pub pressure_ratio_standard_error: f64,
-    /// Standard error of `eta`, what all points share included, fraction.
+    /// Standard error of `eta`, including the shared part, fraction.
     pub eta_standard_error: f64,
-    /// The part of it that all places share, as far as the points say: it moves the whole surface, fraction.
+    /// The part that all places share, as far as the points determine it: it moves the whole surface, fraction.
     #[serde(default)]
     pub eta_common_standard_error: f64,
     /// Standard error that the corrected flows of all places share (the flow meter's gain), kg/s; not part of that across
@@ -56,11 +56,11 @@ pub struct LeftOutLine {
     /// Median orthogonal distance of its points: flow over the line's largest flow, PR - 1 over the line's largest;
     /// ratio.
     pub distance_ratio: f64,
-    /// Median absolute error of efficiency at the nearest place of the fitted line, fraction; `None` without points
-    /// that have one.
+    /// Median absolute error of efficiency at the nearest place of the fitted line, fraction; `None` if no point
+    /// has an efficiency.
     pub eta: Option<f64>,
     /// Share of its points whose distance lies within the 95 % interval of the fitted line and of a point about it;
-    /// `None` in files that do not say.
+    /// `None` in files that do not contain it.
     #[serde(default)]
     pub distance_held_ratio: Option<f64>,
     /// Share of its efficiencies that lie within theirs; `None` without any.
@@ -81,9 +81,9 @@ pub struct FittedMap {
     pub eta_rms: f64,
     /// Scatter of whole lines about the smooth surface (errors of speed, of the day): of flow, ratio.
     pub line_scatter_ratio: f64,
-    /// Pairs of neighbouring lines that cross; 0 in a sound fit.
+    /// Pairs of neighbouring lines that cross; 0 in a valid fit.
     pub crossings: usize,
-    /// What happens at each line when it is left out; empty where this was not asked for or there are too few lines.
+    /// The errors at each line when it is left out; empty if not requested or if there are too few lines.
     pub left_out: Vec<LeftOutLine>,
 }
 

@@ -1,10 +1,10 @@
-//! What a run is guarded by: the vocabulary of campaigns, rigs and runner.
+//! Guards of a run: the terms that campaigns, rigs and runner share.
 
 use crate::Channel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A guard, by the key that campaigns write it under.
+/// A guard, by its key in campaigns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GuardName {
@@ -22,11 +22,11 @@ pub enum GuardName {
     HousingGradient,
     /// Variation of pressure and flow.
     Surge,
-    /// A speed that is not reached, or lost.
+    /// A target speed that is not reached, or lost.
     Speed,
-    /// Samples in order, in time, and alive.
+    /// Samples in order, in time, and not frozen.
     Signals,
-    /// What the rig says of itself.
+    /// The state that the rig reports.
     Rig,
 }
 
@@ -47,22 +47,22 @@ impl std::fmt::Display for GuardName {
     }
 }
 
-/// What is done when a guard trips, mildest first.
+/// Reaction when a guard trips, mildest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(transform = crate::schema::names_alone)]
 pub enum Reaction {
-    /// Say it, and go on.
+    /// Report it, and continue.
     Note,
-    /// Hold the setpoints until it is over, and make the step so much longer.
+    /// Hold the setpoints until it is over, and extend the step by that time.
     Hold,
     /// Go back, and approach the step again in smaller steps.
     SmallerSteps,
-    /// Leave the step out.
+    /// Skip the step.
     SkipStep,
     /// End the run in the safe state.
     Safe,
-    /// End the run in the safe state, and let no other begin before somebody has acknowledged it.
+    /// End the run in the safe state, and lock the rig until an operator acknowledges it.
     Latch,
 }
 
@@ -82,7 +82,7 @@ pub struct LargestChange {
     pub within_s: f64,
 }
 
-/// A guard over one channel. Without any bound it still watches that the channel is alive.
+/// A guard over one channel. Without any bound it still checks that the channel delivers readings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SignalGuard {
     /// Its name.
@@ -95,37 +95,37 @@ pub struct SignalGuard {
     pub below: Option<f64>,
     /// Largest change.
     pub change: Option<LargestChange>,
-    /// A value beyond a bound counts until it is so far back, unit of the channel, >= 0.
+    /// Hysteresis: a value beyond a bound counts until it is this far back, unit of the channel, >= 0.
     pub hysteresis: f64,
-    /// A value trips that has been beyond a bound for so long, s, >= 0.
+    /// A value trips after this time beyond a bound, s, >= 0.
     pub dwell_s: f64,
-    /// Without a good reading for so long the guard trips, s, > 0.
+    /// The guard trips after this time without a good reading, s, > 0.
     pub age_s: f64,
-    /// A reading trips that has not changed by a bit for so long after a jump of the setpoints, s; `None`: not watched.
+    /// A reading trips if it has not changed by a bit for this time after a jump of the setpoints, s; `None`: not checked.
     pub frozen_s: Option<f64>,
-    /// What is done about a bound; a signal that is not there ends the run in any case.
+    /// Reaction to a bound; a missing signal ends the run in any case.
     pub reaction: Reaction,
 }
 
-/// The guard against surge: how much flow and pressure vary from one tenth of a second to the next.
+/// The guard against surge: variation of flow and pressure from one tenth of a second to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurgeVariation {
-    /// Variation of the compressor's flow that counts, one standard deviation over the flow, ratio.
+    /// Threshold of the variation of the compressor's flow, one standard deviation over the flow, ratio.
     pub flow_ratio: f64,
-    /// Variation of P2 or P1 that counts with it, one standard deviation over the pressure, ratio.
+    /// Threshold of the simultaneous variation of P2 or P1, one standard deviation over the pressure, ratio.
     pub pressure_ratio: f64,
-    /// A jump may touch the surge line: it trips after so long, s.
+    /// It trips after this time, s, since a jump may touch the surge line.
     pub dwell_s: f64,
-    /// What is done.
+    /// Reaction.
     pub reaction: Reaction,
 }
 
-/// The guard over the speed that a step asks for.
+/// The guard over the target speed of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedBand {
-    /// Largest deviation of the last seconds of a step, ratio.
+    /// Largest deviation in the last seconds of a step, ratio.
     pub band_ratio: f64,
-    /// What is done.
+    /// Reaction.
     pub reaction: Reaction,
 }
 
@@ -141,12 +141,12 @@ pub struct GuardSet {
 }
 
 impl GuardSet {
-    /// Whether a guard of this name is there that ends the run.
+    /// Whether there is a guard of this name that ends the run.
     pub fn ends_on(&self, name: GuardName) -> bool {
         match name {
             GuardName::Surge => self.surge.is_some_and(|guard| guard.reaction.ends_the_run()),
             GuardName::Speed => self.speed.is_some_and(|guard| guard.reaction.ends_the_run()),
-            // Always there.
+            // Always present.
             GuardName::Signals | GuardName::Rig => true,
             name => self.signals.iter().any(|guard| {
                 let bound = guard.above.is_some() || guard.below.is_some() || guard.change.is_some();
@@ -156,14 +156,14 @@ impl GuardSet {
     }
 }
 
-/// The way into the safe state: valve open and heater off at once, turbine inlet pressure down at a slew, air off.
+/// The safe shutdown: valve open and heater off at once, turbine inlet pressure down at a slew, air off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SafeTrajectory {
-    /// How fast P3 is taken down, Pa/s, > 0; `None`: the air is cut at once.
+    /// Rate at which P3 goes down, Pa/s, > 0; `None`: the air is cut at once.
     pub p3_slew_pa_s: Option<f64>,
-    /// Opening of the back-pressure valve on the way, ratio: a step that has more keeps it.
+    /// Opening of the back-pressure valve during the shutdown, ratio; a step with a larger opening keeps it.
     pub valve_opening_ratio: f64,
-    /// Longest time of the way, s, > 0: the air is cut then, wherever P3 is.
+    /// Longest time of the shutdown, s, > 0: the air is cut then, whatever P3 is.
     pub within_s: f64,
 }
 

@@ -1,9 +1,9 @@
-//! The point that a step held, as it was measured: what tells points apart where nothing says what was commanded.
+//! The point that a step held, from measurements: it distinguishes points if no commands were recorded.
 
 use crate::{Channel, Recording, Series, StepMarker};
 
-/// Channels that jump with the points of a map, each with the share of itself by which it moves at least: less is the same
-/// point. Temperatures follow for minutes, and say nothing about the beginning of a step.
+/// Channels that jump between the points of a map, each with its smallest relative change; a smaller change means the same
+/// point. Temperatures follow for minutes, so they do not mark the beginning of a step.
 pub const JUMPS: [(Channel, f64); 4] = [
     (Channel::ShaftSpeed, 0.01),
     (Channel::CompressorFlow, 0.02),
@@ -11,10 +11,10 @@ pub const JUMPS: [(Channel, f64); 4] = [
     (Channel::P2, 0.015),
 ];
 
-/// As in [`JUMPS`], of the valve's opening.
+/// Like [`JUMPS`], for the valve's opening.
 pub const VALVE_JUMP_RATIO: f64 = 0.02;
 
-/// Medians of the second half of a step; NaN where there are none.
+/// Medians of the second half of a step; NaN if there are none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldPoint {
     speed_rpm: f64,
@@ -24,7 +24,7 @@ pub struct HeldPoint {
 }
 
 impl HeldPoint {
-    /// What a step held; `None` where targets or a commanded P3 and valve say it.
+    /// The measured point of a step; `None` if targets or a commanded P3 and valve define it.
     pub fn of(recording: &Recording, step: &StepMarker) -> Option<HeldPoint> {
         let commanded = recording.series.contains_key(&Channel::P3Command)
             && step.p3_pa.is_finite()
@@ -46,8 +46,8 @@ impl HeldPoint {
         })
     }
 
-    /// Whether two steps held the same point: equal speed and P3, and equal opening of the valve, or where that is not known
-    /// equal flow, each to what would be a jump. A point without speed is like none.
+    /// Whether two steps held the same point: equal speed and P3, and equal opening of the valve, or if that is unknown
+    /// equal flow, each within the size of a jump. A point without speed matches none.
     pub fn is_same(&self, other: &HeldPoint) -> bool {
         let ratio =
             |channel: Channel| JUMPS.iter().find(|(of, _)| *of == channel).map_or(0.0, |(_, ratio)| *ratio);

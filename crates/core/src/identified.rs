@@ -1,4 +1,4 @@
-//! What identification says of one point, and how sure it is.
+//! Identification result of one point, with its uncertainty.
 
 use crate::{CommonErrors, OperatingPoint, StepKind};
 use serde::{Deserialize, Serialize};
@@ -11,9 +11,9 @@ pub enum Method {
     Steady,
     /// Efficiency and heat-transfer coefficient from the transient (Burke et al., eqs. 1-3).
     Dynamic,
-    /// All points of a campaign together: as `Dynamic`, with what they share fitted over all of them.
+    /// All points of a campaign together: like `Dynamic`, with shared parameters fitted over all of them.
     Joint,
-    /// Read from a map that says nothing of how its efficiency was found.
+    /// Read from a map that does not state how its efficiency was found.
     Imported,
 }
 
@@ -28,20 +28,20 @@ impl std::fmt::Display for Method {
     }
 }
 
-/// Whether a point's numbers may be used.
+/// Whether a point's results may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Use it.
     Good,
-    /// Use it with care: `warnings` say why.
+    /// Use it with care: `warnings` give the reasons.
     Doubtful,
-    /// Do not use it: `warnings` say why. Its numbers are absent or meaningless.
+    /// Do not use it: `warnings` give the reasons. Its results are absent or meaningless.
     Unusable,
 }
 
 impl Verdict {
-    /// After a reason to doubt: what is unusable stays so.
+    /// The verdict after a warning; an unusable point stays unusable.
     pub fn doubted(self) -> Self {
         match self {
             Verdict::Good | Verdict::Doubtful => Verdict::Doubtful,
@@ -50,7 +50,7 @@ impl Verdict {
     }
 }
 
-/// A reason to doubt a point.
+/// A warning about a point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Warning {
     /// Stable key for machines, e.g. `small_gradient`.
@@ -73,7 +73,7 @@ pub struct Window {
 pub struct EstimateUncertainty {
     /// One standard error from noise, serial correlation of the residual included; unit of the quantity.
     pub noise_standard_error: f64,
-    /// One standard error from declared fixed sensor offsets and gains, and from what is estimated of the method's own
+    /// One standard error from declared fixed sensor offsets and gains, and from the estimated error of the method's own
     /// assumptions (a constant h where the flow still moves); unit of the quantity.
     pub bias_standard_error: f64,
 }
@@ -104,25 +104,25 @@ pub fn standard_error_of(low: f64, high: f64) -> f64 {
     0.5 * (high - low) / Z_975
 }
 
-/// One identified point of the map. Absent numbers are `None`, never made up.
+/// One identified point of the map. Missing results are `None`, never invented.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IdentifiedPoint {
-    /// Place of the step, from 0; files have its number, from 1.
+    /// Index of the step, from 0; files have its number, from 1.
     #[serde(with = "crate::step_number")]
     pub step: usize,
-    /// Whether the step was made for the map, or to see drift.
+    /// Whether the step was made for the map, or to detect drift.
     #[serde(default)]
     pub kind: StepKind,
-    /// What the plan aimed at; `None` in recordings made by others.
+    /// The target of the plan; `None` in recordings made by others.
     pub target: Option<OperatingPoint>,
     /// Measured shaft speed at the end of the step, rpm.
     pub speed_rpm: f64,
-    /// Commanded valve opening relative to the nominal area; NaN (null in files) where nobody recorded it.
+    /// Commanded valve opening relative to the nominal area; NaN (null in files) if it was not recorded.
     #[serde(rename = "valve", deserialize_with = "nan_where_null")]
     pub valve_opening_ratio: f64,
     /// Compressor mass flow at the end of the step, kg/s.
     pub flow_kg_s: f64,
-    /// Corrected mass flow at the end of the step, kg/s (reference state stands in the map).
+    /// Corrected mass flow at the end of the step, kg/s (the map contains the reference state).
     pub flow_corrected_kg_s: f64,
     /// Corrected shaft speed at the end of the step, rpm.
     pub speed_corrected_rpm: f64,
@@ -148,7 +148,7 @@ pub struct IdentifiedPoint {
     pub h_high_w_m2k: Option<f64>,
     /// Standard errors of `h_w_m2k` by origin, W/(m2 K).
     pub h_uncertainty: Option<EstimateUncertainty>,
-    /// Which part of these errors the recording's other points share.
+    /// The part of these errors that the recording's other points share.
     #[serde(default)]
     pub common: CommonErrors,
     /// How it was identified.
@@ -159,7 +159,7 @@ pub struct IdentifiedPoint {
     pub warnings: Vec<Warning>,
     /// Part of the recording used.
     pub window: Option<Window>,
-    /// Root mean square of what the fit leaves of T2, K.
+    /// Root mean square of the T2 residual, K.
     pub residual_rms_k: Option<f64>,
     /// Change of T2 over the window, K.
     pub dt2_k: Option<f64>,
@@ -181,12 +181,12 @@ impl IdentifiedPoint {
     }
 }
 
-/// What is left of a standard error when an independent part is taken out.
+/// The standard error that remains after an independent part is removed.
 fn beside(all: f64, part: f64) -> f64 {
     (all * all - part * part).max(0.0).sqrt()
 }
 
-/// A number that is null where it is not known.
+/// A number that is null if unknown.
 fn nan_where_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the heat-transfer coefficient before the wheel follows. It matters only where part of the internal area lies there
+/// Model of the heat-transfer coefficient before the wheel. It matters only if part of the internal area lies there
 /// (alpha_A above 0).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

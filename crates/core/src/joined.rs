@@ -1,15 +1,15 @@
-//! Several recordings of one machine, one behind the other, as one recording.
+//! Joins several recordings of one machine into one.
 
 use crate::{Element, HeldPoint, Recording, Series, StepKind, StepMarker};
 use std::collections::BTreeMap;
 
-/// Time between two recordings that are joined, s: far more than any housing remembers, so that nobody takes the last step of
-/// one for the start of the first jump of the next.
+/// Time between two joined recordings, s: far more than the thermal memory of any housing, so that the last step of
+/// one never counts as the start of the first jump of the next.
 const BETWEEN_S: f64 = 3600.0;
-/// Steps of logs without targets are at the same point where their commands agree to this.
+/// Tolerance of the commands within which steps of logs without targets are at the same point.
 const SAME_COMMAND_RATIO: f64 = 5e-3;
 
-/// Where a step of a joined recording comes from.
+/// Origin of a step of a joined recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepOrigin {
     /// Number of the recording, from 0.
@@ -18,15 +18,15 @@ pub struct StepOrigin {
     pub step: usize,
 }
 
-/// Joins recordings in the order in which they are given; one alone stays as it is. Times and indices of steps go on from
-/// recording to recording. Points are told apart by their targets, by their commands, or where neither is known by what was
-/// measured. A point that an earlier recording has visited is a repeat where the same jump leads to it, and a
-/// return where another does, so that each point stands on the map once. The origins are those of the steps, in order.
+/// Joins recordings in the given order; a single one stays unchanged. Times and indices of steps continue from
+/// recording to recording. Points are distinguished by their targets, by their commands, or if neither is known by
+/// measurements. A point of an earlier recording is a repeat if the same jump leads to it, and a
+/// return if another one does, so that each point is on the map once. The origins are those of the steps, in order.
 pub fn joined(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin>) {
     let alone = recordings.len() < 2;
     let mut whole = Recording::default();
     let mut origins = Vec::new();
-    // What each step of the whole held, and the one before it, where that alone says what point it was.
+    // The measured point of each step and of the one before it, if only measurements identify the points.
     let mut held: Vec<Held> = Vec::new();
     for (number, mut recording) in recordings.into_iter().enumerate() {
         origins.extend(recording.steps.iter().map(|step| StepOrigin { recording: number, step: step.index }));
@@ -62,7 +62,7 @@ fn append<K: Ord>(whole: &mut BTreeMap<K, Series>, more: BTreeMap<K, Series>, sh
     }
 }
 
-/// What a step held, and what the step before it.
+/// The measured points of a step and of the step before it.
 type Held = (Option<HeldPoint>, Option<HeldPoint>);
 
 fn kind((step, held): (&StepMarker, Held), earlier: &[StepMarker], earlier_held: &[Held]) -> StepKind {
@@ -79,7 +79,7 @@ fn kind((step, held): (&StepMarker, Held), earlier: &[StepMarker], earlier_held:
         }
         _ => false,
     };
-    // A repeat is there to compare: the point itself may come later, by another jump.
+    // A repeat serves only for comparison: the point itself may come later, by another jump.
     let mut there = earlier
         .iter()
         .zip(earlier_held)
@@ -166,7 +166,7 @@ mod tests {
         assert!(whole.steps[2].start_s - whole.steps[1].end_s >= BETWEEN_S);
     }
 
-    /// Speeds and flows that were held for 100 s each, and nothing that was commanded.
+    /// Speeds and flows that were held for 100 s each, without commands.
     fn measured(points: &[(f64, f64)]) -> Recording {
         let t_s: Vec<f64> = (0..100 * points.len()).map(|t| t as f64).collect();
         let held = |pick: fn(&(f64, f64)) -> f64| Series {

@@ -1,45 +1,45 @@
-//! Which refinements a joint identification makes, and what is assumed of them beforehand.
+//! Parameters that a joint identification estimates, and their prior assumptions.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Whether a shared number is taken as declared or found.
+/// Whether a shared parameter is taken as declared or estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(transform = crate::schema::names_alone)]
 pub enum Choice {
     /// As declared.
     Fixed,
-    /// Found together with the points.
+    /// Estimated together with the points.
     #[default]
     Fitted,
 }
 
-/// How the efficiency moves within a step.
+/// Variation of the efficiency within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(transform = crate::schema::names_alone)]
 pub enum EfficiencyWithinStep {
-    /// It does not.
+    /// Constant.
     Constant,
-    /// As a smooth surface through all points does between the sample's place on the map and the step's end.
+    /// As a smooth surface through all points varies between the sample's place on the map and the step's end.
     #[default]
     Shaped,
 }
 
-/// How the heat-transfer coefficient moves within a step.
+/// Variation of the heat-transfer coefficient within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(transform = crate::schema::names_alone)]
 pub enum ConvectionWithinStep {
-    /// It does not, and no point knows of another's.
+    /// Constant, and independent of the other points.
     Constant,
     /// By a Nusselt law that all points share, each with a deviation of its own.
     #[default]
     Law,
 }
 
-/// The refinements of the joint method. With every one switched off it is the dynamic method.
+/// The shared parameters of the joint method. With all of them switched off it is the dynamic method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct JointSettings {
@@ -47,14 +47,14 @@ pub struct JointSettings {
     pub alpha_area: Choice,
     /// Diameter of the T2 probe; `fixed` takes that of `sensors.T2.probe_diameter`.
     pub probe: Choice,
-    /// Factor on the heat-transfer coefficient where the metal is hotter than the gas; 1 where `fixed`.
+    /// Factor on the heat-transfer coefficient if the metal is hotter than the gas; 1 if `fixed`.
     pub direction: Choice,
-    /// Whether the heat-transfer coefficient before the wheel is that after it or follows the inlet's own diameter; as
-    /// `machine.geometry` has it where `fixed`.
+    /// Whether the heat-transfer coefficient before the wheel equals that after it or follows the inlet's own diameter; as
+    /// in `machine.geometry` if `fixed`.
     pub inlet_h: Choice,
     /// Offsets of the sensors, with their declared uncertainty as prior.
     pub offsets: Choice,
-    /// Efficiency within a step: `constant`, or as a surface through all points has it.
+    /// Efficiency within a step: `constant`, or from a surface through all points.
     pub efficiency: EfficiencyWithinStep,
     /// Heat-transfer coefficient within a step: `constant`, or by a law that all points share.
     pub h: ConvectionWithinStep,
@@ -75,7 +75,7 @@ impl Default for JointSettings {
 }
 
 impl JointSettings {
-    /// Nothing but the two numbers of each step: the dynamic method.
+    /// Only the two parameters of each step: the dynamic method.
     pub fn all_off() -> Self {
         JointSettings {
             alpha_area: Choice::Fixed,
@@ -89,6 +89,6 @@ impl JointSettings {
     }
 }
 
-/// How far the true alpha_A may be off the one that is assumed, one standard deviation, if nothing is said: where nobody has
-/// measured it, a tenth to a quarter of the area may lie before the wheel.
+/// Default uncertainty of the assumed alpha_A, one standard deviation: if it has not been
+/// measured, a tenth to a quarter of the area may lie before the wheel.
 pub const ALPHA_AREA_SIGMA_RATIO: f64 = 0.15;

@@ -1,9 +1,9 @@
-//! From one operating point to another, and jumps that are made again.
+//! Jumps from one operating point to another, and repeated jumps.
 
 use crate::OperatingPoint;
 use serde::{Deserialize, Serialize};
 
-/// From where to where.
+/// Start and end of a jump.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Jump {
@@ -13,15 +13,15 @@ pub struct Jump {
     pub to: OperatingPoint,
 }
 
-/// A jump that is made again and again, so that drift shows.
+/// A jump that is repeated to show drift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Repeats {
-    /// The jump; `None`: from the slowest to the fastest point of the middle opening, or the next best jump that is
-    /// allowed.
+    /// The jump; `None`: from the slowest to the fastest point of the middle opening, or the next best allowed
+    /// jump.
     pub jump: Option<Jump>,
-    /// Steps between two of them at most, >= 2.
+    /// Maximum number of steps between two of them, >= 2.
     pub every_steps: usize,
-    /// Fewest of them, >= 1.
+    /// Minimum number of them, >= 1.
     pub at_least: usize,
 }

@@ -1,11 +1,11 @@
-//! The data that flows through `mapper`, and the two seams to the world: [`Backend`] and [`Clock`].
+//! The data that flows through `mapper`, and the two interfaces to the outside: [`Backend`] and [`Clock`].
 //!
 //! Campaign -> [`Plan`] -> [`Recording`] -> [`IdentifiedPoint`] -> [`CompressorMap`]: every arrow is a function
 //! from data to data. This crate holds the data, names every measured quantity once ([`Channel`]), and does no IO.
 //!
-//! Conventions: SI inside (kelvin, pascal, kg/s) except shaft speed, which is in rpm as every map is; each `f64`
-//! that crosses a boundary carries its unit in its name; pressures and temperatures are total unless a name says
-//! `static`; corrected quantities stand beside the [`ReferenceState`] they were made with.
+//! Conventions: SI inside (kelvin, pascal, kg/s) except shaft speed, which is in rpm as on every map; each `f64`
+//! that crosses a boundary carries its unit in its name; pressures and temperatures are total unless a name contains
+//! `static`; corrected quantities are stored with their [`ReferenceState`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,25 +1,25 @@
-//! The product: a compressor map in corrected quantities.
+//! The result: a compressor map in corrected quantities.
 
 use crate::{FittedMap, IdentifiedPoint, Method, ReferenceState, SurgeMark};
 use serde::{Deserialize, Serialize};
 
-/// One measured point of the map, brought to corrected quantities.
+/// One measured point of the map, converted to corrected quantities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MapPoint {
     /// Corrected mass flow at the speed of the line, kg/s.
     pub flow_corrected_kg_s: f64,
     /// Total pressure ratio P2/P1 at the speed of the line.
     pub pressure_ratio: f64,
-    /// Isentropic efficiency, fraction; `None` where the point could not be identified.
+    /// Isentropic efficiency, fraction; `None` if the point could not be identified.
     pub eta: Option<f64>,
     /// The point as identified, with its uncertainty and warnings.
     pub identified: IdentifiedPoint,
-    /// How the point was brought to the speed of its line; `None` where it stands as measured.
+    /// The correction of the point to the speed of its line; `None` if it is as measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shift: Option<SpeedShift>,
 }
 
-/// What bringing a point from its own corrected speed to that of its line changed, by similarity: flow in proportion
+/// Changes due to the correction of a point from its own corrected speed to that of its line, by similarity: flow in proportion
 /// to speed, isentropic head to its square, efficiency unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedShift {
@@ -38,7 +38,7 @@ pub struct SpeedLine {
     pub speed_corrected_rpm: f64,
     /// Largest minus smallest corrected speed of the line's points, rpm.
     pub speed_spread_rpm: f64,
-    /// Target shaft speed (physical) that the points share, rpm; `None` where they were grouped by measured speed.
+    /// Target shaft speed (physical) that the points share, rpm; `None` if they were grouped by measured speed.
     pub target_speed_rpm: Option<f64>,
     /// Points in order of corrected flow.
     pub points: Vec<MapPoint>,
@@ -55,10 +55,10 @@ pub struct CompressorMap {
     pub method: Method,
     /// Speed lines in order of speed.
     pub lines: Vec<SpeedLine>,
-    /// Surge-side ends that were sought, in order of speed; empty where none were.
+    /// Measured surge-side ends, in order of speed; empty if none were measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surge: Vec<SurgeMark>,
-    /// Smooth surface through the points, as a table; `None` where none was fitted.
+    /// Smooth surface through the points, as a table; `None` if none was fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fitted: Option<FittedMap>,
 }

@@ -1,4 +1,4 @@
-//! The columns of a compressor map as a table, by the names that others give them.
+//! Common column names of compressor maps in tables.
 
 /// Quantity and the names of its column, lower case without blanks, underscores and unit: corrected speed, corrected flow,
 /// pressure ratio, efficiency.

@@ -1,4 +1,4 @@
-//! The seam of map files: a format is a name, a writer, a reader, or both. Formats do no IO.
+//! The interface of map files: a format is a name, a writer, a reader, or both. Formats do no IO.
 
 use crate::{CompressorMap, ExportError, ImportError, ReferenceState};
 
@@ -11,16 +11,16 @@ pub type WriteMap = fn(&CompressorMap) -> Result<Vec<u8>, ExportError>;
 /// Turns a map into the bytes of a picture, its numbers in these units.
 pub type DrawMap = fn(&CompressorMap, &MapUnits) -> Result<Vec<u8>, ExportError>;
 
-/// Units in which a picture of a map is written; the map itself stays in kg/s and rpm.
+/// Units of a picture of a map; the map itself stays in kg/s and rpm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapUnits {
     /// Unit of flows.
     pub flow: String,
-    /// What a flow of 1 kg/s is in it, > 0.
+    /// A flow of 1 kg/s in this unit, > 0.
     pub flow_of_one_kg_s: f64,
     /// Unit of speeds.
     pub speed: String,
-    /// What a speed of 1 rpm is in it, > 0.
+    /// A speed of 1 rpm in this unit, > 0.
     pub speed_of_one_rpm: f64,
 }
 
@@ -36,9 +36,9 @@ impl Default for MapUnits {
     }
 }
 
-/// Turns the text of a file into a map; the second argument is the reference state that the user names.
+/// Parses the text of a file into a map; the second argument is the reference state that the user gives.
 ///
-/// A map without a reference state is refused: a wrong one shifts speeds by 1.7 % and more, and nobody sees it.
+/// A map without a reference state is rejected: a wrong one shifts speeds by 1.7 % and more, and goes unnoticed.
 pub type ReadMap = fn(&str, Option<ReferenceState>) -> Result<CompressorMap, ImportError>;
 
 /// One file format of compressor maps.
@@ -46,22 +46,22 @@ pub type ReadMap = fn(&str, Option<ReferenceState>) -> Result<CompressorMap, Imp
 pub struct MapFormat {
     /// Name as written in campaigns and on the command line.
     pub name: &'static str,
-    /// Extension, without the dot, of the files that are written; it may have several parts (`fitted.csv`).
+    /// Extension, without the dot, of written files; it may have several parts (`fitted.csv`).
     pub extension: &'static str,
-    /// Further extensions by which a file to be read is known.
+    /// Further extensions that identify a file to read.
     pub further_extensions: &'static [&'static str],
-    /// One line for people.
+    /// A one-line description.
     pub description: &'static str,
     /// Its writer, if maps can be written in it.
     pub write: Option<WriteMap>,
-    /// Its writer in other units, if it is a picture for people.
+    /// Its writer in other units, if it is a picture.
     pub draw: Option<DrawMap>,
     /// Its reader, if maps can be read from it.
     pub read: Option<ReadMap>,
 }
 
 impl MapFormat {
-    /// Whether maps are read from files of this extension, whatever its capitals.
+    /// Whether maps are read from files of this extension, ignoring case.
     fn reads_extension(&self, extension: &str) -> bool {
         self.read.is_some()
             && std::iter::once(&self.extension)
@@ -69,10 +69,10 @@ impl MapFormat {
                 .any(|known| known.eq_ignore_ascii_case(extension))
     }
 
-    /// The bytes of a file that holds `map`.
+    /// The content of a file with `map`.
     ///
     /// # Errors
-    /// [`ExportError`]: the format is only read, or it cannot hold this map.
+    /// [`ExportError`]: the format is read-only, or it cannot represent this map.
     pub fn write(&self, map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
         match self.write {
             Some(write) => write(map),
@@ -80,7 +80,7 @@ impl MapFormat {
         }
     }
 
-    /// The same, a picture for people in the units that they want shown.
+    /// The same, a picture in display units.
     ///
     /// # Errors
     /// As [`MapFormat::write`].
@@ -88,10 +88,10 @@ impl MapFormat {
         self.draw.map_or_else(|| self.write(map), |draw| draw(map, units))
     }
 
-    /// The map in the bytes of a file; `given` is the reference state that the user names.
+    /// Parses the map of a file; `given` is the reference state that the user gives.
     ///
     /// # Errors
-    /// [`ImportError`]: the format is only written, the file is too large, not text, not a map (with its line), or
+    /// [`ImportError`]: the format is write-only, the file is too large, not text, not a map (with its line), or
     /// without a reference state.
     pub fn read(&self, bytes: &[u8], given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
         let read = self.read.ok_or(ImportError::OnlyWritten { format: self.name })?;
@@ -109,27 +109,27 @@ fn line_of(bytes: &[u8], offset: usize) -> usize {
     1 + bytes[..offset.min(bytes.len())].iter().filter(|byte| **byte == b'\n').count()
 }
 
-/// The formats that a program knows.
+/// The formats of a program.
 #[derive(Debug, Clone, Copy)]
 pub struct MapFormats(pub &'static [MapFormat]);
 
 impl MapFormats {
-    /// All of them, in the order of lists for people.
+    /// All of them, in display order.
     pub fn iter(self) -> impl Iterator<Item = &'static MapFormat> {
         self.0.iter()
     }
 
-    /// The format of a name.
+    /// The format with this name.
     pub fn find(self, name: &str) -> Option<&'static MapFormat> {
         self.iter().find(|format| format.name == name)
     }
 
-    /// Those that can be written.
+    /// The formats that can be written.
     pub fn written(self) -> impl Iterator<Item = &'static MapFormat> {
         self.iter().filter(|format| format.write.is_some())
     }
 
-    /// The format in which a file of this name is written, whatever its capitals. The longest extension counts:
+    /// The format of a file to write, from its name, ignoring case. The longest extension counts:
     /// `map.fitted.csv` is not plain CSV.
     pub fn written_to(self, file_name: &str) -> Option<&'static MapFormat> {
         let file_name = file_name.to_ascii_lowercase();
@@ -140,12 +140,12 @@ impl MapFormats {
             .max_by_key(|format| format.extension.len())
     }
 
-    /// The format from which a file of this extension (without the dot) is read.
+    /// The format of a file to read, from its extension (without the dot).
     pub fn read_from(self, extension: &str) -> Option<&'static MapFormat> {
         self.iter().find(|format| format.reads_extension(extension))
     }
 
-    /// Every extension by which a file to be read is known.
+    /// Every extension of files that can be read.
     pub fn read_extensions(self) -> impl Iterator<Item = &'static str> {
         self.iter().filter(|format| format.read.is_some()).flat_map(|format| {
             std::iter::once(format.extension).chain(format.further_extensions.iter().copied())

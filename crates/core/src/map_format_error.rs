@@ -2,7 +2,7 @@
 
 use crate::{ReferenceState, step_number};
 
-/// What a library below a format says.
+/// The error of a library below a format.
 type Cause = Box<dyn std::error::Error + Send + Sync>;
 
 /// Why a map could not be written.
@@ -13,13 +13,13 @@ pub enum ExportError {
     Failed {
         /// The format.
         format: &'static str,
-        /// What the library said.
+        /// The error of the library.
         source: Cause,
     },
     /// A coordinate is not a number: JSON would turn it into null, and the file could not be read back.
     #[error("step {}: {quantity} is {value}; the format cannot hold it; leave the point out of the map", step_number(*step))]
     NotFinite {
-        /// Place of the step, from 0.
+        /// Index of the step, from 0.
         step: usize,
         /// Which field.
         quantity: &'static str,
@@ -34,7 +34,7 @@ pub enum ExportError {
         /// The format.
         format: &'static str,
     },
-    /// Maps are read from this format, and not written in it.
+    /// The format is read-only.
     #[error("maps are only read from `{format}`; choose another format to write")]
     OnlyRead {
         /// The format.
@@ -66,12 +66,12 @@ pub enum ImportError {
         /// Line, from 1.
         line: usize,
     },
-    /// A row that the library below the format cannot take apart.
+    /// A row that the library below the format cannot parse.
     #[error("line {line}: {source}")]
     Row {
         /// Line, from 1.
         line: usize,
-        /// What the library said.
+        /// The error of the library.
         source: Cause,
     },
     /// A row that does not have the form of the format.
@@ -81,7 +81,7 @@ pub enum ImportError {
         line: usize,
         /// The row, shortened.
         text: String,
-        /// What a row is.
+        /// The expected form of a row.
         form: &'static str,
     },
     /// All lines slower than any turbocharger's.
@@ -93,7 +93,7 @@ pub enum ImportError {
         /// The fastest corrected speed, rpm.
         speed_corrected_rpm: f64,
     },
-    /// More flow than an inlet passes.
+    /// More flow than an inlet can pass.
     #[error(
         "line {line}: no compressor passes {flow_corrected_kg_s} kg/s at {speed_corrected_rpm} rpm ({most_kg_s:.2} kg/s at most); if the \
          file has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)"
@@ -105,7 +105,7 @@ pub enum ImportError {
         flow_corrected_kg_s: f64,
         /// Corrected speed, rpm.
         speed_corrected_rpm: f64,
-        /// What an inlet passes at most, kg/s.
+        /// Largest flow of an inlet, kg/s.
         most_kg_s: f64,
     },
     /// A field that holds something other than a number.
@@ -115,7 +115,7 @@ pub enum ImportError {
         line: usize,
         /// Which quantity or column.
         quantity: String,
-        /// What stands there, shortened.
+        /// Its text, shortened.
         text: String,
     },
     /// A value without physical meaning.
@@ -125,33 +125,33 @@ pub enum ImportError {
         line: usize,
         /// Which column.
         quantity: &'static str,
-        /// What stands there.
+        /// Its value.
         value: f64,
-        /// What is allowed.
+        /// The allowed range.
         needed: &'static str,
     },
     /// Not a map in JSON.
     #[error("not a map as `mapper` writes it: {0}")]
     Json(#[from] serde_json::Error),
-    /// A field of a JSON map is not a sensible number.
+    /// A field of a JSON map is not a valid number.
     #[error("{place}: {quantity} = {value} has no meaning; it must be {needed}")]
     Field {
         /// Which line and point of the map.
         place: String,
         /// Which field.
         quantity: &'static str,
-        /// What stands there.
+        /// Its value.
         value: f64,
-        /// What is allowed.
+        /// The allowed range.
         needed: &'static str,
     },
-    /// The corrected quantities refer to nothing.
+    /// The corrected quantities have no reference state.
     #[error(
         "the map does not give the reference state of its corrected flows and speeds; give `--reference`: {}, or \"298 K, 100 kPa\"",
         crate::usual_references()
     )]
     NoReference,
-    /// File and user disagree.
+    /// The reference states of file and user differ.
     #[error(
         "the map says that it refers to {found}, `--reference` says {given}; leave `--reference` out, or correct the file"
     )]
@@ -161,16 +161,16 @@ pub enum ImportError {
         /// Given.
         given: ReferenceState,
     },
-    /// A reference state that cannot be one.
+    /// An invalid reference state.
     #[error(
         "`{text}` is not a reference state; write {}, or a temperature and a pressure, e.g. \"298 K, 100 kPa\" (200 to 400 K, 50 to 200 kPa)",
         crate::usual_references()
     )]
     Reference {
-        /// What was given.
+        /// The given values.
         text: String,
     },
-    /// Nothing in it.
+    /// The file is empty.
     #[error("the file holds no points")]
     Empty,
     /// More points than any map has.
@@ -181,7 +181,7 @@ pub enum ImportError {
         /// The limit.
         limit: usize,
     },
-    /// Maps are written in this format, and not read from it.
+    /// The format is write-only.
     #[error("maps are only written as `{format}`; give a CSV, JSON or SAE file")]
     OnlyWritten {
         /// The format.

@@ -1,4 +1,4 @@
-//! What a campaign declares of its nominal model.
+//! Declared tolerances of the nominal model.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,9 +10,9 @@ pub struct ModelTolerances {
     pub flow_meter_gain_ratio: f64,
     /// Flow of the compressor map.
     pub flow_map_ratio: f64,
-    /// Efficiency of the compressor map, everywhere alike.
+    /// Efficiency of the compressor map, the same everywhere.
     pub compressor_efficiency_ratio: f64,
-    /// Error of the efficiency map that changes smoothly over it.
+    /// Error of the efficiency map that varies smoothly over the map.
     pub efficiency_shape_ratio: f64,
     /// Efficiency of the turbine.
     pub turbine_efficiency_ratio: f64,
@@ -24,12 +24,12 @@ pub struct ModelTolerances {
     pub external_convection_ratio: f64,
     /// Conductance to the oil.
     pub oil_conductance_ratio: f64,
-    /// Lag of P3 behind its command as declared, s: a value, not a tolerance.
+    /// Declared lag of P3 behind its command, s: a value, not a tolerance.
     pub actuator_lag_s: f64,
 }
 
 impl Default for ModelTolerances {
-    /// What a careful gas stand declares: half a percent for what is calibrated, more for heat.
+    /// Typical values of a careful gas stand: half a percent for calibrated quantities, more for heat.
     fn default() -> Self {
         ModelTolerances {
             flow_meter_gain_ratio: 0.005,

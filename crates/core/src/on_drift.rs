@@ -1,16 +1,16 @@
-//! What is done when the rig is seen to drift during a run.
+//! Reaction to drift of the rig during a run.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done when a repeated jump differs from its first visit, and differs again.
+/// Reaction when a repeated jump differs from its first visit, and differs again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(transform = crate::schema::names_alone)]
 pub enum OnDrift {
-    /// The run ends in the safe state, and somebody has to look.
+    /// The run ends in the safe state, for inspection by an operator.
     Hold,
-    /// The run goes on; the recording has a note.
+    /// The run continues; the recording has a note.
     Continue,
     /// The run ends in the safe state, without flow, and asks for a zero of the sensors.
     Zero,

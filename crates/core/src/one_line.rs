@@ -1,6 +1,6 @@
-//! Names in files of other programs.
+//! Makes names safe for files of other programs.
 
-/// A name that cannot end a comment: control characters and line separators become blanks.
+/// Replaces control characters and line separators by blanks, so that a name cannot end a comment.
 pub fn one_line(name: &str) -> String {
     name.chars()
         .map(|c| if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') { ' ' } else { c })

@@ -1,4 +1,4 @@
-//! Where on the map a step aims: a shaft speed and a valve opening.
+//! Target of a step on the map: a shaft speed and a valve opening.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,10 +13,10 @@ pub struct OperatingPoint {
 }
 
 impl OperatingPoint {
-    /// Largest opening that a back-pressure valve may be told, relative to its nominal area.
+    /// Largest setpoint of a back-pressure valve's opening, relative to its nominal area.
     pub const OPENING_MAX_RATIO: f64 = 2.5;
 
-    /// Speed in krpm and opening without digits that no rig can set: a hundredth rpm, and 1e-4.
+    /// Speed in krpm and opening, rounded to the resolution of a rig: a hundredth rpm, and 1e-4.
     pub fn shown(&self) -> (f64, f64) {
         ((self.speed_rpm * 1e2).round() / 1e5, (self.valve_opening_ratio * 1e4).round() / 1e4)
     }

@@ -1,4 +1,4 @@
-//! The plan as data: what will be done, in which order, and what is expected of it.
+//! The plan as data: steps, their order, and the expected results.
 
 use crate::OperatingPoint;
 use serde::{Deserialize, Serialize};
@@ -10,16 +10,16 @@ pub enum StepKind {
     /// A point of the grid.
     #[default]
     Point,
-    /// A revisit, to see drift.
+    /// A revisit, to detect drift.
     Repeat,
-    /// The first point once more, at the end: no jump led to it at the start.
+    /// The first point again, at the end: no jump led to it at the start.
     Return,
     /// A step of an approach to the surge line, after all others.
     Approach,
 }
 
 impl StepKind {
-    /// Whether the step measures a point for the map: a repeat is there to compare.
+    /// Whether the step measures a point for the map; a repeat serves only for comparison.
     pub fn measures(self) -> bool {
         match self {
             StepKind::Point | StepKind::Return => true,
@@ -28,19 +28,19 @@ impl StepKind {
     }
 }
 
-/// What the nominal model expects of a step.
+/// Results of a step expected from the nominal model.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Predicted {
     /// Change of T2 over the identification window, K (signed). `None` for the first step, which has no jump.
     pub dt2_k: Option<f64>,
     /// Change of the compressor housing temperature over the window, K (signed).
     pub dtc_k: Option<f64>,
-    /// Standard error of the efficiency (fraction); `None` where it was not forecast.
+    /// Standard error of the efficiency (fraction); `None` if it was not forecast.
     pub sigma_eta: Option<f64>,
-    /// Relative standard error of the heat-transfer coefficient; `None` where it was not forecast.
+    /// Relative standard error of the heat-transfer coefficient; `None` if it was not forecast.
     pub sigma_h_rel: Option<f64>,
-    /// Error that the identification method itself makes of the efficiency, without noise (fraction, signed): its
-    /// result minus the model's own mean over the window. `None` where it was not forecast.
+    /// Error of the identification method itself in the efficiency, without noise (fraction, signed): its
+    /// result minus the model's own mean over the window. `None` if it was not forecast.
     #[serde(default)]
     pub bias_eta: Option<f64>,
     /// The same of the heat-transfer coefficient, relative.
@@ -52,7 +52,7 @@ pub struct Predicted {
     pub pressure_ratio: f64,
     /// Gas temperature at the compressor outlet at the end of the step, K.
     pub t2_k: f64,
-    /// Time until the operating point has settled, s; `None` where it never does within the dwell.
+    /// Time until the operating point has settled, s; `None` if it does not settle within the dwell.
     pub settle_s: Option<f64>,
     /// Duration of the step, minutes.
     pub minutes: f64,
@@ -80,10 +80,10 @@ impl Predicted {
 /// One step: go to a point and stay there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanStep {
-    /// Place in the plan, from 0; files have its number, from 1.
+    /// Index in the plan, from 0; files have its number, from 1.
     #[serde(flatten, with = "crate::step_number::entry")]
     pub index: usize,
-    /// Point, repeat, the first point once more, or approach to surge.
+    /// Point, repeat, the first point again, or approach to surge.
     pub kind: StepKind,
     /// Point before the jump; `None` for the first step.
     pub from: Option<OperatingPoint>,
@@ -100,38 +100,38 @@ pub struct PlanStep {
     pub dwell_s: f64,
     /// Start of the step after the start of the run, s (warm-up included).
     pub start_s: f64,
-    /// What the nominal model expects.
+    /// Results expected from the nominal model.
     pub predicted: Predicted,
 }
 
-/// Hashes of everything the plan was made from; a plan whose hashes no longer match is stale.
+/// Hashes of the plan's inputs; a plan whose hashes no longer match is stale.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MadeFrom {
-    /// SHA-256 of the campaign as the program understood it (defaults filled in, units resolved).
+    /// SHA-256 of the campaign as parsed (defaults filled in, units resolved).
     pub campaign_sha256: String,
     /// SHA-256 of the nominal model's parameters and map.
     pub model_sha256: String,
     /// SHA-256 of the sequence script, if there was one.
     pub script_sha256: Option<String>,
-    /// SHA-256 of what the rig said of itself, where one was asked: a plan alone needs none.
+    /// SHA-256 of the rig's description, if a rig was queried: a plan alone needs none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig_sha256: Option<String>,
 }
 
-/// The plan in four numbers.
+/// Summary of the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanFigures {
     /// Sum over the jumps of the housing's temperature change within the window, K (absolute values).
     pub sum_gradient_k: f64,
     /// Smallest of these changes, K; `None` for a plan without jumps.
     pub min_gradient_k: Option<f64>,
-    /// Largest predicted standard error of the efficiency (fraction); `None` where it was not forecast.
+    /// Largest predicted standard error of the efficiency (fraction); `None` if it was not forecast.
     pub worst_sigma_eta: Option<f64>,
     /// Root of the mean square of predicted standard error and bias of the efficiency (fraction).
     #[serde(default)]
     pub rms_error_eta: Option<f64>,
-    /// The same if alpha_A, the probe and the heating/cooling ratio are not as declared and have to be found (fraction); `None` where the
-    /// method finds none of them, or nothing was forecast.
+    /// The same if alpha_A, the probe and the heating/cooling ratio are not as declared and have to be identified (fraction); `None` if
+    /// the method identifies none of them, or nothing was forecast.
     #[serde(default)]
     pub rms_error_undeclared_eta: Option<f64>,
     /// Largest predicted error of the efficiency, standard error and bias in quadrature (fraction).
@@ -141,14 +141,14 @@ pub struct PlanFigures {
     pub minutes: f64,
 }
 
-/// How good the best order can be at all, by the housing model of the search.
+/// Bounds on the best possible order, by the housing model of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlanBound {
     /// No order has a larger sum of housing gradients, K.
     pub sum_gradient_k: f64,
     /// No order has a larger smallest gradient, K.
     pub min_gradient_k: f64,
-    /// How far the figure that was optimised lies below its bound, % of the bound; `None` where none is known for it.
+    /// Gap between the optimised figure and its bound, % of the bound; `None` if no bound is known.
     pub gap_percent: Option<f64>,
     /// Whether the order was shown to be the best within `proof_tolerance_percent`, by branch and bound.
     pub proven: bool,
@@ -158,16 +158,16 @@ pub struct PlanBound {
     pub model_error_k: f64,
 }
 
-/// An ordered, checked list of steps with what is expected of them.
+/// An ordered, checked list of steps with their expected results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Name of the campaign.
     pub campaign: String,
-    /// What the order was chosen by, e.g. `thermal_gradient`.
+    /// The criterion of the order, e.g. `thermal_gradient`.
     pub objective: String,
     /// Seed of the search (and of simulated rigs).
     pub seed: u64,
-    /// What the plan was made from.
+    /// The inputs of the plan.
     pub made_from: MadeFrom,
     /// Time at the first point before the first step starts, s.
     pub warm_up_s: f64,
@@ -175,18 +175,18 @@ pub struct Plan {
     pub cool_down_s: f64,
     /// The steps in order.
     pub steps: Vec<PlanStep>,
-    /// Time that seeking surge behind the steps is forecast to take, s; 0 where it is not sought.
+    /// Forecast time of the search for surge after the steps, s; 0 without a search.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub surge_search_s: f64,
-    /// The plan in four numbers.
+    /// Summary of the plan.
     pub figures: PlanFigures,
-    /// How good the best order can be; `None` where the order was not searched for.
+    /// Bounds on the best possible order; `None` if the order was not searched for.
     #[serde(default)]
     pub bound: Option<PlanBound>,
-    /// What is not known of the bound, and why; `None` where all is known.
+    /// The unknown part of the bound, and why; `None` if all is known.
     #[serde(default)]
     pub bound_remark: Option<String>,
-    /// What whoever runs the plan should know.
+    /// Warnings for the operator of the plan.
     #[serde(default)]
     pub remarks: Vec<String>,
 }

@@ -1,18 +1,18 @@
-//! What a turbocharger on a gas stand can read: one table for all that judge readings.
+//! Plausible readings of a turbocharger on a gas stand: one table for all checks of readings.
 
 use crate::{Channel, Dimension};
 use std::ops::RangeInclusive;
 
-/// What a channel can read, in its unit.
+/// Plausible readings of a channel, in its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plausible {
-    /// The readings of a machine that runs, from a car's turbocharger (wheels of 30 mm) to a ship's (of 300 mm).
+    /// Readings of a running machine, from a car's turbocharger (wheels of 30 mm) to a ship's (of 300 mm).
     pub running: RangeInclusive<f64>,
-    /// Any single reading, standstill, spikes and faults of the meter included: beyond it the value is lost.
+    /// Any single reading, standstill, spikes and faults of the meter included: a value outside is invalid.
     pub any: RangeInclusive<f64>,
 }
 
-/// What a channel can read.
+/// The plausible readings of a channel.
 ///
 /// | | running | why | any |
 /// |---|---|---|---|
@@ -48,12 +48,12 @@ pub fn plausible(channel: Channel) -> Plausible {
     Plausible { running, any }
 }
 
-/// What a sensor of a gas stand that is wired and scaled rightly can read at all, standstill included, in the unit of the dimension: beyond
-/// it an order of bytes, a unit or a scale is wrong, or the sensor. Narrower than [`Plausible::any`], which bears spikes; wider than
-/// [`Plausible::running`], since a stand may rest.
+/// Readings of a correctly wired and scaled sensor, standstill included, in the unit of the dimension. A value
+/// outside means a wrong byte order, unit or scale, or a defective sensor. Narrower than [`Plausible::any`], which allows spikes; wider
+/// than [`Plausible::running`], since a stand may be at rest.
 pub fn measurable(dimension: Dimension) -> RangeInclusive<f64> {
     match dimension {
-        // Around 0 there is noise.
+        // Noise around 0.
         Dimension::RotationalSpeed => -1e3..=1e6,
         Dimension::MassFlow => -1.0..=20.0,
         Dimension::Pressure => 1e3..=5e6,

@@ -27,7 +27,7 @@ impl Series {
         }
     }
 
-    /// Value at `t_s` as a command holds: that of the last change at or before `t_s`, or the first one.
+    /// Value of a command at `t_s`: that of the last change at or before `t_s`, or the first one.
     pub fn held(&self, t_s: f64) -> Option<f64> {
         let after = self.t_s.partition_point(|t| *t <= t_s);
         self.values.get(after.saturating_sub(1)).copied()
@@ -47,27 +47,27 @@ impl Series {
     }
 }
 
-/// What is not as usual of where a reading comes from.
+/// Unusual provenance of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReadingOrigin {
-    /// When it arrived, s: the time of its sample.
+    /// Arrival time, s: the time of its sample.
     pub t_s: f64,
-    /// When its source took it, s; `None`: when it arrived.
+    /// Source time, s; `None`: the arrival time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source_t_s: Option<f64>,
-    /// How good it is, by the rig's word.
+    /// Quality reported by the rig.
     pub quality: Quality,
 }
 
-/// Everything that was recorded of a run, in SI units.
+/// All recorded data of a run, in SI units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Recording {
-    /// What was measured and commanded.
+    /// Measured and commanded channels.
     pub series: BTreeMap<Channel, Series>,
-    /// Each sensor of the channels that have several; empty where none has.
+    /// Each sensor of the channels that have several; empty if there are none.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub elements: BTreeMap<Element, Series>,
-    /// Readings that are not good, or were not taken when they arrived, in order; others need none. A bad one is NaN in its series.
+    /// Readings that are not good, or were taken before they arrived, in order; others have no entry. A bad one is NaN in its series.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub origins: BTreeMap<Channel, Vec<ReadingOrigin>>,
     /// Steps in order; in recordings made by others found from changes of the command channels.
@@ -76,10 +76,10 @@ pub struct Recording {
     pub events: Vec<Event>,
 }
 
-/// Why a recording cannot serve.
+/// Why a recording cannot be used.
 #[derive(Debug, Clone, thiserror::Error, PartialEq)]
 pub enum RecordingError {
-    /// A channel that is needed is not there.
+    /// A required channel is missing.
     #[error("the recording has no channel {channel} ({}); name it in the channel map", channel.info().description)]
     MissingChannel {
         /// The channel.
@@ -91,7 +91,7 @@ impl Recording {
     /// The series of a channel.
     ///
     /// # Errors
-    /// [`RecordingError::MissingChannel`] where the recording has none, or an empty one.
+    /// [`RecordingError::MissingChannel`] if the recording has none, or an empty one.
     pub fn require(&self, channel: Channel) -> Result<&Series, RecordingError> {
         self.series
             .get(&channel)

@@ -1,16 +1,16 @@
-//! Several sensors that measure one channel: what is declared of each, and the one rule by which they become one reading.
+//! Several sensors on one channel: their declared properties, and the rule that combines them into one reading.
 
 use crate::{Channel, DeclaredUncertainty, Dimension, UnknownChannel};
 use serde::{Deserialize, Serialize};
 
-/// Most sensors that one channel may have.
+/// Maximum number of sensors on one channel.
 pub const MAX_ELEMENTS: usize = 16;
 
-/// Errors (noise and offset together, one standard deviation) by which a single reading may lie off the middle one of all
-/// before it is passed over while the rig runs. What is left out of an identification is judged from the whole recording.
+/// Deviation of a single reading from the median of all, in standard deviations of noise and offset together, from which it is
+/// skipped while the rig runs. The identification excludes sensors based on the whole recording.
 const LIVE_LIMIT_SIGMAS: f64 = 8.0;
 
-/// How the lag of a probe goes with its diameter: `tau ~ d^2/Nu`, and Nu (eq. 11) about as `d^0.5` at the Reynolds numbers of
+/// Exponent of a probe's lag with its diameter: `tau ~ d^2/Nu`, and Nu (eq. 11) about as `d^0.5` at the Reynolds numbers of
 /// a tip of one to four millimetres in an outlet pipe.
 const LAG_EXPONENT: f64 = 1.5;
 
@@ -18,7 +18,7 @@ const LAG_EXPONENT: f64 = 1.5;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Element {
-    /// What it measures.
+    /// Its channel.
     pub channel: Channel,
     /// Its number, from 1.
     pub number: usize,
@@ -71,12 +71,12 @@ impl TryFrom<String> for Element {
     }
 }
 
-/// What is declared of one of the sensors of a channel.
+/// Declared properties of one of the sensors of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeclaredElement {
-    /// What people call it; `T2/3` where nothing else was said.
+    /// Display name; `T2/3` if none is given.
     pub name: String,
-    /// Its own noise, offset and gain error: draws that have nothing to do with those of the others.
+    /// Its own noise, offset and gain error, independent of those of the others.
     pub declared: DeclaredUncertainty,
     /// Diameter of the probe's tip, m; 0 is a probe without inertia.
     pub probe_diameter_m: f64,
@@ -84,8 +84,8 @@ pub struct DeclaredElement {
 
 /// Two or more sensors of one channel.
 ///
-/// Fused, they read `sum w_i x_i` with `w_i ~ 1/(noise_i^2 + offset_i^2)`: the weights of least variance for independent
-/// errors. Where gains alone are declared they weigh as `1/gain_i^2`.
+/// The combined reading is `sum w_i x_i` with `w_i ~ 1/(noise_i^2 + offset_i^2)`: the weights of minimum variance for independent
+/// errors. If only gains are declared, the weights are `1/gain_i^2`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RedundantSensors {
     /// The sensors in the order of their numbers.
@@ -96,7 +96,7 @@ pub struct RedundantSensors {
 }
 
 impl RedundantSensors {
-    /// `count` sensors of a channel, alike and without names of their own.
+    /// `count` identical sensors of a channel, without names of their own.
     pub fn alike(channel: Channel, count: usize, declared: DeclaredUncertainty) -> Self {
         let element = |number| DeclaredElement {
             name: Element { channel, number }.to_string(),
@@ -106,7 +106,7 @@ impl RedundantSensors {
         RedundantSensors { elements: (1..=count).map(element).collect(), common_offset_sigma: 0.0 }
     }
 
-    /// Weights of the sensors that `in_use` names by their position from 0; their sum is 1, and 0 stands for the others.
+    /// Weights of the sensors that `in_use` names by their index from 0; their sum is 1, and the others have 0.
     pub fn weights(&self, in_use: impl Fn(usize) -> bool) -> Vec<f64> {
         let gains_alone = self
             .elements
@@ -137,7 +137,7 @@ impl RedundantSensors {
         raw.into_iter().map(|weight| if sum > 0.0 { weight / sum } else { 0.0 }).collect()
     }
 
-    /// Uncertainty of the fused reading of the sensors in use: what is their own averages out, the common offset does not.
+    /// Uncertainty of the combined reading of the sensors in use: individual errors average out, the common offset does not.
     pub fn fused(&self, in_use: impl Fn(usize) -> bool) -> DeclaredUncertainty {
         let weights = self.weights(in_use);
         let averaged = |of: fn(&DeclaredUncertainty) -> f64| {
@@ -152,8 +152,8 @@ impl RedundantSensors {
         }
     }
 
-    /// Diameter of the one probe, m, that lags as the fused reading of the sensors in use does: to first order in the lag a
-    /// mean of lagged readings lags by the mean of their lags.
+    /// Diameter, m, of the single probe with the same lag as the combined reading of the sensors in use. To first order in the lag,
+    /// a mean of lagged readings lags by the mean of their lags.
     pub fn probe_diameter_m(&self, in_use: impl Fn(usize) -> bool) -> f64 {
         let lags = self.weights(in_use);
         let lags = lags.iter().zip(&self.elements);
@@ -162,8 +162,8 @@ impl RedundantSensors {
         mean.powf(LAG_EXPONENT.recip())
     }
 
-    /// The reading of the channel at one instant, as guards and settle bands need it while the rig runs: the weighted mean
-    /// without what lies far off the middle reading. `readings` in the order of the sensors; NaN where none of them reads.
+    /// The reading of the channel at one instant, for guards and settle bands while the rig runs: the weighted mean
+    /// without outliers from the median. `readings` in the order of the sensors; NaN if none of them has a reading.
     pub fn live(&self, readings: &[f64]) -> f64 {
         let mut sorted: Vec<f64> = readings.iter().copied().filter(|reading| reading.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
@@ -176,7 +176,7 @@ impl RedundantSensors {
                 declared.noise_sigma.hypot(declared.offset_sigma).hypot(declared.gain_sigma_ratio * middle);
             reads(index) && (sigma <= 0.0 || (readings[index] - middle).abs() <= LIVE_LIMIT_SIGMAS * sigma)
         };
-        // Two that contradict each other are both far off their middle.
+        // If two contradict each other, both are far from their median.
         let any_near = (0..self.elements.len()).any(near);
         let weights = self.weights(|index| if any_near { near(index) } else { reads(index) });
         let used = weights.iter().zip(readings).filter(|(weight, _)| **weight > 0.0);
@@ -214,7 +214,7 @@ mod tests {
         }
     }
 
-    /// No other weights with the sum 1 give less variance: those beside them do not.
+    /// No other weights with the sum 1 give a smaller variance: neighbouring ones do not.
     #[test]
     fn the_weights_are_those_of_least_variance() {
         let mut unlike = RedundantSensors::alike(Channel::P2, 3, declared(60.0, 100.0));
@@ -246,7 +246,7 @@ mod tests {
             assert!((four.live(&[350.0, wild, 350.2, 350.1]) - 350.1).abs() < 1e-9, "{wild}");
         }
         assert!(four.live(&[f64::NAN; 4]).is_nan());
-        // Of two that contradict each other neither is known to be the wrong one.
+        // If two contradict each other, neither is known to be wrong.
         let two = RedundantSensors::alike(Channel::P2, 2, declared(60.0, 100.0));
         assert_eq!(two.live(&[150e3, 160e3]), 155e3);
         let exact = RedundantSensors::alike(Channel::P2, 2, declared(0.0, 0.0));

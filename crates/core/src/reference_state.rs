@@ -15,19 +15,19 @@ impl ReferenceState {
     /// SAE J922: 298 K, 100 kPa.
     pub const SAE: ReferenceState = ReferenceState { t_ref_k: 298.0, p_ref_pa: 100_000.0 };
 
-    /// As Garrett prints on its maps: 545 degR, 13.95 psia (a pound-force over a square inch, exactly).
+    /// As printed on Garrett maps: 545 degR, 13.95 psia (a pound-force over a square inch, exactly).
     pub const GARRETT: ReferenceState =
         ReferenceState { t_ref_k: 545.0 * 5.0 / 9.0, p_ref_pa: 13.95 * 4.448_221_615_260_5 / 0.000_645_16 };
 
-    /// As BorgWarner prints on its maps: 293 K, 98.1 kPa.
+    /// As printed on BorgWarner maps: 293 K, 98.1 kPa.
     pub const BORGWARNER: ReferenceState = ReferenceState { t_ref_k: 293.0, p_ref_pa: 98_100.0 };
 
-    /// The state that goes by a name, whatever its capitals.
+    /// The state with this name, ignoring case.
     pub fn named(name: &str) -> Option<ReferenceState> {
         NAMED_REFERENCES.iter().find(|row| row.name.eq_ignore_ascii_case(name.trim())).map(|row| row.state)
     }
 
-    /// Whether both numbers make a reference state: 200 K to 400 K, 50 kPa to 200 kPa.
+    /// Whether both numbers form a valid reference state: 200 K to 400 K, 50 kPa to 200 kPa.
     pub fn is_plausible(&self) -> bool {
         (200.0..=400.0).contains(&self.t_ref_k) && (50e3..=200e3).contains(&self.p_ref_pa)
     }
@@ -63,7 +63,7 @@ impl ReferenceState {
     }
 }
 
-/// A reference state in use under a name.
+/// A named reference state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NamedReference {
     /// Name as written in campaigns and on the command line.
@@ -74,14 +74,14 @@ pub struct NamedReference {
     pub printed: &'static str,
 }
 
-/// Every reference state that has a name.
+/// All named reference states.
 pub const NAMED_REFERENCES: &[NamedReference] = &[
     NamedReference { name: "SAE", state: ReferenceState::SAE, printed: "298 K, 100 kPa" },
     NamedReference { name: "Garrett", state: ReferenceState::GARRETT, printed: "545 degR, 13.95 psia" },
     NamedReference { name: "BorgWarner", state: ReferenceState::BORGWARNER, printed: "293 K, 98.1 kPa" },
 ];
 
-/// The usual choices in a sentence: `SAE (298 K, 100 kPa), Garrett (...), ...`.
+/// The common choices in a sentence: `SAE (298 K, 100 kPa), Garrett (...), ...`.
 pub fn usual_references() -> String {
     let rows: Vec<String> =
         NAMED_REFERENCES.iter().map(|row| format!("{} ({})", row.name, row.printed)).collect();
@@ -90,7 +90,7 @@ pub fn usual_references() -> String {
 
 impl std::fmt::Display for ReferenceState {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // For people: a hundredth of a permille is no matter. Files carry all digits.
+        // For display: a hundredth of a permille does not matter. Files carry all digits.
         let short = |value: f64| (value * 1e3).round() / 1e3;
         write!(f, "{} K, {} kPa", short(self.t_ref_k), short(self.p_ref_pa / 1000.0))
     }

@@ -1,16 +1,16 @@
-//! What a rig is told on its way into the safe state.
+//! Setpoints of a rig during the safe shutdown.
 
 use crate::{OperatingPoint, RigMode, SafeTrajectory, SetpointRange, SetpointRanges, Setpoints};
 
-/// A heater that is told this does not heat, K.
+/// Setpoint at which a heater does not heat, K.
 const HEATER_OFF_K: f64 = 293.15;
 
 impl SafeTrajectory {
-    /// Setpoints `after_s` into the way that began at `from`: heater off, valve open, P3 down at its slew; `None` where the air is to
-    /// be cut: at once without a slew, at the end of the way, and once P3 is at `p3_min_pa`.
+    /// Setpoints `after_s` into the shutdown that began at `from`: heater off, valve open, P3 down at its slew. `None` if the air is to
+    /// be cut: at once without a slew, at the end of the shutdown, and once P3 is at `p3_min_pa`.
     ///
-    /// What the rig accepts bounds heater and valve: a rig that takes no 293 K is told its lowest, since a command that it refuses would
-    /// cut the air at full pressure.
+    /// The rig's ranges bound heater and valve: a rig that does not accept 293 K gets its lowest setpoint, since a rejected command
+    /// would cut the air at full pressure.
     pub fn setpoints(
         &self,
         from: &Setpoints,

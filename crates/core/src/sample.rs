@@ -1,4 +1,4 @@
-//! Samples as a backend hands them over: columns over a common time base.
+//! Samples from a backend: columns over a common time base.
 
 use crate::{Channel, Element, Event};
 use serde::{Deserialize, Serialize};
@@ -6,45 +6,45 @@ use serde::{Deserialize, Serialize};
 /// The samples of one channel in a batch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelColumn {
-    /// Which quantity.
+    /// Its channel.
     pub channel: Channel,
-    /// SI values, as long as the batch's `t_s`. NaN where the sensor gave nothing.
+    /// SI values, as long as the batch's `t_s`. NaN if the sensor gave nothing.
     pub values: Vec<f64>,
 }
 
 /// The samples of one of several sensors of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ElementColumn {
-    /// Which sensor.
+    /// Its sensor.
     pub element: Element,
-    /// SI values, as long as the batch's `t_s`. NaN where the sensor gave nothing.
+    /// SI values, as long as the batch's `t_s`. NaN if the sensor gave nothing.
     pub values: Vec<f64>,
 }
 
-/// How good a reading is, by the rig's own word.
+/// Quality of a reading, as reported by the rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quality {
     /// Good.
     Good,
-    /// To be used with doubt; guards take it.
+    /// Uncertain; guards use it.
     Uncertain,
-    /// No reading at all, whatever number stands there.
+    /// Invalid, whatever its value.
     Bad,
 }
 
-/// Where the readings of a channel come from: beside the time at which they arrived.
+/// Provenance of a channel's readings, in addition to their arrival times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// Which quantity.
+    /// Its channel.
     pub channel: Channel,
     /// When the source took each reading, s since arming; as long as the batch's `t_s`.
     pub source_t_s: Vec<f64>,
-    /// How good each is; as long as the batch's `t_s`.
+    /// Quality of each reading; as long as the batch's `t_s`.
     pub quality: Vec<Quality>,
 }
 
-/// What only a simulator knows; recorded under `/truth`, read by scoring alone.
+/// Truth from a simulator; recorded under `/truth`, read only by scoring.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TruthColumn {
     /// Name with its unit suffix, e.g. `h_w_m2k`.
@@ -62,13 +62,13 @@ pub struct SampleBatch {
     pub first_sequence: u64,
     /// Sample times since arming, s, strictly increasing.
     pub t_s: Vec<f64>,
-    /// One column per channel; of a channel with several sensors what they read together
+    /// One column per channel; for a channel with several sensors the combined reading
     /// ([`RedundantSensors::live`](crate::RedundantSensors::live)).
     pub columns: Vec<ChannelColumn>,
-    /// Each sensor of the channels that have several; empty where none has.
+    /// Each sensor of the channels that have several; empty if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub elements: Vec<ElementColumn>,
-    /// Channels whose readings are not all good, or not taken when they arrived; others need none.
+    /// Channels with readings that are not good or were taken before they arrived; others have no entry.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub provenance: Vec<Provenance>,
     /// Truth of a simulated rig; empty for a real one.
@@ -83,12 +83,12 @@ impl SampleBatch {
         self.columns.iter().find(|column| column.channel == channel).map(|c| c.values.as_slice())
     }
 
-    /// Where the readings of one channel come from; `None`: each was good, and taken when it arrived.
+    /// Provenance of one channel's readings; `None`: each was good, and taken when it arrived.
     pub fn provenance_of(&self, channel: Channel) -> Option<&Provenance> {
         self.provenance.iter().find(|provenance| provenance.channel == channel)
     }
 
-    /// The latest value of one channel, if there is any.
+    /// The latest value of one channel, if there is one.
     pub fn last(&self, channel: Channel) -> Option<f64> {
         self.column(channel).and_then(|values| values.last().copied())
     }

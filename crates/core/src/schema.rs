@@ -1,10 +1,10 @@
-//! What JSON schemas of the vocabulary have in common.
+//! Common parts of the JSON schemas of shared types.
 
 use schemars::Schema;
 use serde_json::{Value, json};
 
-/// An enum of unit variants as one list of names. With a doc comment on each variant `schemars` makes a list of
-/// alternatives of it, which a reader of messages would have to be told one by one.
+/// An enum of unit variants as one list of names. With a doc comment on each variant, `schemars` makes a list of
+/// alternatives instead, and messages would have to report them one by one.
 pub(crate) fn names_alone(schema: &mut Schema) {
     let Some(Value::Array(variants)) = schema.get("oneOf") else { return };
     let names: Option<Vec<Value>> = variants

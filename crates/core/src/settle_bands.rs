@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Largest variation (largest less smallest value) of each quantity, as a ratio of its mean, from some time to the end
-/// of a step: the operating point has settled at that time. What "settled" means is computed in one place, the
+/// Largest variation (maximum minus minimum) of each quantity, as a ratio of its mean, from some time to the end
+/// of a step: the operating point has settled at that time. The criterion is implemented only in the
 /// `settled` module of `mapper-physics`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -1,27 +1,27 @@
-//! How the shaft speed answers to the turbine inlet pressure around one point, and how a run holds the speed with it.
+//! Response of the shaft speed to the turbine inlet pressure around one point, and its use to control the speed.
 
 use serde::{Deserialize, Serialize};
 
-/// The nominal machine around a point at which it rests.
+/// The nominal machine around a steady state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedResponse {
-    /// Change of the resting shaft speed with P3, rpm/Pa, > 0.
+    /// Change of the steady shaft speed with P3, rpm/Pa, > 0.
     pub rpm_per_pa: f64,
-    /// Relative change of P3 that makes a relative change of the turbine's power, ratio, > 0.
+    /// Relative change of P3 per relative change of the turbine's power, ratio, > 0.
     pub p3_per_power: f64,
     /// Time constant with which the speed follows P3's command, actuator included, s, > 0.
     pub time_constant_s: f64,
 }
 
-/// The closed loop over the shaft speed: what the campaign says of it.
+/// The closed loop over the shaft speed, as declared in the campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedControlSettings {
-    /// Within this share of its target the speed counts as reached, ratio, > 0.
+    /// Deviation from the target within which the speed counts as reached, ratio, > 0.
     pub band_ratio: f64,
 }
 
 impl SpeedControlSettings {
-    /// Band where a campaign says nothing, ratio.
+    /// Default band, ratio.
     pub const BAND_RATIO: f64 = 0.003;
 }
 

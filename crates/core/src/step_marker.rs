@@ -1,12 +1,12 @@
-//! Where a step of the plan lies in a recording.
+//! Position of a step in a recording.
 
 use crate::{OperatingPoint, StepKind, step_number};
 use serde::{Deserialize, Serialize};
 
-/// Start and end of one step as it was run (or found in a recording made by others).
+/// Start and end of one executed step (or of one found in a recording made by others).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StepMarker {
-    /// Place of the step in its plan, or in order of appearance, from 0; files have its number, from 1.
+    /// Index of the step in its plan, or in order of appearance, from 0; files have its number, from 1.
     #[serde(flatten, with = "crate::step_number::entry")]
     pub index: usize,
     /// Point or repeat.
@@ -15,9 +15,9 @@ pub struct StepMarker {
     pub start_s: f64,
     /// Run time of the step's end, s.
     pub end_s: f64,
-    /// Where the plan came from; `None` for the first step, and in recordings made by others.
+    /// The point before the jump; `None` for the first step, and in recordings made by others.
     pub from: Option<OperatingPoint>,
-    /// Where the plan aimed; `None` in recordings made by others.
+    /// The target of the plan; `None` in recordings made by others.
     pub to: Option<OperatingPoint>,
     /// Commanded turbine inlet total pressure, Pa.
     pub p3_pa: f64,
@@ -27,10 +27,10 @@ pub struct StepMarker {
 }
 
 impl StepMarker {
-    /// Places from here on belong to steps that a resumed run makes once more, outside its plan: no plan has as many.
+    /// First index of steps that a resumed run repeats outside its plan: no plan has that many steps.
     pub const AGAIN_FROM: usize = 1_000_000;
 
-    /// Number of the step in its run, from 1; `None` for one that is made once more.
+    /// Number of the step in its run, from 1; `None` for a repeated one outside the plan.
     pub fn number(&self) -> Option<usize> {
         (self.index < StepMarker::AGAIN_FROM).then(|| step_number(self.index))
     }

@@ -1,12 +1,12 @@
-//! The number of a step: from 1 in files and in all text, while code counts places from 0.
+//! The number of a step: from 1 in files and in all text, while code uses an index from 0.
 //!
-//! Serde adapters for the fields that hold such a place: this module for one named `step`, [`list`], [`lists`] and [`option`] for several
-//! and for a missing one, [`entry`] for plans and step markers, which older files write otherwise.
+//! Serde adapters for the fields with such an index: this module for one named `step`, [`list`], [`lists`] and [`option`] for several
+//! and for a missing one, [`entry`] for plans and step markers, which have another form in older files.
 
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 
-/// The number of the step at a place, from 1.
+/// The number of the step at an index, from 1.
 pub fn step_number(place: usize) -> usize {
     place.saturating_add(1)
 }
@@ -23,10 +23,10 @@ pub fn serialize<S: Serializer>(place: &usize, serializer: S) -> Result<S::Ok, S
     step_number(*place).serialize(serializer)
 }
 
-/// Reads a number from 1 as a place.
+/// Reads a number from 1 as an index.
 ///
 /// # Errors
-/// Those of the deserializer; 0 is no step.
+/// Those of the deserializer; 0 is not a valid step.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
     place(usize::deserialize(deserializer)?)
 }
@@ -71,7 +71,7 @@ pub mod option {
     }
 }
 
-/// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead, so that the name says which it is.
+/// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead; the name distinguishes them.
 pub mod entry {
     use super::{Deserialize, Deserializer, Error, Serialize, Serializer, place, step_number};
 
@@ -97,7 +97,7 @@ pub mod entry {
     /// Reads `step` or `index`.
     ///
     /// # Errors
-    /// Those of the deserializer; where neither is there, and where `step` is 0.
+    /// Those of the deserializer; if neither is present, and if `step` is 0.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
         let Read { step, index } = Read::deserialize(deserializer)?;
         match step {

@@ -1,22 +1,22 @@
-//! Surge that is sought: how a line's surge-side end is approached, and the mark that comes of it.
+//! The search for surge: the approach to a line's surge-side end, and the resulting mark.
 
 use crate::{Recording, Series, StepKind};
 use serde::{Deserialize, Serialize};
 
-/// How the surge line is approached at the end of a speed line: the valve closes in small steps until the surge flow is
+/// The approach to the surge line at the end of a speed line: the valve closes in small steps until the surge flow is
 /// known, or until it is as near as [`SurgeSeek::closest_margin_ratio`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurgeSeek {
-    /// Smallest surge margin that is gone to, by the surge flow as it is known by then, ratio, > 0.
+    /// Smallest surge margin to approach, by the surge flow known by then, ratio, > 0.
     pub closest_margin_ratio: f64,
     /// Largest change of the valve's opening at a step while the line may be near, ratio, > 0.
     pub step_ratio: f64,
-    /// Time at each opening, s; its first [`SurgeSeek::SETTLE_S`] are for the rig to follow.
+    /// Time at each opening, s; the rig needs its first [`SurgeSeek::SETTLE_S`] to follow.
     pub dwell_s: f64,
-    /// Standard error of the surge flow at which a line is done, ratio, > 0; the flow meter's gain is not part of it.
+    /// Standard error of the surge flow at which a line is finished, ratio, > 0, without the flow meter's gain.
     pub wanted_standard_error_ratio: f64,
-    /// Steps of one line at most, the return from the line not counted.
+    /// Maximum number of steps of one line, without the return from the line.
     pub most_steps: usize,
 }
 
@@ -37,11 +37,11 @@ impl Default for SurgeSeek {
     }
 }
 
-/// What the surge flow of a mark was found by.
+/// Evidence for the surge flow of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SurgeFoundBy {
-    /// The growth of the variation of pressures and flow, carried on to the line. The compressor was not in surge.
+    /// The growth of the variation of pressures and flow, extrapolated to the line. The compressor was not in surge.
     Precursor,
     /// The compressor went into surge: the flow lies between the last opening without surge and the one that surged.
     Surge,
@@ -50,27 +50,27 @@ pub enum SurgeFoundBy {
 /// The surge-side end of a speed line, with one standard error of each of its values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurgeMark {
-    /// Shaft speed that the line aimed at (physical), rpm.
+    /// Target shaft speed of the line (physical), rpm.
     pub target_speed_rpm: f64,
-    /// Corrected speed at which the mark stands, rpm.
+    /// Corrected speed of the mark, rpm.
     pub speed_corrected_rpm: f64,
     /// Corrected flow at surge, kg/s.
     pub flow_corrected_kg_s: f64,
     /// Its standard error without the flow meter's gain, kg/s.
     pub flow_standard_error_kg_s: f64,
-    /// Standard error that all corrected flows share by the flow meter's gain, kg/s.
+    /// Standard error that all corrected flows share through the flow meter's gain, kg/s.
     pub flow_common_standard_error_kg_s: f64,
     /// Total pressure ratio P2/P1 at surge.
     pub pressure_ratio: f64,
     /// Its standard error.
     pub pressure_ratio_standard_error: f64,
-    /// Smallest corrected flow that was measured on the way, kg/s.
+    /// Smallest corrected flow measured during the approach, kg/s.
     pub closest_flow_corrected_kg_s: f64,
     /// Run time at the end of that measurement, s.
     pub closest_end_s: f64,
-    /// What it was found by.
+    /// Its evidence.
     pub found_by: SurgeFoundBy,
-    /// Openings on the way.
+    /// Openings during the approach.
     pub steps: usize,
 }
 
@@ -95,13 +95,13 @@ impl SurgeMark {
 }
 
 impl Recording {
-    /// Takes off the approaches to surge and all that comes after the first of them: they stand behind the points, hold
-    /// none, and what they did to the machine is no part of any. `None` where the recording has none.
+    /// Removes the approaches to surge and everything after the first of them: they come after the points, contain
+    /// none, and must not affect any. `None` if the recording has none.
     pub fn split_off_approaches(&mut self) -> Option<Recording> {
         let first = self.steps.iter().position(|step| step.kind == StepKind::Approach)?;
         let from_s = self.steps[first].start_s;
         let split = |series: &mut Series| {
-            // A sample at the very end of the step before belongs to that.
+            // A sample at the very end of the previous step belongs to that step.
             let at = series.t_s.partition_point(|t_s| *t_s <= from_s);
             Series { t_s: series.t_s.split_off(at), values: series.values.split_off(at) }
         };
@@ -111,7 +111,7 @@ impl Recording {
             elements: self.elements.iter_mut().map(|(element, series)| (*element, split(series))).collect(),
             steps: self.steps.split_off(first),
             events: self.events.split_off(after),
-            // Where readings come from is for those who look a run up, which is the whole one.
+            // Provenance of readings is only needed with the complete run.
             ..Recording::default()
         })
     }

@@ -1,34 +1,34 @@
-//! What all points of a campaign share: how gas and compressor housing exchange heat, and what the sensors add.
+//! Parameters that all points of a campaign share: heat exchange of gas and compressor housing, and sensor errors.
 
 use crate::{Channel, EstimateUncertainty, InletConvection};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How a number of the thermal model came about.
+/// Origin of a parameter of the thermal model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
     /// Found from the recording.
     Fitted,
-    /// Taken as declared; the recording was not asked.
+    /// Taken as declared, without using the recording.
     Assumed,
-    /// The recording says no more about it than was declared beforehand.
+    /// The recording adds no information to the declared value.
     NotIdentifiable,
 }
 
-/// A number with what is known of its error.
+/// A parameter with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SharedValue {
-    /// The value; `None` where the recording cannot tell it from others.
+    /// The value; `None` if the recording cannot distinguish it from other parameters.
     pub value: Option<f64>,
     /// Its standard errors by origin, unit of the value.
     pub uncertainty: EstimateUncertainty,
-    /// Where it comes from.
+    /// Its origin.
     pub origin: Origin,
 }
 
 impl SharedValue {
-    /// A value that was taken as declared, without error.
+    /// A declared value without error.
     pub fn assumed(value: f64) -> Self {
         SharedValue {
             value: Some(value),
@@ -37,7 +37,7 @@ impl SharedValue {
         }
     }
 
-    /// The 95 % interval, where there is a value.
+    /// The 95 % interval, if there is a value.
     pub fn interval_95(&self) -> Option<(f64, f64)> {
         self.value
             .map(|value| crate::confidence_interval_95(value, self.uncertainty.combined_standard_error()))
@@ -57,13 +57,13 @@ pub struct ConvectionLaw {
     pub exponent: SharedValue,
     /// Reynolds number at which coefficient and exponent are uncorrelated: the mean of the points' logarithms.
     pub reynolds_reference: f64,
-    /// Smallest and largest Reynolds number of the points: beyond lies extrapolation.
+    /// Smallest and largest Reynolds number of the points: values outside are an extrapolation.
     pub reynolds_range: (f64, f64),
     /// Root mean square of the single points' deviation from the law, ratio.
     pub deviation_ratio: f64,
 }
 
-/// Two shared numbers that the recording hardly tells apart.
+/// Two shared parameters that the recording hardly distinguishes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entangled {
     /// Symbol of one.
@@ -74,56 +74,56 @@ pub struct Entangled {
     pub correlation: f64,
 }
 
-/// One point of a profile: a number held at a value, all others fitted again.
+/// One point of a profile: a parameter fixed at a value, all others fitted again.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ProfilePoint {
-    /// The value, unit of the number.
+    /// The value, unit of the parameter.
     pub value: f64,
     /// Sum of squared residuals in standard deviations, minus that of the best point of the profile: below 3.84 the
     /// recording allows the value at 95 %.
     pub square: f64,
 }
 
-/// What the heat-transfer coefficient before the wheel was taken to follow.
+/// The assumed model of the heat-transfer coefficient before the wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FoundInlet {
-    /// What it follows in the numbers that stand beside this.
+    /// The model used for the other parameters of this result.
     pub convection: InletConvection,
-    /// Diameter of the inlet that its own law takes, m.
+    /// Diameter of the inlet in its own law, m.
     pub diameter_m: f64,
-    /// `Assumed` where it was declared and the recording was not asked, `Fitted` where the recording tells,
-    /// `NotIdentifiable` where it does not: then the intervals contain what the other would have given.
+    /// `Assumed` if it was declared and the recording was not used, `Fitted` if the recording determines it,
+    /// `NotIdentifiable` if it does not: then the intervals contain the results of the other model.
     pub origin: Origin,
-    /// Probability that it is so, 0..1, from the recording and that what is declared holds more often than not; 1 where
-    /// the recording was not asked.
+    /// Probability of this model, 0..1, from the recording and a prior that favours the declared one; 1 if
+    /// the recording was not used.
     pub probability: f64,
-    /// alpha_A as the other reading has it; `None` where it was not tried, or alpha_A is not sought.
+    /// alpha_A with the other model; `None` if it was not tried, or alpha_A is not estimated.
     pub alpha_area_otherwise_ratio: Option<f64>,
 }
 
 /// Result of a joint identification that belongs to no single point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ThermalModel {
-    /// The convection law; `None` where each point has its own coefficient.
+    /// The convection law; `None` if each point has its own coefficient.
     pub convection: Option<ConvectionLaw>,
     /// Internal area A_c that the coefficients refer to, m2.
     pub internal_area_m2: f64,
     /// Share of the internal area before compression, alpha_A.
     pub alpha_area_ratio: SharedValue,
-    /// How much worse everything else fits with alpha_A held at a value; empty where it was not fitted.
+    /// Loss of fit quality with alpha_A fixed at a value; empty if it was not fitted.
     #[serde(default)]
     pub alpha_area_profile: Vec<ProfilePoint>,
-    /// What h before the wheel follows; `None` where it makes no difference, since no area lies there.
+    /// Model of h before the wheel; `None` if it has no effect, since no area lies there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inlet: Option<FoundInlet>,
     /// Tip diameter of the T2 probe (eqs. 11-12), m; 0 is an ideal probe.
     pub probe_diameter_m: SharedValue,
-    /// Factor on the coefficient where the metal is hotter than the gas it touches.
+    /// Factor on the coefficient if the metal is hotter than the gas it touches.
     pub direction_factor: SharedValue,
-    /// Offsets of readings (reading less true value), by channel, K or Pa.
+    /// Offsets of readings (reading minus true value), by channel, K or Pa.
     pub offsets: BTreeMap<Channel, SharedValue>,
-    /// Numbers that can hardly be told apart (correlation beyond 0.95 in size).
+    /// Parameters that are nearly indistinguishable (correlation beyond 0.95 in size).
     pub entangled: Vec<Entangled>,
-    /// What speaks against the model, one sentence each; empty where nothing does.
+    /// Evidence against the model, one sentence each; empty if there is none.
     pub doubts: Vec<String>,
 }

@@ -1,16 +1,16 @@
-//! How long the parts of a campaign take.
+//! Durations of the parts of a campaign.
 
 use serde::{Deserialize, Serialize};
 
-/// How long the steps of a campaign last, jump included. All steps last equally long.
+/// Duration of the steps of a campaign, jump included. All steps have the same duration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Dwell {
-    /// This long, s, > 0.
+    /// This duration, s, > 0.
     Fixed(f64),
-    /// As long as warm-up, steps and cool-down together may take, s, > 0.
+    /// Fills this total time of warm-up, steps and cool-down, s, > 0.
     TimeBudget(f64),
-    /// As long as the efficiencies need to reach this forecast standard error (rms over the points, fraction, > 0).
+    /// The time that the efficiencies need to reach this forecast standard error (rms over the points, fraction, > 0).
     RequiredSigmaEta(f64),
 }
 
@@ -26,7 +26,7 @@ impl Dwell {
         }
     }
 
-    /// The dwell, s, or the usual one as long as the planner has not chosen it.
+    /// The dwell, s, or the usual one until the planner has chosen it.
     pub fn fixed_or_usual_s(self) -> f64 {
         self.fixed_s().unwrap_or(Self::USUAL_S)
     }

@@ -1,12 +1,12 @@
-//! In which order the points of a campaign are visited.
+//! Order in which the points of a campaign are visited.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the order of the points is chosen by. Campaigns and plans write it in snake case.
+/// Criterion for the order of the points. Campaigns and plans write it in snake case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-// Without descriptions of its own the schema is one list of names: a message can say which of them was meant.
+// Without descriptions of its own the schema is one list of names: a message can suggest the intended one.
 #[schemars(transform = crate::schema::names_alone)]
 #[schemars(extend("x-removed" = {
     "sum_gradient": "write `order: thermal_gradient`, its new name",

@@ -1,12 +1,12 @@
-//! Which part of a step is used.
+//! Which part of a step is evaluated.
 
 use serde::{Deserialize, Serialize};
 
-/// Part of each step that is used by the methods that look at the transient.
+/// Part of each step that is evaluated by the methods that use the transient.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WindowRule {
-    /// From where speed, flow and pressure ratio have settled to the end of the step.
+    /// From the time when speed, flow and pressure ratio have settled to the end of the step.
     #[default]
     Auto,
     /// From `start_s` to `end_s` after the jump; cut at the step's end.
@@ -19,22 +19,22 @@ pub enum WindowRule {
 }
 
 impl WindowRule {
-    /// An automatic window starts at the earliest this long after the last change of a command, s: what Burke et al.
-    /// typically need, and what probes of 1.5 mm need to follow.
+    /// Earliest start of an automatic window after the last change of a command, s: the typical time in Burke et al.,
+    /// and the time that probes of 1.5 mm need to follow.
     pub const EARLIEST_S: f64 = 10.0;
-    /// Shortest useful window, s. A step that settles later gives its last so many seconds, and is doubtful.
+    /// Shortest useful window, s. A step that settles later uses its last seconds of this length, and is doubtful.
     pub const SHORTEST_S: f64 = 30.0;
 
-    /// Share of a step, at its end, in which its operating point must have settled for a method that follows the step from
-    /// its jump on: the point's state is the mean of the last seconds, but a step that swings passes through rest now and then.
+    /// Share of a step, at its end, in which its operating point must have settled for a method that evaluates the step from
+    /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may pass through a momentary rest.
     const AT_REST_RATIO: f64 = 0.25;
 
-    /// The same for a step of `dwell_s`, s: never more than [`Self::SHORTEST_S`].
+    /// The same for a step of `dwell_s`, s: at most [`Self::SHORTEST_S`].
     pub fn rest_at_end_s(dwell_s: f64) -> f64 {
         (Self::AT_REST_RATIO * dwell_s).min(Self::SHORTEST_S)
     }
 
-    /// Start and end of the window of a step that lasts `dwell_s`, s after its jump, where the operating point settles
+    /// Start and end of the window of a step that lasts `dwell_s`, s after its jump, if the operating point settles
     /// `settle_s` after the jump (`None`: never within the step).
     pub fn of_step_s(&self, settle_s: Option<f64>, dwell_s: f64) -> (f64, f64) {
         match *self {

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-/// `value` followed by `unit`; a ratio, whose unit is `1` or empty, stands alone: "1.04", not "1.04 1".
+/// `value` followed by `unit`; a ratio, whose unit is `1` or empty, has no unit: "1.04", not "1.04 1".
 pub fn with_unit(value: impl Display, unit: &str) -> String {
     match unit {
         "" | "1" => value.to_string(),
@@ -10,12 +10,12 @@ pub fn with_unit(value: impl Display, unit: &str) -> String {
     }
 }
 
-/// A temperature as limits are written and as files hold it: `300.0 degC (573.2 K)`.
+/// A temperature in the form of limits and files: `300.0 degC (573.2 K)`.
 pub fn temperature(value_k: f64) -> String {
     format!("{:.1} degC ({value_k:.1} K)", value_k - 273.15)
 }
 
-/// A reading as limits are written: temperatures as [`temperature`], pressures in kPa, speeds in krpm; others in `unit`.
+/// A reading in the form of limits: temperatures as [`temperature`], pressures in kPa, speeds in krpm; others in `unit`.
 pub fn readable(value: f64, unit: &str) -> String {
     match unit {
         "K" => temperature(value),

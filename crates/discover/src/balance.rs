@@ -1,9 +1,9 @@
-//! The balances of the model in which a force can be missing.
+//! The balances of the model in which a source term can be missing.
 
 use mapper_core::Channel;
 use mapper_physics::effect::Submodel;
 
-/// A balance of the model: a state equation, an algebraic one, or what a sensor reads.
+/// A balance of the model: a state equation, an algebraic equation, or a sensor reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Balance {
     /// Heat of the compressor housing, W.
@@ -12,21 +12,21 @@ pub enum Balance {
     TurbineHousing,
     /// Torque of the shaft, N m.
     Shaft,
-    /// Flow into the volume behind the compressor, kg/s.
+    /// Flow into the volume downstream of the compressor, kg/s.
     Outlet,
-    /// Heat to the gas before the wheel, W.
+    /// Heat to the gas upstream of the wheel, W.
     GasBefore,
-    /// Heat to the gas behind the wheel, W, not from the shaft.
+    /// Heat to the gas downstream of the wheel, W, not from the shaft.
     GasAfter,
     /// Heat to the gas between housing and probe, W.
     GasOutlet,
-    /// Isentropic efficiency, as a part of itself.
+    /// Relative deviation of the isentropic efficiency.
     Work,
-    /// Convection between gas and compressor housing, as a part of itself.
+    /// Relative deviation of the convection between gas and compressor housing.
     Convection,
-    /// Flow of the compressor's map, as a part of itself.
+    /// Relative deviation of the compressor map's flow.
     MapFlow,
-    /// What a sensor reads, in its unit.
+    /// Offset of a sensor reading, in its unit.
     Reading(Channel),
     /// Time constant of a sensor, s.
     Lag(Channel),
@@ -50,7 +50,7 @@ impl Balance {
         }
     }
 
-    /// Unit of the force.
+    /// Unit of the source term.
     pub fn unit(self) -> &'static str {
         match self {
             Balance::CompressorHousing
@@ -66,7 +66,7 @@ impl Balance {
         }
     }
 
-    /// A force of this size is plainly there, on a machine of some kilowatts.
+    /// A clearly significant size of the source term, for a machine of some kilowatts.
     pub fn plain_size(self) -> f64 {
         match self {
             Balance::CompressorHousing | Balance::TurbineHousing => 50.0,
@@ -85,7 +85,7 @@ impl Balance {
         }
     }
 
-    /// What the force is, for sentences.
+    /// Name of the source term, for sentences.
     pub fn words(self) -> String {
         match self {
             Balance::CompressorHousing => "heat to the compressor housing".to_owned(),
@@ -103,7 +103,7 @@ impl Balance {
         }
     }
 
-    /// What the force acts on, for sentences.
+    /// Name of what it acts on, for sentences.
     pub fn place_words(self) -> String {
         match self {
             Balance::CompressorHousing => "the compressor housing".to_owned(),
@@ -115,7 +115,7 @@ impl Balance {
         }
     }
 
-    /// The function of an effect's script that takes it; `None` where a script cannot.
+    /// The script function that applies it; `None` if a script cannot.
     pub fn hook_name(self) -> Option<String> {
         Some(match self {
             Balance::CompressorHousing => "heat_to_compressor_w".to_owned(),
@@ -134,7 +134,7 @@ impl Balance {
     }
 }
 
-/// A sensor without a part of its own belongs to the balance it is read for.
+/// A sensor without its own part belongs to the balance that uses its reading.
 fn submodel_of_sensor(channel: Channel) -> Submodel {
     match channel {
         Channel::T1 => Submodel::T1Probe,

@@ -1,4 +1,4 @@
-//! A law as a hypothesis: terms with coefficients fitted by runs of the model, with tolerances and what stands beside it.
+//! A law as a hypothesis: its coefficients are fitted by model runs, together with tolerances and any other effects.
 
 use crate::law_effect::LawEffect;
 use crate::select::Choice;
@@ -11,24 +11,24 @@ use mapper_numerics::parallel;
 use mapper_physics::effect::Effect;
 use std::sync::Arc;
 
-/// A law with its fit; its effect stands in [`Bench::study`] at `effect`.
+/// A fitted law; its effect is [`Bench::study`]'s effect number `effect`.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// Terms of the library, by place.
+    /// Terms, by index in the term library.
     pub choice: Choice,
-    /// The law's effect, by its place in the study.
+    /// Index of the law's effect in the study.
     pub effect: usize,
-    /// At its best.
+    /// Best fit.
     pub fit: Fit,
 }
 
 impl Candidate {
-    /// Logarithm of the evidence, rarity included.
+    /// Logarithm of the evidence, including the rarity.
     pub fn score(&self) -> f64 {
         self.fit.score - self.choice.rarity
     }
 
-    /// Whether the data tell every coefficient from 0, but for the level beside a slope, which may be anything.
+    /// Whether every coefficient differs significantly from 0; the level that accompanies a slope may have any value.
     pub fn is_determined(&self, library: &[Term]) -> bool {
         let covariance = &self.fit.covariance;
         let terms: Vec<&Term> = self.choice.terms.iter().map(|place| &library[*place]).collect();
@@ -51,14 +51,14 @@ impl Candidate {
 /// A study to which laws are added as effects.
 #[derive(Debug)]
 pub struct Bench {
-    /// The recording, with the catalogue's effects and then the laws'.
+    /// The recording, with the library effects followed by the laws.
     pub study: Study,
-    /// The library.
+    /// The term library.
     pub library: Vec<Term>,
 }
 
 impl Bench {
-    /// Fits choices from where the straight line leaves them, beside what stands in the base.
+    /// Fits choices from their linear estimate, together with the effects of the base.
     pub fn fit(
         &mut self,
         base_hypothesis: &Hypothesis,
@@ -78,7 +78,7 @@ impl Bench {
         found
     }
 
-    /// Fits candidates again from where they stand.
+    /// Refits candidates from their current values.
     pub fn refit(
         &self,
         candidates: &[Candidate],
@@ -95,8 +95,7 @@ impl Bench {
         found
     }
 
-    /// A candidate's fit in a study with the catalogue's effects and its own law alone: what else was tried is no further
-    /// effect.
+    /// A candidate's fit in a study with only the library effects and its own law, without the other laws tried.
     pub fn alone(&self, catalogue: &Study, candidate: &Candidate) -> (Study, Fit) {
         let mut own = catalogue.clone();
         let law = own.add(self.study.effects[candidate.effect].clone());
@@ -123,27 +122,27 @@ impl Bench {
     }
 }
 
-/// A coefficient nearer to 0 than this, in standard errors, says nothing.
+/// Minimum significance of a coefficient, in standard errors.
 const MIN_SIGMAS: f64 = 2.0;
 
-/// Drops candidates with a coefficient that says nothing, where others are left.
+/// Drops candidates with an insignificant coefficient, if others remain.
 pub fn keep_determined(library: &[Term], candidates: &mut Vec<Candidate>) {
     if candidates.iter().any(|candidate| candidate.is_determined(library)) {
         candidates.retain(|candidate| candidate.is_determined(library));
     }
 }
 
-/// Best first.
+/// Sorts best first.
 pub fn sort(candidates: &mut [Candidate]) {
     candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
 }
 
-/// Choices that are worth a fit: the best, and the best of every part of the machine that promises something beside it.
+/// Selects the choices to fit: the best ones, and the best of every machine part with a sufficient linear gain.
 pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     let Some(best) = choices.first() else { return Vec::new() };
     let mut worth: Vec<Choice> = Vec::new();
     let part = |choice: &Choice| library[choice.terms[0]].submodel();
-    // Beside something strong a straight line is off by more.
+    // With a strong term present, the linearisation is less accurate.
     let least = PROMISE * best.gain;
     for choice in choices.iter().filter(|choice| choice.gain > least) {
         let of_part = worth.iter().filter(|other| part(other) == part(choice)).count();
@@ -155,9 +154,9 @@ pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     worth
 }
 
-/// Share of the best's promise that another part of the machine must promise.
+/// Minimum linear gain of another machine part, as a share of the best gain.
 const PROMISE: f64 = 0.3;
-/// Laws that are fitted.
+/// Maximum number of fitted laws.
 const MAX: usize = 6;
 const OF_THE_BEST_PART: usize = 3;
 const OF_OTHER_PARTS: usize = 1;

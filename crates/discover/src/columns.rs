@@ -1,5 +1,5 @@
-//! What each term and each force changes in the recording: one run of the model each, whitened, and their products with
-//! the nuisances and the residual, step by step.
+//! Changes of the recording due to each term and source term: one model run each, whitened. Also their products with the nuisances and the
+//! residual, step by step.
 
 use crate::law_effect::LawEffect;
 use crate::term::Term;
@@ -12,35 +12,35 @@ use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Share of a plain size at which a slope is taken.
+/// Step for numerical slopes, as a share of a typical size.
 const BESIDE: f64 = 0.3;
 
-/// From where a force is looked for: nothing, or a cause of the catalogue that stays free beside it.
+/// Base hypothesis of the search: the null hypothesis, or a library cause that stays free during the search.
 #[derive(Debug)]
 pub struct Base<'a> {
     /// The recording.
     pub study: &'a Study,
-    /// Linearised there.
+    /// Linearisation at the base.
     pub linearised: &'a Linearised,
-    /// Nuisances and effects there.
+    /// Nuisances and effects of the base.
     pub hypothesis: Hypothesis,
-    /// Prediction there.
+    /// Prediction of the base.
     pub prediction: Prediction,
-    /// Whitened residual there.
+    /// Whitened residual of the base.
     pub residual: Vec<f64>,
-    /// Whitened changes by the effects there.
+    /// Whitened derivatives with respect to the base's effects.
     pub free: Vec<Vec<f64>>,
 }
 
 impl<'a> Base<'a> {
-    /// Where nothing is off.
+    /// The null hypothesis.
     pub fn nothing(study: &'a Study, linearised: &'a Linearised) -> Base<'a> {
         let residual = linearised.residual(study, &linearised.base);
         let prediction = linearised.base.clone();
         Base { study, linearised, hypothesis: study.nothing(), prediction, residual, free: Vec::new() }
     }
 
-    /// Beside a fit.
+    /// A fitted cause.
     pub fn beside(study: &'a Study, linearised: &'a Linearised, fit: &Fit) -> Base<'a> {
         Base {
             study,
@@ -52,8 +52,7 @@ impl<'a> Base<'a> {
         }
     }
 
-    /// Whitened change for one step of each term's coefficient; `None` where the model cannot run with it, or where it does
-    /// nothing.
+    /// Whitened change for one step of each term's coefficient; `None` if the model cannot run with it or does not change.
     pub fn changes(&self, terms: &[Term]) -> Vec<Option<Vec<f64>>> {
         let mut changes = self.raw_changes(terms);
         for change in &mut changes {
@@ -67,7 +66,7 @@ impl<'a> Base<'a> {
         changes
     }
 
-    /// The same before whitening, in the channels' units.
+    /// Unwhitened changes, in the channels' units.
     pub fn raw_changes(&self, terms: &[Term]) -> Vec<Option<Vec<f64>>> {
         let mut own = self.study.clone();
         let first = own.effects.len();
@@ -98,7 +97,7 @@ impl<'a> Base<'a> {
         of_terms
     }
 
-    /// A change in one sensor's readings alone.
+    /// A change of one sensor's readings alone.
     fn of_sensor(&self, channel: Channel, change: &[f64]) -> Vec<f64> {
         let mut own = vec![0.0; change.len()];
         for group in self.study.groups.iter().filter(|group| OUTPUTS[group.output] == channel) {
@@ -108,7 +107,7 @@ impl<'a> Base<'a> {
     }
 }
 
-/// Terms that share a run, by place: those of different sensors do not see each other.
+/// Terms that share a run, by index: terms of different sensors do not interact.
 fn runs(terms: &[Term]) -> Vec<Vec<usize>> {
     let mut runs: Vec<Vec<usize>> = Vec::new();
     for (place, term) in terms.iter().enumerate() {
@@ -130,17 +129,17 @@ fn runs(terms: &[Term]) -> Vec<Vec<usize>> {
 #[derive(Debug)]
 pub struct Products {
     steps: Vec<DMatrix<f64>>,
-    /// Where the nuisances stand, in their sigmas: they come first.
+    /// Values of the nuisances, in their sigmas; they come first.
     nuisances: DVector<f64>,
-    /// Number of columns behind the nuisances that are free.
+    /// Number of free columns after the nuisances.
     free: usize,
 }
 
-/// Prior precision of what is free: keeps the equations solvable.
+/// Prior precision of free columns: keeps the equations solvable.
 const FREE_PRECISION: f64 = 1e-6;
 
 impl Products {
-    /// Of nuisances and what else is free, `columns`, and the residual, in this order.
+    /// Products of nuisances and other free columns, `columns`, and the residual, in this order.
     pub fn new(base: &Base<'_>, columns: &[Vec<f64>]) -> Products {
         let all: Vec<&[f64]> = base
             .linearised
@@ -161,8 +160,8 @@ impl Products {
         Products { steps, nuisances, free: base.free.len() }
     }
 
-    /// Products of the columns (the residual last) over the steps that count, nuisances and what is free projected out as
-    /// far as their priors let them go.
+    /// Products of the columns (the residual last) over the selected steps. Nuisances and free columns are projected out, as far as their
+    /// priors allow.
     pub fn projected(&self, counts: &[bool]) -> Option<DMatrix<f64>> {
         let size = self.steps.first()?.nrows();
         let (u, n) = (self.nuisances.len(), self.nuisances.len() + self.free);
@@ -176,7 +175,7 @@ impl Products {
         }
         let mut across = sum.view((0, n), (n, size - n)).into_owned();
         let mut rest = sum.view((n, n), (size - n, size - n)).into_owned();
-        // The priors' pull is a residual like any other.
+        // The prior terms count as residuals.
         let last = size - n - 1;
         for i in 0..u {
             across[(i, last)] -= self.nuisances[i];

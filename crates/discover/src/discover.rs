@@ -1,4 +1,4 @@
-//! From a diagnosis that leaves something to the laws that account for it, and to where it is missing.
+//! Searches for laws that explain the residual of a diagnosis, and locates their source terms.
 
 use crate::balance::Balance;
 use crate::candidate::{Bench, Candidate, keep_determined, worth};
@@ -22,33 +22,33 @@ use mapper_gap::report::{Law, MissingForce, Place, Verdict};
 use mapper_gap::selection::Selection;
 use mapper_gap::study::{Study, members};
 
-/// What is found beyond the catalogue.
+/// Results outside the effect library.
 #[derive(Debug, Default)]
 pub struct Discovered {
-    /// Laws that are proposed, best first; usually one or none.
+    /// Proposed laws, best first; usually one or none.
     pub laws: Vec<Law>,
-    /// What each balance lacks, most probable first.
+    /// Residual source term of each balance, most probable first.
     pub forces: Vec<MissingForce>,
-    /// Places of the gap; `None` where those of the diagnosis stand.
+    /// Locations of the gap; `None` if the diagnosis' locations remain valid.
     pub places: Option<Vec<Place>>,
-    /// The first law fitted to all steps, where it is more probable than not.
+    /// The first law fitted to all steps, if it is more probable than not.
     pub settled: Option<Fit>,
 }
 
-/// Folds of steps, each left out once, in which a law must show again.
+/// Number of leave-one-out folds of steps in which a law must recur.
 const FOLDS: usize = 6;
-/// A law must remove this share of the gap on steps that were not used.
+/// Minimum share of the gap that a law must remove on held-out steps.
 const MIN_SHRINK: f64 = 0.5;
-/// A law is doubted that is found in fewer of the folds.
+/// Minimum share of the folds in which a law must recur.
 const MIN_STABILITY: f64 = 0.5;
-/// Laws whose evidence is this near cannot be told apart, in temperatures of the calibration.
+/// Maximum evidence difference of indistinguishable laws, in calibration temperatures.
 const NEAR: f64 = 3.0;
-/// Equivalent laws that are named.
+/// Maximum number of equivalent laws named.
 const MAX_EQUIVALENT: usize = 3;
-/// Balances whose force is told.
+/// Maximum number of reported source terms.
 const FORCES: usize = 3;
 
-/// Looks for what the catalogue does not have. Only where a diagnosis leaves something: [`wanted`] says so.
+/// Searches outside the effect library, if the diagnosis leaves a residual; see [`wanted`].
 pub fn discover(
     diagnosed: &Diagnosed,
     calibration: &Calibration,
@@ -83,7 +83,7 @@ pub fn discover(
     }
     progress(0.6, "what a law leaves");
     let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
-    // Where a law leaves nothing but noise, what a straight line makes of other parts counts for nothing.
+    // If a law leaves only noise, linear gains of other parts are irrelevant.
     let settled = laws.first().filter(|law| law.probability > 0.5);
     let best = found.as_ref().and_then(|found| found.fitted.first());
     let settled_fit = settled.and(best).map(|best| best.fit.clone());
@@ -95,14 +95,13 @@ pub fn discover(
     progress(1.0, "done");
     Discovered {
         laws,
-        forces: forces.into_iter().take(FORCES).map(told_force).collect(),
+        forces: forces.into_iter().take(FORCES).map(reported_force).collect(),
         places: Some(places),
         settled: settled_fit,
     }
 }
 
-/// The steps that no law sees while it is chosen: the first fold. To search once more for each fold would take three times as
-/// long.
+/// Steps withheld while a law is chosen: the first fold. A search for each fold would take three times as long.
 fn held_out_steps(diagnosed: &Diagnosed) -> &[usize] {
     match diagnosed.diagnosis.gap.folds.as_slice() {
         [first, _, ..] => first,
@@ -110,29 +109,29 @@ fn held_out_steps(diagnosed: &Diagnosed) -> &[usize] {
     }
 }
 
-/// Whether a diagnosis leaves something to be found.
+/// Whether a diagnosis leaves a residual to explain.
 pub fn wanted(diagnosed: &Diagnosed) -> bool {
     matches!(diagnosed.diagnosis.verdict, Verdict::PartlyExplained | Verdict::Unexplained)
         || (diagnosed.diagnosis.verdict != Verdict::WithinTolerance
             && diagnosed.diagnosis.probability_outside > 0.5)
 }
 
-/// Laws that were fitted.
+/// Fitted laws.
 struct FittedLaws {
-    /// On the steps that count for the search, best first.
+    /// Fits to the training steps, best first.
     trained: Vec<Candidate>,
-    /// The best of these on all steps, best first.
+    /// The best of these fitted to all steps, best first.
     fitted: Vec<Candidate>,
-    /// Share of the folds in which the best shows again.
+    /// Share of the folds in which the best recurs.
     stability: f64,
-    /// Whether the best leaves nothing but noise.
+    /// Whether the best leaves only noise.
     adequate: bool,
 }
 
-/// A law beside a cause costs as much as a second cause does.
+/// A law in addition to a cause costs as much as a second cause.
 const RARE_BESIDE: f64 = 3.0;
 
-/// The search beside the catalogue's best.
+/// Search in addition to the best library cause.
 fn beside(
     bench: &mut Bench,
     diagnosed: &Diagnosed,
@@ -146,7 +145,7 @@ fn beside(
     found(bench, &base, training, everywhere, &|fit| adequacy(study, linearised, fit, 0.0).may_be_noise())
 }
 
-/// Searches the library from a base: in closed form, then by runs of the model.
+/// Searches the term library from a base: in closed form, then with model runs.
 fn found(
     bench: &mut Bench,
     base: &Base<'_>,
@@ -180,7 +179,7 @@ fn found(
     if adequate(&fitted_best.fit) {
         return Some(FittedLaws { trained: found.0, fitted: found.1, stability, adequate: true });
     }
-    // What none of them explains may have begun in the middle.
+    // If no law explains the residual, one may have begun during the recording.
     let alone = FittedLaws { trained: found.0, fitted: found.1, stability, adequate: false };
     let Some((later, stability)) = begun(base, &mut bench.library, &on_training, &training.steps, &folds)
     else {
@@ -198,7 +197,7 @@ fn found(
     })
 }
 
-/// Choices fitted by runs of the model: on the steps that count for the search, and the best of them on all steps.
+/// Fits choices with model runs: to the training steps, and the best of them to all steps.
 fn fitted(
     bench: &mut Bench,
     base: &Base<'_>,
@@ -210,7 +209,7 @@ fn fitted(
     let mut trained = bench.fit(&base.hypothesis, base.linearised, chosen, training, quick);
     keep_determined(&bench.library, &mut trained);
     trained.truncate(FINALISTS);
-    // Tolerances act otherwise beside something strong.
+    // Tolerances act differently in the presence of a strong term.
     let beside = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
     let linearised = beside.as_ref().unwrap_or(base.linearised);
     let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
@@ -220,12 +219,12 @@ fn fitted(
     Some((trained, fitted))
 }
 
-/// Laws fitted to the end.
+/// Number of laws fitted to convergence.
 const FINALISTS: usize = 3;
-/// In a fold a law shows again where its evidence is this share of the best's.
+/// Minimum evidence of a recurring law in a fold, as a share of the best evidence.
 const LIKE: f64 = 0.95;
 
-/// The best law, where it is one.
+/// The best law, if it passes all tests.
 fn propose(
     diagnosed: &Diagnosed,
     calibration: &Calibration,
@@ -239,7 +238,7 @@ fn propose(
         return Vec::new();
     };
     let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
-    // Beyond nothing, and beyond the catalogue.
+    // The best alternative: no cause, or a library cause.
     let inside = fits
         .iter()
         .map(|fit| weight(calibration, study, fit))
@@ -274,10 +273,11 @@ fn propose(
         .map(|other| ((other.score() - best.score()) / calibration.temperature).exp())
         .sum::<f64>()
         + ((inside - best.score() - PRIOR_LAW.ln()) / calibration.temperature).exp();
-    let say = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
-    let LawDescription { sentence, terms, sink_k } = say(best);
-    let told = LawDescription { sentence: sentence.clone(), terms: terms.clone(), sink_k };
-    let equivalent = found.fitted.iter().skip(1).filter(near).take(MAX_EQUIVALENT).map(|c| say(c).sentence);
+    let describe = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
+    let LawDescription { sentence, terms, sink_k } = describe(best);
+    let description = LawDescription { sentence: sentence.clone(), terms: terms.clone(), sink_k };
+    let equivalent =
+        found.fitted.iter().skip(1).filter(near).take(MAX_EQUIVALENT).map(|c| describe(c).sentence);
     vec![Law {
         submodel: bench.library[best.choice.terms[0]].submodel().name().to_owned(),
         sentence,
@@ -291,11 +291,11 @@ fn propose(
         stability: found.stability,
         equivalent: equivalent.collect(),
         rhai: None,
-        script: script(&bench.library, best, &told),
+        script: script(&bench.library, best, &description),
     }]
 }
 
-/// Effects of the catalogue beside a law.
+/// Library effects fitted together with a law.
 fn names_beside(study: &Study, law: &Candidate) -> Vec<String> {
     let others = law.fit.hypothesis.effects.iter().filter_map(|(index, _)| study.effects.get(*index));
     others.map(|effect| effect.info().id.to_string()).collect()
@@ -304,7 +304,7 @@ fn names_beside(study: &Study, law: &Candidate) -> Vec<String> {
 /// Prior of all laws together.
 const PRIOR_LAW: f64 = 0.15;
 
-/// Places by all that was tried: effects, laws, forces.
+/// Locations from all explanations tried: effects, laws, source terms.
 fn places(
     diagnosed: &Diagnosed,
     bench: &Bench,
@@ -340,7 +340,7 @@ fn places(
         let score = 0.5 * gain - law.choice.rarity - RARITY * (1 + others.len()) as f64;
         Explanation { score, parts: std::iter::once(law_part).chain(other_parts).collect() }
     }));
-    // What a straight line promises counts from the straight line's own null.
+    // Linear gains are relative to the linear cost of the null hypothesis.
     let linear_null = 0.5 * (null.cost - linear_cost(diagnosed));
     for force in forces.iter().filter(|force| force.gain > 0.0) {
         let part = Part {
@@ -353,14 +353,14 @@ fn places(
     places_of(study, linearised, null, &explanations, bend)
 }
 
-/// Cost of nothing but tolerances, by the straight line from where nothing is off.
+/// Linear estimate of the cost with tolerances only, from the nominal model.
 fn linear_cost(diagnosed: &Diagnosed) -> f64 {
     let base = Base::nothing(&diagnosed.study, &diagnosed.linearised);
     let everywhere = Selection::all(&diagnosed.study);
     Products::new(&base, &[]).projected(&everywhere.steps).map_or(diagnosed.null.cost, |left| left[(0, 0)])
 }
 
-fn told_force(force: Force) -> MissingForce {
+fn reported_force(force: Force) -> MissingForce {
     MissingForce {
         submodel: force.balance.submodel().name().to_owned(),
         force: force.balance.words(),

@@ -1,21 +1,20 @@
-//! Evidence of a few linear terms in closed form.
+//! Closed-form evidence of a few linear terms.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Prior width of a coefficient, in its plain steps: as effects have it.
+/// Prior width of a coefficient, in its steps: the same as for effects.
 pub const PRIOR_STEPS: f64 = 10.0;
 
-/// What some terms make of the projected products: logarithm of the evidence over nothing, and the coefficients in steps.
+/// Fit of some terms to the projected products: log evidence relative to none, and the coefficients in steps.
 #[derive(Debug, Clone)]
 pub struct LinearEvidence {
-    /// Logarithm of the evidence, over that of nothing.
+    /// Log evidence relative to no term.
     pub gain: f64,
     /// Coefficients, steps.
     pub coefficients: DVector<f64>,
 }
 
-/// Weighs the terms at `places` of the projected products, whose last row and column are the residual's; `prior_sigma` in
-/// steps.
+/// Evidence of the terms at `places` of the projected products, whose last row and column belong to the residual; `prior_sigma` in steps.
 pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Option<LinearEvidence> {
     let last = products.nrows() - 1;
     let k = places.len();
@@ -31,14 +30,14 @@ pub fn weigh(products: &DMatrix<f64>, places: &[usize], prior_sigma: f64) -> Opt
     Some(LinearEvidence { gain, coefficients })
 }
 
-/// The same for coefficients of a common prior covariance `scale^2 shape`.
+/// Evidence for coefficients with the common prior covariance `scale^2 shape`.
 pub fn weigh_process(
     products: &DMatrix<f64>,
     right: &DVector<f64>,
     covariance: &DMatrix<f64>,
 ) -> Option<Posterior> {
     let k = right.len();
-    // With K = R R': I + R' G R stays well conditioned whatever K is.
+    // With K = R R', I + R' G R is well conditioned for any K.
     let mut jittered = covariance.clone();
     for i in 0..k {
         jittered[(i, i)] *= 1.0 + 1e-9;
@@ -58,10 +57,10 @@ pub fn weigh_process(
     Some(Posterior { gain, mean, covariance })
 }
 
-/// A process as the data leave it.
+/// Posterior of a Gaussian process.
 #[derive(Debug, Clone)]
 pub struct Posterior {
-    /// Logarithm of the evidence, over that of nothing.
+    /// Log evidence relative to no process.
     pub gain: f64,
     /// Mean.
     pub mean: DVector<f64>,

@@ -1,18 +1,18 @@
-//! A formula that is computed and written from one place.
+//! Formulas that can be both evaluated and written as script.
 
 use crate::quantity::Quantity;
 use crate::time_history::Course;
 use mapper_physics::hooks::Site;
 use std::fmt::{Display, Formatter, Result};
 
-/// A formula of the machine's quantities.
+/// A formula of machine quantities.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expression {
     /// A number.
     Number(f64),
     /// A quantity.
     Of(Quantity),
-    /// What the sensor reads without the law; in a reading alone.
+    /// The sensor's reading without the law; only within a reading.
     Value,
     /// First minus second.
     Minus(Box<Expression>, Box<Expression>),
@@ -22,14 +22,14 @@ pub enum Expression {
     Power(Box<Expression>, f64),
     /// The natural logarithm.
     Ln(Box<Expression>),
-    /// A course in time.
+    /// A time history.
     InTime(Course),
 }
 
 use Expression::{InTime, Ln, Minus, Number, Of, Power, Times, Value};
 
 impl Expression {
-    /// Its value; `value` is what the model has at the place that asks.
+    /// Evaluates the formula; `value` is the model's value at the calling hook.
     pub fn of(&self, site: &Site<'_>, value: f64) -> f64 {
         match self {
             Number(number) => *number,
@@ -44,7 +44,7 @@ impl Expression {
     }
 }
 
-/// As an effect's script has it.
+/// Written as in an effect's script.
 impl Display for Expression {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         match self {
@@ -60,7 +60,7 @@ impl Display for Expression {
     }
 }
 
-/// A number as scripts read it: with a point, so that it is no integer.
+/// A number in script notation, with a decimal point so that it is not an integer.
 pub fn number(value: f64) -> String {
     let text = format!("{value:?}");
     match text.split_once('e') {

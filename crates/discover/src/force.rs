@@ -1,8 +1,7 @@
-//! The missing force of each balance: what the recording asks for, as a process that is smooth over the operating points.
+//! Residual source term of each balance, estimated from the recording as a smooth process over the operating points.
 //!
-//! In each step a force has a level and a part that decays after the jump. Both are Gaussian processes: a common level, a
-//! part that is smooth over speed and opening, and a little that is free in each step. How large it is, is found by the
-//! evidence.
+//! In each step the source term has a level and a part that decays after the jump. Both are Gaussian processes: a common level, a part
+//! smooth over speed and opening, and a small free part per step. The evidence determines their size.
 
 use crate::balance::Balance;
 use crate::columns::{Base, Products};
@@ -17,10 +16,10 @@ use mapper_gap::whiten::rows_of_step;
 use mapper_numerics::parallel;
 use nalgebra::{DMatrix, DVector};
 
-/// Steps whose answers come from one run: a housing forgets in a minute or two what was so many steps before.
+/// Distance between steps that share one run: a housing forgets an earlier step within a minute or two.
 pub const APART: usize = 5;
 
-/// Balances whose force needs runs of the model.
+/// Balances whose source term needs model runs.
 const RUN: [Balance; 8] = [
     Balance::CompressorHousing,
     Balance::TurbineHousing,
@@ -32,26 +31,26 @@ const RUN: [Balance; 8] = [
     Balance::MapFlow,
 ];
 
-/// A balance with its missing force.
+/// A balance with its residual source term.
 #[derive(Debug, Clone)]
 pub struct Force {
-    /// Which.
+    /// The balance.
     pub balance: Balance,
-    /// Logarithm of the evidence for it, over that of nothing.
+    /// Log evidence relative to none.
     pub gain: f64,
-    /// What it changes in the recording, in the channels' units.
+    /// Change of the recording, in the channels' units.
     pub signature: Vec<f64>,
-    /// Level at the end of each step, in the balance's unit, and its standard error.
+    /// Level at the end of each step with its standard error, in the balance's unit.
     pub levels: Vec<(f64, f64)>,
 }
 
-/// Every balance that has a force in a recording.
+/// All balances that a recording can have a source term in.
 pub fn balances(study: &Study) -> Vec<Balance> {
     let recorded = |channel: &Channel| *channel != Channel::P3 && study.table.column(*channel).is_some();
     RUN.into_iter().chain(OUTPUTS.into_iter().filter(recorded).map(Balance::Reading)).collect()
 }
 
-/// The missing force of every balance that is `wanted`, each as if it were the only one; best evidence first.
+/// Residual source terms of all `wanted` balances, each assumed to be the only one; best evidence first.
 pub fn forces(base: &Base<'_>, counts: &[bool], wanted: &dyn Fn(&Balance) -> bool) -> Vec<Force> {
     let study = base.study;
     let points = study.points(&study.nothing()).unwrap_or_default();
@@ -67,7 +66,7 @@ pub fn forces(base: &Base<'_>, counts: &[bool], wanted: &dyn Fn(&Balance) -> boo
     found
 }
 
-/// Changes for a plain force in one step each, in the channels' units: levels first, then the parts that decay after each jump.
+/// Changes due to a typical source term in one step each, in the channels' units: levels first, then the decaying parts.
 pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
     let study = base.study;
     let steps = study.steps.len();
@@ -87,7 +86,7 @@ pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
     columns
 }
 
-/// What a sensor reads more needs no run.
+/// A sensor offset needs no model run.
 fn read(study: &Study, channel: Channel, shape: Shape) -> Vec<Vec<f64>> {
     (0..study.steps.len())
         .map(|step| {
@@ -102,7 +101,7 @@ fn read(study: &Study, channel: Channel, shape: Shape) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Changes for a unit of force, from runs in which several steps far apart have it.
+/// Changes per unit of source term, from runs in which several distant steps have it.
 fn run(base: &Base<'_>, balance: Balance, shape: Shape) -> Vec<Vec<f64>> {
     let study = base.study;
     let steps = study.steps.len();
@@ -160,7 +159,7 @@ fn force(
     let right = DVector::from_fn(k, |i, _| projected[(i, k)]);
     let study = base.study;
     let shape = covariance(study, points);
-    // How large it is, by the evidence, over the sizes that a force can have.
+    // The evidence selects the size among the possible ones.
     let mut best: Option<Posterior> = None;
     for exponent in -4..=6 {
         let scale = 2f64.powi(exponent);
@@ -185,15 +184,15 @@ fn force(
     Some(Force { balance, gain: best.gain, signature, levels })
 }
 
-/// Over so much of the speed, rpm, and of the opening a force is much the same.
+/// Correlation lengths of a source term over speed, rpm, and opening.
 const SMOOTH_RPM: f64 = 35e3;
 const SMOOTH_OPENING: f64 = 0.3;
-/// Variance of the common level, of the part that is smooth over the map, and of what is free in each step.
+/// Variances of the common level, the part smooth over the map, and the free part of each step.
 const COMMON: f64 = 0.5;
 const SMOOTH: f64 = 0.5;
 const FREE: f64 = 0.02;
 
-/// Prior covariance of levels and decaying parts for a force of plain size.
+/// Prior covariance of levels and decaying parts for a source term of typical size.
 pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
     let steps = study.steps.len();
     let at = |step: usize| {
@@ -201,7 +200,7 @@ pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
         (speed_rpm / SMOOTH_RPM, study.steps[step].marker.valve_opening_ratio / SMOOTH_OPENING)
     };
     let near = |a: (f64, f64), b: (f64, f64)| (-0.5 * ((a.0 - b.0).powi(2) + (a.1 - b.1).powi(2))).exp();
-    // A part that decays after a jump is much the same for jumps of the same size.
+    // The decaying part is similar for jumps of similar size.
     let jump = |step: usize| {
         let (before, after) = (at(step - 1), at(step));
         (after.0 - before.0, after.1 - before.1)

@@ -1,10 +1,10 @@
-//! What a law removes of the gap on steps that were used neither to find nor to fit it.
+//! Gap reduction by a law on steps used neither to find nor to fit it.
 
 use mapper_gap::adequacy::misfit_of_steps;
 use mapper_gap::fit::Fit;
 use mapper_gap::study::Study;
 
-/// `1 - sum g_after+/sum g_before+` with `g = (|r|^2 - n)/n` over the held-out steps; all steps where none is held out.
+/// `1 - sum g_after+/sum g_before+` with `g = (|r|^2 - n)/n` over the held-out steps; over all steps if none is held out.
 pub fn shrink(study: &Study, before: &Fit, after: &Fit, held_out: &[usize]) -> f64 {
     let all: Vec<usize> = (0..study.steps.len()).collect();
     let steps = if held_out.is_empty() { &all } else { held_out };

@@ -1,10 +1,10 @@
-//! Terms as an effect, so that whatever fits effects fits laws.
+//! Wraps terms as an effect, so that the effect fit also fits laws.
 
 use crate::term::{Term, put_into};
 use mapper_physics::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig};
 use std::borrow::Cow;
 
-/// How many steps a coefficient may be away from nothing.
+/// Maximum distance of a coefficient from zero, in steps.
 pub const MAX_STEPS: f64 = 60.0;
 
 /// Some terms of one part of the machine, each with a coefficient.

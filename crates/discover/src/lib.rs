@@ -1,5 +1,5 @@
-//! Discovery beyond the catalogue: the force that is missing in each balance of the model, where it is missing, and a law
-//! for it. `docs/gap.md` says how, and when not to believe it.
+//! Discovery outside the effect library: the residual source term in each balance, its location, and a law for it. See `docs/gap.md` for
+//! the method and its limits.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,7 +1,7 @@
-//! The physical terms of which a missing force may be made: one line each.
+//! Library of physical terms for a residual source term, one line each.
 //!
-//! Steps are what the physics of such a machine makes plain: the oil takes 8 W/K, gas and housing exchange some 20 W/K, the
-//! shaft carries a tenth of a newton metre. None of them was found on a recording.
+//! Step sizes come from the physics of such a machine, not from a recording. The oil takes 8 W/K, gas and housing exchange some
+//! 20 W/K, the shaft carries a tenth of a newton metre.
 
 use crate::balance::Balance;
 use crate::expression::Expression::{self, Number, Of, Value};
@@ -14,17 +14,16 @@ use mapper_core::Channel;
 
 /// Stefan's and Boltzmann's constant, W/(m2 K4).
 const STEFAN_BOLTZMANN: f64 = 5.670374419e-8;
-/// What temperatures that stand alone in a term are counted from, K: near the middle of all, so that level and slope of a
-/// law can be told apart.
+/// Reference for a single temperature in a term, K: near the middle of all, so that level and slope of a law are distinguishable.
 pub const REFERENCE_K: f64 = 323.15;
-/// Scale of the speed: 100 krpm, rad/s.
+/// Speed scale: 100 krpm, rad/s.
 const SPEED_RAD_S: f64 = 10_471.975_511_965_978;
-/// Scale of the flow, kg/s.
+/// Flow scale, kg/s.
 const FLOW_KG_S: f64 = 0.06;
-/// Scale of pressures, Pa.
+/// Pressure scale, Pa.
 const PRESSURE_PA: f64 = 1e5;
 
-/// Powers of the speed with which something grows, and how that is said behind "growing with the speed".
+/// Powers of the speed, and the words that follow "growing with the speed".
 const GROWTHS: [(f64, &str); 3] = [(1.0, ""), (2.0, "'s square"), (3.0, "'s cube")];
 
 /// All terms.
@@ -146,7 +145,7 @@ pub fn library() -> Vec<Term> {
             let words = format!("{{}} at 100 krpm, growing with the speed{growing}, to {{}}");
             all.push(on(power(Speed, SPEED_RAD_S, *exponent), "W", 50.0, &words));
         }
-        // What the gas gets, a housing loses.
+        // Heat to the gas is lost by a housing.
         let seen = match balance {
             Balance::GasBefore => T1,
             Balance::GasAfter => T2Prime,
@@ -232,7 +231,7 @@ pub fn library() -> Vec<Term> {
 
 /// A term in one balance.
 fn alone(balance: Balance, formula: Expression, unit: &'static str, step: f64, words: &str) -> Term {
-    // The second place in the words is the balance's own.
+    // The second placeholder is the balance's own.
     let words = match words.match_indices("{}").nth(1) {
         Some((place, _)) => {
             let whose = balance.place_words();
@@ -240,7 +239,7 @@ fn alone(balance: Balance, formula: Expression, unit: &'static str, step: f64, w
         }
         None => words.to_owned(),
     };
-    // A level is a number; what counts from the reference is a slope.
+    // A level is a number; a term relative to the reference is a slope.
     let level = matches!(&formula, Number(_)) && unit != "1";
     let role = match unit {
         _ if level => Role::Level,
@@ -253,7 +252,7 @@ fn alone(balance: Balance, formula: Expression, unit: &'static str, step: f64, w
     Term { acts_on: vec![(balance, formula)], unit, step, words, role, positive }
 }
 
-/// Heat from one part to another: what the first gets, the second loses.
+/// Heat from one part to another: what the first gains, the second loses.
 fn between(
     to: Balance,
     from: Balance,

@@ -1,4 +1,4 @@
-//! Laws that begin in the middle of a recording.
+//! Laws that begin during a recording.
 
 use crate::columns::{Base, Products};
 use crate::evidence::{PRIOR_STEPS, weigh};
@@ -11,15 +11,15 @@ use mapper_core::step_number;
 use mapper_gap::whiten::rows_of_step;
 use nalgebra::DMatrix;
 
-/// Terms that are tried with a beginning.
+/// Maximum number of terms tried with an onset.
 const TRIED: usize = 12;
-/// Of one part of the machine.
+/// Maximum number of terms per machine part.
 const OF_A_PART: usize = 7;
-/// Parts of the machine whose constants are tried.
+/// Number of machine parts whose constants are tried.
 const PARTS: usize = 2;
 
-/// The best choices again, each with the step from which on the recording asks for it, best first. Their terms are added to the
-/// library. `choices` were made on the same products' steps, best first.
+/// The best choices, each with the onset step that fits the recording best, best first; adds their terms to the library. `choices` must
+/// come from the same products and steps, best first.
 pub fn begun(
     base: &Base<'_>,
     library: &mut Vec<Term>,
@@ -34,7 +34,7 @@ pub fn begun(
             parts.push(part(choice));
         }
     }
-    // A constant that begins looks like anything but a constant: those of the best parts are tried whatever they promise.
+    // A constant with an onset does not look like a constant, so the best parts' constants are tried whatever their gain.
     let constants = choices.iter().filter(|choice| {
         choice.terms.iter().all(|term| library[*term].is_constant()) && parts.contains(&part(choice))
     });
@@ -48,7 +48,7 @@ pub fn begun(
         }
     }
     let steps = base.study.steps.len();
-    // Each term's change from each step on.
+    // Each term's change for every possible onset.
     let mut terms: Vec<usize> = tried.iter().flat_map(|choice| choice.terms.iter().copied()).collect();
     terms.sort_unstable();
     terms.dedup();
@@ -116,19 +116,19 @@ pub fn begun(
     Some((chosen, stability))
 }
 
-/// A term that is there from a time on.
+/// A term with an onset.
 fn from(term: &Term, begin_s: f64, step: usize) -> Term {
     let mut later = term.clone();
     for (_, formula) in &mut later.acts_on {
         *formula = product(Expression::InTime(Course::from(begin_s)), formula.clone());
     }
-    // Level and slope are no longer one law: their sentence says when each begins.
+    // Level and slope form separate laws now: each sentence includes its own onset.
     later.role = Role::Other;
     later.words = format!("{} from step {} on", later.words, step_number(step));
     later
 }
 
-/// Whitened changes for one step of a term's coefficient from each step of the recording on.
+/// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording.
 fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
     let study = base.study;
     let steps = study.steps.len();
@@ -151,7 +151,7 @@ fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
     for (colour, change) in base.changes(&during).into_iter().enumerate() {
         let Some(change) = change else { continue };
         for member in members(colour) {
-            // What is there from a step on is the sum of what is there in each.
+            // A term with an onset is the sum of its parts in each later step.
             for step in member..(member + APART).min(steps) {
                 for row in rows_of_step(study, step) {
                     for column in &mut columns[..=member] {

@@ -1,28 +1,28 @@
-//! What a term may be made of: quantities of the machine at one instant.
+//! Machine quantities at one instant that terms can use.
 
 use mapper_physics::hooks::Site;
 
 /// Declares the quantities: variant, name in scripts, words, value.
 macro_rules! quantities {
     ($($name:ident $script:literal $words:literal $read:expr;)*) => {
-        /// A quantity of the machine at one instant, SI.
+        /// A machine quantity at one instant, SI.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum Quantity {
             $(#[doc = $words] $name,)*
         }
 
         impl Quantity {
-            /// Its name in an effect's script, behind `at.`.
+            /// Its name in an effect's script, after `at.`.
             pub fn script_name(self) -> &'static str {
                 match self { $(Quantity::$name => $script,)* }
             }
 
-            /// What it is, for sentences.
+            /// Description for sentences.
             pub fn words(self) -> &'static str {
                 match self { $(Quantity::$name => $words,)* }
             }
 
-            /// Its value; NaN where it comes later in the gas path than the hook that asks.
+            /// Its value; NaN if it is downstream of the calling hook in the gas path.
             pub fn of(self, site: &Site<'_>) -> f64 {
                 let read: fn(&Site<'_>) -> f64 = match self { $(Quantity::$name => $read,)* };
                 read(site)

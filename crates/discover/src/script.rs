@@ -1,4 +1,4 @@
-//! A law as an effect's script, to be read, edited and given to the next diagnosis.
+//! A law as an effect script, to be read, edited and used in the next diagnosis.
 
 use crate::balance::Balance;
 use crate::candidate::Candidate;
@@ -7,14 +7,14 @@ use crate::sentence::{LawDescription, sink};
 use crate::term::Term;
 use std::fmt::Write as _;
 
-/// The script; `None` where a term cannot be written as one.
-pub fn script(library: &[Term], candidate: &Candidate, told: &LawDescription) -> Option<String> {
+/// The script; `None` if a term cannot be written as one.
+pub fn script(library: &[Term], candidate: &Candidate, description: &LawDescription) -> Option<String> {
     let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
-    script_of(&terms, told)
+    script_of(&terms, description)
 }
 
 /// The script of some terms.
-pub fn script_of(terms: &[&Term], told: &LawDescription) -> Option<String> {
+pub fn script_of(terms: &[&Term], description: &LawDescription) -> Option<String> {
     let submodel = terms.first()?.submodel().name();
     let mut parameters = String::new();
     // Each balance with the sum that acts on it.
@@ -27,13 +27,13 @@ pub fn script_of(terms: &[&Term], told: &LawDescription) -> Option<String> {
     let line = |name: &str, unit: &str, low: f64, high: f64, neutral: f64, step: f64| {
         format!("//! parameter: {name} [{unit}] {low} .. {high}, neutral {neutral}, step {step}\n")
     };
-    if let (Some((slope, _)), Some(sink_k)) = (sink(terms), told.sink_k) {
+    if let (Some((slope, _)), Some(sink_k)) = (sink(terms), description.sink_k) {
         let term = terms[slope];
         let (balance, formula) = term.acts_on.first()?;
         parameters += &line("G", term.unit, 0.0, 40.0 * term.step, 0.0, term.step);
         let sink_k = (10.0 * sink_k).round() / 10.0;
         parameters += &line("T_sink", "K", sink_k.min(200.0), sink_k.max(1000.0), sink_k, 10.0);
-        // The slope counts from the library's reference.
+        // The slope is relative to the library's reference.
         let Expression::Minus(_, metal) = formula else { return None };
         put(*balance, format!("p.G * (p.T_sink - {metal})"));
     } else {
@@ -53,9 +53,9 @@ pub fn script_of(terms: &[&Term], told: &LawDescription) -> Option<String> {
     }
     let mut text = format!(
         "//! effect: law_of_{submodel}\n//! description: {}\n//! equation: as below\n//! source: found by mapper gap diagnose\n//! submodel: {submodel}\n{parameters}",
-        told.sentence
+        description.sentence
     );
-    let found: Vec<String> = told
+    let found: Vec<String> = description
         .terms
         .iter()
         .map(|t| format!("{}: {} ({} .. {}) {}", t.term, t.value, t.low, t.high, t.unit))

@@ -1,26 +1,25 @@
-//! Which few terms of the library the recording asks for, in closed form.
+//! Selects the few library terms that explain the recording, in closed form.
 
 use crate::evidence::{LinearEvidence, PRIOR_STEPS, weigh};
 use crate::term::{Role, Term};
 use nalgebra::DMatrix;
 
-/// Some terms of the library, by place, and what they make of the recording.
+/// Some library terms, by index, with their fit to the recording.
 #[derive(Debug, Clone)]
 pub struct Choice {
-    /// Places in the library, in order.
+    /// Indices in the library, ascending.
     pub terms: Vec<usize>,
-    /// Logarithm of the evidence over nothing, rarity included.
+    /// Log evidence relative to none, including rarity.
     pub gain: f64,
-    /// What is taken off the evidence for one choice among many.
+    /// Evidence penalty for one choice among many.
     pub rarity: f64,
-    /// Step from which on it is there; 0 from the beginning.
+    /// Onset step; 0 from the beginning.
     pub begin: usize,
     /// Coefficients, in steps.
     pub coefficients: Vec<f64>,
 }
 
-/// All laws of one term, and of two in the same part of the machine; best first. `usable` are the places in the library that
-/// the products' columns stand for.
+/// All laws of one term, and of two in the same machine part; best first. `usable` are the library indices of the products' columns.
 pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> Vec<Choice> {
     let mut found: Vec<Choice> = Vec::new();
     let mut offer = |places: &[usize], rarity: f64| {
@@ -46,7 +45,7 @@ pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> V
         .filter(|(a, b)| go_together(&library[usable[*a]], &library[usable[*b]]))
         .collect();
     for (a, b) in &pairs {
-        // Level and slope are one law, with a temperature of its own.
+        // Level and slope form one law, with its own temperature.
         let sink = library[usable[*a]].role == Role::Slope || library[usable[*b]].role == Role::Slope;
         offer(&[*a, *b], if sink { simple } else { 1.0 + (pairs.len() as f64).ln() });
     }
@@ -54,13 +53,13 @@ pub fn choices(library: &[Term], usable: &[usize], products: &DMatrix<f64>) -> V
     found
 }
 
-/// Whether two terms make a law: both in one part of the machine, and a slope only with the level of its own balance.
+/// Whether two terms form a law: both in one machine part, and a slope only with the level of its own balance.
 fn go_together(a: &Term, b: &Term) -> bool {
     let same_balance = a.balance() == b.balance();
     match (a.role, b.role) {
         (Role::Slope, Role::Level) | (Role::Level, Role::Slope) => same_balance,
         (Role::Slope, _) | (_, Role::Slope) => false,
-        // A level beside a known sink is a sink that is not known.
+        // A level with a known sink equals an unknown sink.
         (Role::Level, Role::Exchange) | (Role::Exchange, Role::Level) => {
             !same_balance && a.submodel() == b.submodel()
         }

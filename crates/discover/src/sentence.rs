@@ -1,4 +1,4 @@
-//! A law in words and numbers.
+//! Describes a law in words and numbers.
 
 use crate::candidate::Candidate;
 use crate::library::REFERENCE_K;
@@ -16,7 +16,7 @@ pub struct Uncertain {
 }
 
 impl Uncertain {
-    /// In words: as many figures as the interval allows.
+    /// As text, with as many figures as the interval justifies.
     pub fn words(self, unit: &str) -> String {
         let Uncertain { value, half } = self;
         if !half.is_finite() || half <= 0.0 {
@@ -37,11 +37,11 @@ pub struct LawDescription {
     pub sentence: String,
     /// Its numbers.
     pub terms: Vec<LawTerm>,
-    /// Temperature of what heat is exchanged with, K, where it is one of the numbers.
+    /// Temperature of the heat exchange partner, K, if it is one of the numbers.
     pub sink_k: Option<f64>,
 }
 
-/// Tells a law; `interval_factor` widens its standard errors.
+/// Describes a law; `interval_factor` widens its standard errors.
 pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> LawDescription {
     let terms: Vec<&Term> = candidate.choice.terms.iter().map(|place| &library[*place]).collect();
     let values = candidate.coefficients();
@@ -77,26 +77,26 @@ pub fn tell(library: &[Term], candidate: &Candidate, interval_factor: f64) -> La
             numbers[slope].words(terms[slope].unit),
             in_celsius.words("degC")
         );
-        let told = vec![
+        let law_terms = vec![
             row(format!("conductance from {from}"), numbers[slope], terms[slope].unit),
             row("temperature of what it goes to".to_owned(), sink, "K"),
         ];
-        return LawDescription { sentence, terms: told, sink_k: Some(sink.value) };
+        return LawDescription { sentence, terms: law_terms, sink_k: Some(sink.value) };
     }
     let sentences: Vec<String> = terms
         .iter()
         .zip(&numbers)
         .map(|(term, number)| term.words.replacen("{}", &number.words(term.unit), 1))
         .collect();
-    let told = terms
+    let law_terms = terms
         .iter()
         .zip(&numbers)
         .map(|(term, number)| row(term.words.replacen("{}", "x", 1), *number, term.unit))
         .collect();
-    LawDescription { sentence: sentences.join(", and "), terms: told, sink_k: None }
+    LawDescription { sentence: sentences.join(", and "), terms: law_terms, sink_k: None }
 }
 
-/// Places of slope and level where the law is heat to something of unknown temperature.
+/// Indices of slope and level if the law is heat exchange with an unknown temperature.
 pub fn sink(terms: &[&Term]) -> Option<(usize, usize)> {
     match terms {
         [a, b] if a.role == Role::Slope && b.role == Role::Level => Some((0, 1)),

@@ -1,4 +1,4 @@
-//! What can be told apart before any rig runs: which balance's missing force could stand in for which effect.
+//! Distinguishability before any rig runs: which balance's source term could imitate which effect.
 
 use crate::balance::Balance;
 use crate::columns::{Base, Products};
@@ -15,13 +15,13 @@ use nalgebra::DVector;
 pub struct Signatures {
     /// The balances.
     pub balances: Vec<Balance>,
-    /// Each effect's id, the length of its signature at one typical step in sigmas (what tolerances can imitate left out), and
-    /// for each balance the share of its energy for which a force in that balance could stand in: 1 where the balance fires
-    /// and all others stay silent once it has its force, 0 where it stays silent.
+    /// Each effect's id, its signature length at one typical step in sigmas (nuisances projected out), and a share per balance. The share
+    /// is the part of its energy that a source term in that balance could reproduce: 1 means that this balance alone explains it, 0 that it
+    /// is unaffected.
     pub effects: Vec<(String, f64, Vec<f64>)>,
 }
 
-/// Sizes that a force may have here, in plain ones: more than any effect asks for.
+/// Prior variance of a source term, relative to its typical size: larger than any effect needs.
 const FREE: f64 = 16.0;
 
 /// The matrix for the effects of a study, on its recording's inputs.
@@ -31,7 +31,7 @@ pub fn signatures(study: &Study, linearised: &Linearised) -> Signatures {
     let places: Vec<usize> = (0..study.effects.len()).collect();
     let changes: Vec<Vec<f64>> = parallel::map(&places, |place| {
         let parameters = &study.effects[*place].info().parameters;
-        // Two parameters together: somewhere in their range.
+        // For two interacting parameters, a point inside their range.
         let values = parameters.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
         let mut with = study.nothing();
         with.effects.push((*place, values));

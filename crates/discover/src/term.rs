@@ -1,4 +1,4 @@
-//! A term: a formula that may be (part of) a missing force, with the unit and the usual size of its coefficient.
+//! A term: a formula for (part of) a residual source term, with the unit and typical size of its coefficient.
 
 use crate::balance::Balance;
 use crate::expression::Expression;
@@ -7,45 +7,43 @@ use mapper_physics::air;
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
-/// What a term is to others of its balance.
+/// Role of a term among others of its balance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// A constant.
     Level,
-    /// In proportion to a temperature against the reference of the library: with the level, heat to something of unknown
-    /// temperature.
+    /// Proportional to a temperature relative to the library reference; together with the level, heat exchange with an unknown temperature.
     Slope,
-    /// Heat exchanged with something of known temperature.
+    /// Heat exchange with a known temperature.
     Exchange,
-    /// Anything else.
+    /// Any other term.
     Other,
 }
 
 /// A term of the library.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Where it acts, with the formula that the coefficient multiplies; the first is where it sits. Heat that passes between
-    /// two parts acts on both.
+    /// Where it acts, with the formula that its coefficient multiplies; the first is its location. Heat between two parts acts on both.
     pub acts_on: Vec<(Balance, Expression)>,
     /// Unit of the coefficient.
     pub unit: &'static str,
-    /// A coefficient of this size is plainly there.
+    /// A clearly significant size of the coefficient.
     pub step: f64,
-    /// What it says, with `{}` where the coefficient stands.
+    /// Description, with `{}` for the coefficient.
     pub words: String,
-    /// What it is to others of its balance.
+    /// Its role among others of its balance.
     pub role: Role,
-    /// Whether the coefficient can only be positive: a conductance, an area, a time.
+    /// Whether the coefficient must be positive: a conductance, an area, a time.
     pub positive: bool,
 }
 
 impl Term {
-    /// Where it sits.
+    /// Its location.
     pub fn balance(&self) -> Balance {
         self.acts_on[0].0
     }
 
-    /// The sensor in whose reading alone it acts, if it does.
+    /// The sensor whose reading alone it changes, if any.
     pub fn sensor(&self) -> Option<Channel> {
         match self.acts_on[..] {
             [(Balance::Reading(channel) | Balance::Lag(channel), _)] => Some(channel),
@@ -53,12 +51,12 @@ impl Term {
         }
     }
 
-    /// Whether it is the same whatever the machine does.
+    /// Whether it is independent of the machine's state.
     pub fn is_constant(&self) -> bool {
         matches!(self.acts_on[..], [(_, Expression::Number(_))])
     }
 
-    /// Whether it has a memory of its own, as a lag has.
+    /// Whether it has its own memory, like a lag.
     pub fn has_memory(&self) -> bool {
         self.acts_on.iter().any(|(balance, _)| matches!(balance, Balance::Lag(_)))
     }
@@ -68,22 +66,22 @@ impl Term {
         self.balance().place_words()
     }
 
-    /// The part of the machine in which it sits.
+    /// The machine part in which it acts.
     pub fn submodel(&self) -> Submodel {
         self.balance().submodel()
     }
 }
 
-/// Terms with their coefficients, at work in a model.
+/// Terms with their coefficients, active in a model.
 #[derive(Debug)]
 pub struct TermHooks {
     /// Balance, coefficient, formula.
     acting: Vec<(Balance, f64, Expression)>,
-    /// Whether something acts on each kind of place, so that nothing is asked in vain.
+    /// Whether each kind of hook is used, so that unused ones are skipped.
     on_readings: bool,
 }
 
-/// Puts terms with coefficients into a rig.
+/// Adds terms with coefficients to a rig.
 ///
 /// # Errors
 /// Never in practice: terms have no hidden temperatures.
@@ -111,7 +109,7 @@ impl TermHooks {
         here.map(|(_, coefficient, formula)| coefficient * formula.of(site, value)).sum()
     }
 
-    /// Temperature of the gas after heat from a balance.
+    /// Gas temperature after heat from a balance.
     fn heated_k(&self, at: Balance, site: &Site<'_>, gas_k: f64) -> f64 {
         let heat_w = self.sum(at, site, gas_k);
         if heat_w == 0.0 {

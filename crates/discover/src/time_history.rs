@@ -1,11 +1,11 @@
-//! The course of a force in time: a level, or a part that decays after a jump, during some spans.
+//! Time history of a source term: a level, or a part that decays after a jump, during some time spans.
 
 use std::fmt::{Display, Formatter, Result};
 
-/// Time constant of the part of a force that decays after a jump, s: near that of the housings.
+/// Time constant of a source term's decaying part, s: similar to that of the housings.
 pub const DECAY_S: f64 = 30.0;
 
-/// Course of a force within a step.
+/// Time history of a source term within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
     /// Constant.
@@ -15,7 +15,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Share of its full size so long after the jump.
+    /// Share of its full size at this time after the jump.
     pub fn at(self, since_s: f64) -> f64 {
         match self {
             Shape::Level => 1.0,
@@ -24,22 +24,22 @@ impl Shape {
     }
 }
 
-/// A shape during some spans of time.
+/// A shape during some time spans.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
-    /// Course within a span.
+    /// Time history within a span.
     pub shape: Shape,
-    /// Begin and end of each, s; what begins at minus infinity was there before the recording.
+    /// Start and end of each, s; a start at minus infinity precedes the recording.
     pub spans_s: Vec<(f64, f64)>,
 }
 
 impl Course {
-    /// Nothing before a time, s, and 1 from it on.
+    /// Zero before a time, s, and 1 from then on.
     pub fn from(begin_s: f64) -> Course {
         Course { shape: Shape::Level, spans_s: vec![(begin_s, f64::INFINITY)] }
     }
 
-    /// Its value at a time; NaN stands for the rest before the recording.
+    /// Its value at a time; NaN means the soak before the recording.
     pub fn at(&self, t_s: f64) -> f64 {
         let mut spans = self.spans_s.iter();
         if t_s.is_nan() {
@@ -51,7 +51,7 @@ impl Course {
     }
 }
 
-/// As an effect's script has it; a level alone can be written.
+/// Written as in an effect's script; only a level can be written.
 impl Display for Course {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         let begin_s = self.spans_s.first().map_or(f64::NEG_INFINITY, |(begin_s, _)| *begin_s);

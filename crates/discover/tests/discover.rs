@@ -1,4 +1,4 @@
-//! Discovery on recordings of the adaptive simulator: what is planted comes back, what is not does not.
+//! Discovery on recordings of the adaptive simulator: planted laws are found, and nothing else is.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -35,7 +35,7 @@ const VISITS: Visits =
 
 fn ask(rig: &Rig, seed: u64) -> Diagnosed {
     let recording = common::record_of(rig, &VISITS, seed);
-    // Candidates that have no part in what is planted.
+    // Candidates unrelated to the planted law.
     let candidates = ["tip_diameter", "flowmeter_gain"];
     diagnose(Question {
         tolerances_declared: true,
@@ -63,8 +63,8 @@ fn heat_to(balance: Balance) -> Vec<Term> {
     terms.filter(|t| t.balance() == balance && matches!(t.role, Role::Level | Role::Slope)).collect()
 }
 
-/// A coolant passage of 1.5 W/K to water at 80 degC, which is in no catalogue: part, conductance and temperature come back, and
-/// the file that is written does what the law does.
+/// A coolant passage of 1.5 W/K to water at 80 degC, outside the effect library. Part, conductance and temperature are found, and the
+/// written file reproduces the law.
 #[test]
 fn a_coolant_passage_is_found_placed_and_written() {
     let terms = heat_to(Balance::CompressorHousing);
@@ -88,19 +88,19 @@ fn a_coolant_passage_is_found_placed_and_written() {
         assert!((term.value - truth).abs() < half, "{}", law.sentence);
     }
     assert!(law.shrink > 0.8, "{}", law.shrink);
-    // Steps that neither the search nor the fit has seen: what tolerances make of the housing is put right, and nothing else spoilt.
+    // Steps used neither in the search nor in the fit: the housing improves, and no channel gets worse.
     let housing = &law.channels["Tc"];
     assert!(law.held_out_steps > 0 && housing.after < 0.2 * housing.before, "{:?}", law.channels);
     assert_eq!(law.worse, [""; 0]);
     assert!(found.settled.is_some());
-    // What was told beside it: the heat that the law gives at each step, by a force that knows no law.
+    // The source term in each step, estimated without the law, agrees with the law.
     assert_eq!(found.forces[0].submodel, "compressor_housing");
     let script = ScriptEffect::new(law.script.as_ref().unwrap(), Path::new("law.rhai")).unwrap();
     assert_eq!(script.info().submodel.name(), "compressor_housing");
 }
 
-/// Recordings without a cause, searched although nothing asks for it: of three at most one has a law, where the stop is meant
-/// to let one in twenty pass.
+/// Fault-free recordings, searched although no diagnosis requires it: at most one of three has a law. The threshold is meant to pass one in
+/// twenty.
 #[test]
 fn nothing_has_no_law() {
     let seeds = [21, 22, 23];
@@ -113,8 +113,7 @@ fn nothing_has_no_law() {
     assert!(sentences.len() <= 1, "{sentences:?}");
 }
 
-/// 60 W to the compressor housing in one step alone: the force is there in that step and nowhere else, and in no other balance
-/// as much evidence.
+/// 60 W to the compressor housing in one step alone: the source term appears in that step only, and no other balance has as much evidence.
 #[test]
 fn a_force_comes_back_in_its_step() {
     let mut planted = study(&VISITS, Vec::new());
@@ -142,12 +141,12 @@ fn a_force_comes_back_in_its_step() {
     assert_eq!(found[0].balance, Balance::CompressorHousing);
     for (step, (level, sigma)) in found[0].levels.iter().enumerate() {
         let truth = if step == 4 { 60.0 } else { 0.0 };
-        // Nine steps: beyond four standard errors once in two thousand recordings.
+        // Nine steps: four standard errors are exceeded once in two thousand recordings.
         assert!((level - truth).abs() < 4.0 * sigma, "step {step}: {level} +/- {sigma} W for {truth} W");
     }
 }
 
-/// Every term as a script gives the readings that the term itself gives.
+/// The script of every term gives the same readings as the term itself.
 #[test]
 fn every_term_can_be_written_and_its_script_does_the_same() {
     let short = Visits { speeds_rpm: &[90e3, 130e3, 60e3], dwell_s: 20.0 };
@@ -170,7 +169,7 @@ fn every_term_can_be_written_and_its_script_does_the_same() {
         let (native, scripted) = (of(Arc::new(LawEffect::new(vec![term.clone()]))), of(Arc::new(script)));
         let change = native.iter().zip(&nothing.values).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let apart = native.iter().zip(&scripted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        // Rounding, which the integration carries on.
+        // Rounding errors, propagated by the integration.
         (apart > 1e-6 * change.max(1e-3)).then(|| format!("{apart} of {change}\n{text}"))
     });
     let wrong: Vec<String> = complaints.into_iter().flatten().collect();

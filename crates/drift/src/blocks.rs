@@ -1,11 +1,11 @@
-//! Steps of all runs on one axis of time, and the stretches of them over which readings are averaged.
+//! Steps of all runs on one time axis, and the segments of them over which readings are averaged.
 
 use mapper_core::{Channel, HeldPoint, NoiseColour, Recording, StepMarker};
 use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_observe::mean::{BEFORE_S, mean_between};
 use mapper_observe::schedule::Schedule;
 
-/// From 5 s after a jump on, longer and longer.
+/// From 5 s after a jump on, with increasing length.
 const STRETCHES: Schedule = Schedule {
     first_s: 5.0,
     lengths_s: &[(15.0, 10.0), (35.0, 20.0), (95.0, 30.0), (f64::INFINITY, 60.0)],
@@ -13,7 +13,7 @@ const STRETCHES: Schedule = Schedule {
     shortest_ratio: 0.0,
 };
 
-/// Relative difference below which two commands are the same point: other programs write them rounded.
+/// Relative difference below which two commands are the same point: other programs round them.
 const SAME_COMMAND: f64 = 1e-3;
 
 /// A step of one of the runs.
@@ -25,7 +25,7 @@ pub(crate) struct CampaignStep {
     /// Run time, s.
     pub start_s: f64,
     pub end_s: f64,
-    /// What is added to run time for the time of the campaign, s.
+    /// Offset from run time to campaign time, s.
     pub offset_s: f64,
     /// Number of its operating point among all.
     pub condition: usize,
@@ -35,7 +35,7 @@ pub(crate) struct CampaignStep {
     pub p3_pa: f64,
 }
 
-/// A stretch of a step.
+/// A segment of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Block {
     /// Position of its step among all steps.
@@ -74,14 +74,14 @@ pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
             });
             from = Some(condition);
         }
-        // Between two runs time stands still: only the time that was measured is known.
+        // Only measured time counts, so the time axis has no gap between two runs.
         offset_s += recording.steps.last().map_or(0.0, |marker| marker.end_s);
     }
     steps
 }
 
-/// What was commanded for an operating point: its speed where that is known, since a loop that holds it moves P3; else P3, Pa.
-/// Beside it the opening of the valve. Where neither was commanded, what was measured.
+/// Command of an operating point: its speed if known, since a loop that holds it moves P3; otherwise P3, Pa. Also the valve opening. Without a
+/// command, the measured value.
 #[derive(Debug, Clone, Copy)]
 struct Condition {
     speed_rpm: Option<f64>,
@@ -120,7 +120,7 @@ fn condition_of(marker: &StepMarker, held: Option<HeldPoint>, conditions: &mut V
     }
 }
 
-/// The stretches of all steps.
+/// The segments of all steps.
 pub(crate) fn blocks(steps: &[CampaignStep]) -> Vec<Block> {
     let of_step = |(position, step): (usize, &CampaignStep)| {
         let stretches = STRETCHES.stretches(step.start_s, step.end_s, 0.0);
@@ -129,12 +129,12 @@ pub(crate) fn blocks(steps: &[CampaignStep]) -> Vec<Block> {
     steps.iter().enumerate().flat_map(of_step).collect()
 }
 
-/// Mean of a channel over a stretch; `None` where fewer than three samples are in it.
+/// Mean of a channel over a segment; `None` if it has fewer than three samples.
 pub(crate) fn mean(recording: &Recording, channel: Channel, block: &Block) -> Option<f64> {
     mean_between(recording, channel, block.start_s, block.end_s, 3)
 }
 
-/// Variance of the mean of a channel over a stretch, over the variance of one reading.
+/// Ratio of the variance of a channel's mean over a segment to that of one reading.
 pub(crate) fn mean_variance_ratio(
     colour: NoiseColour,
     recording: &Recording,

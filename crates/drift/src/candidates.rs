@@ -1,4 +1,4 @@
-//! Every cause with every course it may take, as hypotheses of one likelihood.
+//! All causes with all their time histories, as hypotheses of one likelihood.
 
 use crate::cause::Cause;
 use crate::low_rank::LowRank;
@@ -8,30 +8,30 @@ use crate::time_history::{Course, CourseKind};
 use mapper_inference::hypotheses::{Hypothesis, Likelihood, Priors};
 use nalgebra::DMatrix;
 
-/// Drifts that a campaign is expected to have beforehand: one campaign in two has one. Judgement: repeats are made where drift is expected.
+/// Prior probability of drift: one campaign in two has one. Judgement: repeats are made if drift is expected.
 const EXPECTED_DRIFTS: f64 = 0.5;
-/// Causes that are seldom, against the others: judgement. Those read at the compressor, its machine and the flow meters drift; the rest is
-/// better looked after, and several sensors that drift alike have a common part, of which there are few.
+/// Prior weight of rare causes relative to the others: judgement. Sensors at the compressor, its machine and the flow meters drift. The other
+/// sensors are better maintained, and few sensors share a common part that drifts.
 const SELDOM: f64 = 0.25;
 
-/// Onsets beside one that was found, within a step of the grid to either side: a step of P2 that is dated 40 s late leaves twenty standard
-/// errors in one stretch, which other causes would take up.
+/// Onsets next to one that was found, within a grid step on either side: a step of P2 dated 40 s late leaves twenty standard errors in one
+/// segment, which other causes would absorb.
 const CLOSER: usize = 16;
 
-/// A cause, by its position among those that show, with a course.
+/// A cause, by its position among the observable ones, with a time history.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Candidate {
     pub cause: usize,
     pub course: Course,
 }
 
-/// The causes that show, and all their courses.
+/// The observable causes, and all their time histories.
 pub(crate) struct Candidates {
     pub causes: Vec<Cause>,
     pub all: Vec<Candidate>,
-    /// Each as the readings show it at size 1 (rate per hour, or step), a column each.
+    /// Effect of each on the readings at size 1 (rate per hour, or step), a column each.
     pub shown: DMatrix<f64>,
-    /// What is known of them beforehand.
+    /// Their priors.
     pub priors: Priors,
 }
 
@@ -67,7 +67,7 @@ impl Candidates {
         let hypothesis = |(place, Candidate { cause: family, course }): (usize, &Candidate)| {
             let cause = shown[*family].0;
             let sigma = cause.sigma_of(course.kind, end_s - start_s);
-            // Those beside one of the grid share its prior.
+            // Onsets next to one of the grid share its prior.
             let share = if place < on_grid { 1.0 } else { 1.0 / CLOSER as f64 };
             let prior = share * EXPECTED_DRIFTS * weight(&cause) / weights / courses.len() as f64;
             Hypothesis {
@@ -90,12 +90,12 @@ impl Candidates {
         })
     }
 
-    /// What the readings say of them, beside noise and constants.
+    /// Evidence of the readings for them, in addition to noise and constants.
     pub fn likelihood(&self, noise: &LowRank, difference: &DMatrix<f64>) -> Likelihood {
         let shown = noise.whiten(self.shown.clone());
         let inverse = noise.inverse_times(&shown);
         let pull = inverse.tr_mul(&noise.whiten(difference.clone()));
-        // Not `tr_mul`, which takes dot products one by one: five times as slow for a thousand columns.
+        // Not `tr_mul`, which computes dot products one by one: five times as slow for a thousand columns.
         Likelihood::of(shown.transpose() * &inverse, pull.column(0).into_owned())
     }
 
@@ -113,7 +113,7 @@ fn is_seldom(cause: Cause) -> bool {
     }
 }
 
-/// Ramps from the start on, steps from after it; both until there is too little left to see them.
+/// Ramps from the start on, steps from after it; both until the remaining time is too short to detect them.
 pub(crate) fn courses(start_s: f64, end_s: f64, count: usize) -> Vec<Course> {
     let length_s = end_s - start_s;
     let mut courses = Vec::new();

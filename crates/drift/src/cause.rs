@@ -1,4 +1,4 @@
-//! What may drift.
+//! Possible causes of drift.
 
 use crate::time_history::CourseKind;
 use mapper_core::{Channel, Dimension, with_unit};
@@ -6,12 +6,12 @@ use mapper_observe::sensor_fault::drifts;
 use mapper_physics::bearing_friction::at_150_krpm;
 use serde::{Serialize, Serializer};
 
-/// One thing that may drift.
+/// A possible cause of drift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Cause {
-    /// One or several sensors read more and more beside, alike: by K or Pa, of flow and speed by a ratio to the reading.
+    /// One or several sensors have a growing common error: in K or Pa, for flow and speed as a ratio to the reading.
     Sensors(&'static [Channel]),
-    /// The compressor fouls: its efficiency changes by the rate, its map's flow by 0.6 of it.
+    /// The compressor fouls: its efficiency changes by the rate, and its map's flow by 0.6 of that.
     Fouling,
     /// The bearing takes power c omega^2 from the shaft.
     BearingFriction,
@@ -21,23 +21,23 @@ pub enum Cause {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CauseKind {
-    /// What is measured is right, its reading is not.
+    /// The measured quantity is unchanged, but its reading drifts.
     Sensor,
     /// The machine itself changes.
     Machine,
 }
 
-/// Share of fouling's change of efficiency by which the flow of the map changes.
+/// Ratio of the change of map flow to that of efficiency in fouling.
 pub(crate) const FOULING_FLOW_SHARE: f64 = 0.6;
 
 impl Cause {
-    /// All causes that are considered: the drifts of the catalogue of sensor faults, and what a machine does.
+    /// All causes considered: the drifts of the catalogue of sensor faults, and those of the machine.
     pub fn all() -> Vec<Cause> {
         let sensors = drifts().map(|fault| Cause::Sensors(fault.channels));
         sensors.chain([Cause::Fouling, Cause::BearingFriction]).collect()
     }
 
-    /// Name in JSON; of several sensors with a plus sign between them.
+    /// Name in JSON; several sensors are joined with a plus sign.
     pub fn name(self) -> String {
         match self {
             Cause::Sensors(channels) => {
@@ -56,7 +56,7 @@ impl Cause {
         }
     }
 
-    /// The sensors that drift; none where the machine does.
+    /// The sensors that drift; empty if the machine does.
     pub fn channels(self) -> &'static [Channel] {
         match self {
             Cause::Sensors(channels) => channels,
@@ -76,7 +76,7 @@ impl Cause {
         }
     }
 
-    /// A size of it for people, SI: a ratio without a unit, friction also as its power at 150 krpm.
+    /// A size for display, SI: a ratio without a unit, friction also as its power at 150 krpm.
     pub fn show(self, size: f64) -> String {
         match self {
             Cause::BearingFriction => format!("{size:.2e} {} ({})", self.unit(), at_150_krpm(size)),
@@ -84,7 +84,7 @@ impl Cause {
         }
     }
 
-    /// How large its drift over a campaign is, one standard deviation, unit of the cause.
+    /// Prior size of its drift over a campaign, one standard deviation, unit of the cause.
     fn sigma(self) -> f64 {
         match self {
             Cause::Sensors(channels) => {
@@ -97,7 +97,7 @@ impl Cause {
         }
     }
 
-    /// The same of a course of this kind over a campaign of this length, s: a rate per hour, or a step.
+    /// The same for a time history of this kind over a campaign of this length, s: a rate per hour, or a step.
     pub(crate) fn sigma_of(self, kind: CourseKind, campaign_s: f64) -> f64 {
         match kind {
             CourseKind::Ramp => self.sigma() * 3600.0 / campaign_s,
@@ -105,7 +105,7 @@ impl Cause {
         }
     }
 
-    /// Whether it cannot be below zero: a bearing takes power and never gives any.
+    /// Whether it cannot be negative: a bearing takes power but never gives any.
     pub(crate) fn is_at_least_zero(self) -> bool {
         self == Cause::BearingFriction
     }

@@ -1,4 +1,4 @@
-//! The report in words and numbers.
+//! The report as text and numbers.
 
 use crate::cause::{Cause, CauseKind};
 use crate::corrected::{corrected_points, identified};
@@ -119,7 +119,7 @@ fn correction(cause: Cause) -> String {
     }
 }
 
-/// Never more certain than the assumptions are.
+/// A probability is limited by the certainty of the assumptions.
 fn percent(probability: f64) -> String {
     if probability > 0.995 { "more than 99.5 %".to_owned() } else { format!("{:.0} %", 100.0 * probability) }
 }

@@ -1,9 +1,9 @@
-//! What one constant does to readings and points.
+//! Effect of one constant on readings and points.
 
-/// A constant of one standard deviation, as readings and points show it.
+/// Effect of a constant of one standard deviation on readings and points.
 #[derive(Debug, Clone)]
 pub(crate) struct Constant {
-    /// Readings, stretch after stretch.
+    /// Readings, segment by segment.
     pub readings: Vec<f64>,
     /// Efficiency at the end of each step, fraction.
     pub eta: Vec<f64>,
@@ -12,13 +12,13 @@ pub(crate) struct Constant {
 }
 
 impl Constant {
-    /// The same, so many times as large.
+    /// The same, scaled by this factor.
     pub fn times(&self, factor: f64) -> Constant {
         let times = |values: &[f64]| values.iter().map(|value| factor * value).collect();
         Constant { readings: times(&self.readings), eta: times(&self.eta), h_w_m2k: times(&self.h_w_m2k) }
     }
 
-    /// Both together.
+    /// The sum of both.
     pub fn plus(mut self, other: Constant) -> Constant {
         let add = |into: &mut Vec<f64>, from: &[f64]| {
             into.iter_mut().zip(from).for_each(|(into, from)| *into += from);

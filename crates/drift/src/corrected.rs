@@ -1,4 +1,4 @@
-//! The points of the map without the drift.
+//! The map points corrected for the drift.
 
 use crate::blocks::CampaignStep;
 use crate::cause::{Cause, CauseKind};
@@ -13,10 +13,10 @@ use mapper_identify::identify_each;
 use mapper_observe::mean::mean_between;
 use nalgebra::DVector;
 
-/// What is called the end of a step, s.
+/// Averaging time at the end of a step, s.
 const END_S: f64 = 5.0;
 
-/// Points of a run; none where the recording cannot be identified.
+/// Points of a run; empty if the recording cannot be identified.
 pub(crate) fn identified(recording: &Recording, request: &DriftRequest<'_>) -> Vec<IdentifiedPoint> {
     identify_each(recording, request.identification)
         .map(|points| points.into_iter().filter_map(Result::ok).collect())
@@ -30,7 +30,7 @@ pub(crate) fn point_of<'a>(
     points.get(step.run)?.iter().find(|point| point.step == step.index)
 }
 
-/// All points, the drifts taken out.
+/// All points, with the drifts subtracted.
 pub(crate) fn corrected_points(
     request: &DriftRequest<'_>,
     recordings: &[&Recording],
@@ -58,7 +58,7 @@ pub(crate) fn corrected_points(
         .enumerate()
         .filter_map(|(position, step)| {
             let at = |fit: &Fit| fit.drift_at(step.end_s + step.offset_s);
-            // A step that the model cannot follow has no point.
+            // A step that the model cannot follow gives no point.
             let (mut eta, mut h_w_m2k) =
                 *readings.step_ends.get(position).filter(|(eta, _)| eta.is_finite())?;
             for (constant, size) in constants.iter().zip(fits.constants.iter()) {
@@ -69,7 +69,7 @@ pub(crate) fn corrected_points(
                 eta += signature.eta[position] * at(fit);
                 h_w_m2k += signature.h_w_m2k[position] * at(fit);
             }
-            // What the machine at the campaign's start would have had at this operating point.
+            // Refers to the machine at the start of the campaign, at this operating point.
             let fouling = drifts.iter().find(|fit| fit.cause == Cause::Fouling);
             let fouled = 1.0 + fouling.map_or(0.0, at);
             let weights = DVector::from_iterator(constants.len(), constants.iter().map(|c| c.eta[position]));

@@ -1,4 +1,4 @@
-//! Which causes, with which courses: the most probable set, beside what is constant.
+//! Selects the most probable set of causes and time histories, in addition to constants.
 
 use crate::candidates::Candidates;
 use crate::cause::Cause;
@@ -11,41 +11,41 @@ use crate::time_history::{Course, CourseKind};
 use mapper_inference::hypotheses::Member;
 use nalgebra::DMatrix;
 
-/// Onsets that are tried over a campaign: closer ones are told by the fit of what is found.
+/// Number of onsets tried over a campaign: the fit refines the onset of a detected cause.
 const ONSETS: usize = 36;
 
-/// A cause that is found, before its course is fitted closely.
+/// A detected cause, before its time history is fitted closely.
 #[derive(Debug, Clone)]
 pub(crate) struct FoundDrifts {
     pub cause: Cause,
     pub course: Course,
-    /// Its probability against the others and against none in its place.
+    /// Its probability relative to alternatives and to none in its place.
     pub probability: f64,
-    /// Those, most probable first.
+    /// The alternatives, most probable first.
     pub alternatives: Vec<Alternative>,
 }
 
 impl Decision {
-    /// What is found, by cause and course.
+    /// The detected causes, with their time histories.
     pub fn courses(&self) -> Vec<(Cause, Course)> {
         self.found.iter().map(|found| (found.cause, found.course)).collect()
     }
 }
 
-/// What is found.
+/// Result of the decision.
 pub(crate) struct Decision {
-    /// Nothing where nothing drifts.
+    /// Empty if nothing drifts.
     pub found: Vec<FoundDrifts>,
-    /// No drift and each cause by itself, most probable first.
+    /// No drift and each single cause, most probable first.
     pub alone: Vec<Alternative>,
     pub limits: Vec<DetectionLimit>,
-    /// Stretches that the model cannot follow, and all.
+    /// Number of segments that the model cannot follow, and of all.
     pub left_out: (usize, usize),
-    /// Covariance of each stretch as found, constants apart.
+    /// Estimated covariance of each segment, without constants.
     pub own: Vec<DMatrix<f64>>,
 }
 
-/// `own` is the declared covariance of each stretch; onsets about those that are `known` already are tried more closely.
+/// `own` is the declared covariance of each segment; onsets near those already `known` are tried more closely.
 pub(crate) fn decide(
     readings: &Readings,
     mut own: Vec<DMatrix<f64>>,
@@ -55,7 +55,7 @@ pub(crate) fn decide(
     let candidates = Candidates::new(readings, ONSETS, known)?;
     let difference = DMatrix::from_column_slice(readings.difference.len(), 1, &readings.difference);
     let (left_out, noise, left) = leave_out(&mut own, readings, columns, &difference, &candidates)?;
-    // The noise that the best explanation leaves says how much more there is than declared.
+    // The residual of the best explanation shows how much noise exceeds its declaration.
     inflate(&mut own, readings, &noise, &left);
     let noise = LowRank::new(&own, columns)?;
 
@@ -100,7 +100,7 @@ fn found(candidates: &Candidates, member: &Member) -> FoundDrifts {
     }
 }
 
-/// From ln of the odds, most probable first; they sum to 1.
+/// Probabilities from ln of the odds, most probable first; they sum to 1.
 fn probabilities(ln_odds: Vec<(Option<Cause>, f64)>) -> Vec<Alternative> {
     let largest = ln_odds.iter().map(|(_, ln_odds)| *ln_odds).fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = ln_odds.iter().map(|(_, ln_odds)| (ln_odds - largest).exp()).sum();

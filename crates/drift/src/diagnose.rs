@@ -1,4 +1,4 @@
-//! From recordings to the answer.
+//! Diagnoses drift from recordings.
 
 use crate::blocks::{self, Block, CampaignStep, mean_variance_ratio};
 use crate::conclude::conclude;
@@ -15,19 +15,18 @@ use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 
-/// Stretches closer to the surge line are left out: there a hundredth of P2 is a third of the flow, and no parameter's
-/// effect is linear.
+/// Segments closer to the surge line are left out: there a hundredth of P2 is a third of the flow, and no parameter's effect is linear.
 const SURGE_LIMIT: f64 = 0.97;
-/// Begin of each run that is left out, s: what the rig did before is not known, and rigs are still settling.
+/// Start of each run that is left out, s: the rig's earlier history is unknown, and rigs are still settling.
 const FIRST_S: f64 = 30.0;
-/// What the model leaves unexplained on average over a stretch, over the noise of one sample.
+/// Average model error over a segment, relative to the noise of one sample.
 const MODEL_FLOOR: f64 = 0.15;
 
-/// Says whether anything drifted, and what.
+/// Reports whether anything drifted, and what.
 ///
 /// # Errors
-/// [`DriftError`] where a recording has no steps or too few channels, or the model cannot follow it. A recording that is
-/// sound but cannot tell (no repeats, a gap, another machine) gives a report with the verdict `unclear` and its reason.
+/// [`DriftError`] if a recording has no steps or too few channels, or the model cannot follow it. A valid recording without enough information
+/// (no repeats, a gap, another machine) gives a report with the verdict `unclear` and its reason.
 pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     if request.runs.is_empty() {
         return Err(DriftError::NoRun);
@@ -45,7 +44,7 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
     Ok(conclude(request, &recordings, &refined, &groups))
 }
 
-/// Reads all stretches and drives the model through all runs.
+/// Reads all segments and drives the model through all runs.
 fn read<'a>(
     request: &DriftRequest<'a>,
     recordings: &[&Recording],
@@ -116,7 +115,7 @@ fn read<'a>(
     Ok((readings, drives))
 }
 
-/// Covariance of the readings of each stretch: the sensors' noise, and that of the inputs through the model.
+/// Covariance of the readings of each segment: the sensors' noise, and that of the inputs through the model.
 fn own_covariances(recordings: &[&Recording], readings: &Readings, declared: &Declared) -> Vec<DMatrix<f64>> {
     let count = readings.columns.len();
     let of_block = |(index, block): (usize, &Block)| {

@@ -1,4 +1,4 @@
-//! The nominal model through whole runs, and how its readings answer to each knob.
+//! Runs the nominal model through whole runs, and computes the sensitivity of its readings to each perturbation.
 
 use crate::blocks::{Block, CampaignStep};
 use crate::knobs::{KNOBS, difference_step};
@@ -19,9 +19,9 @@ use mapper_physics::instruments::true_value;
 use mapper_physics::model::{Model, State};
 use mapper_physics::params::BoundaryConditions;
 
-/// Readings of the model within a stretch, s apart.
+/// Interval of model readings within a segment, s.
 const SAMPLE_S: f64 = 2.5;
-/// Readings this long before the start say what state it is in, s.
+/// Time before the start over which readings give the initial state, s.
 const BEFORE_START_S: f64 = 2.0;
 
 /// One run, ready to be driven.
@@ -83,8 +83,7 @@ impl<'a> Drive<'a> {
         Ok(Drive { model, inputs, start, stretches, blocks: block_count })
     }
 
-    /// The run with one knob turned, or none, beside what is planted. An error names the stretch that the model could not
-    /// follow.
+    /// The run with at most one perturbation, in addition to the planted drift. An error names the segment that the model could not follow.
     fn predict(
         &self,
         planted: &[Planted],
@@ -150,16 +149,16 @@ impl<'a> Drive<'a> {
             }
         }
         for (means, count) in prediction.means.iter_mut().zip(counts) {
-            // Nothing was said of a stretch that was not followed.
+            // A segment that was not followed has no prediction.
             means.iter_mut().for_each(|sum| *sum /= count as f64);
         }
         Ok(prediction)
     }
 
-    /// The run with what is planted, and with each knob turned beside it, over all cores.
+    /// The run with the planted drift, and with each perturbation added to it, over all cores.
     pub fn predict_all(&mut self, planted: &[Planted]) -> Result<(Prediction, Vec<Prediction>), DriveError> {
         loop {
-            // What is left out is left out in all, so that their differences stay smooth.
+            // Segments left out of one run are left out of all, so that their differences stay smooth.
             let (index, error) = match self.try_all(planted) {
                 Ok(predictions) => return Ok(predictions),
                 Err(failed) => failed,
@@ -182,7 +181,7 @@ impl<'a> Drive<'a> {
     }
 }
 
-/// What the model says of all runs with what is planted, and with each knob turned beside it.
+/// Model predictions of all runs with the planted drift, and with each perturbation added to it.
 pub(crate) fn predict(
     drives: &mut [Drive<'_>],
     planted: &[Planted],
@@ -198,7 +197,7 @@ pub(crate) fn predict(
     Ok((base, turned))
 }
 
-/// State at the start: as measured just before it, or at rest under the first inputs where nothing was recorded before.
+/// State at the start: as measured just before it, or steady under the first inputs without earlier readings.
 fn start_state(
     run: usize,
     recording: &Recording,
@@ -224,7 +223,7 @@ fn start_state(
 struct Undrifted<'a> {
     inputs: Shifted<'a, AveragedInputs>,
     planted: &'a [Planted],
-    /// What is added to run time for the time of the campaign, s.
+    /// Offset from run time to campaign time, s.
     offset_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Sizes and onsets of what is found, with everything that is constant fitted beside it.
+//! Sizes and onsets of detected causes, fitted together with all constants.
 
 use crate::candidates::{courses, mean_of};
 use crate::cause::Cause;
@@ -9,37 +9,37 @@ use crate::time_history::Course;
 use mapper_numerics::statistics::{CHI_SQUARE_1_95, NORMAL_975};
 use nalgebra::{DMatrix, DVector};
 
-/// Onsets on the fine grid of a cause that is found: closer than the stretches that are compared.
+/// Number of onsets on the fine grid of a detected cause: closer than the compared segments.
 pub(crate) const FINE_ONSETS: usize = 280;
-/// Evidence (twice the ln of a likelihood ratio) that is not a difference.
+/// Evidence (twice the ln of a likelihood ratio) below which a difference is not significant.
 const AS_GOOD: f64 = 0.1;
 /// Rounds in which the onsets of several drifts are fitted in turn.
 const ROUNDS: usize = 2;
 
-/// A cause with its best course and size.
+/// A cause with its best time history and size.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub cause: Cause,
-    /// Best course.
+    /// Best time history.
     pub course: Course,
     /// Rate or step, unit of the cause.
     pub size: f64,
-    /// 95 % interval of the size: the widest over the onsets that the readings allow.
+    /// 95 % interval of the size: the widest over the onsets compatible with the readings.
     pub low: f64,
     pub high: f64,
-    /// 95 % interval of the onset, time of the campaign, s.
+    /// 95 % interval of the onset, campaign time, s.
     pub onset_low_s: f64,
     pub onset_high_s: f64,
 }
 
 impl Fit {
-    /// Size of the drift at a time of the campaign, unit of the cause.
+    /// Size of the drift at a campaign time, unit of the cause.
     pub fn drift_at(&self, t_s: f64) -> f64 {
         self.size * self.course.at(t_s)
     }
 }
 
-/// All that drifts, with what is constant.
+/// All drifts, with the constants.
 pub(crate) struct Fits {
     pub drifts: Vec<Fit>,
     /// Most probable constants, in standard deviations.
@@ -48,7 +48,7 @@ pub(crate) struct Fits {
     pub noise: LowRank,
 }
 
-/// Fits each cause with a course of the kind given, from the onset given on, all beside each other.
+/// Jointly fits all causes, each with a time history of the given kind and initial onset.
 pub(crate) fn fit(
     readings: &Readings,
     own: &[DMatrix<f64>],
@@ -62,7 +62,7 @@ pub(crate) fn fit(
         for place in 0..found.len() {
             let others: Vec<(Cause, Course)> =
                 found.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, one)| *one).collect();
-            let noise = LowRank::new(own, &beside(readings, columns, &others)?)?;
+            let noise = LowRank::new(own, &with_others(readings, columns, &others)?)?;
             let fit = fit_one(readings, &noise, found[place])?;
             found[place].1 = fit.course;
             drifts.push(fit);
@@ -78,8 +78,8 @@ pub(crate) fn fit(
     Ok(Fits { drifts, constants, noise })
 }
 
-/// The constants, and the other drifts as large as they may be.
-fn beside(
+/// The constants, and the other drifts with their prior sizes.
+fn with_others(
     readings: &Readings,
     columns: &DMatrix<f64>,
     others: &[(Cause, Course)],
@@ -97,14 +97,14 @@ fn beside(
     Ok(all)
 }
 
-/// A cause of size 1 with a course, as the readings show it.
+/// Effect of a cause of size 1 with a time history on the readings.
 fn column(readings: &Readings, cause: Cause, course: Course) -> Result<Vec<f64>, DriftError> {
     let signature = readings.signature(cause).ok_or(Unsolvable::Hidden { cause })?;
     let at = |(row, value): (usize, &f64)| value * mean_of(readings, row, course);
     Ok(signature.readings.iter().enumerate().map(at).collect())
 }
 
-/// One cause with courses of one kind. `noise` has everything else in it.
+/// One cause with time histories of one kind. `noise` includes everything else.
 fn fit_one(readings: &Readings, noise: &LowRank, (cause, begun): (Cause, Course)) -> Result<Fit, DriftError> {
     let nothing = || Unsolvable::Hidden { cause };
     let (start_s, end_s) = readings.span_s();
@@ -128,7 +128,7 @@ fn fit_one(readings: &Readings, noise: &LowRank, (cause, begun): (Cause, Course)
     let sigma = |index: usize| information[index].sqrt().recip();
     let evidence = |index: usize| size(index).powi(2) * information[index];
     let best = (0..fine.len()).max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).ok_or_else(nothing)?;
-    // Where nothing is read for a while, all onsets within are equally good: the middle one is the least wrong.
+    // During a gap in the readings all onsets are equally good: the middle one has the smallest error.
     let as_good = |index: &usize| evidence(*index) > evidence(best) - AS_GOOD;
     let first = (0..=best).rev().take_while(as_good).last().unwrap_or(best);
     let last = (best..fine.len()).take_while(as_good).last().unwrap_or(best);

@@ -1,9 +1,9 @@
-//! What the model is turned by, to see how the readings answer.
+//! Perturbations of the model, to find the sensitivity of the readings.
 
 use mapper_core::{Channel, Dimension, ModelTolerances};
 use mapper_observe::perturbation::Perturbation;
 
-/// All that is turned.
+/// All perturbations.
 pub(crate) const KNOBS: [Perturbation; 19] = [
     Perturbation::Input(Channel::T1),
     Perturbation::Input(Channel::P1),
@@ -26,7 +26,7 @@ pub(crate) const KNOBS: [Perturbation; 19] = [
     Perturbation::StartTt,
 ];
 
-/// By how much a knob is turned for the difference: small against curvature, large against rounding.
+/// Size of a perturbation for the difference: small compared with curvature, large compared with rounding.
 pub(crate) fn difference_step(knob: Perturbation) -> f64 {
     match knob {
         Perturbation::Input(channel) if channel.info().dimension == Dimension::Pressure => 100.0,
@@ -36,13 +36,12 @@ pub(crate) fn difference_step(knob: Perturbation) -> f64 {
     }
 }
 
-/// Constant deviations may be so many times as large as is declared: they are not drift, however large, and repeats tell
-/// the two apart.
+/// Factor on declared constant deviations: a constant is not drift, whatever its size, and repeats distinguish the two.
 const WIDER: f64 = 2.0;
-/// That of the turbine housing at the start still more: it takes an hour to forget how it began.
+/// A larger factor for the turbine housing at the start: its initial state takes an hour to decay.
 const WIDER_TT: f64 = 4.0;
 
-/// One standard deviation of what a knob may be off by over the whole campaign, beside declared offsets of inputs.
+/// One standard deviation of a perturbation over the whole campaign, in addition to declared offsets of inputs.
 pub(crate) fn sigma(knob: Perturbation, tolerances: &ModelTolerances) -> f64 {
     let wider = if knob == Perturbation::StartTt { WIDER_TT } else { WIDER };
     wider * knob.tolerance(tolerances)

@@ -1,10 +1,9 @@
-//! Whether the rig stayed the same while a map was made, and if not, what moved: which sensor, or the machine, since
-//! when and how fast.
+//! Checks whether the rig changed while a map was measured, and if so, which sensor or machine part changed, since when and how fast.
 //!
-//! The nominal model is driven by the recorded boundary conditions through all steps; what the readings differ from it
-//! is explained by what is constant over the campaign (declared tolerances and offsets, and a deviation of each operating
-//! point that its repeats share) and by the most probable set of causes, each with a course over time
-//! ([`mapper_inference::hypotheses`]). Only what repeats show can count against the constants. docs/drift.md has the method with its measured error rates.
+//! The recorded boundary conditions drive the nominal model through all steps. Constants over the campaign explain part of the residual:
+//! declared tolerances and offsets, and a deviation of each operating point that its repeats share. The most probable set of causes, each with
+//! a time history ([`mapper_inference::hypotheses`]), explains the rest. Only repeats give evidence against the constants. docs/drift.md has
+//! the method with its measured error rates.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod blocks;

@@ -1,12 +1,12 @@
-//! Noise that is independent from stretch to stretch, plus constants with priors: covariance D + U U'.
+//! Noise that is independent between segments, plus constants with priors: covariance D + U U'.
 
 use crate::request::Unsolvable;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Whitened by D's Cholesky factors; U stands whitened beside it.
+/// Whitened by D's Cholesky factors; U is stored whitened too.
 #[derive(Debug, Clone)]
 pub(crate) struct LowRank {
-    /// Lower Cholesky factor of each stretch's own covariance.
+    /// Lower Cholesky factor of each segment's own covariance.
     factors: Vec<DMatrix<f64>>,
     /// Constants, whitened; a column each, scaled by its standard deviation.
     columns: DMatrix<f64>,
@@ -15,7 +15,7 @@ pub(crate) struct LowRank {
 }
 
 impl LowRank {
-    /// `own` are the covariances of the stretches, `columns` the constants as the readings show them.
+    /// `own` are the covariances of the segments, `columns` the effects of the constants on the readings.
     pub fn new(own: &[DMatrix<f64>], columns: &DMatrix<f64>) -> Result<Self, Unsolvable> {
         let factors = own
             .iter()
@@ -48,12 +48,12 @@ impl LowRank {
         self.inner.solve(&(self.columns.transpose() * whitened))
     }
 
-    /// Variance of a linear function of the constants, after the readings.
+    /// Posterior variance of a linear function of the constants.
     pub fn variance(&self, weights: &DVector<f64>) -> f64 {
         weights.dot(&self.inner.solve(weights))
     }
 
-    /// Degrees of freedom that the constants take: the trace of the projection onto them.
+    /// Degrees of freedom used by the constants: the trace of the projection onto them.
     pub fn degrees_of_freedom(&self) -> f64 {
         self.constants_count() as f64 - self.inner.inverse().trace()
     }

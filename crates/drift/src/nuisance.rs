@@ -1,4 +1,4 @@
-//! What is constant over a campaign, each with its prior: it is not drift.
+//! Constants of a campaign, each with its prior: they are not drift.
 
 use crate::blocks::Block;
 use crate::constant::Constant;
@@ -9,7 +9,7 @@ use mapper_observe::channels::OUTPUTS;
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 
-/// Deviations of each operating point from the smooth model, shared by its repeats: one standard deviation.
+/// Deviations of each operating point from the smooth model, common to its repeats: one standard deviation.
 const OWN_DEVIATIONS: [(Perturbation, f64); 4] = [
     (Perturbation::Efficiency, 0.005),
     (Perturbation::Flow, 0.004),
@@ -17,7 +17,7 @@ const OWN_DEVIATIONS: [(Perturbation, f64); 4] = [
     (Perturbation::CompressorConvection, 0.03),
 ];
 
-/// The same of each channel at each operating point, which no law of the model gives.
+/// The same for each channel at each operating point, beyond the smooth model laws.
 fn own_deviation(channel: Channel, level: f64) -> f64 {
     match channel {
         Channel::ShaftSpeed => 40.0,
@@ -76,14 +76,14 @@ pub(crate) fn constants(readings: &Readings, declared: &Declared) -> Vec<Constan
     constants
 }
 
-/// Distance of the knots of what wanders slowly, s.
+/// Knot distance of slow wander, s.
 const KNOT_S: f64 = 480.0;
-/// The air around the housings is seldom recorded: it wanders by so much, K.
+/// Wander of the air around the housings, which is seldom recorded, K.
 const AMBIENT_WANDER_K: f64 = 0.7;
-/// What the turbine side wanders by, K: its housing takes an hour to forget what the model has wrong.
+/// Wander of the turbine side, K: model errors of its housing take an hour to decay.
 const TURBINE_WANDER: [(Channel, f64); 2] = [(Channel::Tt, 0.2), (Channel::T4, 0.1)];
 
-/// Courses that are linear between knots: no drift of the causes looked for.
+/// Time histories that are linear between knots, unlike the drifts considered.
 fn wander(readings: &Readings, constants: &mut Vec<Constant>) {
     let (start_s, end_s) = readings.span_s();
     let count = ((end_s - start_s) / KNOT_S).ceil().clamp(1.0, 60.0);

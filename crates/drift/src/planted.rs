@@ -1,5 +1,4 @@
-//! A drift that was found, put into the model, so that the next fit is linear around it and no longer around a machine
-//! that never changed.
+//! A detected drift added to the model, so that the next fit is linearised about it and no longer about an unchanged machine.
 
 use crate::cause::{Cause, FOULING_FLOW_SHARE};
 use crate::time_history::Course;
@@ -7,7 +6,7 @@ use mapper_observe::channels::DRIVERS;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::params::{BoundaryConditions, Params};
 
-/// A cause with its course, and its rate or step.
+/// A cause with its time history, and its rate or step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Planted {
     pub cause: Cause,
@@ -16,22 +15,22 @@ pub(crate) struct Planted {
 }
 
 impl Planted {
-    /// Whether the model has it at all: what the sensor of an output adds is linear as it is.
+    /// Whether the model includes it: the drift of an output sensor is already linear.
     pub fn is_in_model(&self) -> bool {
         self.machine_changes() || self.input_drifts()
     }
 
-    /// Whether the machine is another one from moment to moment.
+    /// Whether the machine changes over time.
     pub fn machine_changes(&self) -> bool {
         matches!(self.cause, Cause::Fouling | Cause::BearingFriction)
     }
 
-    /// Whether something that drives the model was read wrong.
+    /// Whether a model input was misread.
     pub fn input_drifts(&self) -> bool {
         self.cause.channels().iter().any(|channel| DRIVERS.contains(channel))
     }
 
-    /// The machine as it is on average over a part of the campaign, time of the campaign, s.
+    /// The mean machine over a part of the campaign, campaign time, s.
     pub fn drift_machine(&self, params: &mut Params, from_s: f64, to_s: f64) {
         let now = self.size * self.course.mean(from_s, to_s);
         match self.cause {
@@ -44,7 +43,7 @@ impl Planted {
         }
     }
 
-    /// Takes the drift of a sensor off the input that was read with it.
+    /// Subtracts the drift of a sensor from the input that it measures.
     pub fn undrift(&self, boundary: &mut BoundaryConditions, t_s: f64) {
         for channel in self.cause.channels().iter().filter(|channel| DRIVERS.contains(channel)) {
             Perturbation::Input(*channel).shift(boundary, -self.size * self.course.at(t_s));

@@ -1,4 +1,4 @@
-//! All readings beside the model.
+//! All readings compared with the model.
 
 use crate::blocks::{Block, CampaignStep};
 use crate::cause::{Cause, FOULING_FLOW_SHARE, is_relative};
@@ -9,27 +9,27 @@ use mapper_core::Channel;
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::perturbation::Perturbation;
 
-/// All readings beside the model.
+/// All readings compared with the model.
 pub(crate) struct Readings {
     pub runs: usize,
     pub steps: Vec<CampaignStep>,
-    /// Stretches that are compared.
+    /// Number of compared segments.
     pub blocks: Vec<Block>,
-    /// Channels that are compared, as positions in [`OUTPUTS`].
+    /// Compared channels, as positions in [`OUTPUTS`].
     pub columns: Vec<usize>,
-    /// Reading less model, channel after channel, stretch after stretch.
+    /// Reading minus model, channel by channel, segment by segment.
     pub difference: Vec<f64>,
     /// The model, in the same order.
     pub model: Vec<f64>,
-    /// How readings and points answer to each of [`KNOBS`], per unit.
+    /// Sensitivity of readings and points to each of [`KNOBS`], per unit.
     pub answers: Vec<Constant>,
     /// Efficiency and heat-transfer coefficient of the model at the end of each step.
     pub step_ends: Vec<(f64, f64)>,
     /// Mean of each of [`DRIVERS`].
     pub input_levels: Vec<f64>,
-    /// Positions of the stretches that are compared among all.
+    /// Positions of the compared segments among all.
     pub kept: Vec<usize>,
-    /// Every stretch with its readings and the nominal model's, those that are not compared included.
+    /// Every segment with its readings and the nominal model's, including those not compared.
     pub all: Vec<(Block, [Option<f64>; OUTPUTS.len()], [f64; OUTPUTS.len()])>,
 }
 
@@ -47,14 +47,14 @@ impl Readings {
             .unwrap_or(0.0)
     }
 
-    /// Begin of the campaign and end of its last step, time of the campaign, s.
+    /// Start of the campaign and end of its last step, campaign time, s.
     pub fn span_s(&self) -> (f64, f64) {
         let start = self.steps.first().map_or(0.0, |step| step.start_s + step.offset_s);
         let end = self.steps.last().map_or(0.0, |step| step.end_s + step.offset_s);
         (start, end)
     }
 
-    /// A cause of unit size all the time, as readings and points show it; `None` where nothing shows it.
+    /// Effect of a constant cause of unit size on readings and points; `None` if it has no effect.
     pub fn signature(&self, cause: Cause) -> Option<Constant> {
         match cause {
             Cause::Sensors(channels) => {
@@ -71,7 +71,7 @@ impl Readings {
         }
     }
 
-    /// The part of a signature that the model has once the cause is planted: all but what the sensors of outputs add.
+    /// The part of a signature that the model includes once the cause is planted: all but the drift of output sensors.
     pub fn planted_signature(&self, cause: Cause) -> Option<Constant> {
         match cause {
             Cause::Sensors(channels) => {
@@ -83,7 +83,7 @@ impl Readings {
     }
 
     fn of_sensor(&self, channel: Channel) -> Option<Constant> {
-        // An input that reads too high drives the model too high: the truth lies below.
+        // An input that reads too high drives the model too high: the true value is lower.
         if DRIVERS.contains(&channel) {
             return Some(self.answer(Perturbation::Input(channel))?.times(-1.0));
         }
@@ -100,12 +100,12 @@ impl Readings {
         Some(Constant { readings, eta: vec![0.0; steps], h_w_m2k: vec![0.0; steps] })
     }
 
-    /// `None` where there is nothing to add, or it shows nowhere.
+    /// `None` if there is nothing to add, or it has no effect.
     fn sum(&self, parts: impl Iterator<Item = Constant>) -> Option<Constant> {
         parts.reduce(Constant::plus).filter(|sum| sum.readings.iter().any(|value| *value != 0.0))
     }
 
-    /// The same readings beside another prediction; `None` where it does not say all that the first one said.
+    /// The same readings with another prediction; `None` if it covers less than the first one.
     pub fn around(&self, base: Prediction, turned: &[Prediction]) -> Option<Readings> {
         let columns = &self.columns;
         let rows = |values: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
@@ -151,7 +151,7 @@ impl Readings {
         readings.difference.iter().all(|value| value.is_finite()).then_some(readings)
     }
 
-    /// Takes a linear part out of the model, as large as `of_rows` says in the readings, as `of_steps` at the steps' ends.
+    /// Subtracts a linear effect from the model: `of_rows` in the readings, `of_steps` at the steps' ends.
     pub fn give_back(&mut self, part: &Constant, of_rows: &[f64], of_steps: &[f64]) {
         for ((difference, shown), size) in self.difference.iter_mut().zip(&part.readings).zip(of_rows) {
             *difference += shown * size;
@@ -163,7 +163,7 @@ impl Readings {
     }
 }
 
-/// 0 for steps that the model cannot follow, which have no point.
+/// 0 for steps that the model cannot follow; they give no point.
 fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { 0.0 }
 }

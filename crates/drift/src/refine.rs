@@ -1,5 +1,5 @@
-//! A drift that was found is planted in the model and fitted again around that: the signature of the first look is that
-//! of a small change that has always been there, while the metal lags behind a real one.
+//! Plants a detected drift in the model and fits again about it. The first signature is that of a small constant change, but the metal lags
+//! behind a real one.
 
 use crate::candidates::mean_of;
 use crate::cause::Cause;
@@ -15,9 +15,9 @@ use crate::time_history::Course;
 use mapper_observe::declared::Declared;
 use nalgebra::DMatrix;
 
-/// Rounds: each leaves about a tenth of what the one before had wrong.
+/// Number of rounds: each one reduces the error to about a tenth.
 const ROUNDS: usize = 2;
-/// Readings, constants, what is decided and fits around what was found.
+/// Readings, constants, decisions and fits about the detected drift.
 pub(crate) struct Refined {
     pub readings: Readings,
     pub constants: Vec<Constant>,
@@ -26,7 +26,7 @@ pub(crate) struct Refined {
 }
 
 impl Refined {
-    /// Decides and fits, then again around what was found, in rounds; what was found last stays where the model cannot follow it further.
+    /// Decides and fits, then repeats about the result; keeps the last result that the model can follow.
     pub fn new(
         readings: Readings,
         own: &[DMatrix<f64>],
@@ -43,7 +43,7 @@ impl Refined {
         Ok(refined)
     }
 
-    /// Of these readings, beside what is known; first with onsets on a grid, then with closer ones about what was found.
+    /// Decides from these readings and the known drifts; first with onsets on a grid, then with closer ones about the result.
     fn of(
         readings: Readings,
         own: &[DMatrix<f64>],
@@ -66,7 +66,7 @@ impl Refined {
         Ok(Refined { readings, constants, decision, fits })
     }
 
-    /// `None` where there is nothing to plant, the model cannot follow what is planted, or nothing is found around it.
+    /// `None` if there is nothing to plant, the model cannot follow it, or nothing is found about it.
     fn round(&self, own: &[DMatrix<f64>], drives: &mut [Drive<'_>], declared: &Declared) -> Option<Refined> {
         let drifts = &self.fits.drifts;
         let planted: Vec<Planted> = drifts
@@ -79,7 +79,7 @@ impl Refined {
         }
         let (base, turned) = predict(drives, &planted).ok()?;
         let mut readings = self.readings.around(base, &turned)?;
-        // What is planted is fitted again as a whole: its linear part is given back to the readings.
+        // The planted drift is fitted again as a whole, so its linear part is added back to the readings.
         for Planted { cause, course, size } in planted {
             let signature = readings.planted_signature(cause)?;
             let of_rows: Vec<f64> =
@@ -93,10 +93,10 @@ impl Refined {
     }
 }
 
-/// The constants, and of each drift that is known what an error of its date does: otherwise that of a large one would be a drift of others.
+/// The constants, and the effect of a date error of each known drift, which would otherwise look like another drift.
 fn with_dates(columns: &DMatrix<f64>, readings: &Readings, known: &[Fit]) -> DMatrix<f64> {
     let (start_s, end_s) = readings.span_s();
-    // As far as the onsets are apart that the fit tries.
+    // Use the onset spacing of the fit.
     let dated_s = (end_s - start_s) / FINE_ONSETS as f64;
     let mut all = columns.clone().resize_horizontally(columns.ncols() + known.len(), 0.0);
     for (place, Fit { cause, course, size, .. }) in known.iter().enumerate() {
@@ -112,7 +112,7 @@ fn with_dates(columns: &DMatrix<f64>, readings: &Readings, known: &[Fit]) -> DMa
     all
 }
 
-/// Constants as the readings show them, a column each.
+/// Effects of constants on the readings, a column each.
 fn columns(constants: &[Constant], readings: &Readings) -> DMatrix<f64> {
     DMatrix::from_fn(readings.difference.len(), constants.len(), |row, column| {
         constants[column].readings[row]

@@ -1,24 +1,24 @@
-//! Which jumps are repeated, and whether that is enough to judge.
+//! Finds repeated jumps, and checks whether they suffice for a judgement.
 
 use crate::blocks::CampaignStep;
 use crate::request::RecordedRun;
 use mapper_core::{Channel, Recording, step_number};
 use std::collections::BTreeMap;
 
-/// Visits of one jump that are needed: two show a difference, only a third shows that it stays or grows.
+/// Minimum number of visits of one jump: two show a difference, only a third shows whether it persists or grows.
 const VISITS_NEEDED: usize = 3;
-/// Longest step through which the model is driven, s.
+/// Longest step that the model is driven through, s.
 const LONGEST_STEP_S: f64 = 86_400.0;
-/// Longest time of all steps together, s.
+/// Longest total time of all steps, s.
 const LONGEST_S: f64 = 30.0 * 86_400.0;
-/// Silence of a channel within the steps that is taken for a gap, s.
+/// Time without readings of a channel within the steps that counts as a gap, s.
 const GAP_S: f64 = 3.0;
 
-/// All visits of each jump that is made more than once, by position among the steps; most visits first.
+/// All visits of each repeated jump, by position among the steps; most visits first.
 pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
     let mut by_jump: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (position, step) in steps.iter().enumerate() {
-        // A change too small to tell from staying is not a jump.
+        // A change within the tolerance of one operating point is not a jump.
         if let Some(from) = step.from.filter(|from| *from != step.condition) {
             by_jump.entry((from, step.condition)).or_default().push(position);
         }
@@ -28,7 +28,7 @@ pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Why nothing can be said; `None` where something can.
+/// Reason why no judgement is possible; `None` if it is.
 pub(crate) fn refusal(
     runs: &[RecordedRun<'_>],
     steps: &[CampaignStep],
@@ -98,7 +98,7 @@ pub(crate) fn refusal(
     })
 }
 
-/// A channel that falls silent within the steps, with begin and end of the silence.
+/// A channel with a gap within the steps, with start and end of the gap.
 fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
     let (start_s, end_s) = (recording.steps.first()?.start_s, recording.steps.last()?.end_s);
     let measured = |channel: &Channel| {
@@ -118,7 +118,7 @@ fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
         };
         let inner = times.windows(2).map(|pair| (pair[0], pair[1]));
         let mut all = inner.chain([(start_s, *first), (*last, end_s)]);
-        // A slow logger is not a gap: silence counts against the channel's own usual distance.
+        // A slow logger is not a gap: compare with the channel's own sample interval.
         let usual_s = (last - first) / times.len().max(2) as f64;
         if let Some((from_s, to_s)) = all.find(|(from_s, to_s)| to_s - from_s > GAP_S.max(20.0 * usual_s)) {
             return Some((*channel, from_s, to_s));

@@ -1,15 +1,15 @@
-//! The answer, as it is printed and written as JSON.
+//! The report, printed and written as JSON.
 
 use crate::cause::Cause;
 use crate::time_history::{Course, CourseKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// The answer in a word.
+/// The verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriftVerdict {
-    /// It is more probable that nothing drifted than that anything did.
+    /// No drift is more probable than any drift.
     None,
     /// One or more sensors drift.
     Sensor,
@@ -17,11 +17,11 @@ pub enum DriftVerdict {
     Machine,
     /// The machine changes and a sensor drifts.
     SensorAndMachine,
-    /// Something may have moved, but the recording cannot tell what; or it cannot tell whether: `reason` says.
+    /// Either the recording cannot identify the drift, or it cannot show whether there is one: see `reason`.
     Unclear,
 }
 
-/// How fast, or how far.
+/// Rate or step size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RateOrStep {
@@ -34,18 +34,18 @@ pub enum RateOrStep {
 /// A cause with its probability.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Alternative {
-    /// The cause; `None` is not drift.
+    /// The cause; `None` means no drift.
     pub cause: Option<Cause>,
     /// Its probability; all of them and that of `none` sum to 1.
     pub probability: f64,
 }
 
-/// The smallest drift that is seen.
+/// The smallest detectable drift.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DetectionLimit {
     /// The cause.
     pub cause: Cause,
-    /// Steady drift over the whole campaign that is expected to be as probable as none, unit of the cause.
+    /// Expected steady drift over the whole campaign that is as probable as none, unit of the cause.
     pub change: f64,
     /// Unit.
     pub unit: &'static str,
@@ -56,11 +56,11 @@ pub struct DetectionLimit {
 pub struct VisitChannel {
     /// Mean reading over the end of the step, SI.
     pub end: f64,
-    /// The same minus the model's, SI: boundary conditions that wander are taken out.
+    /// The same minus the model's, SI: removes the effect of wandering boundary conditions.
     pub end_less_model: f64,
-    /// Mean reading over the transient minus the model's, SI; `None` where the step is too short.
+    /// Mean reading over the transient minus the model's, SI; `None` if the step is too short.
     pub transient_less_model: Option<f64>,
-    /// One standard error of the end, from noise, SI.
+    /// One standard error of the mean at the end, from noise, SI.
     pub sigma: f64,
 }
 
@@ -69,22 +69,22 @@ pub struct VisitChannel {
 pub struct Visit {
     /// Which recording, from 0.
     pub run: usize,
-    /// Place of the step in the recording, from 0; files have its number, from 1.
+    /// Position of the step in the recording, from 0; files have its number, from 1.
     #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
-    /// Start of the step, time of the campaign, s.
+    /// Start of the step, campaign time, s.
     pub t_s: f64,
     /// Identified efficiency, fraction.
     pub eta: Option<f64>,
-    /// One standard error of it from noise, fraction: offsets are the same at each visit.
+    /// One standard error of it from noise, fraction: offsets are equal at each visit.
     pub sigma_eta: Option<f64>,
-    /// Change of it since the first visit, fraction.
+    /// Its change since the first visit, fraction.
     pub change_eta: Option<f64>,
     /// Identified heat-transfer coefficient, W/(m2 K).
     pub h_w_m2k: Option<f64>,
     /// One standard error of it from noise, W/(m2 K).
     pub sigma_h_w_m2k: Option<f64>,
-    /// Change of it since the first visit, W/(m2 K).
+    /// Its change since the first visit, W/(m2 K).
     pub change_h_w_m2k: Option<f64>,
     /// Channels by symbol.
     pub channels: BTreeMap<&'static str, VisitChannel>,
@@ -93,50 +93,50 @@ pub struct Visit {
 /// All visits of one jump.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RepeatGroup {
-    /// Where the jump starts, in words.
+    /// Description of the jump's start.
     pub from: String,
-    /// Where it leads, in words.
+    /// Description of the jump's end.
     pub to: String,
     /// Its visits, in order of time.
     pub visits: Vec<Visit>,
 }
 
-/// A point of the map without the drift.
+/// A map point corrected for the drift.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CorrectedPoint {
     /// Which recording, from 0.
     pub run: usize,
-    /// Place of the step in the recording, from 0; files have its number, from 1.
+    /// Position of the step in the recording, from 0; files have its number, from 1.
     #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
     /// Measured shaft speed at the end of the step, rpm.
     pub speed_rpm: f64,
     /// Commanded valve opening relative to the nominal area.
     pub valve: f64,
-    /// Efficiency of the model as fitted to all steps of the campaign, the drift taken out, fraction.
+    /// Efficiency of the model fitted to all steps of the campaign, with the drift subtracted, fraction.
     pub eta: f64,
     /// One standard error of `eta`, fraction.
     pub sigma_eta: f64,
-    /// Heat-transfer coefficient of the model as fitted, W/(m2 K).
+    /// Heat-transfer coefficient of the fitted model, W/(m2 K).
     pub h_w_m2k: f64,
-    /// Efficiency identified from this step with the drift taken out of the readings, fraction.
+    /// Efficiency identified from this step with the drift subtracted from the readings, fraction.
     pub eta_identified: Option<f64>,
     /// Efficiency identified from this step as recorded, fraction.
     pub eta_uncorrected: Option<f64>,
-    /// What was subtracted at the end of this step, for each drift in their order, unit of its cause.
+    /// Drift subtracted at the end of this step, for each drift in order, unit of its cause.
     pub corrections: Vec<f64>,
 }
 
-/// Something that drifts.
+/// A detected drift.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FoundDrift {
-    /// What drifts.
+    /// The cause.
     pub cause: Cause,
-    /// Probability that it is this, beside the other drifts; the rest is that of `alternatives`.
+    /// Probability of this cause, given the other drifts; `alternatives` have the remainder.
     pub probability: f64,
-    /// What may stand in its place, none included, most probable first.
+    /// Alternative causes, including none, most probable first.
     pub alternatives: Vec<Alternative>,
-    /// Onset, time of the campaign, s.
+    /// Onset, campaign time, s.
     pub onset_s: f64,
     /// Lower end of its 95 % interval, s.
     pub onset_low_s: f64,
@@ -154,12 +154,12 @@ pub struct FoundDrift {
 }
 
 impl FoundDrift {
-    /// Whether it is more probable than all that may stand in its place.
+    /// Whether it is more probable than all its alternatives.
     pub fn is_clear(&self) -> bool {
         self.probability >= 0.5
     }
 
-    /// Its size at a time of the campaign, s; unit of the cause.
+    /// Its size at a campaign time, s; unit of the cause.
     pub fn at(&self, t_s: f64) -> f64 {
         let (kind, size) = match self.size {
             RateOrStep::RatePerH(rate) => (CourseKind::Ramp, rate),
@@ -169,27 +169,27 @@ impl FoundDrift {
     }
 }
 
-/// What is said of a campaign.
+/// The drift report of a campaign.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriftReport {
-    /// In a word.
+    /// The verdict.
     pub verdict: DriftVerdict,
-    /// What drifts, the most probable set; empty where nothing does or it is not known.
+    /// Detected drifts, the most probable set; empty if there are none or no verdict is possible.
     pub drifts: Vec<FoundDrift>,
-    /// No drift, and each cause as the only one, most probable first; sums to 1. Empty where there is no verdict.
+    /// No drift, and each cause as the only one, most probable first; sums to 1. Empty without a verdict.
     pub alone: Vec<Alternative>,
-    /// In sentences: why there is no verdict, what was found, what was corrected.
+    /// Sentences: why there is no verdict, what was found, what was corrected.
     pub reason: String,
-    /// Smallest drift that is seen, per cause.
+    /// Smallest detectable drift, per cause.
     pub detection_limits: Vec<DetectionLimit>,
     /// Repeated jumps.
     pub groups: Vec<RepeatGroup>,
-    /// Points of the map without the drifts; empty where nothing drifts.
+    /// Map points corrected for the drifts; empty if nothing drifts.
     pub corrected_points: Vec<CorrectedPoint>,
 }
 
 impl DriftReport {
-    /// A recording that cannot tell, with why.
+    /// A recording without enough information, with the reason.
     pub fn without_verdict(reason: String) -> Self {
         DriftReport {
             verdict: DriftVerdict::Unclear,

@@ -1,4 +1,4 @@
-//! What is asked, and why there may be no answer.
+//! The input of the diagnosis, and its errors.
 
 use crate::cause::Cause;
 use mapper_core::{Channel, ModelTolerances, Recording};
@@ -9,32 +9,32 @@ use mapper_physics::inputs::InputsError;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 
-/// A recording with what says whether it belongs to the others.
+/// A recording with the identity of its campaign and machine.
 #[derive(Debug, Clone, Copy)]
 pub struct RecordedRun<'a> {
     /// The recording.
     pub recording: &'a Recording,
-    /// What campaign and machine it was made with, e.g. their hashes; `None` where that is not known.
+    /// Identity of campaign and machine, e.g. their hashes; `None` if unknown.
     pub fingerprint: Option<&'a str>,
 }
 
-/// Runs of one machine, one after the other, with what is known of machine and rig.
+/// Consecutive runs of one machine, with the declarations of machine and rig.
 #[derive(Debug, Clone, Copy)]
 pub struct DriftRequest<'a> {
     /// The recordings in the order in which they were made.
     pub runs: &'a [RecordedRun<'a>],
     /// The nominal machine.
     pub model: &'a Model,
-    /// Boundary conditions for what is not recorded.
+    /// Boundary conditions for channels that are not recorded.
     pub boundary: BoundaryConditions,
-    /// How far the nominal machine may be off without having drifted.
+    /// Tolerances of the nominal machine, within which it has not drifted.
     pub tolerances: ModelTolerances,
     /// Declared uncertainty, window, geometry.
     pub identification: &'a IdentifyConfig,
 }
 
 impl DriftRequest<'_> {
-    /// What is declared of rig and machine.
+    /// The declarations of rig and machine.
     pub(crate) fn declared(&self) -> Declared {
         Declared {
             sensors: self.identification.declared.clone(),
@@ -58,15 +58,15 @@ pub enum DriftError {
         /// Which recording, from 0.
         run: usize,
     },
-    /// Channels without which drift is not judged.
+    /// Missing channels that are needed to judge drift.
     #[error("recording {}: it has no {}; drift is judged by all of N, P2, T1 and T2", .run + 1, symbols(.channels))]
     MissingChannels {
         /// Which recording, from 0.
         run: usize,
-        /// What is missing.
+        /// The missing channels.
         channels: Vec<Channel>,
     },
-    /// A channel that often reads nothing.
+    /// A channel with many invalid readings.
     #[error(
         "recording {}: {missing} of {all} readings of {channel} are not numbers; repair the channel, or record again",
         .run + 1
@@ -81,12 +81,12 @@ pub enum DriftError {
         /// All readings.
         all: usize,
     },
-    /// Readings that no running machine has.
+    /// Readings that are impossible for a running machine.
     #[error("recording {}: {source}", .run + 1)]
     Implausible {
         /// Which recording, from 0.
         run: usize,
-        /// Why.
+        /// The reason.
         source: Implausible,
     },
     /// The boundary conditions cannot drive the model.
@@ -94,15 +94,15 @@ pub enum DriftError {
     Inputs {
         /// Which recording, from 0.
         run: usize,
-        /// Why.
+        /// The reason.
         source: InputsError,
     },
-    /// Nothing is left to compare.
+    /// No segments remain for the comparison.
     #[error(
         "no stretch of the recordings can be compared with the model: readings are missing or not numbers, or all of them lie at the surge line. Look at the channels and their units, and whether the campaign names the machine"
     )]
     NothingComparable,
-    /// The model cannot be driven by what was recorded.
+    /// The model cannot be driven by the recording.
     #[error(
         "the nominal model cannot follow recording {}: {source}. Does the campaign name the machine that was recorded?",
         .run + 1
@@ -110,7 +110,7 @@ pub enum DriftError {
     Drive {
         /// Which recording, from 0.
         run: usize,
-        /// Why.
+        /// The reason.
         source: mapper_physics::driven::DriveError,
     },
     /// The statistics have no solution.
@@ -127,7 +127,7 @@ pub enum Unsolvable {
     /// Readings or predictions are not finite.
     #[error("a reading or the model's answer to a parameter is not finite")]
     NotFinite,
-    /// Constants cannot be told apart.
+    /// Constants cannot be distinguished.
     #[error("constants of the campaign are not independent")]
     Dependent,
     /// No cause has an effect on what is recorded.

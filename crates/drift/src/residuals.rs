@@ -1,4 +1,4 @@
-//! What the best explanation leaves: stretches that the model cannot follow, and noise beyond what is declared.
+//! Residuals of the best explanation: segments that the model cannot follow, and noise above the declaration.
 
 use crate::candidates::Candidates;
 use crate::low_rank::LowRank;
@@ -7,14 +7,14 @@ use crate::request::Unsolvable;
 use mapper_numerics::statistics::median;
 use nalgebra::{DMatrix, DVector};
 
-/// A stretch stands out when it lies so many times as far from the model as the middle one.
+/// Distance from the model, relative to the median segment, above which a segment is an outlier.
 const FAR_OUT: f64 = 5.0;
 const LEAVE_OUT_ROUNDS: usize = 4;
-/// Factor on the variance of what is left out.
+/// Factor on the variance of excluded segments.
 const AS_GOOD_AS_NOTHING: f64 = 1e8;
 
-/// Leaves out stretches that stand far out of all others even beside the best explanation: the model cannot follow the
-/// machine there (surge, a valve at its stop). Gives their number, the noise without them, and what the best explanation leaves then.
+/// Excludes outlying segments even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop). Returns
+/// their number, the noise without them, and the residual of the best explanation.
 pub(crate) fn leave_out(
     own: &mut [DMatrix<f64>],
     readings: &Readings,
@@ -50,7 +50,7 @@ pub(crate) fn leave_out(
     Ok((out.iter().filter(|out| **out).count(), noise, left))
 }
 
-/// What constants and the most probable causes leave, whitened.
+/// Residual after constants and the most probable causes, whitened.
 fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, candidates: &Candidates) -> DMatrix<f64> {
     let explained = candidates.likelihood(noise, difference).explain(&candidates.priors).unwrap_or_default();
     let mut left = difference.clone();
@@ -60,11 +60,11 @@ fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, candidates: &Candidat
     noise.inverse_times(&noise.whiten(left))
 }
 
-/// Raises each channel's own noise to what the best explanation leaves (`left`, whitened by `noise`).
+/// Increases each channel's own noise to match the residual of the best explanation (`left`, whitened by `noise`).
 pub(crate) fn inflate(own: &mut [DMatrix<f64>], readings: &Readings, noise: &LowRank, left: &DMatrix<f64>) {
     let count = readings.columns.len();
     let rows = left.nrows() as f64;
-    // Constants take their share of the degrees of freedom.
+    // Constants use up their share of the degrees of freedom.
     let free = (1.0 - noise.degrees_of_freedom() / rows).max(0.2);
     let factors: Vec<f64> = (0..count)
         .map(|column| {

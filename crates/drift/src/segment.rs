@@ -1,4 +1,4 @@
-//! One step of a run as the model is driven through it.
+//! One step of a run, as the model is driven through it.
 
 use crate::blocks::CampaignStep;
 use crate::planted::Planted;
@@ -8,12 +8,12 @@ use mapper_observe::start::state_as_read;
 use mapper_physics::model::State;
 use mapper_physics::params::BoundaryConditions;
 
-/// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
+/// Maximum time steps after a jump: pairs of time after it, s, and maximum step, s.
 const STEPS_S: [(f64, f64); 5] = [(0.2, 0.05), (3.0, 0.1), (8.0, 0.5), (20.0, 1.0), (f64::INFINITY, 3.0)];
-/// A jump that the model cannot follow (deep beyond the surge line) is left out for this long, s: shaft and outlet then
-/// stand where they were read, the metal as far from where it was as its sensors say.
+/// Time for which a jump is left out if the model cannot follow it (deep beyond the surge line), s. Shaft and outlet then start from their
+/// readings, the metal from the change of its readings.
 pub(crate) const LEFT_OUT_S: f64 = 5.0;
-/// A machine that drifts is taken as constant over this long, s, or over the so-manieth part of a long step.
+/// Time over which a drifting machine is taken as constant, s, and the maximum number of such parts in a long step.
 const PART_S: f64 = 30.0;
 const MAX_PARTS: f64 = 60.0;
 
@@ -22,15 +22,15 @@ pub(crate) struct Stretch {
     pub step: CampaignStep,
     pub start_s: f64,
     pub end_s: f64,
-    /// The state as read just before the jump.
+    /// The measured state just before the jump.
     pub read_first: Option<State>,
-    /// The state as read [`LEFT_OUT_S`] after the jump.
+    /// The measured state [`LEFT_OUT_S`] after the jump.
     pub read_later: Option<State>,
-    /// The state as read at the end.
+    /// The measured state at the end.
     pub read_last: Option<State>,
     /// How far the model can follow it.
     pub followed: Followed,
-    /// Times at which the model is read, and where each reading belongs.
+    /// Times at which the model is read, and the target of each reading.
     pub times_s: Vec<f64>,
     pub places: Vec<Place>,
 }
@@ -40,9 +40,9 @@ pub(crate) struct Stretch {
 pub(crate) enum Followed {
     /// From the jump on.
     Whole,
-    /// From [`LEFT_OUT_S`] after the jump on, shaft and outlet as read there.
+    /// From [`LEFT_OUT_S`] after the jump on, with shaft and outlet as measured there.
     AfterJump,
-    /// Not at all: the next step begins with what was read at the end of this one.
+    /// Not at all: the next step begins with the measured state at the end of this one.
     No,
 }
 
@@ -53,7 +53,7 @@ pub(crate) enum Place {
 }
 
 impl Stretch {
-    /// Ends of the integration's steps: fine after the jump, coarse where only metal moves.
+    /// Ends of the time steps: fine after the jump, coarse when only metal temperatures change.
     pub(crate) fn nodes_s(&self, start_s: f64) -> Vec<f64> {
         let mut nodes = Vec::new();
         let mut at_s = start_s;
@@ -69,7 +69,7 @@ impl Stretch {
         nodes
     }
 
-    /// Parts of a stretch in each of which the machine is one and the same: the whole of it, but for a machine that drifts.
+    /// Parts of a segment with a constant machine: the whole segment, unless the machine drifts.
     pub(crate) fn parts(&self, start_s: f64, planted: &[Planted]) -> Vec<(f64, f64)> {
         let mut edges = vec![start_s];
         for Planted { course, .. } in planted.iter().filter(|planted| planted.machine_changes()) {
@@ -78,7 +78,7 @@ impl Stretch {
                 (1..count as usize).map(|part| start_s + (self.end_s - start_s) * part as f64 / count),
             );
             let onset_s = course.onset_s - self.step.offset_s;
-            // Not so close to an end that a part has no length.
+            // Not so close to an end that a part has zero length.
             if (start_s + 0.1..self.end_s - 0.1).contains(&onset_s) {
                 edges.push(onset_s);
             }
@@ -90,7 +90,7 @@ impl Stretch {
     }
 }
 
-/// The state as read around a time; `None` where one of its channels is not read.
+/// The measured state around a time; `None` if one of its channels is missing.
 pub(crate) fn read_state(recording: &Recording, boundary: &BoundaryConditions, t_s: f64) -> Option<State> {
     let read = |channel| mean_between(recording, channel, t_s - 0.5, t_s + 0.5 + BEFORE_S, 1);
     let all = [Channel::ShaftSpeed, Channel::P2, Channel::Tc, Channel::Tt, Channel::T2];
@@ -98,7 +98,7 @@ pub(crate) fn read_state(recording: &Recording, boundary: &BoundaryConditions, t
     complete.then(|| state_as_read(boundary, read))
 }
 
-/// The state as read later, the metal by the change that was read: offsets of its sensors stay out.
+/// The measured state at a later time; the metal uses the change of its readings, without the offsets of its sensors.
 pub(crate) fn carried(state: State, first: Option<State>, later: State) -> State {
     let first = first.unwrap_or(State { tc_k: state.tc_k, tt_k: state.tt_k, ..later });
     let tc_k = state.tc_k + later.tc_k - first.tc_k;

@@ -5,7 +5,7 @@ use crate::fit::Fit;
 use crate::report::{DriftReport, FoundDrift};
 use mapper_core::{Channel, Recording};
 
-/// The first recording with the drift of its sensors, as reported, subtracted; `None` where no sensor was found to drift.
+/// The first recording with the reported sensor drift subtracted; `None` if no sensor drifts.
 pub fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Recording> {
     let of_sensors = |drift: &&FoundDrift| !drift.cause.channels().is_empty();
     report.drifts.iter().find(of_sensors)?;
@@ -16,7 +16,7 @@ pub fn without_drift(recording: &Recording, report: &DriftReport) -> Option<Reco
     Some(recording)
 }
 
-/// The recording of a run that begins `offset_s` after the campaign with what was fitted subtracted.
+/// The recording of a run that begins `offset_s` after the campaign, with the fitted drift subtracted.
 pub(crate) fn without_drifts(recording: &Recording, drifts: &[Fit], offset_s: f64) -> Recording {
     let mut recording = recording.clone();
     for fit in drifts {

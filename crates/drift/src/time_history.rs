@@ -1,4 +1,4 @@
-//! How a drift goes over time.
+//! Time histories of a drift.
 
 use serde::Serialize;
 
@@ -12,12 +12,12 @@ pub enum CourseKind {
     Step,
 }
 
-/// A course with its onset.
+/// A time history with its onset.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Course {
     /// Ramp or step.
     pub kind: CourseKind,
-    /// Onset, time of the campaign, s.
+    /// Onset, campaign time, s.
     pub onset_s: f64,
 }
 
@@ -30,7 +30,7 @@ impl Course {
         }
     }
 
-    /// Mean size over a stretch.
+    /// Mean size over a segment.
     pub fn mean(self, start_s: f64, end_s: f64) -> f64 {
         let length_s = end_s - start_s;
         let after_s = (end_s - self.onset_s).clamp(0.0, length_s.max(0.0));

@@ -1,4 +1,4 @@
-//! Whether a recording can be examined at all, before the model is driven by it.
+//! Checks whether a recording can be examined, before the model is driven by it.
 
 use crate::request::DriftError;
 use mapper_core::{Channel, Recording};
@@ -6,15 +6,15 @@ use mapper_numerics::statistics::median;
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::plausible::check_running;
 
-/// Without these drift is not judged.
+/// Channels needed to judge drift.
 const NEEDED: [Channel; 4] = [Channel::ShaftSpeed, Channel::P2, Channel::T2, Channel::T1];
-/// Share of readings that may not be numbers.
+/// Maximum share of readings that are not numbers.
 const NOT_NUMBERS_SHARE: f64 = 0.02;
 
-/// Looks at what drives the model and at what is compared with it, within the steps.
+/// Checks the model inputs and the compared channels, within the steps.
 ///
 /// # Errors
-/// [`DriftError`] that says what is missing or wrong.
+/// [`DriftError`] with the missing or wrong input.
 pub(crate) fn usable(run: usize, recording: &Recording) -> Result<(), DriftError> {
     let missing: Vec<Channel> =
         NEEDED.into_iter().filter(|channel| recording.require(*channel).is_err()).collect();

@@ -1,4 +1,4 @@
-//! Visits of a repeated jump: what was read, what was identified, and how it differs from the first visit.
+//! Visits of a repeated jump: readings, identified values, and their differences from the first visit.
 
 use crate::blocks::{CampaignStep, mean_variance_ratio};
 use crate::corrected::{end_speed_rpm, point_of};

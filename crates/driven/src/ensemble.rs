@@ -1,26 +1,25 @@
-//! A sample of everything that is in agreement with a log: walkers that learn their steps from each other.
+//! Ensemble sampler of all parameter values that agree with a log; walkers take their steps from each other.
 //!
-//! The stretch move of Goodman and Weare (Comm. App. Math. Comp. Sci. 5, 65-80 (2010)) in halves that move in parallel, as in
-//! Foreman-Mackey et al. (PASP 125, 306 (2013)): no derivative, no tuning, indifferent to how parameters lean on each other.
+//! The stretch move of Goodman and Weare (Comm. App. Math. Comp. Sci. 5, 65-80 (2010)), in halves that move in parallel as in
+//! Foreman-Mackey et al. (PASP 125, 306 (2013)). It needs no derivatives or tuning and is insensitive to parameter correlations.
 
 use mapper_numerics::parallel;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
-/// Walkers; even, and several times the parameters.
+/// Number of walkers; even, and several times the number of parameters.
 const WALKERS: usize = 64;
-/// Moves of each before and after they count.
+/// Number of moves for burn-in and for sampling.
 const MOVES: (usize, usize) = (1000, 600);
-/// Moves between those that are kept.
+/// Thinning: moves between kept samples.
 const KEEP_EVERY: usize = 20;
-/// Walkers whose density is below the median by more than this factor's logarithm have lost their way: 14 normal numbers
-/// scatter by 2.6 about their mean.
+/// Walkers whose log density is below the median by more than this are stuck: 14 normal numbers scatter by 2.6 about their mean.
 const LOST: f64 = 40.0;
-/// Largest stretch.
+/// Stretch parameter `a`.
 const STRETCH: f64 = 2.0;
 
-/// Draws from the density whose logarithm is given, over standard normal numbers. Same seed, same draws.
+/// Draws from a density given by its logarithm over standard normal numbers. The same seed gives the same draws.
 pub(crate) fn draws<const N: usize>(
     log_density: impl Fn(&[f64; N]) -> f64 + Sync,
     seed: u64,
@@ -28,7 +27,7 @@ pub(crate) fn draws<const N: usize>(
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut walkers: Vec<([f64; N], f64)> = (0..WALKERS)
         .map(|_| {
-            // Nearer to the middle than the prior, whose tails no log agrees with.
+            // Start nearer to the middle than the prior, whose tails agree with no log.
             let place: [f64; N] = std::array::from_fn(|_| {
                 let z: f64 = StandardNormal.sample(&mut random);
                 0.5 * z
@@ -69,8 +68,7 @@ pub(crate) fn draws<const N: usize>(
     kept
 }
 
-/// Puts walkers that are caught in a place of no account where the others are, one after the other: their moves tell them
-/// apart again.
+/// Moves stuck walkers in a negligible local maximum to the positions of the others, in turn; their moves separate them again.
 fn bring_back<const N: usize>(walkers: &mut [([f64; N], f64)]) {
     let mut densities: Vec<f64> = walkers.iter().map(|(_, density)| *density).collect();
     densities.sort_by(f64::total_cmp);
@@ -87,7 +85,7 @@ mod tests {
     use super::*;
     use mapper_numerics::statistics::mean;
 
-    /// Two normal numbers that lean on each other, and a third with a level and width of its own.
+    /// Two correlated normal numbers, and a third with its own level and width.
     #[test]
     fn draws_have_the_moments_of_the_density() {
         let rho: f64 = 0.9;
@@ -97,7 +95,7 @@ mod tests {
         };
         let draws = draws(log_density, 3);
         let average = |f: &dyn Fn(&[f64; 3]) -> f64| mean(draws.iter().map(f)).unwrap();
-        // 2000 draws, neighbours in time alike: some 500 of their own; four standard errors and more.
+        // 2000 autocorrelated draws, some 500 of them independent: at least four standard errors.
         assert!(average(&|x| x[0]).abs() < 0.18);
         assert!((average(&|x| x[0] * x[1]) - rho).abs() < 0.25);
         assert!((average(&|x| x[2]) - 0.7).abs() < 0.04);

@@ -1,11 +1,11 @@
-//! The compressor side of a log without steps, driven by its measured neighbours.
+//! Identification from a log without steps, driven by the measured neighbours of the compressor side.
 //!
-//! On an engine nobody sets P3 and a valve, and nothing rests. What the compressor does to the gas follows from speed, flow,
-//! pressures and inlet temperature as they were measured; T2 (and Tc, where it was measured) is what is judged.
-//! [`identify`] finds all parameters that are in agreement with one part of a log, and says what they predict for the rest.
+//! On an engine P3 and valve are not set, and the machine never settles. The compressor's effect on the gas follows from the measured
+//! speed, flow, pressures and inlet temperature. The judged channels are T2 and, if measured, Tc. [`identify`] samples all parameters that
+//! agree with one part of a log, and predicts the rest.
 //!
-//! The parameters are not a best fit but a sample of everything the log leaves open, within what is known of such machines
-//! beforehand ([`PARAMETERS`]): a log of 13 s does not tell a slow probe from a warm housing, and the answer has to say so.
+//! The result is a posterior sample within the priors ([`PARAMETERS`]), not a best fit: a log of 13 s cannot distinguish a slow probe from
+//! a warm housing, and the result must show this.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

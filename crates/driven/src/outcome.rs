@@ -1,4 +1,4 @@
-//! What a log without steps gives, and how far it is from a part that nobody fitted.
+//! Result of the identification from a log without steps, and its error on held-out rows.
 
 use crate::density::log_density;
 use crate::ensemble::draws;
@@ -12,15 +12,15 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
-/// Rows that are needed: twice the parameters.
+/// Minimum number of rows: twice the parameters.
 const MIN_ROWS: usize = 2 * COUNT;
-/// A log has told something of a parameter whose interval is narrower than this share of the prior's.
+/// A parameter counts as identified if its interval is narrower than this share of the prior's.
 pub(crate) const TOLD_RATIO: f64 = 0.7;
 
-/// A parameter as the log leaves it.
+/// Posterior of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FoundParameter {
-    /// Which one, and what was known beforehand.
+    /// The parameter with its prior.
     #[serde(flatten)]
     pub parameter: Parameter,
     /// Median.
@@ -29,11 +29,11 @@ pub struct FoundParameter {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Whether the log tells it: else it is the prior's.
+    /// Whether the log identifies it; otherwise the prior dominates.
     pub told: bool,
 }
 
-/// A part of the log beside what is predicted for it.
+/// A part of the log compared with its prediction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Judged {
     /// Time of its first row, s.
@@ -42,19 +42,19 @@ pub struct Judged {
     pub until_s: f64,
     /// Rows.
     pub rows: usize,
-    /// Root mean square of T2 less its mean prediction, K.
+    /// Root mean square of T2 minus its mean prediction, K.
     pub rms_k: f64,
-    /// What that was expected to be, K: median and 95 % interval over everything that the fitted part leaves open.
+    /// Expected value of `rms_k`, K: median and 95 % interval over the posterior.
     pub expected_rms_k: f64,
     /// Its lower end, K.
     pub expected_low_k: f64,
     /// Its upper end, K.
     pub expected_high_k: f64,
-    /// Share of the rows whose 95 % interval holds the reading, ratio.
+    /// Share of the rows with the reading inside its 95 % interval, ratio.
     pub inside_ratio: f64,
 }
 
-/// How much something moves the reading of T2 over the fitted part, K rms: median and 95 % interval.
+/// Influence of something on the T2 reading over the fitted part, K rms: median and 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Moves {
     /// Median, K.
@@ -65,12 +65,12 @@ pub struct Moves {
     pub high_k: f64,
 }
 
-/// T2 over time, as read and as predicted, K.
+/// T2 over time, measured and predicted, K.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trace {
     /// Times, s.
     pub t_s: Vec<f64>,
-    /// As read.
+    /// Measured.
     pub read_k: Vec<f64>,
     /// Mean prediction.
     pub predicted_k: Vec<f64>,
@@ -80,36 +80,36 @@ pub struct Trace {
     pub high_k: Vec<f64>,
     /// Isentropic efficiency, mean, fraction.
     pub efficiency: Vec<f64>,
-    /// Apparent efficiency `T1 (PR^kappa - 1)/(T2 - T1)` of the readings, fraction: what nobody should believe.
+    /// Apparent efficiency `T1 (PR^kappa - 1)/(T2 - T1)` of the readings, fraction; misleading, for comparison only.
     pub apparent_efficiency: Vec<f64>,
 }
 
-/// What a log gives.
+/// Identification result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DrivenOutcome {
-    /// Time up to which it was fitted, s.
+    /// End of the fitted part, s.
     pub fitted_until_s: f64,
     /// The parameters.
     pub parameters: Vec<FoundParameter>,
-    /// What the probe's lag does to T2.
+    /// Influence of the probe's lag on T2.
     pub probe_moves: Moves,
-    /// What heat to and from the housing does to T2.
+    /// Influence of heat to and from the housing on T2.
     pub heat_moves: Moves,
-    /// The part that was fitted.
+    /// The fitted part.
     pub fitted: Judged,
-    /// The rest; `None` where everything was fitted.
+    /// The held-out part; `None` if everything was fitted.
     pub held_out: Option<Judged>,
     /// T2 over all rows.
     pub trace: Trace,
-    /// Rows of T2 that could not be used.
+    /// Unusable rows of T2.
     pub lost_rows: usize,
 }
 
-/// Identifies the compressor side from all rows before `fit_until_s`, and predicts the others, of which nothing but what drives
-/// is looked at. Same seed, same answer.
+/// Identifies the compressor side from all rows before `fit_until_s`, and predicts the others from their driving channels alone. The same
+/// seed gives the same result.
 ///
 /// # Errors
-/// [`DrivenError::TooFewRows`] where there is too little to fit.
+/// [`DrivenError::TooFewRows`] if there are too few rows to fit.
 pub fn identify(
     rows: &Readings,
     params: Params,
@@ -155,11 +155,11 @@ fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParamete
         standard[place] = z;
         Values::of_standard(&standard).0[place]
     };
-    let told = high - low < TOLD_RATIO * (prior(1.96) - prior(-1.96));
-    FoundParameter { parameter, value: at(0.5), low, high, told }
+    let identified = high - low < TOLD_RATIO * (prior(1.96) - prior(-1.96));
+    FoundParameter { parameter, value: at(0.5), low, high, told: identified }
 }
 
-/// Each draw with noise of its own, as if it were the truth.
+/// Each draw with its own noise, as if it were the truth.
 fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Readings, seed: u64) -> Vec<Vec<f64>> {
     let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_add(1));
     sample
@@ -224,7 +224,7 @@ fn judged(rows: &Readings, trace: &Trace, noisy: &[Vec<f64>], from: usize, until
     }
 }
 
-/// How far T2 moves when a parameter is 0.
+/// Influence of a parameter: change of T2 when it is set to 0.
 fn moves(
     sample: &[Values],
     predicted: &[Predicted],

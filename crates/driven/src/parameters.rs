@@ -1,11 +1,11 @@
-//! What is not known of the compressor side, and what is known of it beforehand.
+//! Unknown parameters of the compressor side, with their priors.
 //!
-//! Priors are those of passenger-car and lorry turbochargers: published maps for the efficiency, Burke et al., Appendix A,
-//! scaled to the declared machine, for the heat. They are wide, and whatever a log does not tell stays as wide.
+//! Priors describe passenger-car and lorry turbochargers: efficiency from published maps, heat from Burke et al., Appendix A, scaled to the
+//! declared machine. They are wide; a parameter that the log does not identify stays as wide.
 
 use serde::Serialize;
 
-/// How a parameter is spread beforehand.
+/// Form of a prior.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spread {
@@ -20,7 +20,7 @@ pub enum Spread {
 pub struct Parameter {
     /// Short name.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub description: &'static str,
     /// Its unit; empty for a ratio.
     pub unit: &'static str,
@@ -90,7 +90,7 @@ pub const PARAMETERS: [Parameter; COUNT] = [
 pub struct Values(pub [f64; COUNT]);
 
 impl Parameter {
-    /// Its value so many standard deviations of what is known beforehand above the middle.
+    /// Value at this number of prior standard deviations above the middle.
     pub fn at(&self, standard: f64) -> f64 {
         match self.spread {
             Spread::Normal => self.middle + self.width * standard,
@@ -100,12 +100,12 @@ impl Parameter {
 }
 
 impl Values {
-    /// From standard normal numbers: what the search walks in.
+    /// From standard normal numbers, the coordinates of the sampler.
     pub fn of_standard(standard: &[f64; COUNT]) -> Self {
         Values(std::array::from_fn(|i| PARAMETERS[i].at(standard[i])))
     }
 
-    /// The same with another value of one parameter; unchanged for a name that is none.
+    /// Replaces the value of one parameter; unchanged for an unknown name.
     pub(crate) fn with(mut self, name: &str, value: f64) -> Self {
         if let Some(place) = PARAMETERS.iter().position(|parameter| parameter.name == name) {
             self.0[place] = value;

@@ -1,14 +1,14 @@
-//! What drives the compressor side, and what is judged: one row a sample.
+//! Driving and judged channels of the compressor side, one row per sample.
 
 use crate::DrivenError;
 use crate::rows::{Rows, Wanted};
 use mapper_core::{Channel, Recording};
 
-/// A pressure ratio below which a compressor does hardly any work: its temperature rise says nothing of its efficiency.
+/// Pressure ratio below which a compressor does hardly any work, so that its temperature rise does not show its efficiency.
 const WORKING_RATIO: f64 = 1.02;
-/// Smallest flow, kg/s, that eqs. 1-3 are evaluated at (they divide by it).
+/// Minimum flow at which eqs. 1-3 are evaluated, kg/s (they divide by it).
 const SMALLEST_FLOW_KG_S: f64 = 1e-3;
-/// What the compressor side asks of a log.
+/// Channels that the compressor side needs.
 pub(crate) const COMPRESSOR: Wanted<'_> = Wanted {
     drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],
     judged: &[Channel::T2, Channel::Tc],
@@ -33,19 +33,19 @@ pub struct Readings {
     pub p2_pa: Vec<f64>,
     /// Inlet temperature, K.
     pub t1_k: Vec<f64>,
-    /// Outlet temperature as the probe reads it, K.
+    /// Outlet temperature as measured by the probe, K.
     pub t2_k: Vec<f64>,
-    /// Housing temperature, K; NaN where it was not measured.
+    /// Housing temperature, K; NaN if not measured.
     pub tc_k: Vec<f64>,
-    /// Rows of T2 that were left out: a value missing or impossible, or a compressor that does not work.
+    /// Omitted rows of T2: a value is missing or impossible, or the compressor does no work.
     pub lost: usize,
 }
 
 impl Readings {
-    /// The rows of a recording at the times of T2.
+    /// Rows of a recording at the times of T2.
     ///
     /// # Errors
-    /// [`DrivenError::Channel`] where speed, flow, P1, P2, T1 or T2 is missing.
+    /// [`DrivenError::Channel`] if speed, flow, P1, P2, T1 or T2 is missing.
     pub fn of(recording: &Recording) -> Result<Self, DrivenError> {
         let rows = Rows::read(recording, COMPRESSOR)?;
         Ok(Readings::from(rows))
@@ -56,7 +56,7 @@ impl Readings {
         self.t_s.len()
     }
 
-    /// Whether there is no row.
+    /// Whether there are zero rows.
     pub fn is_empty(&self) -> bool {
         self.t_s.is_empty()
     }

@@ -1,23 +1,23 @@
-//! Complete rows of a log: what drives one side of the machine, and what is judged.
+//! Complete rows of a log: driving and judged channels of one side of the machine.
 
 use crate::DrivenError;
 use mapper_core::{Channel, Recording};
 use mapper_observe::plausible::is_reading;
 
-/// Rows are taken no denser than this, s: nothing on either side that is judged is faster than a probe.
+/// Minimum spacing of rows, s: no judged quantity is faster than a probe.
 const SPACING_S: f64 = 0.1;
-/// Most rows that are kept, of longer logs spread over all of it: five minutes at 10 Hz. What is sought goes through them some
-/// hundred thousand times.
+/// Maximum number of rows, spread over the whole of a longer log: five minutes at 10 Hz. The sampler evaluates them some hundred thousand
+/// times.
 const MAX_ROWS: usize = 3_000;
 
-/// What a side asks of a log.
+/// Channels that a side needs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Wanted<'a> {
-    /// Channels that drive.
+    /// Driving channels.
     pub(crate) drives: &'a [Channel],
-    /// Channels that are judged; the first has to be there, and its times are those of the rows.
+    /// Judged channels; the first is required and its times define the rows.
     pub(crate) judged: &'a [Channel],
-    /// Whether the side does what its equations say under these values of `drives`.
+    /// Whether the side's equations apply at these values of `drives`.
     pub(crate) works: fn(&[f64]) -> bool,
 }
 
@@ -26,21 +26,21 @@ pub(crate) struct Wanted<'a> {
 pub(crate) struct Rows {
     /// Time, s, rising.
     pub(crate) t_s: Vec<f64>,
-    /// What drives, in the order asked for.
+    /// Driving channels, in the requested order.
     pub(crate) drives: Vec<(Channel, Vec<f64>)>,
-    /// How fast each of these goes, per second; empty where nobody asked.
+    /// Their rates of change, per second; empty if not requested.
     pub(crate) rates: Vec<Vec<f64>>,
-    /// What is judged, in the order asked for; NaN where it was not measured, which the first always was.
+    /// Judged channels, in the requested order; NaN if not measured (never for the first).
     pub(crate) judged: Vec<(Channel, Vec<f64>)>,
-    /// Rows of the first judged channel that were left out.
+    /// Omitted rows of the first judged channel.
     pub(crate) lost: usize,
 }
 
 impl Rows {
-    /// The rows of a recording at the times of the first judged channel.
+    /// Rows of a recording at the times of the first judged channel.
     ///
     /// # Errors
-    /// [`DrivenError::Channel`] where one that drives, or the first that is judged, is missing.
+    /// [`DrivenError::Channel`] if a driving channel or the first judged one is missing.
     pub(crate) fn read(recording: &Recording, wanted: Wanted<'_>) -> Result<Self, DrivenError> {
         let Some(first) = wanted.judged.first() else {
             return Ok(Rows {
@@ -74,7 +74,7 @@ impl Rows {
             }
             row.clear();
             row.extend(series.iter().map_while(|(channel, series)| {
-                // Beyond the ends of a channel there is no reading.
+                // No extrapolation beyond the ends of a channel.
                 let inside = series.t_s.first() <= Some(t_s) && series.t_s.last() >= Some(t_s);
                 series.interpolate(*t_s).filter(|value| inside && is_reading(*channel, *value))
             }));
@@ -82,7 +82,7 @@ impl Rows {
                 rows.lost += 1;
                 continue;
             }
-            // Spread over the log there is one more at most.
+            // Spacing over the whole log may give one row too many.
             if rows.t_s.len() > MAX_ROWS {
                 break;
             }
@@ -104,12 +104,12 @@ impl Rows {
         self.t_s.len()
     }
 
-    /// What a channel that drives read; nothing for one that does not.
+    /// Readings of a driving channel; empty for any other.
     pub(crate) fn drive(&self, channel: Channel) -> &[f64] {
         self.drives.iter().find(|(of, _)| *of == channel).map_or(&[], |(_, column)| column)
     }
 
-    /// Every `n`-th row, so that at most `most` are left.
+    /// Every `n`-th row, so that at most `most` remain.
     pub(crate) fn thinned(&self, most: usize) -> Rows {
         let every = self.len().div_ceil(most.max(1)).max(1);
         let thin = |column: &[f64]| column.iter().copied().step_by(every).collect::<Vec<f64>>();

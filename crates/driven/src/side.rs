@@ -1,4 +1,4 @@
-//! The compressor side under its measured neighbours: eqs. 1-3, one housing node, and the probe.
+//! Compressor side driven by its measured neighbours: eqs. 1-3, one housing node, and the probe.
 
 use crate::{Readings, Values};
 use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_ratio};
@@ -6,13 +6,13 @@ use mapper_physics::housing::compressor_capacity_j_k;
 use mapper_physics::params::Params;
 use mapper_physics::{nusselt, thermocouple};
 
-/// Efficiencies that the polynomial is held within: beyond, it has nothing to do with a compressor that works.
+/// Limits of the efficiency polynomial; outside them it does not describe a working compressor.
 pub(crate) const EFFICIENCY: (f64, f64) = (0.25, 0.90);
 
-/// What is declared of the machine, and the middle of the log about which its efficiency is described.
+/// Declared machine, and the middle of the log as reference of its efficiency.
 #[derive(Debug, Clone, Copy)]
 pub struct Declared {
-    /// Geometry, masses and laws.
+    /// Geometry, masses and correlations.
     pub params: Params,
     /// Speed at which the relative speed is 0, rpm.
     middle_speed_rpm: f64,
@@ -21,7 +21,7 @@ pub struct Declared {
 }
 
 impl Declared {
-    /// About the geometric means of the rows.
+    /// Reference at the geometric means of the rows.
     pub fn new(params: Params, rows: &Readings) -> Self {
         let mean = |values: &mut dyn Iterator<Item = f64>| {
             let (sum, count) =
@@ -36,15 +36,15 @@ impl Declared {
     }
 }
 
-/// Flow over speed at the inlet's density: the flow coefficient but for the wheel's size and the gas constant.
+/// Flow over speed at inlet density: the flow coefficient without wheel size and gas constant.
 fn flow_coefficient(rows: &Readings, i: usize) -> f64 {
     rows.flow_kg_s[i] * rows.t1_k[i] / (rows.p1_pa[i] * rows.speed_rpm[i])
 }
 
-/// What the parameters say the sensors should have read.
+/// Predicted sensor readings.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Predicted {
-    /// T2 as the probe reads it, K.
+    /// T2 as measured by the probe, K.
     pub t2_k: Vec<f64>,
     /// Housing, K.
     pub tc_k: Vec<f64>,
@@ -52,7 +52,7 @@ pub struct Predicted {
     pub efficiency: Vec<f64>,
 }
 
-/// Goes through the first `count` rows.
+/// Simulates the first `count` rows.
 pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usize) -> Predicted {
     let [
         eta,
@@ -108,12 +108,12 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
             },
             None,
         );
-        // The next row's state: both relax exactly towards what holds now.
+        // State of the next row: exact exponential relaxation towards the current equilibrium.
         let elapsed_s = rows.t_s.get(i + 1).map_or(0.0, |next_s| next_s - rows.t_s[i]);
         let lag_s =
             thermocouple::time_constant_s(1e-3 * probe_mm, compressor.outlet_diameter_m, flow_kg_s, gas.t2_k);
         if state.is_none() {
-            // The probe begins with what it reads.
+            // The probe starts at its reading.
             reading_k = rows.t2_k[i] - t2_offset_k;
         }
         predicted.t2_k.push(reading_k + t2_offset_k);
@@ -122,7 +122,7 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
         let keep = if lag_s > 0.0 { (-elapsed_s / lag_s).exp() } else { 0.0 };
         reading_k = gas.t2_k + (reading_k - gas.t2_k) * keep;
         let capacity_j_k = capacity_ratio * compressor_capacity_j_k(&declared.params, tc_k);
-        // Exponential Euler: exact where gas and surroundings hold still, and bounded over any gap in the log.
+        // Exponential Euler: exact for constant gas and surroundings, and bounded over any gap in the log.
         let conductance_w_k = h_w_m2k * compressor.internal_area_m2 + loss_w_k;
         let net_w = gas.q1_w + gas.q2_w - loss_w_k * (tc_k - surroundings_k);
         tc_k += net_w / conductance_w_k * (1.0 - (-conductance_w_k * elapsed_s / capacity_j_k).exp());

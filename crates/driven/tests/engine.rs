@@ -1,5 +1,5 @@
-//! Engines of which the truth is known: the whole lumped machine accelerates and brakes, sensors read it, and what was found
-//! before the brake has to hold during it.
+//! Simulated engines with known truth: the lumped machine accelerates and brakes, and sensors measure it. The identification before the
+//! brake must predict the brake.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -14,7 +14,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
-/// Full load begins, and the exhaust brake: less pressure before the turbine, less air.
+/// Start of full load, and of the exhaust brake: less pressure upstream of the turbine, less air.
 const LOAD_S: f64 = 6.4;
 const BRAKE_S: f64 = 13.2;
 const END_S: f64 = 18.0;
@@ -94,13 +94,13 @@ fn what_is_left_of_the_brake_is_what_was_expected() {
         inside += judged.inside_ratio * judged.rows as f64;
         rows += judged.rows as f64;
     }
-    // One interval in twenty misses: both of two do once in four hundred.
+    // One interval in twenty misses: both of two miss once in four hundred.
     assert!(held >= 1, "{held} of {seeds}");
     assert!(known.iter().all(|count| *count >= 1), "probe and h {known:?} of {seeds}");
     assert!(inside / rows > 0.85, "{}", inside / rows);
 }
 
-/// A day at 10 Hz is read to its end, in no more rows than a sample can go through.
+/// A day at 10 Hz is read completely, but thinned to the maximum number of rows of a sample.
 #[test]
 fn a_long_log_is_thinned() {
     let (mut recording, ..) = log(0);

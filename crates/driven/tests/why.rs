@@ -1,4 +1,4 @@
-//! Causes planted in simulated engines, and what the diagnosis by measured neighbours says of them.
+//! Causes planted in simulated engines, and their diagnosis from measured neighbours.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
@@ -32,12 +32,12 @@ fn seeds() -> u64 {
     std::env::var("MAPPER_WHY_SEEDS").map_or(2, |seeds| seeds.parse().unwrap())
 }
 
-/// Ids of what is open, one string a cause.
+/// Ids of the open causes, one string per cause.
 fn open(found: &Diagnosis) -> Vec<String> {
     found.causes[..found.open].iter().map(|cause| cause.effects.join("+")).collect()
 }
 
-/// Diagnoses an engine of each seed with a planted cause, all of its log fitted. `without` is not recorded.
+/// Diagnoses an engine of each seed with a planted cause, fitted to the whole log. `without` is not recorded.
 fn all_of(side: Which, course: &Course, planted: &[(&str, f64)], without: &[Channel]) -> Vec<Diagnosis> {
     let each = (0..seeds()).map(|seed| {
         let (mut recording, _) = engine(seed, course, planted, healthy);
@@ -47,7 +47,7 @@ fn all_of(side: Which, course: &Course, planted: &[(&str, f64)], without: &[Chan
     each.collect()
 }
 
-/// Of the seeds, how many do as they should.
+/// Number of seeds with the expected result.
 fn count(found: &[Diagnosis], right: impl Fn(&Diagnosis) -> bool) -> usize {
     let wrong = found.iter().filter(|found| !right(found));
     for found in wrong {
@@ -67,7 +67,7 @@ fn is_named(found: &Diagnosis, effect: &str) -> bool {
     found.word == Word::Named && open(found) == [effect]
 }
 
-/// One seed may go wrong.
+/// One seed may fail.
 fn almost_all() -> usize {
     seeds() as usize - 1
 }
@@ -83,7 +83,7 @@ fn without_a_cause_none_is_named() {
     }
 }
 
-/// Eighteen seconds, no housing temperature: the lag is named, its size lies in the interval, and phases that no fit saw agree.
+/// Eighteen seconds without housing temperature: the lag is named, its interval contains the true size, and held-out phases confirm it.
 #[test]
 fn a_slow_probe_is_named_with_its_size() {
     let found = all_of(COMPRESSOR, &Course::brake(), &[("tip_diameter", 2.5e-3)], &[Channel::Tc]);
@@ -99,7 +99,7 @@ fn a_slow_probe_is_named_with_its_size() {
     }
 }
 
-/// An element within a sheath: two lags, one behind the other, which a bare probe has not.
+/// A sheathed element: two lags in series, unlike a bare probe.
 #[test]
 fn a_sheathed_probe_is_named_and_no_wall_beside_a_bare_one() {
     let sheath = [("tip_diameter", 3e-3), (ELEMENT_LAG, 1.5)];
@@ -114,14 +114,14 @@ fn a_sheathed_probe_is_named_and_no_wall_beside_a_bare_one() {
     assert!(count(&found, held) >= almost_all());
 }
 
-/// What a sheath is not: a housing whose inner wall lags behind the gas.
+/// Unlike a sheath: a housing whose inner wall lags behind the gas.
 #[test]
 fn an_inner_wall_is_named_and_no_sheath() {
     let found = all_of(COMPRESSOR, &Course::hills(), &[("inner_node", 15.0)], &[]);
     assert!(count(&found, |found| is_named(found, "inner_node")) >= almost_all());
 }
 
-/// A part of the log that nobody fitted is predicted within what was said of it.
+/// The held-out part of the log is predicted within its expected error.
 #[test]
 fn the_brake_is_predicted_with_the_cause_that_was_named_before_it() {
     let mut held = 0;
@@ -143,17 +143,17 @@ fn what_four_minutes_show_is_named_or_said_to_be_alike() {
         let found = all_of(COMPRESSOR, &hills, &[(effect, size)], no_tc);
         assert!(count(&found, |found| is_named(found, effect)) >= almost_all(), "{effect}");
     }
-    // The area before the wheel and h that depends on the direction both tie T2 to the metal.
+    // The area upstream of the wheel and the heating/cooling ratio of h both couple T2 to the metal.
     let found = all_of(COMPRESSOR, &hills, &[("area_split", 0.3)], no_tc);
     assert!(count(&found, |found| open(found).contains(&"area_split".to_owned())) >= almost_all());
-    // An offset of T2, one of T1 the other way, and one of P2 look alike where efficiency is free.
+    // Offsets of T2, of T1 (opposite sign) and of P2 are indistinguishable if the efficiency is free.
     let found = all_of(COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc);
     let alike =
         |found: &Diagnosis| found.word == Word::NotToldApart && open(found).contains(&"t2_offset".to_owned());
     assert!(count(&found, alike) >= almost_all());
 }
 
-/// A gain of the flow meter is another efficiency over flow: nothing is named, and it is said that it cannot be asked.
+/// A flow meter gain is equivalent to another efficiency over flow: it is not named, but listed as not diagnosable.
 #[test]
 fn what_cannot_be_asked_is_said() {
     let found = all_of(COMPRESSOR, &Course::brake(), &[("flowmeter_gain", 1.15)], &[Channel::Tc]);
@@ -174,7 +174,7 @@ fn what_cannot_be_asked_is_said() {
             let said = &not_asked(effect).unwrap().reason;
             assert!(said.contains(reason), "{effect}: {said}");
         }
-        // Everything of the catalogue is one or the other.
+        // Every library effect is in one of the two lists.
         let mut all: Vec<String> = found.asked.iter().map(|one| one.effect.clone()).collect();
         all.extend(found.not_asked.iter().map(|one| one.effect.clone()));
         all.sort();
@@ -185,7 +185,7 @@ fn what_cannot_be_asked_is_said() {
     }
 }
 
-/// A loose contact: now and then T2 reads too little for a second or two, which no effect of the catalogue does.
+/// A loose contact: occasionally T2 reads too low for a second or two, unlike any library effect.
 #[test]
 fn a_cause_outside_the_catalogue_is_said_to_be_outside() {
     let outside = (0..seeds()).map(|seed| {
@@ -209,10 +209,10 @@ fn slow_probes_of_the_turbine_side_are_named() {
     };
     let found = all_of(Which::Turbine, &Course::hills(), &[("t4_lag", 1.5)], without);
     assert!(count(&found, |found| is_named(found, "t4_lag") && near(found, "t4_lag", 0.05)) >= almost_all());
-    // T3 drives: what its lag did cannot be taken off it to the last, and what is left looks like a short lag of T4 beside it.
+    // T3 is an input: its lag cannot be corrected completely, and the residual looks like an additional short lag of T4.
     let found = all_of(Which::Turbine, &Course::hills(), &[("t3_lag", 1.5)], without);
     assert!(count(&found, |found| found.open == 1 && near(found, "t3_lag", 0.15)) >= almost_all());
-    // Two probes whose difference alone is seen.
+    // Only the difference of the two probes is observable.
     let found = all_of(Which::Turbine, &Course::hills(), &[("t4_offset", 30.0)], without);
     let alike = |found: &Diagnosis| {
         let mut open = open(found);
@@ -220,7 +220,7 @@ fn slow_probes_of_the_turbine_side_are_named() {
         open == ["t3_offset", "t4_offset"]
     };
     assert!(count(&found, alike) >= almost_all(), "{without:?}");
-    // A gain of the flow is another heat transfer.
+    // A flow gain is equivalent to another heat transfer.
     let found = all_of(Which::Turbine, &Course::hills(), &[("turbine_flow_gain", 1.2)], without);
     assert!(count(&found, |found| found.open == 0) >= almost_all(), "{without:?}");
     for found in &found {
@@ -230,7 +230,7 @@ fn slow_probes_of_the_turbine_side_are_named() {
     assert_eq!(turbine_sensors().len(), 6);
 }
 
-/// What is found of the turbine itself, its efficiency before all, holds the truth.
+/// The intervals of the turbine's own parameters, especially its efficiency, contain the truth.
 #[test]
 fn the_turbine_is_identified() {
     let mut held = 0;

@@ -1,46 +1,46 @@
-//! What a study costs, from the items that are done.
+//! Cost of a study, extrapolated from the finished items.
 
 use crate::place::Machine;
 use crate::{Engine, Fleet, FleetError, Kind, Status, Which};
 use serde::Serialize;
 
-/// What was tried to know the cost.
+/// Result of the trial that estimates the cost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tried {
-    /// What it costs.
+    /// The estimated cost.
     pub cost: Cost,
-    /// How far the study is.
+    /// Progress of the study.
     pub status: Status,
 }
 
-/// What a study costs.
+/// Cost of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cost {
     /// Number of items.
     pub items: usize,
-    /// Items that are done: what the rest is reckoned from.
+    /// Finished items, on which the estimate is based.
     pub from: usize,
     /// Items without a result.
     pub left: usize,
-    /// What an item takes on one core on average, s.
+    /// Average time of an item on one core, s.
     pub item_s: f64,
-    /// What the longest took, s.
+    /// Longest time of an item, s.
     pub longest_s: f64,
     /// Processor time of all items, h.
     pub hours: f64,
-    /// Processor time of what is left, h.
+    /// Processor time of the remaining items, h.
     pub left_hours: f64,
-    /// Memory that one item needs at a time, bytes; 0: nobody knows.
+    /// Peak memory of one item, bytes; 0 if unknown.
     pub memory_bytes: u64,
-    /// What items and parts take on the shared disk, bytes.
+    /// Size of items and parts on the shared disk, bytes.
     pub disk_bytes: u64,
 }
 
-/// What a part's first line takes, and the rest of a block of the disk, bytes.
+/// Allowance for the first line of a part and for the unused rest of a disk block, bytes.
 const PART_BESIDE_BYTES: u64 = 4096;
 
 impl Fleet {
-    /// What the study costs, as far as what is done says it; `None` where nothing is done.
+    /// The estimated cost of the study; `None` if no item is done.
     pub fn cost(&self, status: &Status) -> Option<Cost> {
         let left_s = status.left_s()?;
         let from = status.done.max(1);
@@ -64,10 +64,10 @@ impl Fleet {
         })
     }
 
-    /// Does a few items where fewer are done, one at a time, and says what all will cost. What was tried stays done.
+    /// Runs items one at a time until a few are done, and estimates the cost of all. Their results are kept.
     ///
     /// # Errors
-    /// As [`Fleet::work`]; [`FleetError::NothingTried`] where none has a result.
+    /// As [`Fleet::work`]; [`FleetError::NothingTried`] if none has a result.
     pub fn tried(
         &self,
         kind: &dyn Kind,
@@ -78,7 +78,7 @@ impl Fleet {
         let done = self.status().done;
         let mut why = String::new();
         if done < count {
-            // One at a time: its time and its memory are its own.
+            // One at a time, so that time and memory belong to one item.
             let one = Engine { jobs: Some(1), ..*engine };
             let worked = self.work(kind, Which::First(count - done), false, &one, machine)?;
             why = worked

@@ -1,4 +1,4 @@
-//! The one loop over pieces of work: nights, diagnoses, calibrations and fleets all run in it.
+//! The only work loop: nights, diagnoses, calibrations and fleets all run in it.
 
 use mapper_numerics::parallel;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -8,26 +8,26 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-/// How pieces are worked on.
+/// Settings of the work loop.
 #[derive(Clone, Copy)]
 pub struct Engine<'a> {
-    /// Pieces at a time; `None`: as many as there are cores.
+    /// Pieces at a time; `None`: the number of cores.
     pub jobs: Option<usize>,
-    /// Set from outside to begin no further piece.
+    /// Set from outside to start no further piece.
     pub stop: &'a AtomicBool,
-    /// Told how many of how many are done, from the first second on.
+    /// Receives the number of finished pieces and the total, from the first second on.
     pub told: &'a (dyn Fn(usize, usize) + Sync),
 }
 
 impl Engine<'_> {
-    /// Pieces at a time where there are so many.
+    /// Pieces at a time, limited by their number.
     pub fn at_a_time(&self, pieces: usize) -> usize {
         self.jobs.unwrap_or_else(cores).clamp(1, pieces.max(1))
     }
 
-    /// `work` on every piece; results in the order of the pieces, whatever the number of jobs. The cores are shared out among
-    /// the pieces under way, so that each runs on its own. After an error or a stop nothing is begun; a piece that was not
-    /// begun for a stop is `None`.
+    /// Does `work` on every piece; results are in the order of the pieces, whatever the number of jobs. The pieces under way share
+    /// the cores, so that each runs on its own. After an error or a stop no further piece starts. A piece that a stop
+    /// prevented is `None`.
     ///
     /// # Errors
     /// That of the first piece whose work fails.

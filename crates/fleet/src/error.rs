@@ -1,9 +1,9 @@
-//! Why something cannot be done in a fleet directory.
+//! Errors of a fleet directory.
 
 use crate::Hash;
 use std::path::{Path, PathBuf};
 
-/// Why something cannot be done in a fleet directory.
+/// Errors of a fleet directory.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
     /// The study's file cannot be read, or has mistakes.
@@ -12,21 +12,21 @@ pub enum FleetError {
     /// A file or directory cannot be read or written.
     #[error("failed to {action} {}: {source}", .path.display())]
     File {
-        /// What was tried.
+        /// The attempted operation.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// A file does not hold what it should.
+    /// A file has the wrong content.
     #[error("{} is not {what}: {source}", .path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What it should be.
+        /// The expected content.
         what: &'static str,
-        /// Why it is not.
+        /// The cause.
         source: serde_json::Error,
     },
     /// There is no study in the directory.
@@ -35,14 +35,14 @@ pub enum FleetError {
         /// The directory.
         directory: PathBuf,
     },
-    /// The layout of the directory is that of another program.
+    /// The directory has the layout of another program.
     #[error("{} has layout {found}; this program reads {known}", .path.display())]
     Layout {
         /// The study's file.
         path: PathBuf,
-        /// What was found.
+        /// The layout found.
         found: u32,
-        /// What is read.
+        /// The supported layout.
         known: u32,
     },
     /// The directory holds another study.
@@ -50,7 +50,7 @@ pub enum FleetError {
     OtherStudy {
         /// The directory.
         directory: PathBuf,
-        /// Name of the study that is there.
+        /// Name of the study found.
         found: String,
         /// Its kind.
         kind: String,
@@ -63,25 +63,25 @@ pub enum FleetError {
     OtherProgram {
         /// The directory.
         directory: PathBuf,
-        /// Who made it.
+        /// The program that made it.
         made_by: String,
-        /// Who reads it.
+        /// The program that reads it.
         program: String,
     },
-    /// A kind of study that does not exist.
+    /// An unknown kind of study.
     #[error("`{kind}` is not a kind of study; the kinds are {known}")]
     UnknownKind {
-        /// What was written.
+        /// The kind written.
         kind: String,
-        /// What there is.
+        /// The known kinds.
         known: String,
     },
     /// A study has no items, or too many.
     #[error("the study asks for {items} items; 1 to {most} are allowed")]
     Items {
-        /// How many.
+        /// Number of items.
         items: usize,
-        /// How many are allowed.
+        /// Maximum number of items.
         most: usize,
     },
     /// Two items of a study are the same.
@@ -92,7 +92,7 @@ pub enum FleetError {
         /// The other.
         second: String,
     },
-    /// An item's file is not what it was.
+    /// An item's file was changed.
     #[error("{} has been changed: its hash is not its name; make the study again with `mapper fleet make`", .path.display())]
     Changed {
         /// The file.
@@ -101,22 +101,22 @@ pub enum FleetError {
     /// An item that the study does not have.
     #[error("the study has no item {hash}; `mapper fleet status DIR --items` lists them")]
     NoItem {
-        /// The item asked for.
+        /// The requested item.
         hash: Hash,
     },
-    /// Nothing is known of what an item costs.
+    /// The cost of an item is unknown.
     #[error("nothing was tried yet: every item that was tried failed, the first with: {why}")]
     NothingTried {
-        /// Why.
+        /// The cause.
         why: String,
     },
     /// The study does not fit.
     #[error("not submitted: {why}")]
     DoesNotFit {
-        /// What does not fit, with numbers and what to do.
+        /// What does not fit, with numbers and the remedy.
         why: String,
     },
-    /// Nothing is left to do.
+    /// No item is left to do.
     #[error("all {items} items are done; merge with `mapper fleet merge {}`", .directory.display())]
     NothingLeft {
         /// Number of items.
@@ -124,23 +124,23 @@ pub enum FleetError {
         /// The directory.
         directory: PathBuf,
     },
-    /// A retry without a submission before it.
+    /// A retry without an earlier submission.
     #[error("{} was not submitted yet; submit it with `mapper fleet submit`", .directory.display())]
     NotSubmitted {
         /// The directory.
         directory: PathBuf,
     },
-    /// The queue did not take it.
+    /// The queue rejected the submission.
     #[error("the queue did not take {}: {said}; its template is {template}", .script.display())]
     Queue {
-        /// What was run.
+        /// The command.
         script: PathBuf,
-        /// What it said.
+        /// Its output.
         said: String,
         /// The template.
         template: String,
     },
-    /// What merges or makes a study failed, in the words of its kind.
+    /// Making or merging a study failed, in the words of its kind.
     #[error(transparent)]
     Kind(Box<dyn std::error::Error + Send + Sync>),
     /// Stopped by the operator.

@@ -1,4 +1,4 @@
-//! The directory of a study, and where things lie in it.
+//! The directory of a study and its layout.
 
 use crate::part::{Expected, Part, PartRefusal};
 use crate::{FleetError, Hash, Kind, Listed, Study};
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fleet {
     directory: PathBuf,
-    /// What it says of itself.
+    /// The description of the study.
     pub study: Study,
 }
 
@@ -20,7 +20,7 @@ impl Fleet {
     /// Opens a study that was made by `program`.
     ///
     /// # Errors
-    /// [`FleetError::NoStudy`], [`FleetError::OtherProgram`] where another version made it, [`FleetError::Content`].
+    /// [`FleetError::NoStudy`], [`FleetError::OtherProgram`] if another version made it, [`FleetError::Content`].
     pub fn open(directory: &Path, program: &str) -> Result<Fleet, FleetError> {
         let path = directory.join(STUDY);
         if !path.exists() {
@@ -42,7 +42,7 @@ impl Fleet {
         &self.directory
     }
 
-    /// Its kind among those there are.
+    /// The kind of the study, from the known kinds.
     ///
     /// # Errors
     /// [`FleetError::UnknownKind`].
@@ -53,7 +53,7 @@ impl Fleet {
         })
     }
 
-    /// Where the result is.
+    /// Directory of the result.
     pub fn result(&self) -> PathBuf {
         self.directory.join("result")
     }
@@ -70,17 +70,17 @@ impl Fleet {
         self.parts().join(part_name(hash))
     }
 
-    /// Says that somebody works on the item; holds who.
+    /// Marks the item as in progress; contains the name of the worker.
     pub(crate) fn begun(&self, hash: &Hash) -> PathBuf {
         self.directory.join(BEGUN).join(hash.to_string())
     }
 
-    /// What there is of an item's part; `None`: nothing.
+    /// State of an item's part; `None` if there is no part.
     pub(crate) fn head(&self, item: &Listed) -> Option<Result<Part, PartRefusal>> {
         Part::read_head(&self.part(&item.hash), self.expected(item))
     }
 
-    /// An item's part with its body; `None`: nothing.
+    /// An item's part with its body; `None` if there is no part.
     pub(crate) fn whole(&self, item: &Listed) -> Option<Result<(Part, String), PartRefusal>> {
         Part::read(&self.part(&item.hash), self.expected(item))
     }

@@ -5,23 +5,23 @@ use sha2::{Digest, Sha256};
 use std::fmt;
 use std::str::FromStr;
 
-/// SHA-256, written as 64 lower-case hexadecimal digits: never anything that leads out of a directory.
+/// SHA-256, as 64 lower-case hexadecimal digits, so that a name can never lead out of a directory.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Hash([u8; 32]);
 
 impl Hash {
-    /// Of these bytes.
+    /// The hash of these bytes.
     pub fn of(bytes: &[u8]) -> Hash {
         Hash(Sha256::digest(bytes).into())
     }
 
-    /// The first eight bytes as a number, even over its whole range: what shards are dealt by.
+    /// The first eight bytes as a uniformly distributed number; items are assigned to shards by it.
     pub(crate) fn number(&self) -> u64 {
         self.0.iter().take(8).fold(0, |number, byte| (number << 8) | u64::from(*byte))
     }
 
-    /// The first twelve digits, enough for people.
+    /// The first twelve digits, for display.
     pub fn short(&self) -> String {
         self.to_string().chars().take(12).collect()
     }

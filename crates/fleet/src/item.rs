@@ -1,4 +1,4 @@
-//! One piece of work: a small file that says all that is needed to do it.
+//! One piece of work: a small file with everything needed to do it.
 
 use crate::place::read_at_most;
 use crate::{FleetError, Hash};
@@ -9,22 +9,22 @@ use std::path::Path;
 /// Largest file of an item, bytes: a campaign with its map file.
 const LARGEST_BYTES: u64 = 32 << 20;
 
-/// What is done, by which program.
+/// The work, and the program that does it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Item {
-    /// Name for people; results are listed by it.
+    /// Display name; results are listed by it.
     pub name: String,
     /// Kind of the study.
     pub kind: String,
-    /// Program, version and commit that made the item and may do it.
+    /// Program, version and commit that made the item; only they may do it.
     pub program: String,
-    /// What the kind needs: campaign, machine, seed, method or case.
+    /// Input of the kind: campaign, machine, seed, method or case.
     pub payload: Value,
 }
 
 impl Item {
-    /// The bytes of its file.
+    /// The content of its file.
     ///
     /// # Errors
     /// The serialiser's: none in practice.
@@ -34,10 +34,10 @@ impl Item {
         Ok(bytes)
     }
 
-    /// Reads an item and makes sure that it is the one of this name.
+    /// Reads an item and checks that its hash matches its name.
     ///
     /// # Errors
-    /// [`FleetError::File`], [`FleetError::Changed`] where its hash is another, [`FleetError::Content`].
+    /// [`FleetError::File`], [`FleetError::Changed`] if the hash differs, [`FleetError::Content`].
     pub fn read(path: &Path, hash: &Hash) -> Result<Item, FleetError> {
         let bytes = read_at_most(path, LARGEST_BYTES)?;
         if Hash::of(&bytes) != *hash {

@@ -1,4 +1,4 @@
-//! What a study is about: how it becomes items, how one is done, how parts become a result.
+//! Kinds of study: how a study is split into items, how an item is done, how parts are merged.
 
 use crate::{FleetError, StudyFile};
 use serde_json::Value;
@@ -8,25 +8,25 @@ use std::sync::atomic::AtomicBool;
 /// An item before it is written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
-    /// Name for people, unique within the study.
+    /// Display name, unique within the study.
     pub name: String,
-    /// What the kind needs to do it.
+    /// Input of the work.
     pub payload: Value,
 }
 
-/// The items of a study, and what merging needs.
+/// The items of a study, and the input of merging.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drafts {
     /// In the order of the result.
     pub items: Vec<Draft>,
-    /// What merging needs beside the parts.
+    /// Input of merging in addition to the parts.
     pub settings: Value,
 }
 
-/// What an item is done with.
+/// Environment of an item's work.
 #[derive(Clone, Copy)]
 pub struct At<'a> {
-    /// A directory of its own that is gone afterwards.
+    /// A temporary directory of its own.
     pub scratch: &'a Path,
     /// Set from outside to stop.
     pub stop: &'a AtomicBool,
@@ -35,9 +35,9 @@ pub struct At<'a> {
 /// Why an item has no result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WorkError {
-    /// Stopped by the operator: it is as if it had not begun.
+    /// Stopped by the operator; the item counts as not started.
     Interrupted,
-    /// It failed; why, in a sentence.
+    /// It failed; the cause, in a sentence.
     Failed(String),
 }
 
@@ -47,7 +47,7 @@ impl<E: std::error::Error> From<E> for WorkError {
     }
 }
 
-/// Where a result goes: files by their name, in a directory that is made whole.
+/// Writes a result: named files in a directory that appears only when complete.
 #[derive(Debug)]
 pub struct Output {
     directory: PathBuf,
@@ -73,21 +73,21 @@ impl Output {
     }
 }
 
-/// Name and result of each item in the order of the study; `Err`: why there is none.
+/// Name and result of each item in the order of the study; `Err`: why there is no result.
 pub type Results<'a> = dyn Iterator<Item = (String, Result<String, String>)> + 'a;
 
 /// A kind of study.
 pub trait Kind: Sync {
-    /// As `study:` names it.
+    /// Its name in `study:`.
     fn name(&self) -> &'static str;
 
-    /// What it is, in a line.
+    /// A one-line description.
     fn summary(&self) -> &'static str;
 
     /// The items of a study.
     ///
     /// # Errors
-    /// [`FleetError::Kind`] with all that is wrong with the study.
+    /// [`FleetError::Kind`] with all mistakes of the study.
     fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError>;
 
     /// Does one item; what it returns is JSON. Equal payloads give equal results on any machine.
@@ -96,10 +96,10 @@ pub trait Kind: Sync {
     /// [`WorkError`].
     fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError>;
 
-    /// Makes the result from the parts, which come one by one in the order of the study. Says what it is, in a line. What is
-    /// missing or failed is left out.
+    /// Merges the parts, which come one by one in the order of the study, into the result. Returns a one-line description. Missing
+    /// and failed parts are left out.
     ///
     /// # Errors
-    /// [`FleetError`] where a file cannot be written or a part's result is not what [`Kind::work`] makes.
+    /// [`FleetError`] if a file cannot be written or a part's result is not what [`Kind::work`] makes.
     fn merge(&self, settings: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError>;
 }

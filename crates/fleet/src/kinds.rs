@@ -1,8 +1,8 @@
-//! The kind that a study asks for.
+//! The kind that a study names.
 
 use crate::{FleetError, Kind, StudyFile};
 
-/// The kind of this name; a mistake at its place in the file where there is none.
+/// The kind of this name; if it is unknown, a mistake at its place in the file.
 ///
 /// # Errors
 /// [`FleetError::StudyFile`].

@@ -1,9 +1,9 @@
 //! Work in many independent pieces, on the cores of one machine or on many machines that share a directory.
 //!
-//! A study becomes items, each a small file named by the SHA-256 of its bytes; whoever does an item leaves one part file;
-//! parts merge into the result that one machine alone would write. State is what lies in the directory: no daemon, no
-//! database, no clock. What an item is and what is done with it is the business of a [`Kind`]; this crate knows no physics.
-//! The contract stands in docs/fleet.md.
+//! A study becomes items, each a small file named by the SHA-256 of its bytes. A worker writes one part file per item.
+//! Parts merge into the result that one machine alone would write. All state is in the directory: no daemon, no
+//! database, no clock. A [`Kind`] defines the items and the work; this crate contains no physics.
+//! docs/fleet.md specifies the contract.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

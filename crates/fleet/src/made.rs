@@ -1,4 +1,4 @@
-//! From a study's drafts to its directory.
+//! Writes a study's drafts to its directory.
 
 use crate::fleet::{BEGUN, ITEMS, LOGS, PARTS, STUDY};
 use crate::place::{Durability, make_directory, write_whole};
@@ -7,19 +7,19 @@ use crate::{Drafts, Fleet, FleetError, Hash, Item, Kind, Listed, Study, StudyFil
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// What was made.
+/// The outcome.
 #[derive(Debug)]
 pub struct Made {
     /// The study in its directory.
     pub fleet: Fleet,
-    /// Items that were not there before.
+    /// New items.
     pub new: usize,
-    /// Items that were there before and are no more; their parts stay and are left out.
+    /// Items that were removed; their parts stay in the directory and are ignored.
     pub gone: usize,
 }
 
 impl Made {
-    /// Makes the directory of a study; where it holds an earlier state of the same study, items come and go and the parts
+    /// Makes the directory of a study. If it holds an earlier state of the same study, items are added and removed, and the parts
     /// stay. Equal studies give equal bytes.
     ///
     /// # Errors
@@ -67,14 +67,14 @@ impl Made {
             items: listed,
         };
         study.check()?;
-        // Written last: what lists the items is there when they are.
+        // Written last, so that the listed items exist.
         study.write(&directory.join(STUDY), writer)?;
         let kept = study.items.iter().filter(|item| earlier.contains(&item.hash)).count();
         Ok(Made { fleet: Fleet::new(directory.to_owned(), study), new, gone: earlier.len() - kept })
     }
 }
 
-/// The items that the directory has already.
+/// The items already in the directory.
 fn earlier(study: &StudyFile, directory: &Path, program: &str) -> Result<BTreeSet<Hash>, FleetError> {
     match Fleet::open(directory, program) {
         Ok(Fleet { study: found, .. }) if found.name == study.name && found.kind == study.kind => {

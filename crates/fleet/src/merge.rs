@@ -1,4 +1,4 @@
-//! From parts to the result, which no number of machines and no order of work changes.
+//! Merges parts into the result, which is the same for any number of machines and any order of work.
 
 use crate::place::{Machine, make_directory};
 use crate::status::{Lacking, Status};
@@ -6,20 +6,20 @@ use crate::{Fleet, FleetError, Kind, Outcome, Output, PartRefusal};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-/// What was merged.
+/// The outcome.
 #[derive(Debug)]
 pub struct Merged {
-    /// How far the study is.
+    /// Progress of the study.
     pub status: Status,
-    /// Where the result is, and what it is in a line; `None`: something is missing, and nothing was written.
+    /// The result's directory and one-line description; `None` if parts are missing and nothing was written.
     pub result: Option<(PathBuf, String)>,
 }
 
 impl Fleet {
-    /// Merges all parts into `result`; where something is missing or failed, only with `partial`. One part at a time is in
-    /// memory. Two that merge at once write the same bytes.
+    /// Merges all parts into `result`; with missing or failed parts only if `partial` is set. Only one part is in memory at a
+    /// time. Two concurrent merges write the same bytes.
     ///
-    /// # Errors
+    /// [`FleetError`] if a file cannot be written, or a part's result is not what the kind makes.
     /// [`FleetError`] where a file cannot be written, or a part's result is not what the kind makes.
     pub fn merge(&self, kind: &dyn Kind, partial: bool, machine: &Machine<'_>) -> Result<Merged, FleetError> {
         let mut status = self.status();
@@ -44,7 +44,7 @@ impl Fleet {
         });
         let said = kind.merge(&self.study.settings, &mut parts, &output);
         drop(parts);
-        // What the first lines did not show: content that was changed.
+        // Content that was changed, which the first lines do not show.
         for lacking in spoilt.into_inner() {
             self.put_aside(&lacking);
             if !status.refused.contains(&lacking) {
@@ -57,7 +57,7 @@ impl Fleet {
             Ok(said) if whole => said,
             other => {
                 let _ = std::fs::remove_dir_all(&new);
-                // What is spoilt is told first: it may be why the merge failed.
+                // Report damaged parts first: they may be why the merge failed.
                 return match other {
                     Err(error) if whole => Err(error),
                     _ => Ok(Merged { status, result: None }),
@@ -73,7 +73,7 @@ impl Fleet {
 }
 
 impl Fleet {
-    /// Moves a part whose content was changed out of the way: its first line looks whole, and it would be taken for done.
+    /// Moves a part with changed content out of the way: its first line is intact, so it would count as done.
     fn put_aside(&self, lacking: &Lacking) {
         let part = self.part(&lacking.hash);
         let is_changed = lacking.why.as_deref() == Some(PartRefusal::Checksum.to_string().as_str());
@@ -83,7 +83,7 @@ impl Fleet {
     }
 }
 
-/// Puts each file in its place, and takes away what an earlier merge left.
+/// Moves each file to its place and removes the files of an earlier merge.
 fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
     make_directory(result.to_owned())?;
     let names = |folder: &Path| -> Result<Vec<_>, FleetError> {
@@ -98,7 +98,7 @@ fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
         std::fs::rename(new.join(name), &to).map_err(FleetError::file("write", &to))?;
     }
     for name in names(result)?.into_iter().filter(|name| files.binary_search(name).is_err()) {
-        // Gone already where two merge at once.
+        // Another merge may have removed it already.
         let _ = std::fs::remove_file(result.join(name));
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! What became of an item: one line that says what it is, then the result, or why there is none.
+//! The outcome of an item: a header line, then the result or the reason why there is none.
 
 use crate::place::{Durability, Machine, write_whole};
 use crate::{FleetError, Hash, Item};
@@ -12,13 +12,13 @@ const LONGEST_HEAD_BYTES: usize = 4096;
 /// Largest result of one item, bytes.
 const LARGEST_BODY_BYTES: u64 = 64 << 20;
 
-/// What became of an item.
+/// The outcome of an item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// The body is its result.
     Done,
-    /// The body says why there is none.
+    /// The body is the reason why there is no result.
     Failed,
 }
 
@@ -30,11 +30,11 @@ pub struct Part {
     pub item: Hash,
     /// Program, version and commit that did it.
     pub program: String,
-    /// What became of it.
+    /// The outcome.
     pub outcome: Outcome,
     /// How long it took on one core, s.
     pub duration_s: f64,
-    /// Largest memory of the process, over its workers, bytes; 0 where nobody knows it.
+    /// Peak memory of the process, over its workers, bytes; 0 if unknown.
     pub memory_bytes: u64,
     /// Length of the body, bytes.
     pub body_bytes: u64,
@@ -42,46 +42,46 @@ pub struct Part {
     pub body_sha256: Hash,
 }
 
-/// Why a file is not a part of the study.
+/// Why a file is not a valid part of the study.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PartRefusal {
     /// It cannot be read.
     #[error("cannot be read: {0}")]
     Unread(String),
-    /// It does not begin as a part does.
+    /// It does not begin like a part.
     #[error("is not a part")]
     NotAPart,
-    /// It says that it belongs to another item.
+    /// Its header names another item.
     #[error("holds the item {0}")]
     OtherItem(Hash),
     /// Another version made it.
     #[error("was made by {0}")]
     OtherProgram(String),
-    /// It is longer or shorter than it says.
+    /// Its length differs from its header.
     #[error("has {found} bytes of {said}")]
     Length {
-        /// What there is.
+        /// Actual length.
         found: u64,
-        /// What it says.
+        /// Length in its header.
         said: u64,
     },
     /// It is larger than any part.
     #[error("has {found} bytes, more than the {limit} that are read")]
     TooLarge {
-        /// What there is.
+        /// Actual length.
         found: u64,
-        /// What is read.
+        /// Maximum length.
         limit: u64,
     },
-    /// Its content is not what was written.
+    /// Its content was changed.
     #[error("has been changed: its checksum is wrong")]
     Checksum,
-    /// Its content is not what the kind makes.
+    /// The kind cannot read its content.
     #[error("does not hold what it should: {0}")]
     Content(String),
 }
 
-/// What a part file has to be.
+/// Requirements of a part file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Expected<'a> {
     pub hash: &'a Hash,
@@ -89,7 +89,7 @@ pub(crate) struct Expected<'a> {
 }
 
 impl Part {
-    /// Writes what became of an item.
+    /// Writes the outcome of an item.
     pub(crate) fn write(
         path: &Path,
         of: (&Hash, &Item),
@@ -101,7 +101,7 @@ impl Part {
             item: *of.0,
             program: of.1.program.clone(),
             outcome: outcome.0,
-            // A clock that goes backwards is no duration.
+            // A clock that goes backwards gives no duration.
             duration_s: if cost.0.is_finite() { cost.0.max(0.0) } else { 0.0 },
             memory_bytes: cost.1,
             body_bytes: outcome.1.len() as u64,
@@ -112,7 +112,7 @@ impl Part {
         Ok(part)
     }
 
-    /// The first line of a part file and whether the file is as long as that says; `None` where there is no file.
+    /// The header line of a part file, and whether the file has the stated length; `None` if there is no file.
     pub(crate) fn read_head(path: &Path, expected: Expected<'_>) -> Option<Result<Part, PartRefusal>> {
         match std::fs::symlink_metadata(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
@@ -124,7 +124,7 @@ impl Part {
         Some(open(path, expected).map(|(part, ..)| part))
     }
 
-    /// A part with its body; `None` where there is no file.
+    /// A part with its body; `None` if there is no file.
     pub(crate) fn read(path: &Path, expected: Expected<'_>) -> Option<Result<(Part, String), PartRefusal>> {
         match Self::read_head(path, expected)? {
             Ok(_) => Some(read_body(path, expected)),
@@ -137,7 +137,7 @@ fn unread(error: impl std::fmt::Display) -> PartRefusal {
     PartRefusal::Unread(error.to_string())
 }
 
-/// The head, the file behind it and what was read of the body already.
+/// The header, the rest of the file, and the part of the body already read.
 fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), PartRefusal> {
     let mut file = File::open(path).map_err(unread)?;
     let length = file.metadata().map_err(unread)?.len();

@@ -1,31 +1,31 @@
-//! Files of a directory that many machines share: whole or not there, and never more of them read than a limit.
+//! Files of a directory that many machines share: written completely or not at all, and read only up to a limit.
 
 use crate::FleetError;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Who works, and how long it takes: nothing here reads a clock by itself.
+/// The worker's identity and its clocks: nothing here reads a clock by itself.
 #[derive(Clone, Copy)]
 pub struct Machine<'a> {
-    /// Name of the machine and the process, for whoever looks for it; unique among all that work at once.
+    /// Name of the machine and the process, for display; unique among concurrent workers.
     pub name: &'a str,
-    /// Processor time of the thread that asks, s: what an item takes, whatever else the machine has to do.
+    /// Processor time of the calling thread, s: the cost of an item, whatever the load of the machine.
     pub thread_s: &'a (dyn Fn() -> f64 + Sync),
-    /// Largest memory of this process so far, bytes; `None` where the system does not say.
+    /// Peak memory of this process so far, bytes; `None` if the system does not report it.
     pub peak_memory_bytes: &'a (dyn Fn() -> Option<u64> + Sync),
 }
 
-/// Whether the file is on the disk when it is said to be there.
+/// When a file is flushed to the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Durability {
-    /// Written through before it has its name: whole after a power cut, if it is there.
+    /// Flushed before it gets its name: complete after a power cut, if it exists.
     Synced,
-    /// Whenever the system likes; it can be made again.
+    /// Whenever the system flushes it; the file can be made again.
     Unsynced,
 }
 
-/// Writes a file so that it is there whole or not at all, whoever is killed when. `writer` keeps two writers apart.
+/// Writes a file completely or not at all, even if a process is killed. `writer` separates concurrent writers.
 pub(crate) fn write_whole(
     path: &Path,
     pieces: &[&[u8]],
@@ -54,7 +54,7 @@ pub(crate) fn write_whole(
     })
 }
 
-/// Reads a plain file of at most so many bytes. A pipe or a device is not opened: it could hang.
+/// Reads a regular file of at most so many bytes. A pipe or a device is not opened: it could hang.
 pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FleetError> {
     let read = || -> std::io::Result<Vec<u8>> {
         if !std::fs::metadata(path)?.is_file() {
@@ -71,7 +71,7 @@ pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, Fle
     read().map_err(FleetError::file("read", path))
 }
 
-/// Makes a directory and those above it.
+/// Makes a directory and its parents.
 pub(crate) fn make_directory(path: PathBuf) -> Result<PathBuf, FleetError> {
     std::fs::create_dir_all(&path).map_err(FleetError::file("create", &path))?;
     Ok(path)

@@ -1,4 +1,4 @@
-//! A queue of a cluster behind one template: a shell script that submits, and a line in it that asks.
+//! Interface to a cluster's queue: a template with a shell script that submits, and one line in it that queries the state.
 
 use crate::FleetError;
 use crate::place::read_at_most;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// A template: how a queue takes an array of tasks and the merge behind it.
+/// A template that submits an array of tasks and a merge that follows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Template {
     /// Its name, or its file.
@@ -42,12 +42,12 @@ impl Template {
     }
 }
 
-/// Text as one word of a shell.
+/// Text quoted as one word of a shell.
 pub(crate) fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
-/// Runs the submission; what it prints as `word ID` by its word.
+/// Runs the submission; returns the IDs that it prints as `word ID`, by word.
 pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<String, String>, FleetError> {
     let failed = |said: String| FleetError::Queue {
         script: PathBuf::from(script),
@@ -74,8 +74,8 @@ pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<S
     }
 }
 
-/// States of the tasks of a job by how many have them, as the queue says it; `None` where it does not answer within some
-/// seconds: nothing depends on it.
+/// Number of tasks of a job in each state, as the queue reports it; `None` if it does not answer within some seconds.
+/// Nothing depends on the answer.
 pub fn running(template: &Template, job: &str) -> Option<BTreeMap<String, usize>> {
     let question = template.question()?;
     let mut child = Command::new("sh")
@@ -103,6 +103,6 @@ pub fn running(template: &Template, job: &str) -> Option<BTreeMap<String, usize>
     None
 }
 
-/// How often, and how far apart, a queue is looked at that does not answer: 5 s.
+/// Number and interval of the attempts to reach a queue that does not answer: 5 s.
 const LOOKS: usize = 100;
 const BETWEEN: Duration = Duration::from_millis(50);

@@ -1,4 +1,4 @@
-//! A share of the items, by their hash alone: it stays when other items come and go.
+//! A share of the items, determined by their hash alone, so that added or removed items do not change it.
 
 use crate::Hash;
 use std::fmt;
@@ -12,7 +12,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// The share that an item is in.
+    /// The share of an item.
     pub fn holding(hash: &Hash, of: u64) -> Shard {
         Shard { number: hash.number() % of.max(1) + 1, of: of.max(1) }
     }
@@ -22,7 +22,7 @@ impl Shard {
         self.number
     }
 
-    /// Whether it has this item.
+    /// Whether it contains this item.
     pub fn holds(self, hash: &Hash) -> bool {
         Shard::holding(hash, self.of) == self
     }

@@ -1,4 +1,4 @@
-//! How far a study is, from its parts alone.
+//! Progress of a study, from its parts alone.
 
 use crate::fleet::part_name;
 use crate::part::Outcome;
@@ -13,11 +13,11 @@ pub struct Lacking {
     pub name: String,
     /// Its hash.
     pub hash: Hash,
-    /// Why there is no result; `None`: nobody has said anything.
+    /// Why there is no result; `None` if unknown.
     pub why: Option<String>,
 }
 
-/// How far a study is.
+/// Progress of a study.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Status {
     /// Number of items.
@@ -26,34 +26,34 @@ pub struct Status {
     pub done: usize,
     /// Items that failed, and why.
     pub failed: Vec<Lacking>,
-    /// Files in the place of a part that are none of this study, and why; left out.
+    /// Files in the place of a part that do not belong to this study, and why; left out.
     pub refused: Vec<Lacking>,
-    /// Items without a part; `why`: who began it.
+    /// Items without a part; `why`: the worker that started it.
     pub missing: Vec<Lacking>,
-    /// Files among the parts that belong to no item; left out.
+    /// Part files that belong to no item; left out.
     pub strangers: Vec<String>,
-    /// What the items that are done took together on one core, s.
+    /// Total time of the finished items on one core, s.
     pub spent_s: f64,
-    /// What the longest took, s.
+    /// Longest time of an item, s.
     pub longest_s: f64,
-    /// Largest memory that one needed, bytes.
+    /// Largest memory of an item, bytes.
     pub memory_bytes: u64,
-    /// What the results take on the disk, bytes.
+    /// Size of the results on the disk, bytes.
     pub disk_bytes: u64,
 }
 
 impl Status {
-    /// Items that have no result.
+    /// Items without a result.
     pub fn lacking(&self) -> usize {
         self.items - self.done
     }
 
-    /// Items that somebody began and that have no part: under way, or lost with their worker.
+    /// Items that were started and have no part: in progress, or lost with their worker.
     pub fn begun(&self) -> usize {
         self.missing.iter().filter(|item| item.why.is_some()).count()
     }
 
-    /// What is left, in seconds of one core; `None` before anything is done.
+    /// Remaining work, in seconds of one core; `None` before any item is done.
     pub fn left_s(&self) -> Option<f64> {
         (self.done > 0).then(|| self.spent_s / self.done as f64 * self.lacking() as f64)
     }
@@ -67,11 +67,11 @@ impl Status {
     }
 }
 
-/// Strangers that are told at most.
+/// Maximum number of unrelated files that are listed.
 const MAX_STRANGERS: usize = 1000;
 
 impl Fleet {
-    /// How far it is. Only the first lines of parts are read.
+    /// The progress. Only the header lines of parts are read.
     pub fn status(&self) -> Status {
         let mut status = Status { items: self.study.items.len(), ..Status::default() };
         for item in &self.study.items {
@@ -96,7 +96,7 @@ impl Fleet {
         let known: BTreeSet<String> = self.study.items.iter().map(|item| part_name(&item.hash)).collect();
         let Ok(entries) = std::fs::read_dir(self.parts()) else { return Vec::new() };
         let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
-        // A name that begins with a dot is a part that is being written, or was when its worker was killed.
+        // A name with a leading dot is a part that is being written, or whose worker was killed.
         let mut strangers: Vec<String> = names
             .filter(|name| !name.starts_with('.') && !known.contains(name))
             .take(MAX_STRANGERS)

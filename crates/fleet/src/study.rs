@@ -1,4 +1,4 @@
-//! What a fleet directory says of itself.
+//! The description of a study in its directory.
 
 use crate::place::{Durability, read_at_most, write_whole};
 use crate::{FleetError, Hash};
@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Layout of the directory; counts up with each change.
+/// Version of the directory's layout.
 pub(crate) const LAYOUT: u32 = 1;
 /// Maximum number of items of a study.
 pub(crate) const MAX_ITEMS: usize = 1_000_000;
@@ -20,11 +20,11 @@ const LARGEST_BYTES: u64 = 256 << 20;
 pub struct Listed {
     /// Its file's name.
     pub hash: Hash,
-    /// Its name for people.
+    /// Its display name.
     pub name: String,
 }
 
-/// A study: its kind, who made it, what is merged how, its items in the order of the result.
+/// A study: its kind, the program that made it, the input of merging, its items in the order of the result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
@@ -36,7 +36,7 @@ pub struct Study {
     pub kind: String,
     /// Program, version and commit.
     pub program: String,
-    /// What the kind needs to merge.
+    /// Input of merging.
     pub settings: Value,
     /// The items.
     pub items: Vec<Listed>,
@@ -45,7 +45,7 @@ pub struct Study {
 impl Study {
     pub(crate) fn read(path: &Path) -> Result<Study, FleetError> {
         let bytes = read_at_most(path, LARGEST_BYTES)?;
-        // Looked at before the rest, which another layout may have otherwise.
+        // Checked first: another layout may have other keys.
         #[derive(Deserialize)]
         struct Head {
             layout: u32,

@@ -1,4 +1,4 @@
-//! A study as people write it: its name and kind here, everything else by the kind.
+//! A study file: name and kind are read here, everything else by the kind.
 
 use mapper_yaml::{
     Document, FindingKind, Findings, Node, Notes, ReadError, Schema, Source, path_text, steps,
@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// What messages call the file.
+/// Name of the file in messages.
 static DOCUMENT: Document = Document { name: "study", example: "campaigns/fleet/blind.yaml" };
 /// Largest file of a study, bytes: some ten thousand names of campaigns.
 const LARGEST_BYTES: usize = 4 << 20;
@@ -28,7 +28,7 @@ pub enum StudyFileError {
     Mistakes(Box<Findings>),
 }
 
-/// A study's file, read as far as its name and its kind.
+/// A study file, of which only the name and the kind are read.
 #[derive(Debug)]
 pub struct StudyFile {
     path: PathBuf,
@@ -41,15 +41,15 @@ pub struct StudyFile {
 }
 
 impl StudyFile {
-    /// A file that it names, from its own folder.
+    /// A file that it names, relative to its own directory.
     pub fn beside(&self, file: &Path) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
-    /// The file as the kind knows it, name and kind included.
+    /// The complete file, read by the kind; name and kind included.
     ///
     /// # Errors
-    /// [`StudyFileError::Mistakes`] with all that is wrong.
+    /// [`StudyFileError::Mistakes`] with all mistakes.
     pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, StudyFileError> {
         let mut notes = Notes::default();
         Schema::of::<T>().check(&self.source, &self.root, &mut notes);
@@ -68,7 +68,7 @@ impl StudyFile {
         Err(StudyFileError::Mistakes(Box::new(Findings::new(self.source.clone(), notes))))
     }
 
-    /// A mistake that only the kind knows, at a key of the file.
+    /// A mistake found by the kind, at a key of the file.
     pub fn mistake(&self, key: &str, message: String, remedy: &str) -> StudyFileError {
         let steps = steps![key];
         let place = self.root.place(&steps);

@@ -1,4 +1,4 @@
-//! Handing a study to a queue: few tasks of many items each, sized by what items cost, and never more than the limits.
+//! Submits a study to a queue: few tasks of many items each, sized by the cost of items, within the limits.
 
 use crate::fleet::LOGS;
 use crate::place::{Durability, Machine, make_directory, read_at_most, write_whole};
@@ -7,48 +7,48 @@ use crate::{Cost, Fleet, FleetError, Shard, Status};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What is given for a submission.
+/// Options of a submission.
 #[derive(Debug, Clone)]
 pub struct SubmitOptions {
     /// The queue.
     pub template: Template,
-    /// The program, as the tasks start it.
+    /// The command that starts the program.
     pub program: PathBuf,
-    /// Partition, or queue; the site's own where empty.
+    /// Partition, or queue; the site's default if empty.
     pub partition: String,
     /// Cores of a task.
     pub cpus: usize,
-    /// How long a task should last, minutes.
+    /// Target duration of a task, minutes.
     pub task_min: f64,
     /// Limits.
     pub limits: Limits,
 }
 
-/// What must not be exceeded.
+/// Limits of a submission.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Time limit of a task, minutes; `None`: twice what it should last, and five minutes.
+    /// Time limit of a task, minutes; `None`: twice the target duration plus five minutes.
     pub time_min: Option<u64>,
     /// Number of tasks of an array.
     pub tasks: u64,
-    /// Number of tasks at once, if it is limited.
+    /// Maximum number of concurrent tasks, if limited.
     pub at_once: Option<u64>,
-    /// Processor time of all that is left, h.
+    /// Processor time of all remaining items, h.
     pub hours: Option<f64>,
     /// Memory of a task, MB.
     pub memory_mb: Option<u64>,
 }
 
-/// What was submitted, kept in the directory for a retry.
+/// The submission, kept in the directory for a retry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Submission {
     /// Name of the template.
     pub template: String,
-    /// Its text.
+    /// Its content.
     pub template_text: String,
-    /// Number of tasks that the items are dealt among.
+    /// Number of tasks that share the items.
     pub tasks: u64,
-    /// The tasks that were submitted, as ranges: 1-8 or 2,5-7.
+    /// The submitted tasks, as ranges: 1-8 or 2,5-7.
     pub array: String,
     /// Cores of a task.
     pub cpus: usize,
@@ -56,25 +56,25 @@ pub struct Submission {
     pub minutes: u64,
     /// Memory of a task, MB.
     pub memory_mb: u64,
-    /// Partition; empty: the site's own.
+    /// Partition; empty: the site's default.
     pub partition: String,
-    /// Tasks at once, if limited.
+    /// Maximum number of concurrent tasks, if limited.
     pub at_once: Option<u64>,
     /// The program.
     pub program: PathBuf,
-    /// The queue's number of the array job.
+    /// ID of the array job.
     pub work: String,
-    /// That of the merge behind it.
+    /// ID of the merge job that follows it.
     pub merge: Option<String>,
 }
 
-/// How much longer than reckoned a task may take.
+/// Safety factor on the estimated duration of a task.
 const SLACK: f64 = 1.5;
-/// Memory beside the items, and what a queue counts that nobody else does, MB.
+/// Memory in addition to the items, with overheads that only queues count, MB.
 const MEMORY_BESIDE_MB: u64 = 128;
 
 impl Fleet {
-    /// Submits what is left. The number of tasks is the smallest with which none lasts longer than wanted.
+    /// Submits the remaining items. The number of tasks is the smallest that keeps each within the target duration.
     ///
     /// # Errors
     /// [`FleetError::DoesNotFit`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
@@ -113,7 +113,7 @@ impl Fleet {
         let most_tasks = limits.tasks.min(cost.left as u64).max(1);
         let fair = (cost.left_hours * 60.0 / options.cpus as f64 / wanted_min).ceil() as u64;
         let mut tasks = fair.clamp(1, most_tasks);
-        // Shards are even on average: a few more tasks where the largest is too large.
+        // Shards are even on average: add a few tasks if the largest is too large.
         while lasts_min(tasks) > 1.25 * wanted_min && tasks < most_tasks {
             tasks = (tasks + tasks.div_ceil(10)).min(most_tasks);
         }
@@ -142,7 +142,7 @@ impl Fleet {
         self.hand_over(submission, "", machine)
     }
 
-    /// Submits the tasks again whose items are missing, failed or spoilt, and the merge behind them.
+    /// Submits again the tasks with missing, failed or damaged items, and the merge that follows them.
     ///
     /// # Errors
     /// [`FleetError::NotSubmitted`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
@@ -164,10 +164,10 @@ impl Fleet {
         self.hand_over(Submission { array: ranges(&numbers), ..before }, "--again", machine)
     }
 
-    /// What was submitted last.
+    /// The last submission.
     ///
     /// # Errors
-    /// [`FleetError::NotSubmitted`] where nothing was.
+    /// [`FleetError::NotSubmitted`] if there was none.
     pub fn submission(&self) -> Result<Submission, FleetError> {
         let path = self.directory().join(SUBMITTED);
         if !path.exists() {
@@ -181,7 +181,7 @@ impl Fleet {
         FleetError::NothingLeft { items: self.study.items.len(), directory: self.directory().to_owned() }
     }
 
-    /// Items without a result in the largest of so many shards.
+    /// Number of items without a result in the largest shard, for this number of shards.
     fn largest_shard(&self, status: &Status, tasks: u64) -> usize {
         let lacking = status.failed.iter().chain(&status.refused).chain(&status.missing);
         let mut counts = std::collections::BTreeMap::new();
@@ -191,7 +191,7 @@ impl Fleet {
         counts.into_values().max().unwrap_or(0)
     }
 
-    /// Writes the scripts and runs the one that submits.
+    /// Writes the scripts and runs the submission script.
     fn hand_over(
         &self,
         mut submission: Submission,
@@ -204,7 +204,7 @@ impl Fleet {
         let word = |path: &Path| quoted(&path.to_string_lossy());
         let program = word(&submission.program);
         let (cpus, tasks, here) = (submission.cpus, submission.tasks, word(&directory));
-        // Every item keeps to its share of the cores, and what else counts them sees the task's alone.
+        // Items keep to their share of the cores; other programs that count cores see only those of the task.
         let task = format!(
             "# One task: shard $1 of {tasks}.\nexport RAYON_NUM_THREADS={cpus}\n\
              exec {program} fleet work {here} --shard \"$1/{tasks}\" --jobs {cpus} {again}\n"
@@ -248,7 +248,7 @@ impl Fleet {
 
 const SUBMITTED: &str = "submitted.json";
 
-/// Sorted numbers as queues write them: 1,4-6.
+/// Sorted numbers in the syntax of queues: 1,4-6.
 fn ranges(numbers: &[u64]) -> String {
     let mut ranges: Vec<(u64, u64)> = Vec::new();
     for number in numbers {

@@ -1,4 +1,4 @@
-//! Doing items: each leaves one part, whoever is killed when.
+//! Does items: each leaves one part, even if a process is killed.
 
 use crate::part::{Outcome, Part};
 use crate::place::Machine;
@@ -8,31 +8,31 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Which items are done.
+/// Selection of items.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Which {
     /// All of them.
     All,
     /// Those of a shard.
     Shard(Shard),
-    /// One.
+    /// A single item.
     Item(Hash),
-    /// So many that are not there yet, to see what they cost.
+    /// This many unfinished items, to estimate the cost.
     First(usize),
 }
 
-/// What was worked off.
+/// Result of a call.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Worked {
     /// Items done now.
     pub done: usize,
-    /// Items that were there already.
+    /// Items that were already done.
     pub there: usize,
-    /// Items that failed now or before and were not tried again: name, and why.
+    /// Items that failed now or earlier and were not retried: name, and why.
     pub failed: Vec<(String, String)>,
 }
 
-/// How one item came out.
+/// Outcome of one item.
 enum One {
     Done,
     There,
@@ -40,11 +40,11 @@ enum One {
 }
 
 impl Fleet {
-    /// Does the items that have no part yet, and with `again` those that failed. Interrupted work costs the items under way,
-    /// no other.
+    /// Does the items that have no part yet, and with `again` those that failed. An interruption loses only the items in
+    /// progress.
     ///
     /// # Errors
-    /// [`FleetError::Interrupted`]; [`FleetError::File`] where a part cannot be written; [`FleetError::Changed`] for an item
+    /// [`FleetError::Interrupted`]; [`FleetError::File`] if a part cannot be written; [`FleetError::Changed`] for an item
     /// whose file was changed; [`FleetError::NoItem`].
     pub fn work(
         &self,
@@ -60,14 +60,14 @@ impl Fleet {
             match self.head(item) {
                 Some(Ok(part)) if part.outcome == Outcome::Done => worked.there += 1,
                 Some(Ok(_)) if !again => worked.failed.push((item.name.clone(), self.why(item))),
-                // What is no part of this study is replaced.
+                // Files that do not belong to this study are replaced.
                 _ => items.push(item),
             }
         }
         if let Which::First(count) = which {
             items.truncate(count);
         }
-        // What was begun and has no part killed its worker once, or is under way elsewhere: last.
+        // An item that was started and has no part may have killed its worker, or is in progress elsewhere: do it last.
         items.sort_by_cached_key(|item| self.begun(&item.hash).exists());
         let jobs = engine.at_a_time(items.len());
         let results =
@@ -99,7 +99,7 @@ impl Fleet {
             }
         };
         if let Which::First(_) = which {
-            // By hash: a sample, not the first of the study, which may all be of one sort.
+            // By hash, to get a sample: the first items of the study may be all of one sort.
             chosen.sort_by_key(|item| item.hash);
         }
         Ok(chosen)
@@ -114,7 +114,7 @@ impl Fleet {
         stop: &AtomicBool,
         machine: &Machine<'_>,
     ) -> Result<One, FleetError> {
-        // Somebody else may have done it since.
+        // Another worker may have done it in the meantime.
         if let Some(Ok(part)) = self.head(listed)
             && (part.outcome == Outcome::Done || !again)
         {
@@ -122,9 +122,9 @@ impl Fleet {
         }
         let item = Item::read(&self.item(&listed.hash), &listed.hash)?;
         let begun = self.begun(&listed.hash);
-        // For whoever asks; work goes on where there is no room for it.
+        // For information only; work continues if the disk is full.
         let _ = std::fs::write(&begun, machine.name);
-        // Each item on one core: what it takes is then what the thread took.
+        // Each item on one core, so that the thread's time is the item's cost.
         let (result, duration_s) = parallel::confined(1, || {
             let started_s = (machine.thread_s)();
             let result = done(kind, &item, stop);
@@ -145,7 +145,7 @@ impl Fleet {
         one
     }
 
-    /// Why an item failed, as its part says.
+    /// Why an item failed, from its part.
     pub(crate) fn why(&self, item: &Listed) -> String {
         match self.whole(item) {
             Some(Ok((_, body))) => body.chars().take(LONGEST_REASON).collect(),
@@ -155,10 +155,10 @@ impl Fleet {
     }
 }
 
-/// Longest reason that is told, characters.
+/// Longest reason that is recorded, characters.
 const LONGEST_REASON: usize = 400;
 
-/// Does an item in a directory of its own. A panic is a failure of this item, not of the others.
+/// Does an item in a directory of its own. A panic fails this item only.
 fn done(kind: &dyn Kind, item: &Item, stop: &AtomicBool) -> Result<String, WorkError> {
     let room = std::env::temp_dir();
     let scratch = tempfile::Builder::new().prefix("mapper-fleet-").tempdir().map_err(|error| {
@@ -171,7 +171,7 @@ fn done(kind: &dyn Kind, item: &Item, stop: &AtomicBool) -> Result<String, WorkE
         Err(WorkError::Failed(format!("the program is at fault, it panicked: {said}")))
     });
     match result {
-        // Whatever it says when it is stopped, it was stopped.
+        // Whatever it returns after a stop, it counts as stopped.
         Err(WorkError::Failed(_)) if stop.load(Ordering::Relaxed) => Err(WorkError::Interrupted),
         other => other,
     }

@@ -1,4 +1,4 @@
-//! What one more effect would do beside a fit, in closed form.
+//! Closed-form effect of adding one more effect to a fit.
 
 use crate::coordinate::Coordinate;
 use crate::fit::Fit;
@@ -11,30 +11,30 @@ use mapper_physics::effect::EffectParameter;
 use nalgebra::DVector;
 use std::ops::Range;
 
-/// What one more effect would do beside a fit.
+/// Result of adding one more effect to a fit.
 #[derive(Debug)]
 pub struct Addition {
-    /// Which.
+    /// Index of the effect.
     pub effect: usize,
-    /// What it would take off the cost, in a straight line.
+    /// Linear estimate of the cost reduction.
     pub gain: f64,
-    /// Where to start a fit.
+    /// Start of a fit.
     pub start: Hypothesis,
 }
 
-/// Steps beyond which a straight line is not believed, in those that were taken: effects bend.
+/// Maximum trusted linear step, as a multiple of the step taken; effects are nonlinear.
 const MAX_REACH: f64 = 3.0;
-/// Share of a step off neutral at which a fit begins at least: some effects have no slope where they vanish.
+/// Minimum start offset from neutral, as a share of a step: some effects have zero slope at neutral.
 const OFF_NEUTRAL: f64 = 0.1;
 
-/// Every further effect beside a fit, in closed form from a run each; where two parameters work together, from several starts. Of effects that
-/// begin with a step, where the study has them, as if nothing before it had been changed and nothing lasted.
+/// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts. Effects
+/// with an onset are treated as if nothing before the onset changed and nothing persisted.
 pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
     let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
         return Vec::new();
     };
-    // At the fit's best what the residual asks of the nuisances is what their priors ask back: a tolerance that stands far
-    // out pulls for the effect that would let it go.
+    // At the optimum, the residual's pull on each nuisance equals its prior's. A strained tolerance therefore supports the effect that
+    // would release it.
     let mut right_residual = projector.right(&base.residual);
     for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
         *right -= nuisance;
@@ -67,7 +67,7 @@ impl FitNeighbourhood<'_> {
         start
     }
 
-    /// What values of an effect change, whitened.
+    /// Whitened change due to an effect's values.
     fn change(&self, effect: usize, values: Vec<f64>) -> Option<Vec<f64>> {
         let there = self.study.predict(&self.with(effect, values)).ok()?;
         let mut change: Vec<f64> =
@@ -76,7 +76,7 @@ impl FitNeighbourhood<'_> {
         Some(change)
     }
 
-    /// Squared length of a change, and what the residual has of it, nuisances free.
+    /// Squared length of a change and its product with the residual, with nuisances free.
     fn products(&self, change: &[f64]) -> (f64, f64) {
         let right = self.projector.right(change);
         let own = self.projector.product(change, &right, change, &right);
@@ -90,7 +90,7 @@ impl FitNeighbourhood<'_> {
         Some(Addition { effect, gain, start: self.with(effect, values) })
     }
 
-    /// An effect with one parameter, and as it begins with each step.
+    /// An effect with one parameter, throughout and with each possible onset.
     fn at_one(&self, effect: usize, parameter: &EffectParameter) -> Vec<Addition> {
         let step_to =
             |by: f64| (parameter.neutral + by).clamp(parameter.low, parameter.high) - parameter.neutral;
@@ -101,7 +101,7 @@ impl FitNeighbourhood<'_> {
         });
         let Some((mut step, mut change, mut products)) = looked else { return Vec::new() };
         let opposite = step_to(-step);
-        // The line is drawn on the side that it points to.
+        // Linearise on the side that the gradient points to.
         if products.1 < -OFF_NEUTRAL * products.0
             && opposite != 0.0
             && let Some(other) = self.change(effect, vec![parameter.neutral + opposite])
@@ -130,7 +130,7 @@ impl FitNeighbourhood<'_> {
         found
     }
 
-    /// The best along the line through a step.
+    /// The optimum along the line through a step.
     fn along(
         &self,
         effect: usize,
@@ -152,7 +152,7 @@ impl FitNeighbourhood<'_> {
     }
 }
 
-/// Where the search begins for an effect of several parameters: the corners of the inner part of their ranges.
+/// Search starts for an effect of several parameters: the corners of the inner part of their ranges.
 fn corners(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {
     let places = |p: &EffectParameter| {
         let coordinate = Coordinate::new(p);

@@ -1,44 +1,43 @@
-//! Whether what a fit leaves is noise. A misfit is smooth: it is looked for where it can be, in few directions, so that
-//! thousands of noisy values do not hide it.
+//! Tests whether the residual of a fit is noise. A misfit is smooth, so the test uses a few smooth directions; thousands of noisy values
+//! would hide it.
 
 use crate::fit::Fit;
 use crate::selection::Selection;
 use crate::study::Study;
 use crate::whiten::{Linearised, dot, rows_of_step};
 
-/// Time constants of the smooth basis after a jump, s; a step belongs to it too.
+/// Time constants of the smooth basis after a jump, s; the basis also includes a step.
 const BASIS_S: [f64; 4] = [5.0, 20.0, 60.0, 200.0];
 /// Directions in each group.
 pub const DIRECTIONS: usize = BASIS_S.len() + 1;
 
-/// Smooth misfit that noise leaves in one recording of a thousand, standard deviations, and what scatter from step to step counts
-/// beside it: it grows with the strength of an effect, also of one that is found.
+/// Smooth misfit that noise exceeds in one recording of a thousand, standard deviations. Scatter from step to step is counted relative to
+/// it, because scatter grows with the strength of an effect, even of a correct one.
 const NOISE_SIGMA: f64 = 3.3;
 const SCATTER_COUNTS: f64 = 0.25;
 
-/// What a fit leaves.
+/// Residual of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adequacy {
-    /// Energy in the smooth basis, beyond its expectation, in its standard deviations.
+    /// Energy in the smooth basis above its expectation, in its standard deviations.
     pub smooth_sigma: f64,
-    /// Energy in the smooth basis beyond its expectation.
+    /// Energy in the smooth basis above its expectation.
     pub smooth_excess: f64,
-    /// Scatter of the effect's parameters from step to step, beyond expectation, in standard deviations; 0 without
-    /// effects.
+    /// Scatter of the effect's parameters from step to step above its expectation, in standard deviations; 0 without effects.
     pub scatter_sigma: f64,
-    /// What one more effect of the catalogue would take off the cost at most.
+    /// Largest cost reduction that one more library effect could achieve.
     pub one_more: f64,
     /// Mean squared whitened residual.
     pub mean_square: f64,
 }
 
 impl Adequacy {
-    /// Whether what is left may be noise and the imperfection of a fit, one more effect of the catalogue not considered.
+    /// Whether the residual is consistent with noise and an imperfect fit, ignoring further library effects.
     pub fn may_be_noise(&self) -> bool {
         self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < NOISE_SIGMA
     }
 
-    /// What the probability of an outside cause is made of.
+    /// Features for the probability of an unmodelled cause.
     pub fn features(&self) -> [f64; 3] {
         [self.smooth_sigma, self.scatter_sigma, self.one_more]
     }
@@ -63,7 +62,7 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
                     })
                     .collect();
                 linearised.whiten_group(index, &mut direction);
-                // Gram and Schmidt.
+                // Gram-Schmidt orthogonalisation.
                 for before in &directions {
                     let along = dot(&direction, before);
                     for (d, b) in direction.iter_mut().zip(before) {
@@ -80,7 +79,7 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
         .collect()
 }
 
-/// Looks at what a fit leaves on all steps. `one_more` is the largest gain of a further effect.
+/// Evaluates the residual of a fit on all steps. `one_more` is the largest gain of a further effect.
 pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64) -> Adequacy {
     let energies = smooth_energies(study, linearised, &fit.residual);
     let expected: f64 = study.groups.iter().map(|group| DIRECTIONS.min(group.rows.len()) as f64).sum();

@@ -1,7 +1,7 @@
-//! What a soak would show: at rest all temperature sensors read alike, but for their offsets.
+//! Expected result of a soak: all temperature sensors read the same temperature, apart from their offsets.
 //!
-//! The housings on their way there would tell of heat to oil and cell as well; they are not used, for the model has no
-//! rundown of the shaft that leads there.
+//! Housing temperatures during the cool-down would also contain heat to oil and cell. They are not used, because the model cannot simulate
+//! the shaft's run-down.
 
 use crate::coordinate::{Coordinate, coordinates, parameters, set_parameter};
 use crate::experiment::AtRest;
@@ -11,12 +11,12 @@ use crate::study::{Hypothesis, Study};
 use mapper_core::Channel;
 use nalgebra::DMatrix;
 
-/// One sigma of what all sensors read together, in the units of what is left of them: nobody knows it.
+/// Prior of the common temperature of all sensors, 1 sigma, in units of each remaining uncertainty: effectively unknown.
 const COMMON_SIGMA: f64 = 1e4;
-/// Part of a typical step over which slopes are taken; readings are straight in offsets.
+/// Step for numerical slopes, as a share of a typical step; readings are linear in offsets.
 const BESIDE: f64 = 0.02;
 
-/// By how much a soak would raise the misfit of each fit (column), fitted again, were another (row) true, in squared sigmas.
+/// Misfit increase of each fit (column) after refitting to a soak, if another fit (row) were true, in squared sigmas.
 pub(crate) fn apart_at_rest(recorded: &Study, soak: &AtRest, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
     let sensors: Vec<(Channel, f64)> = AtRest::CHANNELS
         .into_iter()
@@ -50,12 +50,12 @@ pub(crate) fn apart_at_rest(recorded: &Study, soak: &AtRest, fits: &[&Fit]) -> O
     predicted.iter().map(|(truth, ..)| of_truth(truth)).collect()
 }
 
-/// What the sensors read too much, in what is left of each.
+/// Offsets of the sensors, in units of each remaining uncertainty.
 fn readings(study: &Study, sensors: &[(Channel, f64)], hypothesis: &Hypothesis) -> Option<Vec<f64>> {
     sensors.iter().map(|(channel, sigma)| Some(study.offset_at_end(hypothesis, *channel)? / sigma)).collect()
 }
 
-/// The same for a sigma of each nuisance and a unit of each effect's coordinate.
+/// Offset changes for one sigma of each nuisance and one unit of each effect coordinate.
 fn changes(
     study: &Study,
     sensors: &[(Channel, f64)],
@@ -74,7 +74,7 @@ fn changes(
     let values = parameters(hypothesis);
     let of_parameter = |(place, coordinate): (usize, &Coordinate)| {
         let at = coordinate.of(values[place]);
-        // To the side where there is room.
+        // Step towards the side with room.
         let ahead = coordinate.of(coordinate.value(at + BESIDE)) - at;
         let step = if ahead.abs() > 0.5 * BESIDE { ahead } else { -BESIDE };
         let mut moved = hypothesis.clone();

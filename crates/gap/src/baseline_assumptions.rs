@@ -1,24 +1,24 @@
-//! What was taken for granted of a rig, as machines read it.
+//! Baseline of a rig taken from a reference recording, machine-readable.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What was taken for granted of a rig: what it was like while it was healthy.
+/// Baseline of a rig: its model error in fault-free condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Since {
-    /// The healthy recording.
+    /// The reference recording.
     pub recording: String,
-    /// For each channel what the model lacked there with its tolerances fitted: in both recordings, and not judged.
+    /// Model error of each channel there after fitting tolerances; present in both recordings and therefore not diagnosed.
     pub lacking: BTreeMap<String, Lacking>,
 }
 
-/// What a model lacks of one channel.
+/// Model error of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lacking {
     /// Root mean square, in the channel's unit.
     pub size: f64,
     /// Unit.
     pub unit: String,
-    /// Share by which the model misses what the channel does over the recording, 0..1: it may miss as much of what changed since.
+    /// Relative model error of the channel's changes over the recording, 0..1; changes since then may be predicted equally badly.
     pub share: f64,
 }

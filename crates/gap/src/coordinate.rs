@@ -1,9 +1,9 @@
-//! The coordinates in which effects' parameters are searched.
+//! Search coordinates of effect parameters.
 
 use crate::study::{Hypothesis, Study};
 use mapper_physics::effect::EffectParameter;
 
-/// The coordinate in which a parameter is searched: itself in typical steps, or its logarithm where it spans decades.
+/// Search coordinate of a parameter: its value in typical steps, or its logarithm if it spans decades.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coordinate {
     pub(crate) low: f64,
@@ -50,7 +50,7 @@ pub fn coordinates(study: &Study, hypothesis: &Hypothesis) -> Vec<Coordinate> {
     parameters.map(Coordinate::new).collect()
 }
 
-/// Moves the `place`-th parameter of all effects to a value.
+/// Sets the `place`-th parameter of all effects to a value.
 pub fn set_parameter(hypothesis: &mut Hypothesis, place: usize, value: f64) {
     if let Some(slot) = hypothesis.effects.iter_mut().flat_map(|(_, values)| values.iter_mut()).nth(place) {
         *slot = value;

@@ -1,9 +1,9 @@
-//! What is assumed where the campaign declares no tolerances.
+//! Assumptions for campaigns that declare no tolerances.
 
 use crate::study::Study;
 use mapper_observe::lagged_command::Response;
 
-/// One sentence for each thing that was assumed.
+/// One sentence per assumption.
 pub(crate) fn assumed(study: &Study) -> Vec<String> {
     let t = &study.declared.tolerances;
     let tolerances = [

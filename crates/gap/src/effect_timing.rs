@@ -1,18 +1,18 @@
-//! When in a recording an effect acts.
+//! Onset and growth of an effect within a recording.
 
-/// When in a recording an effect acts.
+/// Onset and growth of an effect within a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Course {
-    /// In all of it.
+    /// Present throughout.
     Throughout,
-    /// From the step of this index on.
+    /// From the step with this index on.
     From(usize),
-    /// It grows evenly from step to step: not there before the step of this index, at its full size in the last one.
+    /// Grows evenly from step to step: absent before the step with this index, at full size in the last step.
     Growing(usize),
 }
 
 impl Course {
-    /// Share of its full size in a step of a recording of `steps`, 0..1.
+    /// Share of the full size in a step of a recording with `steps` steps, 0..1.
     pub fn share(self, step: usize, steps: usize) -> f64 {
         match self {
             Course::Throughout => 1.0,
@@ -22,7 +22,7 @@ impl Course {
         }
     }
 
-    /// The step with which it begins; `None` where it is always there.
+    /// The step with which it begins; `None` if it is always present.
     pub fn onset(self) -> Option<usize> {
         match self {
             Course::Throughout => None,

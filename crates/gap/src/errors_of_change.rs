@@ -1,23 +1,22 @@
-//! How wrong a model may be about what changes, by how wrong it is about what changes within a healthy recording.
+//! Expected model error of changes, estimated from its errors within a reference recording.
 //!
-//! What a model lacks is subtracted where the machine ran on the healthy night. A cause moves it elsewhere, where the model lacks something else,
-//! and the model's answer to a cause is as wrong as its answer to the steps of the campaign. Both are seen. The model misses what an output does over the
-//! healthy recording by a share `k`: of a change `d` of that output it misses as much. And where a step runs elsewhere by a share `r` of what the
-//! recording spans, what is lacking there, `b`, changes by as much of itself. Both in level and course: between the values of a step
-//! `(k^2 d_i d_j + r^2 b_i b_j) exp(-|ln(t_i/t_j)|)`. Where nothing changes it is nothing.
+//! Subtracting the reference removes the model error at the reference operating points. A fault moves the machine elsewhere, and the
+//! model's response to the fault is as wrong as its response to the steps of the campaign. The model misses a share `k` of each output's
+//! variation in the reference, so it misses the same share of a change `d`. If a step runs elsewhere by a share `r` of the recorded span,
+//! the model error `b` there changes by that share. Within a step the covariance is `(k^2 d_i d_j + r^2 b_i b_j) exp(-|ln(t_i/t_j)|)`. It
+//! is zero if nothing changes.
 
 use crate::nuisance::OUTPUTS;
 use crate::study::Study;
 use crate::whiten::Linearised;
 use nalgebra::DMatrix;
 
-/// Noise beyond so many declared variances stands for values that say nothing, near surge.
+/// Noise variance above this multiple of the declared one marks uninformative values near surge.
 const SAYS_NOTHING: f64 = 1e3;
-/// What moves within this long after a jump moves together, s.
+/// Values within this time after a jump are fully correlated, s.
 const AT_ONCE_S: f64 = 0.3;
 
-/// Share by which the model misses what each output does over a recording, 0 where noise accounts for it; `lacking` is what is measured less what is
-/// predicted.
+/// Relative model error of each output's variation over a recording; 0 if noise accounts for it. `lacking` is measured minus predicted.
 pub(crate) fn errors_of_change(
     study: &Study,
     linearised: &Linearised,
@@ -27,8 +26,8 @@ pub(crate) fn errors_of_change(
     for (place, group) in study.groups.iter().enumerate() {
         let variances = linearised.covariance(place).diagonal();
         let most = SAYS_NOTHING * study.declared.noise_sigma(OUTPUTS[group.output]).powi(2);
-        let told = group.rows.clone().zip(variances.iter().copied()).filter(|(_, variance)| *variance < most);
-        of_output[group.output].extend(told);
+        let kept = group.rows.clone().zip(variances.iter().copied()).filter(|(_, variance)| *variance < most);
+        of_output[group.output].extend(kept);
     }
     of_output.map(|rows: Vec<(usize, f64)>| {
         let count = rows.len().max(1) as f64;
@@ -42,8 +41,8 @@ pub(crate) fn errors_of_change(
     })
 }
 
-/// Share of what each output spans over a recording, one standard deviation, by which each step runs elsewhere: the largest of all
-/// outputs, of the step itself and of the one from which it jumps.
+/// Shift of each step's operating point, 1 sigma, relative to each output's span over the recording. Returns the maximum over all outputs,
+/// of the step and of the one it jumps from.
 pub(crate) fn elsewhere(study: &Study, changed: &[f64]) -> Vec<f64> {
     let spans: Vec<f64> = (0..OUTPUTS.len())
         .map(|output| {
@@ -64,7 +63,7 @@ pub(crate) fn elsewhere(study: &Study, changed: &[f64]) -> Vec<f64> {
     (0..shares.len()).map(|step| shares[step].max(shares[step.saturating_sub(1)])).collect()
 }
 
-/// Covariance of values of a step that err in proportion to each of `courses`, in level and course.
+/// Covariance within a step of errors proportional to each of `courses`, correlated over time.
 pub(crate) fn covariance_of_errors(since_jump_s: &[f64], courses: [&[f64]; 2]) -> DMatrix<f64> {
     let n = since_jump_s.len();
     let at: Vec<f64> = since_jump_s.iter().map(|t_s| (t_s.max(0.0) + AT_ONCE_S).ln()).collect();

@@ -1,13 +1,13 @@
-//! What may be done on a stand to tell causes apart: one settled start, one step, and perhaps a sensor more.
+//! Experiments on the stand that distinguish candidate effects: a settled start, one step and, optionally, another sensor.
 
 use mapper_core::{Channel, OperatingPoint, Series};
 
-/// A jump that may be run.
+/// An allowed jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AllowedJump {
-    /// Where it starts, settled.
+    /// Start point, settled.
     pub from: OperatingPoint,
-    /// Where it goes.
+    /// Target point.
     pub to: OperatingPoint,
     /// Turbine inlet total pressure commanded at the start, Pa.
     pub from_p3_pa: f64,
@@ -17,67 +17,67 @@ pub struct AllowedJump {
     pub dwell_s: f64,
 }
 
-/// Something that may be done.
+/// An experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Experiment {
-    /// Start, target and time; equal points where a temperature alone is changed. P3 is what holds the target. Nothing of it counts for a soak.
+    /// Start, target and dwell; equal points if only a temperature changes. P3 is the value that holds the target. Unused for a soak.
     pub jump: AllowedJump,
-    /// What is changed besides.
+    /// What changes in addition to the jump.
     pub beside: Beside,
 }
 
-/// What is changed beside P3 and the valve.
+/// What changes in addition to P3 and the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Beside {
     /// Nothing.
     Nothing,
-    /// Turbine inlet total temperature, with the step; K.
+    /// Turbine inlet total temperature changes with the step; K.
     T3 {
         /// Before.
         from_k: f64,
         /// After.
         to_k: f64,
     },
-    /// Oil inlet temperature, with the step; K.
+    /// Oil inlet temperature changes with the step; K.
     Oil {
         /// Before.
         from_k: f64,
         /// After.
         to_k: f64,
     },
-    /// A channel of the model is measured that was not.
+    /// A model channel is measured that was not recorded before.
     Sensor(Channel),
-    /// The machine rests before it runs, so that its temperature sensors are held against each other.
+    /// The machine soaks before the run, so that its temperature sensors can be compared with each other.
     Soak(AtRest),
 }
 
-/// How well a soak tells the offsets of the temperature sensors.
+/// How well a soak determines the offsets of the temperature sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AtRest {
     /// Time at rest, s, > 0.
     pub duration_s: f64,
-    /// One standard deviation of what is then left of each offset against the others, K, > 0; in the order of [`AtRest::CHANNELS`].
+    /// Remaining uncertainty of each relative offset, 1 sigma, K, > 0; in the order of [`AtRest::CHANNELS`].
     pub left_sigma_k: [f64; AtRest::CHANNELS.len()],
 }
 
 impl AtRest {
-    /// Sensors that are told. Of two pressure taps that differ nobody knows which is off, and a supply of oil wanders.
+    /// Sensors whose offsets a soak determines. If two pressure taps differ, either may be off; the oil supply temperature drifts.
     pub const CHANNELS: [Channel; 3] = [Channel::T1, Channel::T2, Channel::Tc];
 }
 
-/// How T3 and oil follow their setpoints on a usual stand, s: the virtual lab's, and nobody declares another.
+/// Lag of T3 and oil behind their setpoints on a usual stand, s: the virtual lab's values; campaigns do not declare their own.
 const T3_LAG_S: f64 = 20.0;
 const OIL_LAG_S: f64 = 30.0;
-/// Time that mounting a sensor takes, min.
+/// Time to mount a sensor, min.
 const MOUNTING_MIN: f64 = 30.0;
 
 impl Experiment {
-    /// A jump and nothing else.
+    /// A jump without any other change.
     pub fn jump(jump: AllowedJump) -> Experiment {
         Experiment { jump, beside: Beside::Nothing }
     }
 
-    /// Time that it takes, min; the way to its start is not counted, a sensor's mounting is (half an hour).
+    /// Duration, min. Excludes the approach to the start; includes half an hour for mounting a sensor.
     pub fn minutes(&self) -> f64 {
         let mounting = if matches!(self.beside, Beside::Sensor(_)) { MOUNTING_MIN } else { 0.0 };
         let at_work_s =
@@ -85,7 +85,7 @@ impl Experiment {
         (at_work_s / 60.0).max(0.1) + mounting
     }
 
-    /// Whether the valve alone is moved, at one speed.
+    /// Whether only the valve moves, at one speed.
     pub fn is_valve_step(&self) -> bool {
         let AllowedJump { from, to, .. } = self.jump;
         self.beside == Beside::Nothing
@@ -93,7 +93,7 @@ impl Experiment {
             && from.valve_opening_ratio != to.valve_opening_ratio
     }
 
-    /// The driver that its step changes, as it would be recorded at `t_s` (rising) if the step began at `start_s`.
+    /// The input that the step changes, as it would be recorded at `t_s` (rising) if the step began at `start_s`.
     pub fn driven(&self, t_s: &[f64], start_s: f64) -> Option<(Channel, Series)> {
         let (channel, from_k, to_k, lag_s) = match self.beside {
             Beside::Nothing | Beside::Sensor(_) | Beside::Soak(_) => return None,

@@ -1,4 +1,4 @@
-//! The metal's temperature at the start is no property of the machine: a fit that has not seen the first step reads it there.
+//! The initial metal temperature is not a machine property: a fit without the first step takes it from there.
 
 use crate::fit::{Fit, MAX_SIGMAS};
 use crate::nuisance::NuisanceKind;
@@ -8,13 +8,13 @@ use crate::whiten::{Linearised, rows_of_step};
 use mapper_observe::perturbation::Perturbation;
 use nalgebra::{DMatrix, DVector};
 
-/// Whether a nuisance is the metal's temperature at the start.
+/// Whether a nuisance is the initial metal temperature.
 pub(crate) fn is_start(kind: NuisanceKind) -> bool {
     matches!(kind, NuisanceKind::Perturbation(Perturbation::StartTc | Perturbation::StartTt))
 }
 
-/// A fit whose start is read from the first step, all else as it is. Without it a step that was held out would count what nobody
-/// could know for a misfit of the machine, a hundred times over. The fit itself where the start is known no better so.
+/// Refits only the initial state to the first step. Otherwise a held-out first step would count an unknowable start temperature as a
+/// machine misfit, a hundred times too large. Returns the fit unchanged if the misfit of the first step does not fall.
 pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
     let rows = [rows_of_step(study, 0)];
     let starts: Vec<usize> =

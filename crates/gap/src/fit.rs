@@ -32,6 +32,8 @@ pub struct Fit {
     pub covariance: DMatrix<f64>,
     /// Precision of nuisances and the effects' search coordinates, priors included.
     pub precision: DMatrix<f64>,
+    /// What one more iteration promised in the cost: much where the nuisances act otherwise here than where they were linearised.
+    pub promised: f64,
 }
 
 /// How thoroughly to fit.
@@ -81,7 +83,7 @@ pub fn fit(
     };
     let until = Until { iterations: effort.iterations, enough: effort.enough };
     let point = fitted.at_hypothesis(start.clone())?;
-    let End { unknowns, point, normal } = descend(&mut fitted, unknowns, point, until);
+    let End { unknowns, point, normal, promised } = descend(&mut fitted, unknowns, point, until);
     let Point { hypothesis, prediction, residual } = point;
     let cost = cost_of(&fitted.rows, &residual, &hypothesis);
     let nuisances = hypothesis.nuisances.len();
@@ -100,6 +102,7 @@ pub fn fit(
         effect_columns: fitted.effect_columns,
         covariance: normal.covariance_from(nuisances).unwrap_or_else(unknown),
         precision: normal.matrix,
+        promised,
     })
 }
 

@@ -1,27 +1,27 @@
-//! Steps that are held out together, chosen by place before anything is fitted.
+//! Cross-validation folds, chosen by operating point before any fit.
 
 use crate::study::Study;
 
 /// Number of folds.
 const FOLDS: usize = 3;
 
-/// Parts of the steps, each to be predicted by a fit to the others.
+/// Groups of steps, each to be predicted by a fit to the others.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Folds {
-    /// Steps of each fold, by index, rising; a single fold holds nothing out.
+    /// Step indices of each fold, ascending; a single fold means no hold-out.
     pub steps: Vec<Vec<usize>>,
 }
 
 impl Folds {
-    /// The folds of a recording: every one has every opening and every range of speed, as far as there are steps for it. None
-    /// where steps are too few.
+    /// The folds of a recording. Each fold covers every opening and speed range as far as the number of steps allows. Empty if there are
+    /// too few steps.
     pub fn of(study: &Study) -> Folds {
         let places = study.steps.iter().map(|step| (step.marker.valve_opening_ratio, step.marker.p3_pa));
         Folds::dealt(&places.collect::<Vec<_>>())
     }
 
-    /// Deals steps at these openings and pressures like a Latin square: along each opening in the order of the pressure, which
-    /// is that of the speed, beginning with another fold at each next opening.
+    /// Assigns steps to folds like a Latin square: along each opening in order of pressure (and so speed), starting with a different fold
+    /// at each opening.
     fn dealt(places: &[(f64, f64)]) -> Folds {
         if places.len() < 2 * FOLDS {
             return Folds { steps: vec![(0..places.len()).collect()] };
@@ -30,7 +30,7 @@ impl Folds {
         openings.sort_by(f64::total_cmp);
         openings.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
         let mut steps = vec![Vec::new(); FOLDS];
-        // A single step at an opening goes on where the opening before it stopped.
+        // A single step at an opening continues the order of the previous opening.
         let mut dealt_before = 0;
         for (row, opening) in openings.iter().enumerate() {
             let mut here: Vec<usize> =
@@ -53,7 +53,7 @@ impl Folds {
 mod tests {
     use super::*;
 
-    /// Six speeds at three openings in any order: each fold has every speed once and every opening twice.
+    /// Six speeds at three openings, shuffled: each fold has every speed once and every opening twice.
     #[test]
     fn every_fold_has_every_speed_and_every_opening() {
         let mut places = Vec::new();
@@ -75,7 +75,7 @@ mod tests {
         let mut all = folds.concat();
         all.sort_unstable();
         assert_eq!(all, (0..18).collect::<Vec<_>>());
-        // Each opening once: still three folds of two.
+        // One step per opening still gives three folds of two.
         let single: Vec<(f64, f64)> = (0..6).map(|i| (0.5 + 0.1 * f64::from(i), 1e5)).collect();
         assert!(Folds::dealt(&single).steps.iter().all(|fold| fold.len() == 2));
     }

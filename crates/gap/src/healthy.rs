@@ -1,9 +1,8 @@
-//! What changed since a recording of the same rig in which nothing was wrong.
+//! Changes since a reference recording of the same rig in fault-free condition.
 //!
-//! No model of a rig is right. What it lacks in structure is in every recording of that rig, and larger than most causes. A recording
-//! made while nothing was wrong tells it, block by block: its readings `m_h` less the model `f_h` with the tolerances `u_h` fitted to it. That
-//! is subtracted from the recording under diagnosis, `m - (m_h - f_h(u_h))`, whose noise becomes `C + C_h`: as it is, for
-//! smoothing it would ask for how it runs. Each recording is driven by its own inputs, so that other weather is no change.
+//! Every model of a rig has a structural error, larger than most faults and present in every recording. A reference recording measures it
+//! block by block: readings `m_h` minus the model `f_h` with its fitted tolerances `u_h`. The diagnosis uses `m - (m_h - f_h(u_h))` with
+//! noise `C + C_h`, unsmoothed because smoothing needs its time history. Each recording has its own inputs, so ambient changes do not count.
 
 use crate::actuators::Actuators;
 use crate::baseline_assumptions::{Lacking, Since};
@@ -29,30 +28,30 @@ use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// A recording of the same rig with the same steps, made while nothing was wrong.
+/// A reference recording: the same rig and steps, fault-free.
 #[derive(Debug)]
 pub struct Healthy<'a> {
-    /// Its name for people.
+    /// Display name.
     pub name: String,
-    /// What was recorded.
+    /// The recording.
     pub recording: &'a Recording,
-    /// What is declared of it.
+    /// The declared tolerances and noise of this recording.
     pub declared: Declared,
 }
 
-/// A study of what changed.
+/// A study of the changes since the reference recording.
 pub(crate) struct Changed {
     pub(crate) study: Study,
     pub(crate) since: Since,
-    /// What to know of the healthy recording.
+    /// Warnings about the reference recording.
     pub(crate) warnings: Vec<String>,
 }
 
 impl Study {
-    /// This recording as what changed since a healthy one.
+    /// Turns this study into one of the changes since a reference recording.
     ///
     /// # Errors
-    /// [`GapError`] where the healthy recording cannot be used, or has other steps.
+    /// [`GapError`] if the reference recording is unusable or has other steps.
     pub(crate) fn since(
         self,
         healthy: Healthy<'_>,
@@ -73,18 +72,18 @@ impl Study {
         let linearised = Linearised::new(&before)?;
         another_machine(&before, &linearised.base.values)?;
         let tolerances = tolerances(&before, &linearised)?;
-        let told = before.predict(&tolerances)?;
+        let predicted = before.predict(&tolerances)?;
         let lacking: Vec<f64> =
-            before.measured.iter().zip(&told.values).map(|(seen, told)| seen - told).collect();
+            before.measured.iter().zip(&predicted.values).map(|(seen, predicted)| seen - predicted).collect();
         let shares = errors_of_change(&before, &linearised, &lacking);
-        // What the healthy recording has no value for cannot be compared.
+        // Values missing in the reference recording cannot be compared.
         let partners = partners(&self, &before);
         let mut study = self.with_rows(&partners.iter().map(Option::is_some).collect::<Vec<_>>());
         let partners: Vec<usize> = partners.into_iter().flatten().collect();
         for (measured, row) in study.measured.iter_mut().zip(&partners) {
             *measured -= lacking[*row];
         }
-        // From where they were tolerances may have moved by as much as is declared: sensors are mounted again.
+        // Tolerances may have moved from their reference values by as much as declared, because sensors are remounted.
         for nuisance in &mut study.nuisances {
             let was =
                 before.nuisances.iter().zip(&tolerances.nuisances).find(|(was, _)| was.kind == nuisance.kind);
@@ -94,7 +93,7 @@ impl Study {
         }
         let unchanged = study.predict(&study.nothing())?;
         let changed: Vec<f64> =
-            study.measured.iter().zip(&unchanged.values).map(|(seen, told)| seen - told).collect();
+            study.measured.iter().zip(&unchanged.values).map(|(seen, predicted)| seen - predicted).collect();
         let elsewhere = elsewhere(&study, &changed);
         let noise = study.groups.iter().map(|group| {
             let rows = &partners[group.rows.clone()];
@@ -121,10 +120,11 @@ impl Study {
     }
 }
 
-/// Iterations of the fit of the tolerances, which are small.
+/// Iterations of the tolerance fit; tolerances are small.
 const ITERATIONS: usize = 4;
 
-/// Tolerances of a healthy rig, fitted with the noise that its misfit asks for: what no tolerance explains must not strain them.
+/// Fits the tolerances of a fault-free rig. The misfit sets the noise level, so that model error does not push tolerances outside their
+/// priors.
 fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, PredictError> {
     let everywhere = Selection::all(study);
     let products = nuisance_products(study, linearised, &everywhere);
@@ -154,7 +154,7 @@ fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, Pred
     Ok(best)
 }
 
-/// What is lacking of each channel.
+/// Model error of each channel.
 fn by_channel(study: &Study, lacking: &[f64], shares: &[f64]) -> BTreeMap<String, Lacking> {
     let of_output = |(output, channel): (usize, &Channel)| {
         let groups = study.groups.iter().filter(|group| group.output == output);
@@ -167,7 +167,7 @@ fn by_channel(study: &Study, lacking: &[f64], shares: &[f64]) -> BTreeMap<String
     OUTPUTS.iter().enumerate().filter_map(of_output).collect()
 }
 
-/// For each row of a study the row of the other at the same place.
+/// For each row of a study, the row of the other study at the same time.
 fn partners(study: &Study, other: &Study) -> Vec<Option<usize>> {
     let mut partners = vec![None; study.measured.len()];
     for group in &study.groups {

@@ -1,4 +1,4 @@
-//! How far the gap shrinks, on steps that were not used to fit.
+//! Gap reduction on held-out steps.
 
 use crate::adequacy::misfit_of_steps;
 use crate::first_step::{is_start, with_start_read};
@@ -14,32 +14,32 @@ use mapper_numerics::parallel;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// What is compared.
+/// Fits to compare.
 #[derive(Clone, Copy)]
 pub struct Compared<'a> {
     /// The recording.
     pub study: &'a Study,
-    /// Linearised where nothing is off, and beside the best cause.
+    /// Linearised at the nominal model, and at the best cause.
     pub linearised: [&'a Linearised; 2],
-    /// Tolerances alone.
+    /// Fit of tolerances alone.
     pub null: &'a Fit,
-    /// The causes among which each fold chooses again, best first; none where none is named.
+    /// Causes from which each fold selects, best first; empty if none is named.
     pub causes: &'a [&'a Fit],
-    /// Logarithm of the evidence of a fit, priors included.
+    /// Logarithm of the evidence of a fit, including priors.
     pub weight: &'a (dyn Fn(&Fit) -> f64 + Sync),
 }
 
-/// Whitened residuals and predicted values of all steps, each step by a fit that did not see it.
+/// Whitened residuals and predicted values of all steps, each from a fit to other steps.
 struct Unseen {
     residual: Vec<f64>,
     values: Vec<f64>,
 }
 
-/// Effort of a fit without some of the steps: it begins at the best of all of them.
+/// Effort of a fit without some of the steps; it starts at the best fit to all steps.
 const EFFORT: Effort = Effort { iterations: 5, enough: 0.2, most_sigmas: crate::fit::MAX_SIGMAS };
 
-/// Compares tolerances alone with the best cause, step by step, each by a fit that did not see the step: in every fold the
-/// cause is chosen among the first few, and fitted, without the steps of the fold.
+/// Compares tolerances alone with the best cause on held-out steps. Each fold selects among the first few causes and refits, without its
+/// own steps.
 pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     let Compared { study, linearised: [nominal, _], null, .. } = compared;
     let (before, after) = unseen(compared, folds);
@@ -81,11 +81,11 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     }
 }
 
-/// From so many sigmas on a tolerance is strained.
+/// Minimum deviation at which a tolerance counts as outside its prior, sigmas.
 const STRAINED_SIGMAS: f64 = 3.0;
 
-/// The tolerance of a fit that is furthest from what is declared; how the metal started and the clocks go are no properties of a
-/// rig.
+/// The tolerance of a fit furthest outside its prior. Initial metal state and clock errors are excluded, because they are not rig
+/// properties.
 fn strained(study: &Study, fit: &Fit) -> Option<Strained> {
     let own = study.nuisances.iter().zip(&fit.hypothesis.nuisances);
     let machine = own.filter(|(n, _)| !is_start(n.kind) && !matches!(n.kind, NuisanceKind::Delay(_)));
@@ -100,7 +100,7 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
     if folds.steps.len() < 2 {
         return (whole(null), whole(causes.first().unwrap_or(&null)));
     }
-    // Each fold with the null and each cause.
+    // Fits the null and each cause in every fold.
     let jobs: Vec<(usize, usize)> =
         (0..folds.steps.len()).flat_map(|fold| (0..=causes.len()).map(move |which| (fold, which))).collect();
     let fitted = parallel::map(&jobs, |(fold, which)| {
@@ -112,7 +112,7 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
             None => (nominal, null),
             Some(cause) => (beside, causes[cause]),
         };
-        // A fold that cannot be fitted keeps the fit to all steps: it claims less than it could.
+        // If a fold cannot be fitted, it keeps the fit to all steps.
         let fitted = fit(study, linearised, &whole.hypothesis, &selection, EFFORT);
         let fitted = fitted.unwrap_or_else(|_| whole.clone());
         if selection.steps[0] { fitted } else { with_start_read(study, linearised, fitted) }
@@ -135,7 +135,7 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
     (before, after)
 }
 
-/// Channels on some steps by what each predicts of them, and those that the last makes worse than the one before.
+/// Channel residuals on some steps for each prediction, and the channels that the last prediction makes worse than the one before it.
 pub fn channels_on(
     study: &Study,
     linearised: &Linearised,
@@ -150,12 +150,12 @@ pub fn channels_on(
     by_channel(study, [&nominal, &of(before), &of(after)], steps)
 }
 
-/// A channel is worse where its residual is larger by this share, and by more than chance makes of it, in standard deviations.
+/// A channel is worse if its residual grows by this ratio, and by more than this many standard deviations of chance.
 const WORSE_RATIO: f64 = 1.1;
 const WORSE_SIGMAS: f64 = 3.0;
 
-/// Root mean square of measured minus predicted block means of these steps, for each channel, in its unit, with the nominal
-/// model, with tolerances fitted, and with the cause; and the channels that the cause makes worse.
+/// Root mean square of measured minus predicted block means of these steps, per channel in its unit: nominal model, fitted tolerances, and
+/// cause. Also returns the channels that the cause makes worse.
 fn by_channel(
     study: &Study,
     [nominal, before, after]: [&Unseen; 3],
@@ -182,7 +182,7 @@ fn by_channel(
         let squares = |of: &[f64]| dot_over(&rows, of, of);
         let apart: Vec<f64> = before.residual.iter().zip(&after.residual).map(|(b, a)| b - a).collect();
         let more = squares(&after.residual) - squares(&before.residual);
-        // Of two predictions that are as good as each other the misfits differ by twice their distance, one sigma.
+        // For two equally good predictions, the misfit difference has a standard deviation of twice their distance.
         let chance = 2.0 * squares(&apart).sqrt();
         if gap.after > WORSE_RATIO * gap.before && more > WORSE_SIGMAS * chance.max(WORSE_SIGMAS) {
             worse.push(channel.symbol().to_owned());
@@ -192,9 +192,9 @@ fn by_channel(
     (channels, worse)
 }
 
-/// Efficiency and heat transfer at the end of each step: by the cause with the tolerances found beside it, by these tolerances
-/// alone, and by the nominal model, all at the same speed, pressures and metal temperatures. What does not touch the efficiency
-/// does not move it, however far it moves the operating point.
+/// Efficiency and heat transfer at the end of each step: with the cause and its tolerances, with these tolerances alone, and for the
+/// nominal model. All use the same speed, pressures and metal temperatures, so a shifted operating point does not appear as an efficiency
+/// change.
 fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
     let tolerances = Hypothesis { nuisances: after.nuisances.clone(), effects: Vec::new() };
     let nothing = study.nothing();

@@ -1,9 +1,9 @@
-//! A point in the space of everything that may be off.
+//! A hypothesis: values of all nuisances and effects.
 
-/// Effects with their values: indices into the candidates, and as many values as each has parameters.
+/// Effects with their values: indices of the candidates, and one value per parameter.
 pub type EffectValues = Vec<(usize, Vec<f64>)>;
 
-/// A point in the space of everything that may be off.
+/// A hypothesis: values of all nuisances and effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypothesis {
     /// Nuisances, in their sigmas.

@@ -1,16 +1,16 @@
-//! Sizes of effects as engineers judge them.
+//! Effect sizes as text in engineering terms.
 
 use mapper_core::with_unit;
 use mapper_physics::bearing_friction::at_150_krpm;
 use mapper_physics::effect::EffectParameter;
 
-/// Housings between which radiation is judged, K.
+/// Housing temperatures between which radiation is stated, K.
 const HOT_K: f64 = 700.0;
 const COLD_K: f64 = 350.0;
 /// Stefan and Boltzmann's constant, W/(m2 K4).
 const SIGMA: f64 = 5.670_374_419e-8;
 
-/// A value of an effect's parameter in words: "+5 %" for a factor of 1.05, "370 W at 150 krpm" for a friction.
+/// A parameter value as text: "+5 %" for a factor of 1.05, "370 W at 150 krpm" for friction.
 pub fn size(parameter: &EffectParameter, value: f64) -> String {
     match parameter.unit.as_ref() {
         "1" if parameter.neutral == 1.0 => {
@@ -32,7 +32,7 @@ fn sign(value: f64) -> &'static str {
     if value < 0.0 { "-" } else { "+" }
 }
 
-/// Three figures, without zeros at the end.
+/// Three figures, without trailing zeros.
 fn figures(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -46,7 +46,7 @@ fn figures(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// By hand: 5.67e-8 (700^4 - 350^4) = 12 763 W/m2, times 4e-3 m2 is 51 W.
+    /// Hand calculation: 5.67e-8 (700^4 - 350^4) = 12 763 W/m2, times 4e-3 m2 is 51 W.
     #[test]
     fn sizes_by_hand() {
         let parameter = |unit: &'static str, neutral: f64| EffectParameter {

@@ -1,14 +1,14 @@
-//! Whether a machine rested when a recording began, and what it starts from where it did not.
+//! Whether the machine had settled when the recording began, and its initial state otherwise.
 
 use mapper_core::Channel;
 use mapper_observe::mean::mean_reading;
 use mapper_observe::table::Table;
 use mapper_physics::model::Model;
 
-/// Metal this much heavier keeps its temperature while all else comes to rest.
+/// Factor on the metal's heat capacity that holds its temperature while everything else settles.
 const HEAVY_RATIO: f64 = 1e9;
 
-/// The model with metal that keeps its temperature.
+/// The model with its metal temperatures held.
 pub(crate) fn with_metal_held(model: &Model) -> Model {
     let mut heavy = model.clone();
     heavy.params.compressor.housing_mass_kg *= HEAVY_RATIO;
@@ -16,12 +16,12 @@ pub(crate) fn with_metal_held(model: &Model) -> Model {
     heavy
 }
 
-/// Time over which the metal is watched at the start, s, and the rate above which it does not rest, K/s: some hundred times what
-/// noise makes of it, and a tenth of what a machine does that was cold minutes ago.
+/// Time over which the initial metal temperatures are checked, s, and the rate above which they are not settled, K/s. The rate is some
+/// hundred times noise, and a tenth of that of a machine started cold minutes ago.
 const WATCH_S: f64 = 30.0;
 const RESTLESS_K_S: f64 = 0.05;
 
-/// Whether the metal's temperatures stand still when a recording's first step begins.
+/// Whether the metal temperatures are steady when the first step of a recording begins.
 pub(crate) fn rested(table: &Table, start_s: f64) -> bool {
     [Channel::Tc, Channel::Tt].into_iter().all(|channel| {
         let Some(column) = table.column(channel) else { return true };

@@ -1,8 +1,8 @@
-//! Several recordings of one rig: what persists, what came, what went, and the causes' sizes by all of them together.
+//! Joint analysis of several recordings of one rig: which causes persist, appear or disappear, and their sizes from all recordings.
 //!
-//! Offsets and tolerances are those of the rig, the same in every recording; the metal's start is each recording's own. With each
-//! recording's best (mode `x_i`, precision `P_i`, priors `D` of the nuisances included; starts integrated out) the whole is
-//! `P = sum (P_i - D) + D`, `P x = sum P_i x_i`: what the recordings share is not counted as if each had measured it anew.
+//! Offsets and tolerances belong to the rig and are the same in every recording; the metal's start is per recording. Each recording has a
+//! mode `x_i` and a precision `P_i` with nuisance priors `D`, starts integrated out. The joint solution is `P = sum (P_i - D) + D`, `P x =
+//! sum P_i x_i`, so shared information is counted once.
 
 use crate::calibration::Calibration;
 use crate::coordinate::{Coordinate, coordinates, parameters};
@@ -29,19 +29,19 @@ pub struct Value {
     pub high: f64,
 }
 
-/// What became of a cause over the recordings.
+/// Change of a cause over the recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
-    /// It is in all of them, and as large.
+    /// In all recordings, with the same size.
     Persists,
-    /// It is in all of them, and not as large in each.
+    /// In all recordings, with different sizes.
     Changes,
-    /// It is in the last and was not in the first.
+    /// In the last recording but not in the first.
     Came,
-    /// It was in the first and is not in the last.
+    /// In the first recording but not in the last.
     Went,
-    /// It is in some.
+    /// In some recordings.
     ComesAndGoes,
 }
 
@@ -50,31 +50,31 @@ pub enum Fate {
 pub struct Over {
     /// Id of the effect.
     pub effect: String,
-    /// Its name for people.
+    /// Display name.
     pub name: String,
     /// The parameter.
     pub parameter: String,
     /// Unit.
     pub unit: String,
-    /// What became of it.
+    /// Change of the cause.
     pub fate: Fate,
-    /// Each recording by itself, in order.
+    /// Value of each recording alone, in order.
     pub each: Vec<Value>,
-    /// Whether it is in each of them.
+    /// Whether each recording has the cause.
     pub present: Vec<bool>,
-    /// By all recordings that have it together.
+    /// Joint value from all recordings with the cause.
     pub together: Value,
-    /// The joint value in words.
+    /// The joint value as text.
     pub size: String,
 }
 
-/// Sigmas by which a recording is worse without a cause that is there, and standard errors between two recordings beyond which it changed.
+/// Minimum misfit increase without a present cause, sigmas; also the minimum difference of a changed size, standard errors.
 const THERE: f64 = 3.0;
-/// Causes that are followed at most.
+/// Maximum number of causes followed.
 const MAX: usize = 4;
 
-/// What several recordings of one rig say together; nothing where no cause is named in any of them, and where they were not
-/// recorded alike (other channels, so that other things may be off).
+/// Jointly analyses several recordings of one rig. Empty if no recording has a named cause, or if their channels differ and so their
+/// nuisances do too.
 pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> Vec<Over> {
     let Some(first) = diagnosed.first() else { return Vec::new() };
     let effects = named_anywhere(diagnosed);
@@ -105,7 +105,7 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
     for (k, (index, number)) in named.iter().enumerate() {
         let effect = fits[0].hypothesis.effects.iter().position(|(other, _)| other == index).unwrap_or(0);
         let present: Vec<bool> = there.iter().map(|there| there[effect]).collect();
-        // Where the cause is not there, its size is none, as surely as its curvature says.
+        // An absent cause has the neutral size, with the uncertainty given by its curvature.
         let place = |i: usize| if present[i] { places[i][k] } else { neutral[k] };
         let having: Vec<&Fit> =
             fits.iter().zip(&present).filter(|(_, there)| **there).map(|(f, _)| f).collect();
@@ -149,7 +149,7 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
     over
 }
 
-/// Effects that are named in any recording, by index in the catalogue, each with the values it has there.
+/// Effects named in any recording, by library index, each with its values there.
 fn named_anywhere(diagnosed: &[&Diagnosed]) -> EffectValues {
     let mut effects: EffectValues = Vec::new();
     for one in diagnosed {
@@ -169,8 +169,8 @@ fn named_anywhere(diagnosed: &[&Diagnosed]) -> EffectValues {
     effects
 }
 
-/// One recording fitted with all effects that are named in any, and whether it has each of them: whether the fit is worse
-/// without it by [`THERE`] sigmas.
+/// Refits one recording with all effects named in any of them. Also returns whether it has each effect: whether removing it worsens the fit
+/// by [`THERE`] sigmas.
 fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<(Fit, Vec<bool>)> {
     let study = &diagnosed.study;
     let everywhere = Selection::all(study);
@@ -202,7 +202,7 @@ fn neutral_coordinates(study: &Study, hypothesis: &Hypothesis, at: &[Coordinate]
     parameters.zip(at).map(|(parameter, coordinate)| coordinate.of(parameter.neutral)).collect()
 }
 
-/// Coordinate of one parameter by several recordings together, and its standard error.
+/// Joint coordinate of one parameter over several recordings, and its standard error.
 fn together(study: &Study, fits: Vec<&Fit>, at: &[Coordinate], wanted: usize) -> Option<(f64, f64)> {
     let starts: Vec<usize> =
         study.nuisances.iter().enumerate().filter(|(_, n)| is_start(n.kind)).map(|(i, _)| i).collect();

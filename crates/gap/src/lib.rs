@@ -1,5 +1,5 @@
-//! Diagnosis of the gap between the model and a rig: where it lies, which effect causes it, how far it shrinks, what to
-//! do next. `docs/gap.md` says how, and when not to believe it.
+//! Diagnosis of the gap between the model and a rig: its location, its cause, the gap reduction and the next step. See `docs/gap.md` for
+//! the method and its limits.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,12 +1,11 @@
-//! Whether a recording is of another machine than the nominal one, by what it reads.
+//! Checks whether a recording belongs to a machine other than the nominal one.
 
 use crate::nuisance::OUTPUTS;
 use crate::problem::Problem;
 use crate::study::Study;
 use mapper_core::Channel;
 
-/// Deviations of a step's end from the nominal machine that no effect of a rig makes: of speed, flows, and the rise of
-/// pressure and temperature through the compressor.
+/// Deviations at the end of a step that no rig effect causes: of speed, flows, and the compressor's pressure and temperature rise.
 const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
     (Channel::ShaftSpeed, 0.25),
     (Channel::CompressorFlow, 0.4),
@@ -15,7 +14,7 @@ const ANOTHER_MACHINE_RATIO: [(Channel, f64); 5] = [
     (Channel::T2, 0.6),
 ];
 
-/// Refuses a recording that is nowhere near the nominal machine, by its prediction without any deviation.
+/// Rejects a recording that is far from the nominal prediction.
 ///
 /// # Errors
 /// [`Problem::OtherMachine`].
@@ -23,7 +22,7 @@ pub fn another_machine(study: &Study, predicted: &[f64]) -> Result<(), Problem> 
     let mut worst: Option<(f64, Channel, f64)> = None;
     for (channel, limit) in ANOTHER_MACHINE_RATIO {
         let nominal = &study.declared.nominal;
-        // Rises are compared, not levels.
+        // Compare rises, not levels.
         let zero = match channel {
             Channel::P2 => nominal.p1_pa,
             Channel::T2 => nominal.t1_k,

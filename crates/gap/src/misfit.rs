@@ -1,10 +1,10 @@
-//! What of a difference a fit cannot take up.
+//! Misfit that a fit cannot absorb.
 
 use crate::whiten::dot;
 use nalgebra::{DMatrix, DVector};
 
-/// The square of `difference` (whitened) that is left when `columns` are fitted to it; `precision`: what is known of their
-/// coefficients beforehand. `None` where the equations are singular.
+/// Squared residual of `difference` (whitened) after fitting `columns`; `precision` is the prior precision of their coefficients. `None` if
+/// the equations are singular.
 pub(crate) fn misfit(difference: &[f64], columns: &[Vec<f64>], precision: &DMatrix<f64>) -> Option<f64> {
     let n = columns.len();
     let mut matrix = precision.clone();

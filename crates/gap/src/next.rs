@@ -1,4 +1,4 @@
-//! What to do next: what a stand can do to tell the remaining candidates apart, or the sensor that would.
+//! Next step: the experiments that best distinguish the remaining candidates, or the sensor that would.
 
 use crate::experiment::{AllowedJump, Beside, Experiment};
 use crate::fit::Fit;
@@ -11,48 +11,47 @@ use mapper_core::{Channel, OperatingPoint};
 use mapper_numerics::parallel;
 use mapper_physics::effect::Submodel;
 
-/// Share of the first among the causes that are open from which on it is settled.
+/// Share of the open probability above which the first cause is settled.
 pub const SETTLED: f64 = 0.95;
-/// What answers less than this of what is open is not worth its minutes.
+/// Experiments expected to resolve less than this share of the open question are dropped.
 const MIN_ANSWER: f64 = 0.1;
-/// Jumps that are looked at closely, and experiments of each other kind.
+/// Number of jumps, and of experiments of each other kind, that are evaluated with refits.
 const CLOSE_LOOKS: usize = 6;
 const CLOSE_LOOKS_BESIDE: usize = 2;
-/// Experiments that are told, and of one kind.
+/// Maximum number of experiments shown, and of one kind.
 const SHOWN: usize = 5;
 const SHOWN_OF_KIND: usize = 2;
-/// Candidates that are told apart.
+/// Maximum number of candidates to distinguish.
 const RIVALS: usize = 4;
-/// Every experiment is judged by the same draws.
+/// All experiments are compared with the same random draws.
 const SEED: u64 = 1;
-/// Time at the start of a step in a script, s: housings settle in minutes.
+/// Time at the start of a step in a script, s: housings settle within minutes.
 const START_S: u32 = 300;
 
-/// The candidates that are still open, best first, and their probabilities.
+/// Open candidates, best first, with their probabilities.
 pub struct Rivals<'a> {
     /// At least two fits; the first is the best.
     pub fits: Vec<&'a Fit>,
-    /// As many probabilities.
+    /// One probability per fit.
     pub probabilities: Vec<f64>,
 }
 
-/// What to do next, and what else could be done.
+/// Suggested next step and the alternatives.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Suggested {
-    /// The first of `experiments`, or a sensor that the model knows nothing of; `None` where nothing is known to help.
+    /// The first of `experiments`, or a sensor that the model does not include; `None` if no experiment helps.
     pub next: Option<Next>,
-    /// What the stand can do, best first.
+    /// Possible experiments, best first.
     pub experiments: Vec<Suggestion>,
 }
 
-/// What tells the rivals apart best for each minute.
+/// Ranks experiments by how well they distinguish the rivals per minute.
 ///
-/// All `allowed` experiments are looked at with the candidates as they stand, by `U = sum over k, j of p_k p_j d_kj^2 / minutes`, with
-/// `d_kj^2` by how much the experiment would raise the misfit of `j`, fitted again, were `k` true. The most promising of each kind are
-/// looked at with each rival fitted again, and ranked by how much of the open question they are expected to answer for each minute
-/// ([`odds`]). Without allowed jumps those of the recording are taken, to be repeated; channels of the model that were not recorded are
-/// tried beside the most promising jump. Where nothing answers enough, the sensor beside the part in which the first candidate sits is named.
-/// `temperature` is that of the diagnosis.
+/// A first pass scores every `allowed` experiment with the fitted candidates: `U = sum over k, j of p_k p_j d_kj^2 / minutes`. Here
+/// `d_kj^2` is the misfit increase of a refitted `j` if `k` were true. The most promising of each kind are evaluated with every rival
+/// refitted, and ranked by the expected share of the open question resolved per minute ([`odds`]). Without allowed jumps, repeats of the
+/// recorded jumps are used. Unrecorded model channels are tried with the most promising jump. If no experiment resolves enough, the
+/// function names a sensor for the first candidate's part. `temperature` is the diagnosis'.
 pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], temperature: f64) -> Suggested {
     rivals.fits.truncate(RIVALS);
     rivals.probabilities.truncate(RIVALS);
@@ -90,7 +89,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
         Some((*experiment, odds, rate(experiment, &apart)))
     });
     let mut looked: Vec<(Experiment, Odds, f64)> = looked.into_iter().flatten().collect();
-    // What answers all of it answers no more by being plainer; then the plainest.
+    // Share resolved per minute; if several experiments resolve everything, the simplest comes first.
     let of_minute =
         |(experiment, odds, _): &(Experiment, Odds, f64)| odds.entropy_drop_bit / experiment.minutes();
     looked.sort_by(|a, b| of_minute(b).total_cmp(&of_minute(a)).then(b.2.total_cmp(&a.2)));
@@ -147,7 +146,7 @@ fn suggestion(kind: Kind, experiment: &Experiment, odds: &Odds, open_bit: f64) -
     }
 }
 
-/// The lines of a sequence that run a step, or that of a campaign which begins with a soak.
+/// Sequence lines that run a step, or campaign lines that begin with a soak.
 fn script(experiment: &Experiment) -> Vec<String> {
     let place = |point: OperatingPoint| {
         format!("point(\"{} krpm\", {})", round(point.speed_rpm / 1e3), round(point.valve_opening_ratio))
@@ -165,13 +164,12 @@ fn script(experiment: &Experiment) -> Vec<String> {
     start.into_iter().chain(change).chain(go).collect()
 }
 
-/// To three places after the point, without the rest of a sum.
+/// Rounds to three decimals and removes floating-point residue.
 fn round(value: f64) -> f64 {
     (1e3 * value).round() / 1e3
 }
 
-/// The step that is left where the catalogue does not explain the gap: the sensor that would look into the part where most of it
-/// lies, or where no part is known, a suspicion.
+/// Suggestion for a gap outside the effect library: a suspected effect, or a sensor for the part with most of the gap.
 pub fn look_beside(places: &[Place]) -> Next {
     let place = places.first();
     let part = place.and_then(|place| Submodel::ALL.into_iter().find(|part| part.name() == place.submodel));
@@ -201,7 +199,7 @@ fn gain(probabilities: &[f64], apart: &[Vec<f64>]) -> f64 {
     probabilities.iter().zip(apart).map(row).sum()
 }
 
-/// A sensor that would look into a part directly.
+/// A sensor that measures a part directly.
 fn sensor_for(part: Submodel) -> &'static str {
     match part {
         Submodel::Actuator | Submodel::TurbineFlow => "a second, fast pressure sensor at the turbine inlet",

@@ -1,4 +1,4 @@
-//! The normal equations of nuisances and effects.
+//! Normal equations of nuisances and effects.
 
 use crate::selection::{Selection, dot_over};
 use crate::study::Study;
@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Prior width of an effect's parameter, in typical steps.
 pub const PRIOR_STEPS: f64 = 10.0;
 
-/// Products of the nuisances' columns over the steps that count.
+/// Products of the nuisance columns over the selected steps.
 pub(crate) fn nuisance_products(
     study: &Study,
     linearised: &Linearised,
@@ -20,7 +20,7 @@ pub(crate) fn nuisance_products(
     counted.fold(DMatrix::zeros(n, n), |sum, (products, _)| sum + products)
 }
 
-/// Precision of nuisances, priors of one sigma included, and of columns beside them.
+/// Precision of the nuisances, including their unit priors, and of additional columns.
 pub(crate) fn normal_matrix(
     rows: &[Range<usize>],
     linearised: &Linearised,
@@ -44,7 +44,7 @@ pub(crate) fn normal_matrix(
             matrix[(n + l, n + j)] = product;
             matrix[(n + j, n + l)] = product;
         }
-        // Next to nothing: keeps the equations solvable where a parameter does nothing.
+        // Tiny regularisation that keeps the equations solvable if a parameter has no influence.
         matrix[(n + j, n + j)] += 1e-6;
     }
     matrix

@@ -1,5 +1,5 @@
-//! What may be off without being an effect: declared offsets and tolerances, the start, clocks. Each is fitted again,
-//! with its declared size as prior, in every hypothesis.
+//! Nuisance parameters: declared offsets and tolerances, the initial state, clocks. Every hypothesis refits each of them, with its declared
+//! size as the prior.
 
 use crate::shape::{SHAPE_SUM, SHAPES};
 use mapper_core::{Channel, Dimension};
@@ -8,33 +8,33 @@ use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::effect::Rig;
 
-/// What the model predicts and a sensor reads, in the order of the residuals.
+/// Outputs of the model that sensors measure, in the order of the residuals.
 pub const OUTPUTS: [Channel; 9] = {
     let [n, p2, m_c, m_t, t2, tc, tt, t4] = channels::OUTPUTS;
     [n, m_c, p2, t2, tc, m_t, t4, tt, Channel::P3]
 };
 
-/// One thing that may be off.
+/// Kind of nuisance parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NuisanceKind {
     /// Fixed offset of a sensor.
     Offset(Channel),
-    /// Offset that all sensors of a dimension have in common which were compared at rest.
+    /// Common offset of all sensors of one dimension that were compared at rest.
     CommonOffset(Dimension),
     /// Gain of the compressor's flow meter.
     FlowMeterGain,
-    /// One quantity of machine, cell or start.
+    /// One quantity of machine, cell or initial state.
     Perturbation(Perturbation),
-    /// Drop of the gas temperature through the turbine against the power at the shaft.
+    /// Gas temperature drop through the turbine relative to the shaft power.
     TurbineDrop,
-    /// One smooth deviation of the efficiency map.
+    /// A smooth deviation of the efficiency map.
     Shape(usize),
-    /// Clock of one output, by its place in [`OUTPUTS`].
+    /// Clock error of one output, by its index in [`OUTPUTS`].
     Delay(usize),
 }
 
 impl std::fmt::Display for NuisanceKind {
-    /// As it stands in files and is told to people.
+    /// Name in files and messages.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             NuisanceKind::Offset(channel) => write!(f, "offset of {channel}"),
@@ -58,32 +58,30 @@ impl std::fmt::Display for NuisanceKind {
     }
 }
 
-/// One thing that may be off, and by how much.
+/// A nuisance parameter with its prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nuisance {
-    /// What.
+    /// Kind.
     pub kind: NuisanceKind,
-    /// Where it is if nothing is known of this recording, in the unit of what it changes: 0 for the nominal rig, what an earlier
-    /// recording says of this one otherwise.
+    /// Prior mean, in the unit of what it changes: 0 for the nominal rig, or the value from an earlier recording of this rig.
     pub centre: f64,
     /// One sigma, in the unit of what it changes.
     pub sigma: f64,
 }
 
 impl Nuisance {
-    /// What stands in the rig, so many sigmas from the centre.
+    /// Physical value at so many sigmas from the centre.
     pub fn value(&self, sigmas: f64) -> f64 {
         self.centre + sigmas * self.sigma
     }
 }
 
-/// The gas behind a turbine swirls and is not mixed, and what the shaft gets is less than what the gas gives by what
-/// bearings take: T4 tells the turbine's work within this, and no more.
+/// Uncertainty of the turbine drop. Swirling, unmixed gas behind the turbine and bearing losses limit how well T4 gives the turbine's work.
 const TURBINE_DROP_RATIO: f64 = 0.03;
 /// Clocks of one rig agree within a fraction of a sample, s.
 const DELAY_SIGMA_S: f64 = 0.02;
 
-/// All nuisances of a rig; those with nothing declared are left out.
+/// All nuisances of a rig; undeclared ones are omitted.
 pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     use NuisanceKind as K;
     let t = &declared.tolerances;
@@ -116,20 +114,20 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
         .collect()
 }
 
-/// What is not part of a rig but of how it is driven.
+/// Operating circumstances that are not part of the rig.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Circumstances {
-    /// What is added to the ambient temperature and to the start, in the unit of each.
+    /// Perturbations of the ambient temperature and the start, each in its unit.
     pub knobs: Vec<(Perturbation, f64)>,
-    /// Drop of temperature through the turbine larger by, ratio.
+    /// Relative increase of the temperature drop through the turbine.
     pub t4_drop_ratio: f64,
     /// Coefficients of the efficiency map's shape.
     pub shape: [f64; SHAPES],
-    /// Clocks late by, s.
+    /// Clock delay of each output, s.
     pub delay_s: [f64; OUTPUTS.len()],
 }
 
-/// Puts one nuisance of size `value` (in the unit of what it changes) into a rig.
+/// Applies one nuisance of size `value` (in the unit of what it changes) to a rig.
 pub fn apply(
     declared: &Declared,
     kind: NuisanceKind,
@@ -147,7 +145,7 @@ pub fn apply(
         }
         K::Offset(channel) => rig.instruments.path_mut(channel).offset += value,
         K::FlowMeterGain => rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *= 1.0 + value,
-        // The cell's temperature is read too high by it, so that the model is driven with less.
+        // The cell sensor reads too high by this amount, so the model is driven with less.
         K::Perturbation(Perturbation::Ambient) => circumstances.knobs.push((Perturbation::Ambient, -value)),
         K::Perturbation(knob @ (Perturbation::StartTc | Perturbation::StartTt)) => {
             circumstances.knobs.push((knob, value))

@@ -1,37 +1,37 @@
-//! What an experiment is expected to leave of an open question, from how far apart it shows the causes.
+//! Expected outcome of an experiment, given how strongly it separates the causes.
 //!
-//! Under the linear model the logarithm of the odds of the true cause `k` over `j` grows by a normal quantity of mean `d^2/2`
-//! and variance `d^2`. The causes are points whose mutual distances are the `d`, a reading is the true one's point with unit
-//! noise, and Bayes' rule does the rest: seeded draws of it, no run of the model.
+//! In the linear model, the log odds of the true cause `k` over `j` grow by a normal quantity of mean `d^2/2` and variance `d^2`. The
+//! causes are points with mutual distances `d`; a reading is the true cause's point with unit noise. Bayes' rule on seeded draws of such
+//! readings gives the result, without running the model.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-/// What is expected of an experiment.
+/// Expected outcome of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Odds {
-    /// Probability that the true cause then has at least the share asked for of what the open ones have.
+    /// Probability that the true cause reaches the requested share of the open causes' probability.
     pub settles: f64,
-    /// Mean share of the true cause then.
+    /// Expected share of the true cause afterwards.
     pub share: f64,
-    /// By how much the entropy of the open causes is expected to drop, bit, >= 0.
+    /// Expected reduction of the entropy of the open causes, bit, >= 0.
     pub entropy_drop_bit: f64,
 }
 
-/// Draws of one forecast: the error of a probability of one half is 0.8 %.
+/// Number of draws per forecast: the standard error of a probability of one half is 0.8 %.
 const DRAWS: usize = 4000;
 
-/// The forecast for causes of `probabilities` (any sum above 0) that are `apart` in squared sigmas (row: true, column: rival; of the two
-/// directions of a pair the smaller one counts). `temperature` divides the logarithm of evidence, as in the diagnosis; `settled` is the share asked for.
+/// Forecast for causes of `probabilities` (any sum above 0), `apart` in squared sigmas (row: true, column: rival; the smaller direction of
+/// a pair counts). `temperature` divides log evidence, as in the diagnosis; `settled` is the requested share.
 pub fn odds(probabilities: &[f64], apart: &[Vec<f64>], temperature: f64, settled: f64, seed: u64) -> Odds {
     let total: f64 = probabilities.iter().sum();
     let p: Vec<f64> = probabilities.iter().map(|p| p / total.max(f64::MIN_POSITIVE)).collect();
     let places = places(apart);
     let mut random = Pcg64::seed_from_u64(seed);
     let (mut settles, mut share, mut left_bit) = (0.0, 0.0, 0.0);
-    // As many draws for each cause, weighted: no probability is too small for its share.
+    // Equal numbers of draws per cause, weighted, so that small probabilities are sampled too.
     let draws = (DRAWS / p.len().max(1)).max(1);
     for (truth, of_truth) in p.iter().enumerate() {
         let weight = of_truth / draws as f64;
@@ -47,12 +47,12 @@ pub fn odds(probabilities: &[f64], apart: &[Vec<f64>], temperature: f64, settled
             left_bit += weight * entropy_bit(&after);
         }
     }
-    // Sums of weights end a rounding beyond 1.
+    // Rounding may push the sums slightly above 1.
     let (settles, share) = (settles.min(1.0), share.min(1.0));
     Odds { settles, share, entropy_drop_bit: (entropy_bit(&p) - left_bit).max(0.0) }
 }
 
-/// Probabilities after a reading.
+/// Posterior probabilities after a reading.
 fn after(p: &[f64], places: &[Vec<f64>], reading: &[f64], temperature: f64) -> Vec<f64> {
     let d2 = |place: &Vec<f64>| place.iter().zip(reading).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
     let d2: Vec<f64> = places.iter().map(d2).collect();
@@ -70,11 +70,11 @@ pub fn entropy_bit(probabilities: &[f64]) -> f64 {
     -shares.filter(|p| *p > 0.0).map(|p| p * p.log2()).sum::<f64>()
 }
 
-/// Points with the given mutual squared distances (Torgerson 1952); distances that no points have lose what is beyond.
+/// Points with the given squared distances (Torgerson 1952); the non-Euclidean part of the distances is dropped.
 fn places(apart: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let n = apart.len();
     let d2 = DMatrix::from_fn(n, n, |i, j| if i == j { 0.0 } else { apart[i][j].min(apart[j][i]) });
-    // Products of the points as seen from the first.
+    // Scalar products of the points relative to the first.
     let products = DMatrix::from_fn(n, n, |i, j| 0.5 * (d2[(0, i)] + d2[(0, j)] - d2[(i, j)]));
     let eigen = SymmetricEigen::new(products);
     (0..n)
@@ -92,7 +92,7 @@ mod tests {
         (0..n).map(|k| (0..n).map(|j| if k == j { 0.0 } else { d2 }).collect()).collect()
     }
 
-    /// Of the normal distribution, by Simpson's rule over its density.
+    /// Normal distribution function, by Simpson's rule.
     fn below(x: f64) -> f64 {
         let (a, n) = (-9.0, 2000);
         let h = (x.clamp(-9.0, 9.0) - a) / f64::from(n);
@@ -105,17 +105,17 @@ mod tests {
     fn what_shows_nothing_settles_nothing_and_what_shows_all_settles_all() {
         let p = [0.6, 0.3, 0.1];
         let nothing = odds(&p, &even(3, 0.0), 1.0, SETTLED, 1);
-        // Without news the true one keeps its own probability: sum of p^2.
+        // Without information the true cause keeps its own probability: sum of p^2.
         assert!((nothing.share - 0.46).abs() < 1e-12 && nothing.settles == 0.0);
         assert!(nothing.entropy_drop_bit < 1e-12);
         let all = odds(&p, &even(3, 200.0), 1.0, SETTLED, 1);
         assert!(all.settles > 1.0 - 1e-9 && (all.entropy_drop_bit - entropy_bit(&p)).abs() < 1e-6);
-        // In bits a part of a question can be answered.
+        // Measured in bits, a question can be resolved partially.
         let some = odds(&p, &even(3, 4.0), 1.0, SETTLED, 1);
         assert!(some.settles > 0.0 && some.settles < all.settles && some.share > 0.46);
     }
 
-    /// Two causes: `P = sum p_k Phi((d^2/2 + logit p_k - logit 0.95) / d)`, and the mean of the odds' logarithm by Simpson.
+    /// Two causes: `P = sum p_k Phi((d^2/2 + logit p_k - logit 0.95) / d)`, and the mean log odds by Simpson's rule.
     #[test]
     fn draws_agree_with_the_closed_form_of_two_causes() {
         let logit = |p: f64| (p / (1.0 - p)).ln();
@@ -127,7 +127,7 @@ mod tests {
             // Four standard errors of 4000 draws.
             let room = 4.0 * (settles * (1.0 - settles) / 4000.0).sqrt() + 1e-3;
             assert!((drawn.settles - settles).abs() < room, "{p} {d2}: {} {settles}", drawn.settles);
-            // Entropy left, integrated over the logarithm of the odds.
+            // Remaining entropy, integrated over the log odds.
             let left: f64 = [p, 1.0 - p]
                 .iter()
                 .map(|p| {
@@ -147,13 +147,13 @@ mod tests {
         }
     }
 
-    /// Of three causes an experiment may tell one from the other two, and these not at all.
+    /// The experiment separates one of three causes from the other two, but not these two from each other.
     #[test]
     fn a_pair_that_looks_alike_stays_open() {
         let apart = vec![vec![0.0, 0.0, 400.0], vec![0.0, 0.0, 400.0], vec![400.0, 400.0, 0.0]];
         let odds = odds(&[0.4, 0.4, 0.2], &apart, 1.0, SETTLED, 3);
         assert!((odds.settles - 0.2).abs() < 1e-9, "{odds:?}");
-        // What is left is one bit in four of five cases.
+        // One bit remains in four of five cases.
         assert!((odds.entropy_drop_bit - (entropy_bit(&[0.4, 0.4, 0.2]) - 0.8)).abs() < 1e-6);
     }
 }

@@ -1,5 +1,4 @@
-//! What an experiment that was not made would show: the candidates' predictions of it, and how far apart they are once each
-//! is fitted again.
+//! Predicted outcome of an experiment that was not run: the candidates' predictions, and their separation after refitting each.
 
 use crate::actuators::Actuators;
 use crate::at_rest::apart_at_rest;
@@ -21,18 +20,18 @@ use mapper_physics::steady::hold_speed;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Time at the start of a jump that is looked at as well, s.
+/// Time at the start point before a jump that is also simulated, s.
 const HOLD_S: f64 = 30.0;
-/// Samples of a first look, and of a close one, s apart.
+/// Sample intervals of the first pass and of the detailed pass, s.
 const COARSE_S: f64 = 0.5;
 const FINE_S: f64 = 0.1;
-/// Maximum number of samples of a jump; a dwell that is longer is looked at up to there.
+/// Maximum time at the target that is simulated, s; longer dwells are cut.
 const MAX_S: f64 = 600.0;
 
-/// What imagined steps have in common with a recording.
+/// Properties that simulated steps share with a recording.
 #[derive(Debug, Clone)]
 pub struct Alike {
-    /// What is declared.
+    /// Declared tolerances and noise.
     pub declared: Declared,
     /// The nominal machine.
     pub model: Model,
@@ -40,12 +39,12 @@ pub struct Alike {
     pub effects: Vec<Arc<dyn Effect>>,
     /// Channels that would be measured.
     pub channels: Vec<Channel>,
-    /// How the actuators follow.
+    /// Response of the actuators.
     pub actuators: Actuators,
 }
 
-/// Steps made ready like a recording, with nothing in it but the inputs: `rest` is where they begin, `driven` an input that
-/// does not stay what the campaign has, at the times given.
+/// Simulated steps prepared like a recording that contains only inputs. `rest` is the initial state; `driven` is an input that departs from
+/// the campaign's value, at the given times.
 pub(crate) fn imagined_steps(
     like: Alike,
     steps: Vec<StepMarker>,
@@ -55,7 +54,7 @@ pub(crate) fn imagined_steps(
 ) -> Option<Study> {
     let end_s = steps.last()?.end_s;
     let t_s: Vec<f64> = (0..(end_s / interval_s) as usize).map(|i| interval_s * i as f64).collect();
-    // The rest at the start, as a first guess; the inputs are those of the campaign.
+    // Initial guess of the start; the inputs are the campaign's.
     let boundary =
         BoundaryConditions { valve_opening_ratio: rest.valve_opening_ratio, ..like.declared.nominal };
     let held = hold_speed(&like.model, rest.speed_rpm, &boundary).ok()?.state;
@@ -69,7 +68,7 @@ pub(crate) fn imagined_steps(
     };
     let series =
         |channel: Channel| (channel, Series { t_s: t_s.clone(), values: vec![level(channel); t_s.len()] });
-    // What drives the model comes from the campaign but for what is changed; what the rig measured would be measured again.
+    // Inputs come from the campaign except for the changed one; the channels the rig measured are measured again.
     let measured =
         OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && like.channels.contains(channel));
     let recording = Recording {
@@ -81,7 +80,7 @@ pub(crate) fn imagined_steps(
     Some(Study::with_actuators(&recording, table, like.declared, like.model, like.effects, like.actuators))
 }
 
-/// An experiment made ready like a recording, of rest at its start and its dwell. What began in the recording is there.
+/// A simulated experiment prepared like a recording, with the settled start and its dwell. Effects that began in the recording are active.
 fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Option<Study> {
     let jump = &experiment.jump;
     let dwell_s = jump.dwell_s.clamp(10.0, MAX_S);
@@ -114,7 +113,7 @@ fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Optio
     Some(study)
 }
 
-/// A fit's hypothesis at a new start, of which its own start says nothing.
+/// A fit's hypothesis with a new, unknown start.
 fn refound(study: &Study, fit: &Fit) -> Hypothesis {
     let mut hypothesis = fit.hypothesis.clone();
     for (nuisance, sigmas) in study.nuisances.iter().zip(&mut hypothesis.nuisances) {
@@ -125,9 +124,9 @@ fn refound(study: &Study, fit: &Fit) -> Hypothesis {
     hypothesis
 }
 
-/// How far apart two candidates' predictions of an experiment are, in squared sigmas of the noise alone: a first look.
+/// First-pass separation of two candidates' predictions of an experiment, in squared sigmas of the noise alone.
 ///
-/// `None` where the model cannot make the step.
+/// `None` if the model cannot run the step.
 pub fn apart_at_first_sight(
     recorded: &Study,
     experiment: &Experiment,
@@ -151,11 +150,10 @@ pub fn apart_at_first_sight(
     Some(predictions.iter().map(|a| predictions.iter().map(|b| distance(a, b)).collect()).collect())
 }
 
-/// The same with each rival fitted again to what the experiment would show: row `k`, column `j` is by how much it would
-/// raise the misfit of `j` if `k` is true, in squared sigmas.
+/// Separation after refitting each rival to the experiment: entry `k`, `j` is the misfit increase of `j` if `k` is true, squared sigmas.
 ///
-/// With `D` the difference of the predictions, `J` the derivatives of `j`'s prediction by its nuisances and parameters
-/// and `L` the precision in which the recording leaves them: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
+/// `D` is the difference of the predictions and `J` the derivatives of `j`'s prediction with respect to its nuisances and parameters. `L`
+/// is their precision from the recording. Result: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
 pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
     if let Beside::Soak(soak) = experiment.beside {
         return apart_at_rest(recorded, &soak, fits);
@@ -185,7 +183,7 @@ pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option
     Some(rows)
 }
 
-/// What the recording leaves open, but that a new start is as unknown as the first one was.
+/// Precision of a fit from the recording; the new start is as uncertain as the first one was.
 fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
     let mut precision = fit.precision.clone();
     for (index, nuisance) in study.nuisances.iter().enumerate() {
@@ -198,7 +196,7 @@ fn precision(study: &Study, fit: &Fit) -> DMatrix<f64> {
     precision
 }
 
-/// The jumps that were recorded, for where nothing else is known to be allowed.
+/// The recorded jumps, used if no others are declared as allowed.
 pub fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<AllowedJump> {
     let pairs = study.steps.windows(2).zip(points.windows(2));
     pairs
@@ -212,7 +210,7 @@ pub fn recorded_jumps(study: &Study, points: &[OperatingPoint]) -> Vec<AllowedJu
         .collect()
 }
 
-/// The points at which a recording's steps ended, by a hypothesis.
+/// Operating points at the end of the recorded steps, for a hypothesis.
 pub fn recorded_points(study: &Study, hypothesis: &Hypothesis) -> Vec<OperatingPoint> {
     let points = study.points(hypothesis).unwrap_or_default();
     let steps = study.steps.iter().zip(points);

@@ -1,9 +1,8 @@
-//! Where the gap lies: what explains it, and in which parts of the machine that sits.
+//! Locates the gap in parts of the machine.
 //!
-//! Each explanation (a fitted cause, a law, a force missing in one balance) has a score and its parts. A part's share of an
-//! explanation is by how much it reduces the misfit beside the others; a part's share of the gap is the mean of these over
-//! the explanations, weighted with their probability. So shares add up to 1, and what is in order has none: whatever a
-//! healthy sensor would have to read to account for the gap, something else accounts for it better.
+//! Each explanation (a fitted cause, a law, a source term in one balance) has a score and parts. A part's share of an explanation is its
+//! additional misfit reduction given the other parts. Its share of the gap is the probability-weighted mean over the explanations, so
+//! shares add up to 1. A fault-free part has no share, because another part explains the gap better than any reading of its sensors would.
 
 use crate::fit::Fit;
 use crate::nuisance::OUTPUTS;
@@ -12,16 +11,16 @@ use crate::study::{PointState, Study, members};
 use crate::whiten::Linearised;
 use mapper_physics::effect::Submodel;
 
-/// A part with less of the gap is not a place.
+/// Minimum share of the gap for a part to be listed.
 const MIN_SHARE: f64 = 0.01;
 
-/// A straight line is off by this part of what it gains: explanations nearer to each other than that stay open.
+/// Linearisation error as a share of the gain: explanations closer than this remain open.
 pub const BEND: f64 = 0.01;
 
-/// What one more effect costs in the logarithm of the evidence, roughly.
+/// Approximate cost of one more effect in log evidence.
 pub const RARITY: f64 = 5.0;
 
-/// Phases of a step: name and first second after the jump.
+/// Phases of a step: name and start after the jump, s.
 const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 30.0)];
 
 /// A fit with its reduction of the misfit of all steps.
@@ -29,29 +28,29 @@ const PHASES: [(&str, f64); 3] = [("0-5 s", 0.0), ("5-30 s", 5.0), ("30-110 s", 
 pub struct Gain<'a> {
     /// The fit.
     pub fit: &'a Fit,
-    /// Cost of the null minus its own; of a fit to some steps, in proportion.
+    /// Null cost minus its own cost; scaled up proportionally for a fit to some of the steps.
     pub gain: f64,
 }
 
-/// What a part of the machine does in an explanation.
+/// Contribution of a machine part to an explanation.
 pub struct Part<'a> {
     /// The part.
     pub submodel: Submodel,
-    /// By how much it reduces the misfit beside the others, squared sigmas.
+    /// Its additional misfit reduction given the other parts, squared sigmas.
     pub gain: f64,
-    /// What it changes in the recording, in the channels' units.
+    /// Its change of the recording, in the channels' units.
     pub signature: Box<dyn Fn() -> Option<Vec<f64>> + 'a>,
 }
 
-/// Something that accounts for the gap, in one part of the machine or several.
+/// An explanation of the gap, in one or several parts of the machine.
 pub struct Explanation<'a> {
-    /// Logarithm of the evidence, over that of nothing.
+    /// Log evidence relative to no cause.
     pub score: f64,
     /// Its parts.
     pub parts: Vec<Part<'a>>,
 }
 
-/// The fits as explanations. `fits` are single effects and more, best first.
+/// Converts fits to explanations. `fits` are effects and combinations, best first.
 pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>]) -> Vec<Explanation<'a>> {
     let explanation = |candidate: &'a Gain<'_>| {
         let all = members(&candidate.fit.hypothesis);
@@ -65,13 +64,13 @@ pub fn of_fits<'a>(study: &'a Study, fits: &'a [Gain<'_>]) -> Vec<Explanation<'a
                 signature: Box::new(move || signature(study, candidate.fit, effect)),
             }
         });
-        // Scores of fits to some steps and to all are not alike, gains are.
+        // Scores of fits to some steps and to all steps are not comparable; gains are.
         Explanation { score: 0.5 * candidate.gain - RARITY * all.len() as f64, parts: parts.collect() }
     };
     fits.iter().map(explanation).collect()
 }
 
-/// What one effect of a fit changes.
+/// Change of the recording due to one effect of a fit.
 pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
     let mut without = fit.hypothesis.clone();
     without.effects.retain(|(index, _)| *index != effect);
@@ -79,8 +78,7 @@ pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
     Some(fit.prediction.values.iter().zip(&there.values).map(|(with, without)| with - without).collect())
 }
 
-/// Places of the gap, largest first. `fits` are single effects and pairs, best first; where `named` is set, the first of
-/// them is the cause.
+/// Locations of the gap, largest first. `fits` are single effects and pairs, best first; if `named` is set, the first is the cause.
 pub fn places(
     study: &Study,
     linearised: &Linearised,
@@ -89,14 +87,14 @@ pub fn places(
     named: bool,
 ) -> Vec<Place> {
     let considered = if named { &fits[..fits.len().min(1)] } else { fits };
-    // The fits beside it tell what each of its members does.
+    // The other fits give each member's contribution.
     let mut explanations = of_fits(study, fits);
     explanations.truncate(considered.len());
     places_of(study, linearised, null, &explanations, if named { 0.0 } else { BEND })
 }
 
-/// Places of the gap by what explains it, largest first. Explanations nearer to each other than `bend` of what the best gains
-/// stay open; 0 where the best leaves nothing.
+/// Locations of the gap from its explanations, largest first. Explanations within the share `bend` of the best gain remain open; `bend` is
+/// 0 if the best leaves only noise.
 pub fn places_of(
     study: &Study,
     linearised: &Linearised,
@@ -110,7 +108,7 @@ pub fn places_of(
     let temperature = 1.0 + bend * 0.5 * most;
     let weights: Vec<f64> = explanations.iter().map(|e| ((e.score - best) / temperature).exp()).collect();
     let total: f64 = weights.iter().sum();
-    // Share, and the explanation in which the part has most.
+    // Share, and the explanation in which the part contributes most.
     let mut parts: Vec<(Submodel, f64, f64, &Part<'_>)> = Vec::new();
     let mut whole = 0.0;
     for (explanation, weight) in explanations.iter().zip(&weights) {
@@ -159,7 +157,7 @@ struct Shown {
     size: f64,
 }
 
-/// Where a signature shows most; `None` where it shows nowhere.
+/// Location of the largest contribution of a signature; `None` if it is zero.
 fn show(study: &Study, linearised: &Linearised, signature: &[f64], points: &[PointState]) -> Option<Shown> {
     let mut whitened = signature.to_vec();
     linearised.whiten(study, &mut whitened);
@@ -199,7 +197,7 @@ fn show(study: &Study, linearised: &Linearised, signature: &[f64], points: &[Poi
     })
 }
 
-/// A place on the map in words.
+/// Map region as text.
 fn region(point: &PointState) -> String {
     let side = match point.surge_position_ratio {
         x if x > 0.97 => "near surge",

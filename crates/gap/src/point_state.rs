@@ -1,8 +1,8 @@
-//! The model at one instant, as far as maps show it.
+//! Model state at one instant, in map coordinates.
 
 use mapper_physics::model::{Outputs, State};
 
-/// The model at the end of a step.
+/// Model state at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PointState {
     /// Shaft speed, rpm.
@@ -11,7 +11,7 @@ pub struct PointState {
     pub efficiency: f64,
     /// Heat-transfer coefficient, W/(m2 K).
     pub h_w_m2k: f64,
-    /// Place on the speed line: 0 choke, 1 surge.
+    /// Position on the speed line: 0 choke, 1 surge.
     pub surge_position_ratio: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Columns with what nuisances can stand in for taken out.
+//! Projects nuisances out of columns.
 
 use crate::normal::{normal_matrix, nuisance_products};
 use crate::selection::{Selection, dot_over};
@@ -6,12 +6,12 @@ use crate::study::Study;
 use crate::whiten::Linearised;
 use nalgebra::{Cholesky, DVector, Dyn};
 
-/// Solves the nuisances' part of the normal equations again and again.
+/// Repeated solver for the nuisance block of the normal equations.
 pub(crate) struct Projector<'a> {
     linearised: &'a Linearised,
     rows: Vec<std::ops::Range<usize>>,
     cholesky: Cholesky<f64, Dyn>,
-    /// Columns besides the nuisances' that are free as well.
+    /// Additional free columns.
     others: &'a [Vec<f64>],
 }
 
@@ -36,7 +36,7 @@ impl<'a> Projector<'a> {
         })
     }
 
-    /// Product of two columns with the span of the free ones (softened by their priors) taken out.
+    /// Product of two columns after projecting out the free ones (softened by their priors).
     pub(crate) fn product(
         &self,
         a: &[f64],

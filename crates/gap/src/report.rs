@@ -1,78 +1,78 @@
-//! What a diagnosis says, as machines read it.
+//! Diagnosis report, machine-readable.
 
 use crate::baseline_assumptions::Since;
 use crate::experiment::{Beside, Experiment};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The word on the whole.
+/// Overall verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Nothing beyond what is declared.
+    /// Everything is within the declared tolerances.
     WithinTolerance,
-    /// An effect or pair of the catalogue leaves nothing but noise.
+    /// An effect or pair of the effect library leaves only noise.
     Explained,
-    /// An effect or pair removes most, and what is left is more than tolerance.
+    /// An effect or pair removes most of the gap, but the residual exceeds tolerance.
     PartlyExplained,
-    /// Nothing of the catalogue removes most of it.
+    /// No effect or pair removes most of the gap.
     Unexplained,
 }
 
 /// A diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
-    /// The word on the whole.
+    /// Overall verdict.
     pub verdict: Verdict,
-    /// Where a healthy recording was given: all that is said is of what changed since.
+    /// Set if a reference recording was given: the diagnosis then covers only changes since that recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub since: Option<Since>,
-    /// Places of the gap, largest first.
+    /// Locations of the gap, largest first.
     pub r#where: Vec<Place>,
     /// Causes, best first.
     pub candidates: Vec<Candidate>,
     /// Probability that nothing is beyond tolerance.
     pub probability_none: f64,
-    /// Probability that the cause is outside the catalogue.
+    /// Probability that the cause is not in the effect library.
     pub probability_outside: f64,
-    /// Laws found for what the catalogue leaves, best first; empty where none is proposed.
+    /// Laws for the gap that the effect library does not explain, best first; empty if none is proposed.
     pub laws: Vec<Law>,
-    /// What each balance lacks if it alone lacks something, the most probable first; empty where nothing was looked for.
+    /// Residual source term of each balance, if it is the only one, most probable first; empty without a search.
     pub forces: Vec<MissingForce>,
-    /// The gap before and after.
+    /// The gap before and after the best cause.
     pub gap: Gap,
-    /// What to do next; `None` where nothing is left to settle.
+    /// Suggested next step; `None` if the diagnosis is settled.
     pub next: Option<Next>,
-    /// What the stand can do to tell the open causes apart, best first for each minute; `next` is the first of it.
+    /// Experiments that distinguish the open causes, best per minute first; `next` is the first of them.
     pub experiments: Vec<Suggestion>,
-    /// Where nothing is named: how small each effect would have been seen.
+    /// If no cause is named: the smallest detectable size of each effect.
     pub smallest_seen: Vec<SmallestSeen>,
-    /// What was assumed because the campaign does not declare it; one sentence each.
+    /// Assumptions for missing campaign declarations; one sentence each.
     pub assumed: Vec<String>,
-    /// Sensors that a soak shows to be off by more than is declared, which was subtracted beforehand; one sentence each.
+    /// Sensor offsets beyond tolerance found by a soak and already subtracted; one sentence each.
     pub off_at_rest: Vec<String>,
-    /// What could not be used, and what to know before believing the rest; one sentence each.
+    /// Unusable data and caveats; one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// A place of the gap.
+/// A location of the gap.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Place {
     /// Part of the model.
     pub submodel: String,
-    /// Channel in which it shows most.
+    /// Channel with the largest share.
     pub channel: String,
-    /// Phase of the step in which it shows most.
+    /// Phase of the step with the largest share.
     pub phase: String,
-    /// Region of the map in which it shows most.
+    /// Region of the map with the largest share.
     pub region: String,
     /// Share of the whole gap's energy, 0..1.
     pub share: f64,
-    /// Size in standard deviations of what is declared.
+    /// Size in declared standard deviations.
     pub sigma: f64,
     /// Root mean square in the channel's unit.
     pub size: f64,
-    /// That unit.
+    /// Unit of `size`.
     pub unit: String,
 }
 
@@ -87,70 +87,69 @@ pub struct Estimate {
     pub high: f64,
     /// Unit.
     pub unit: String,
-    /// Value at which the effect is not there.
+    /// Value without the effect.
     pub neutral: f64,
-    /// The best value in words.
+    /// The best value as text.
     pub size: String,
 }
 
-/// With which step a cause begins.
+/// Onset of a cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Onset {
-    /// Place of the step, from 0; files have its number, from 1.
+    /// Index of the step, from 0; files use its number, from 1.
     #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
-    /// Its start, s of the recording.
+    /// Start of the step, s of the recording.
     pub t_s: f64,
-    /// Whether the cause grows from there to the end; else it is whole from there on.
+    /// Whether the cause grows from there to the end; otherwise it acts in full from there on.
     pub grows: bool,
 }
 
-/// How small an effect would have been seen.
+/// Smallest detectable size of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SmallestSeen {
     /// Id of the effect.
     pub effect: String,
-    /// Its name for people.
+    /// Display name.
     pub name: String,
-    /// The parameter that says its size.
+    /// The parameter that sets its size.
     pub parameter: String,
-    /// The value that would have been named in 95 of 100 recordings like this one; `None` where none within its range would.
+    /// The value that would be named in 95 of 100 recordings like this one; `None` if no value in its range would.
     pub value: Option<f64>,
     /// Unit.
     pub unit: String,
-    /// The value in words.
+    /// The value as text.
     pub size: Option<String>,
 }
 
-/// A law that was found for a missing force.
+/// A law found for a residual source term.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Law {
-    /// Part of the model in which it sits.
+    /// Part of the model where it acts.
     pub submodel: String,
-    /// What it says, with its numbers.
+    /// The law as a sentence, with its numbers.
     pub sentence: String,
     /// Its terms.
     pub terms: Vec<LawTerm>,
-    /// Probability that it is this law, among all that were tried and none of them.
+    /// Probability of this law among all laws tried and no law.
     pub probability: f64,
-    /// Share of the gap that it removes on steps used neither to find nor to fit it; 0 where a channel gets worse on them.
+    /// Share of the gap removed on steps used neither to find nor to fit the law; 0 if any channel gets worse.
     pub shrink: f64,
-    /// Number of these steps.
+    /// Number of these held-out steps.
     pub held_out_steps: usize,
-    /// Each channel on these steps.
+    /// Gap of each channel on these steps.
     pub channels: BTreeMap<String, ChannelGap>,
-    /// Channels that it makes worse on them.
+    /// Channels that get worse on these steps.
     pub worse: Vec<String>,
-    /// Effects of the catalogue beside which it was found; empty where it stands alone.
+    /// Library effects fitted together with the law; empty if it was found alone.
     pub beside: Vec<String>,
-    /// Share of the folds of steps, each left out once, in which the others ask for the same part and for this law's terms or
-    /// their like.
+    /// Share of the leave-one-out folds of steps that select the same part and this law's terms or equivalents.
     pub stability: f64,
-    /// Laws that the recording does not tell from this one, as sentences.
+    /// Laws that the recording cannot distinguish from this one, as sentences.
     pub equivalent: Vec<String>,
-    /// The effect file that was written for it.
+    /// Name of the effect file written for it.
     pub rhai: Option<String>,
-    /// What that file holds; `None` where a script cannot say it.
+    /// Content of that file; `None` if a script cannot express the law.
     #[serde(skip)]
     pub script: Option<String>,
 }
@@ -158,7 +157,7 @@ pub struct Law {
 /// One number of a law with its 95 % interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawTerm {
-    /// What it is.
+    /// Name.
     pub term: String,
     /// Best value.
     pub value: f64,
@@ -170,44 +169,44 @@ pub struct LawTerm {
     pub unit: String,
 }
 
-/// The force that one balance lacks, if it is the only one that lacks something.
+/// Residual source term of one balance, assuming that it is the only one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MissingForce {
     /// Part of the model.
     pub submodel: String,
-    /// What is missing.
+    /// The missing quantity.
     pub force: String,
     /// Its unit.
     pub unit: String,
-    /// Logarithm of the evidence for it, over nothing missing.
+    /// Logarithm of its evidence relative to none.
     pub evidence: f64,
     /// At the end of each step: value and the ends of its 95 % interval.
     pub steps: Vec<[f64; 3]>,
 }
 
-/// A cause: one effect or several together.
+/// A cause: one or more effects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// Ids of its effects.
     pub effects: Vec<String>,
-    /// Their names for people.
+    /// Display names.
     pub names: Vec<String>,
-    /// Calibrated probability that it is these effects, with or without others too weak to tell.
+    /// Calibrated probability of these effects, with or without others too weak to detect.
     pub probability: f64,
-    /// Parameters; `inner_node.phi` where an effect has several.
+    /// Parameters; `inner_node.phi` if an effect has several.
     pub parameters: BTreeMap<String, Estimate>,
-    /// Effects that begin with a step, by id.
+    /// Onsets of effects that begin with a step, by id.
     pub onsets: BTreeMap<String, Onset>,
-    /// Causes that the data cannot tell apart from this one.
+    /// Causes that the data cannot distinguish from this one.
     pub equivalent: Vec<Vec<String>>,
 }
 
-/// Root mean square residual of a channel over the steps, each predicted by a fit that did not see it.
+/// Root mean square residual of a channel over the steps, each predicted by a fit to other steps.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChannelGap {
-    /// With the nominal model as it stands, nothing fitted.
+    /// Nominal model, nothing fitted.
     pub nominal: f64,
-    /// With the nominal model, tolerances fitted.
+    /// Nominal model, tolerances fitted.
     pub before: f64,
     /// With the best cause.
     pub after: f64,
@@ -215,66 +214,66 @@ pub struct ChannelGap {
     pub unit: String,
 }
 
-/// Efficiency and heat transfer at the end of a step, three times at the same speed, pressures and metal temperatures.
+/// Efficiency and heat transfer at the end of a step for three models, at the same speed, pressures and metal temperatures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointGap {
     /// Shaft speed, rpm.
     pub speed_rpm: f64,
     /// Valve opening.
     pub valve: f64,
-    /// Efficiency by the nominal model as it stands.
+    /// Efficiency of the nominal model.
     pub eta_nominal: f64,
-    /// Efficiency with the tolerances found beside the best cause, without the cause.
+    /// Efficiency with the tolerances of the best cause's fit, but without the cause.
     pub eta_before: f64,
     /// Efficiency with the best cause.
     pub eta_after: f64,
-    /// Heat-transfer coefficient by the nominal model as it stands, W/(m2 K).
+    /// Heat-transfer coefficient of the nominal model, W/(m2 K).
     pub h_nominal_w_m2k: f64,
-    /// Heat-transfer coefficient with the tolerances found beside the best cause, without the cause, W/(m2 K).
+    /// Heat-transfer coefficient with the tolerances of the best cause's fit, but without the cause, W/(m2 K).
     pub h_before_w_m2k: f64,
     /// Heat-transfer coefficient with the best cause, W/(m2 K).
     pub h_after_w_m2k: f64,
 }
 
-/// A tolerance or offset beyond what is declared.
+/// A tolerance or offset outside its prior.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Strained {
-    /// Which.
+    /// Name.
     pub what: String,
-    /// By how much it is off, in sigmas as declared, > 0; 6 at most.
+    /// Absolute deviation in declared sigmas, > 0; at most 6.
     pub sigmas: f64,
 }
 
-/// The gap, each step predicted by a fit that did not see it.
+/// The gap, with each step predicted by a fit to other steps.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gap {
-    /// Mean of `(|r|^2 - n)/n` over the steps, nominal model as it stands.
+    /// Mean of `(|r|^2 - n)/n` over the steps for the nominal model.
     pub nominal: f64,
     /// The same with tolerances fitted.
     pub before: f64,
     /// The same with the best cause.
     pub after: f64,
-    /// Share removed; 0 where a channel gets worse.
+    /// Gap reduction as a share; 0 if a channel gets worse.
     pub shrink: f64,
-    /// 95 % interval of the share in steps like these: lower end.
+    /// 95 % interval of this share for similar steps: lower end.
     pub shrink_low: f64,
     /// Upper end.
     pub shrink_high: f64,
-    /// Number of steps whose misfit is beyond noise, tolerances fitted: the witnesses of the interval.
+    /// Number of steps with a misfit beyond noise after the tolerance fit: the sample size of the interval.
     pub steps_with_gap: usize,
-    /// Place of the step that carries most of the gap, from 0; files have its number, from 1.
+    /// Index of the step with the largest share of the gap, from 0; files use its number, from 1.
     #[serde(serialize_with = "mapper_core::step_number::option::serialize")]
     pub largest_step: Option<usize>,
     /// Its share of the gap.
     pub largest_share: f64,
-    /// The tolerance that is furthest from what is declared where no cause is assumed; `None` where all are within three sigmas.
+    /// The tolerance furthest outside its prior without a cause; `None` if all are within three sigmas.
     pub strained: Option<Strained>,
     /// Channels that the cause makes worse.
     pub worse: Vec<String>,
-    /// Places of the steps that were held out in one of the folds; none where steps are too few. Files have numbers, from 1.
+    /// Indices of the steps held out in one of the folds; empty if there are too few steps. Files use numbers, from 1.
     #[serde(serialize_with = "mapper_core::step_number::list::serialize")]
     pub held_out_steps: Vec<usize>,
-    /// The folds: places of the steps that were held out together, from 0; files have numbers, from 1.
+    /// Folds: indices of the steps held out together, from 0; files use numbers, from 1.
     #[serde(serialize_with = "mapper_core::step_number::lists::serialize")]
     pub folds: Vec<Vec<usize>>,
     /// Each channel.
@@ -292,24 +291,24 @@ pub struct JumpPoint {
     pub valve: f64,
 }
 
-/// What to do next.
+/// Suggested next step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Next {
-    /// The jump that separates the remaining candidates best.
+    /// The jump that best distinguishes the remaining candidates.
     Jump {
-        /// Where it starts.
+        /// Start.
         from: JumpPoint,
-        /// Where it goes.
+        /// Target.
         to: JumpPoint,
-        /// Probability expected for the true candidate after it.
+        /// Expected probability of the true candidate afterwards.
         expected_probability: f64,
-        /// Its length, min.
+        /// Duration, min.
         minutes: f64,
-        /// T3 before and after, where the step changes it, K.
+        /// T3 before and after, K, if the step changes it.
         #[serde(skip_serializing_if = "Option::is_none")]
         t3_k: Option<[f64; 2]>,
-        /// Oil temperature before and after, where the step changes it, K.
+        /// Oil temperature before and after, K, if the step changes it.
         #[serde(skip_serializing_if = "Option::is_none")]
         oil_temperature_k: Option<[f64; 2]>,
     },
@@ -317,42 +316,42 @@ pub enum Next {
     Soak {
         /// Time at rest, min.
         soak_minutes: f64,
-        /// Probability expected for the true candidate after it.
+        /// Expected probability of the true candidate afterwards.
         expected_probability: f64,
     },
-    /// The sensor that would.
+    /// A sensor that would distinguish them.
     Sensor {
-        /// Which.
+        /// Name.
         sensor: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
 }
 
-/// What kind of experiment.
+/// Kind of experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// To another speed, at any opening.
+    /// Change of speed, at any opening.
     Jump,
-    /// To another opening at one speed.
+    /// Change of opening at one speed.
     ValveStep,
-    /// Another turbine inlet temperature at one point.
+    /// Change of turbine inlet temperature at one point.
     T3Step,
-    /// Another oil temperature at one point.
+    /// Change of oil temperature at one point.
     OilStep,
-    /// A jump with a channel measured that was not.
+    /// A jump with an additional channel measured.
     Sensor,
-    /// A rest before the run, in which sensors are held against each other.
+    /// A soak before the run, in which the sensors are compared with each other.
     Soak,
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Kind; 6] =
         [Kind::Jump, Kind::ValveStep, Kind::T3Step, Kind::OilStep, Kind::Sensor, Kind::Soak];
 
-    /// That of an experiment.
+    /// Kind of an experiment.
     pub fn of(experiment: &Experiment) -> Kind {
         match experiment.beside {
             Beside::T3 { .. } => Kind::T3Step,
@@ -365,37 +364,37 @@ impl Kind {
     }
 }
 
-/// An experiment and what is expected of it.
+/// An experiment with its expected result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Suggestion {
-    /// What kind.
+    /// Kind.
     pub kind: Kind,
-    /// Where it starts, settled; standing still for a soak.
+    /// Start, settled; standstill for a soak.
     pub from: JumpPoint,
-    /// Where it goes.
+    /// Target.
     pub to: JumpPoint,
-    /// T3 before and after, where the step changes it, K.
+    /// T3 before and after, K, if the step changes it.
     pub t3_k: Option<[f64; 2]>,
-    /// Oil temperature before and after, where the step changes it, K.
+    /// Oil temperature before and after, K, if the step changes it.
     pub oil_temperature_k: Option<[f64; 2]>,
-    /// Channel that is measured as well.
+    /// Additionally measured channel.
     pub sensor: Option<String>,
-    /// Its length, min; for a sensor with half an hour to mount it.
+    /// Duration, min; for a sensor it includes half an hour of mounting.
     pub minutes: f64,
-    /// Probability that the true one of the open causes has 95 % of what these have afterwards.
+    /// Probability that the true cause ends with 95 % of the probability of all open causes.
     pub probability_settled: f64,
-    /// Mean of what it has afterwards.
+    /// Expected share of the true cause afterwards.
     pub expected_probability: f64,
-    /// By how much the entropy of the open causes is expected to drop, bit.
+    /// Expected reduction of the entropy of the open causes, bit.
     pub entropy_drop_bit: f64,
-    /// That entropy before, bit.
+    /// Entropy of the open causes before, bit.
     pub entropy_bit: f64,
-    /// The lines of a sequence that run it; for a soak that of the campaign.
+    /// Sequence lines that run it; campaign lines for a soak.
     pub script: Vec<String>,
 }
 
 impl Suggestion {
-    /// As what to do next.
+    /// Converts to a next step.
     pub fn as_next(&self) -> Next {
         if let Some(sensor) = &self.sensor {
             return Next::Sensor {
@@ -423,7 +422,7 @@ impl Suggestion {
     }
 }
 
-/// The law that is more probable than not; `None` where none is.
+/// The law that is more probable than not; `None` if there is none.
 pub fn law_found(diagnosis: &Diagnosis) -> Option<&Law> {
     diagnosis.laws.first().filter(|law| law.probability > 0.5)
 }

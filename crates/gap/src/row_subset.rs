@@ -1,10 +1,10 @@
-//! A study of some of its values.
+//! A study restricted to some of its values.
 
 use crate::nuisance::OUTPUTS;
 use crate::study::{Group, Study};
 
 impl Study {
-    /// The same with these rows alone, `keep` in the layout of the residuals.
+    /// Keeps only these rows; `keep` uses the layout of the residuals.
     pub(crate) fn with_rows(mut self, keep: &[bool]) -> Study {
         let (mut groups, mut measured) = (Vec::new(), Vec::new());
         for of_step in &mut self.rows {

@@ -1,20 +1,19 @@
-//! Whether two recordings have the same steps.
+//! Compares the steps of two recordings.
 
 use crate::problem::Problem;
 use crate::study::Study;
 use mapper_core::Channel;
 use mapper_observe::mean::mean_reading;
 
-/// Commanded P3 of a step may differ by this share, and the opening of the valve by this much: what a model lacks hardly moves from
-/// there to there.
+/// Allowed differences of a step's commanded P3 (ratio) and valve opening: model error hardly changes over this distance.
 const P3_RATIO: f64 = 0.02;
 const OPENING: f64 = 0.01;
 /// Length of a step, s.
 const LENGTH_S: f64 = 1.0;
-/// Turbine inlet temperature, K: weather, not another point.
+/// Turbine inlet temperature, K: a smaller difference is ambient variation, not another operating point.
 const T3_K: f64 = 10.0;
 
-/// Refuses a healthy recording whose steps are not those of the recording under diagnosis.
+/// Rejects a reference recording with steps other than those of the recording under diagnosis.
 ///
 /// # Errors
 /// [`Problem::OtherSteps`] and [`Problem::OtherStep`].
@@ -40,7 +39,7 @@ pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> 
         };
         differs("commanded P3", theirs.p3_pa / 1e3, ours.p3_pa / 1e3, "kPa", P3_RATIO * ours.p3_pa / 1e3)?;
         differs("opening of the valve", theirs.valve_opening_ratio, ours.valve_opening_ratio, "", OPENING)?;
-        // How long a rig ran before its first jump is no part of what is compared.
+        // The running time before the first jump is not compared.
         if index > 0 {
             differs("length", theirs.end_s - theirs.start_s, ours.end_s - ours.start_s, "s", LENGTH_S)?;
         }

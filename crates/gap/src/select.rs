@@ -33,6 +33,9 @@ const STRONG: f64 = 30.0;
 /// nothing is built upon it.
 const HALVED: f64 = 0.5;
 
+/// What one more iteration may promise in the cost of a fit that is at its best: well below what any cause is named for.
+const UNFINISHED: f64 = 1.0;
+
 const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
 const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: crate::fit::MAX_SIGMAS };
 
@@ -43,7 +46,7 @@ pub struct SearchResult {
     pub null: Fit,
     /// Sets of effects, most probable first.
     pub fits: Vec<Fit>,
-    /// Linearised beside the best single, where the nominal point is far from it, and that single.
+    /// Linearised at the best single, or at nothing but tolerances, where the nominal point is far from it, and that set.
     pub refound: Option<(Linearised, Vec<usize>)>,
 }
 
@@ -52,8 +55,17 @@ pub struct SearchResult {
 /// # Errors
 /// [`PredictError`] where the nominal model cannot follow the recording.
 pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<SearchResult, PredictError> {
-    let Search { study, linearised, selection, .. } = search;
-    let null = fit(study, linearised, &study.nothing(), selection, Effort::default())?;
+    let Search { study, selection, .. } = search;
+    let first = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
+    // Tolerances that act otherwise at the fit than where they were linearised stop it short.
+    let short =
+        if first.promised > UNFINISHED { search.linearised.at(study, &first.hypothesis).ok() } else { None };
+    let linearised = short.as_ref().unwrap_or(search.linearised);
+    let null = match short {
+        Some(_) => fit(study, linearised, &first.hypothesis, selection, Effort::default())?,
+        None => first,
+    };
+    let search = Search { linearised, ..search };
     progress(0.15, "single effects");
     // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for an effect.
     let untouched = fit(study, linearised, &study.nothing(), selection, Effort { iterations: 1, ..QUICK })?;
@@ -77,7 +89,8 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     }
     progress(0.4, "several effects");
     extend(&search, &mut known, LIMITS);
-    Ok(SearchResult { null, fits: known.ranked(&search), refound })
+    let fits = known.ranked(&search);
+    Ok(SearchResult { null, fits, refound: refound.or(short.map(|linearised| (linearised, Vec::new()))) })
 }
 
 /// Adds sets with effects that begin with a step, for which the study has candidates by now.

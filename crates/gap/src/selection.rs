@@ -1,13 +1,13 @@
-//! Which steps of a recording count.
+//! Selection of the steps of a recording.
 
 use crate::study::Study;
 use crate::whiten::{dot, rows_of_step};
 use std::ops::Range;
 
-/// Which rows count.
+/// Selected steps.
 #[derive(Debug, Clone)]
 pub struct Selection {
-    /// For each step, whether it counts.
+    /// Whether each step is selected.
     pub steps: Vec<bool>,
 }
 
@@ -17,7 +17,7 @@ impl Selection {
         Selection { steps: vec![true; study.steps.len()] }
     }
 
-    /// Rows of the steps that count.
+    /// Rows of the selected steps.
     pub fn rows(&self, study: &Study) -> Vec<Range<usize>> {
         let counts = |step: &usize| self.steps.get(*step).copied().unwrap_or(false);
         (0..study.steps.len()).filter(counts).map(|step| rows_of_step(study, step)).collect()

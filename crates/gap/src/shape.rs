@@ -1,14 +1,14 @@
-//! Smooth deviations of an efficiency map: what a measured map is allowed to be off by, beside its level.
+//! Smooth deviations of an efficiency map: the allowed error of a measured map, in addition to its level.
 
 use mapper_core::ReferenceState;
 use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use std::sync::Arc;
 
-/// Bumps over corrected speed: how many, where the first lies and how wide each is and how far from the next, 100 krpm.
+/// Bumps over corrected speed: their number, centre of the first, and width and spacing, 100 krpm.
 const SPEEDS: usize = 6;
 const FIRST_SPEED: f64 = 0.5;
 const SPEED_WIDTH: f64 = 0.2;
-/// Bumps over the way from the surge line (0) to choke (1).
+/// Number of bumps between the surge line (0) and choke (1).
 const WAYS: usize = 3;
 const FIRST_WAY: f64 = 0.1;
 const WAY_WIDTH: f64 = 0.3;
@@ -16,21 +16,21 @@ const WAY_WIDTH: f64 = 0.3;
 /// Number of basis functions.
 pub const SHAPES: usize = SPEEDS * WAYS;
 
-/// What the declared size is divided by for one coefficient. The root mean square of all together would be 1.7: a
-/// deviation that lives in one corner of the map must not count as impossible.
+/// Divisor of the declared size for one coefficient. The root mean square of all together would be 1.7, but a deviation confined to one
+/// corner of the map must remain plausible.
 pub const SHAPE_SUM: f64 = 1.0;
 
 /// A map whose efficiency is multiplied by `1 + sum c_i phi_i(speed, place on the speed line)`.
 #[derive(Debug, Clone)]
 pub struct ShapedMap {
-    /// The map as declared.
+    /// The declared map.
     pub inner: Arc<dyn CompressorCharacteristic>,
     /// Coefficients of the basis, ratios.
     pub coefficients: [f64; SHAPES],
 }
 
-/// Gaussian bumps a fifth of the speed range and a third of a speed line wide: a deviation may rise and fall from one
-/// operating point to its neighbour, and is smooth between.
+/// Gaussian bumps, a fifth of the speed range and a third of a speed line wide. A deviation may rise and fall from one operating point to
+/// the next, and is smooth in between.
 fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
     let speed = speed_corrected_rpm / 100_000.0;
     let position = surge_position_ratio.clamp(0.0, 1.0);
@@ -40,10 +40,10 @@ fn basis(speed_corrected_rpm: f64, surge_position_ratio: f64) -> [f64; SHAPES] {
     std::array::from_fn(|i| over_speed[i / WAYS] * over_way[i % WAYS])
 }
 
-/// `exp(-(x - i)^2 / 2)` for i = 0, 1, ...: each from the one before by a ratio that falls by e, since exponentials are most of
-/// what a diagnosis computes.
+/// `exp(-(x - i)^2 / 2)` for i = 0, 1, ... Each value follows from the one before by a ratio that falls by e, because exponentials dominate
+/// the computing time of a diagnosis.
 fn bumps<const N: usize>(widths_from_first: f64) -> [f64; N] {
-    // Further away all are nothing, and no ratio may overflow.
+    // All bumps are negligible further away, and no ratio may overflow.
     let x = widths_from_first.clamp(-20.0, 20.0);
     let (mut bump, mut ratio) = ((-0.5 * x * x).exp(), (x - 0.5).exp());
     std::array::from_fn(|_| {
@@ -98,7 +98,7 @@ mod tests {
         for x in [-3.0, -0.4, 0.0, 1.3, 5.0, 8.5] {
             for (i, bump) in bumps::<6>(x).into_iter().enumerate() {
                 let expected = f64::exp(-0.5 * (x - i as f64).powi(2));
-                // Some ten roundings.
+                // Tolerance: about ten roundings.
                 assert!((bump - expected).abs() <= 1e-14 * expected, "{x} {i}: {bump:e} {expected:e}");
             }
         }

@@ -1,5 +1,4 @@
-//! How small an effect would have been seen: from the length of its signature, nuisances projected out, and the evidence that a
-//! cause needs to be named.
+//! Smallest detectable size of an effect, from its signature length with nuisances projected out and the evidence required to name a cause.
 
 use crate::calibration::Calibration;
 use crate::coordinate::Coordinate;
@@ -12,15 +11,14 @@ use crate::study::Study;
 use crate::whiten::Linearised;
 use mapper_numerics::parallel;
 
-/// 95 % quantile of the standard normal distribution: so many sigmas above what is needed, an effect is seen in 95 of 100
-/// recordings.
+/// 95 % quantile of the standard normal distribution: at this margin above the threshold, an effect is named in 95 of 100 recordings.
 const SURELY: f64 = 1.645;
-/// Runs in which a size is found, and how near in the logarithm of the length is near enough.
+/// Maximum number of runs to find a size, and the tolerance in the logarithm of the length.
 const LOOKS: usize = 5;
 const NEAR: f64 = 0.05;
 
-/// The smallest size of each effect, on the side of its typical step, that would have been named in 95 of 100 recordings like this
-/// one; effects that would not have been within their range have no size.
+/// Smallest size of each effect, on the side of its typical step, that would be named in 95 of 100 recordings like this one. Effects that
+/// stay undetectable within their range have no size.
 pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calibration) -> Vec<SmallestSeen> {
     let everywhere = Selection::all(study);
     let Some(projector) = Projector::new(study, linearised, &everywhere, &[]) else { return Vec::new() };
@@ -32,7 +30,7 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
         let info = study.effects[*index].info();
         let (parameter, others) = info.parameters.split_last()?;
         let coordinate = Coordinate::new(parameter);
-        // Where several work together the others stand a typical step from neutral.
+        // With several parameters, the others are a typical step from neutral.
         let at = |value: f64| {
             let mut there = study.nothing();
             let beside = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
@@ -47,7 +45,7 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
             let right = projector.right(&change);
             Some(projector.product(&change, &right, &change, &right).max(0.0).sqrt())
         };
-        // How far from neutral: of what spans decades its inverse tells, for the effect is there where it is small.
+        // Distance from neutral; its inverse for a parameter that spans decades, because the effect is strong at small values.
         let away = |value: f64| {
             if coordinate.is_logarithmic() { 1.0 / value } else { value - parameter.neutral }
         };
@@ -64,7 +62,7 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
             if sigma <= 1e-6 || here == 0.0 {
                 return None;
             }
-            // Laplace's evidence of one parameter of this curvature, held against what a cause needs.
+            // Laplace evidence of one parameter with this curvature, compared with the threshold of a cause.
             let unit = coordinate.of(value_at(here)) - coordinate.of(parameter.neutral);
             let curvature = (sigma / unit.abs().max(1e-9)).powi(2);
             let needed =
@@ -74,7 +72,7 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
             if (sigma / wanted).ln().abs() < NEAR {
                 break;
             }
-            // In logarithms, by the power that two looks show: effects bend.
+            // Interpolates logarithms with the power law of two runs, because effects are nonlinear.
             let power = before.map_or(1.0, |(there, length): (f64, f64)| {
                 ((sigma / length).ln() / (here / there).ln()).clamp(0.6, 3.0)
             });

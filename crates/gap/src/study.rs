@@ -1,4 +1,4 @@
-//! One recording made ready: residuals' layout, whitening, and the model's prediction for any hypothesis.
+//! One prepared recording: residual layout, whitening, and model predictions for any hypothesis.
 
 use crate::actuators::Actuators;
 use crate::effect_timing::Course;
@@ -27,16 +27,16 @@ use mapper_physics::model::{Model, Outputs, PreparedModel, State};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Values of one output in one step that have a common noise.
+/// Values of one output in one step with common noise.
 #[derive(Debug, Clone)]
 pub struct Group {
-    /// Step, by its place in [`Study::steps`].
+    /// Step, by its index in [`Study::steps`].
     pub step: usize,
-    /// Output, by its place in [`OUTPUTS`].
+    /// Output, by its index in [`OUTPUTS`].
     pub output: usize,
-    /// Where the group's values lie in the vector of residuals.
+    /// Rows of the group in the vector of residuals.
     pub rows: std::ops::Range<usize>,
-    /// Blocks of the values, by their place in the step.
+    /// Blocks of the values, by their index in the step.
     pub blocks: Vec<usize>,
 }
 
@@ -51,7 +51,7 @@ pub struct StudyStep {
     pub blocks: Vec<Block>,
 }
 
-/// What the model gives for a hypothesis.
+/// Model prediction for a hypothesis.
 #[derive(Debug, Clone)]
 pub struct Prediction {
     /// Block means in the residuals' layout, in the channels' units.
@@ -60,21 +60,21 @@ pub struct Prediction {
     pub slopes: Vec<f64>,
 }
 
-/// Why no prediction can be made.
+/// Errors that prevent a prediction.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PredictError {
     /// The model cannot follow.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// A value out of its range.
+    /// A value is out of its range.
     #[error(transparent)]
     Effect(#[from] EffectError),
 }
 
-/// One recording made ready.
+/// One prepared recording.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// What is declared.
+    /// Declared tolerances and noise.
     pub declared: Declared,
     /// All samples.
     pub table: Table,
@@ -84,11 +84,11 @@ pub struct Study {
     pub nominal: Rig,
     /// Candidate effects.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// When each of them acts.
+    /// When each effect acts.
     pub courses: Vec<Course>,
-    /// Number of effects of the catalogue; behind them stand those among them that begin with a step.
+    /// Number of library effects; they are followed by candidates that begin with a step.
     pub catalogue: usize,
-    /// What may be off besides.
+    /// Nuisance parameters.
     pub nuisances: Vec<Nuisance>,
     /// Values of one output and step each.
     pub groups: Vec<Group>,
@@ -96,28 +96,28 @@ pub struct Study {
     pub measured: Vec<f64>,
     /// The recorded inputs.
     pub inputs: SmoothedInputs,
-    /// How P3 and the valve follow their commands, as recorded.
+    /// Recorded response of P3 and the valve to their commands.
     pub actuators: Actuators,
-    /// Scatter of the times of its samples, s: what moves is known by so much less.
+    /// Scatter of the sample times, s: it adds uncertainty to moving quantities.
     pub scatter_s: f64,
-    /// Whether the metal rested when the recording began.
+    /// Whether the metal had settled when the recording began.
     rested: bool,
     grid: FrozenGrid,
-    /// Times at which the model is read; two a block, and one at each jump.
+    /// Times at which the model is evaluated: two per block, and one at each jump.
     times_s: Vec<f64>,
-    /// For each time, the place of its block: step and block; `None` at a jump.
+    /// Step and block of each time; `None` at a jump.
     places: Vec<Option<(usize, usize)>>,
     /// Row of each output in each step's blocks.
     pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
-    /// For each group the noise of what was subtracted from its values, unit squared; nothing where nothing was.
+    /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
     pub(crate) noise_besides: Vec<DMatrix<f64>>,
 }
 
-/// The first step counts from this long before the first jump, s: before it nothing tells what a rig was doing, and
-/// the metal's start is fitted anyway.
+/// The first step counts from this time before the first jump, s. The rig's earlier history is unknown, and the metal's start is fitted
+/// anyway.
 const HOLD_S: f64 = 100.0;
 
-/// Blocks where only metal moves.
+/// Blocks of phases in which only the metal temperature changes.
 const SLOW: Schedule =
     Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.0, shortest_ratio: 0.5 };
 /// Blocks after a jump.
@@ -126,16 +126,16 @@ const AFTER_JUMP: Schedule = Schedule {
     ..SLOW
 };
 
-/// Blocks after a jump of a recording with more steps than [`MANY_STEPS`]: half as many, for half the time.
+/// Blocks after a jump in a recording with more steps than [`MANY_STEPS`]: half as many, over half the time.
 const AFTER_ONE_OF_MANY: Schedule = Schedule {
     lengths_s: &[(1.0, 0.2), (3.0, 0.5), (7.0, 2.0), (15.0, 4.0), (31.0, 8.0), (f64::INFINITY, 16.0)],
     ..SLOW
 };
-/// Number of steps above which each counts in fewer blocks.
+/// Number of steps above which each has fewer blocks.
 const MANY_STEPS: usize = 30;
 
 impl Study {
-    /// Makes a recording ready whose campaign declares how its actuators follow.
+    /// Prepares a recording whose campaign declares the actuator response.
     pub fn new(
         recording: &Recording,
         table: Table,
@@ -147,7 +147,7 @@ impl Study {
         Study::with_actuators(recording, table, declared, model, effects, actuators)
     }
 
-    /// Makes a recording ready.
+    /// Prepares a recording.
     pub fn with_actuators(
         recording: &Recording,
         table: Table,
@@ -170,7 +170,7 @@ impl Study {
             .enumerate()
             .map(|(index, marker)| {
                 let jumped = index > 0;
-                // Half a sample beyond the last one, which is the next step's first where steps follow each other.
+                // Half a sample after the last one, which is the next step's first sample if steps are contiguous.
                 let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
                 let start_s =
                     if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
@@ -185,7 +185,7 @@ impl Study {
             steps.iter().map(|step| vec![[None; OUTPUTS.len()]; step.blocks.len()]).collect();
         for (step_index, step) in steps.iter().enumerate() {
             for (output, channel) in OUTPUTS.iter().enumerate() {
-                // Where nobody says how P3 follows its command, no way of following is wrong.
+                // If no P3 response is declared, none is wrong.
                 if *channel == Channel::P3 && !actuators.judged {
                     continue;
                 }
@@ -215,7 +215,7 @@ impl Study {
                 reads.push((times.starts_s[step_index], None));
             }
             for (block_index, block) in step.blocks.iter().enumerate() {
-                // The mean of the two ends of one standard deviation has the mean and the spread of the samples.
+                // The mean of the two one-sigma ends has the mean and the spread of the samples.
                 let place = Some((step_index, block_index));
                 reads.push((block.mean_s - block.spread_s, place));
                 if block.spread_s > 0.0 {
@@ -252,12 +252,12 @@ impl Study {
         }
     }
 
-    /// The hypothesis that nothing is off.
+    /// The null hypothesis.
     pub fn nothing(&self) -> Hypothesis {
         Hypothesis { nuisances: vec![0.0; self.nuisances.len()], effects: Vec::new() }
     }
 
-    /// The rig of a hypothesis in one step, and the circumstances in which it runs.
+    /// The rig of a hypothesis in one step, and its operating circumstances.
     fn rig(&self, hypothesis: &Hypothesis, step: usize) -> Result<(Rig, Circumstances), EffectError> {
         let mut rig = self.nominal.clone();
         let mut circumstances = Circumstances::default();
@@ -279,20 +279,20 @@ impl Study {
             rig.model.map =
                 Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
         }
-        // A sensor that reads too high drives the model too high: the truth lies below.
+        // A sensor that reads too high drives the model too high, so its offset is subtracted.
         let read =
             DRIVERS.map(|channel| (Perturbation::Input(channel), -rig.instruments.path(channel).offset));
         circumstances.knobs.extend(read);
         Ok((rig, circumstances))
     }
 
-    /// What a channel reads too much by a hypothesis at the end of the recording, in its unit.
+    /// Offset of a channel under a hypothesis at the end of the recording, in its unit.
     pub(crate) fn offset_at_end(&self, hypothesis: &Hypothesis, channel: Channel) -> Option<f64> {
         let last = self.steps.len().checked_sub(1)?;
         Some(self.rig(hypothesis, last).ok()?.0.instruments.path(channel).offset)
     }
 
-    /// Stretches of steps in which a hypothesis' rig stays what it is: the first step of each.
+    /// Segments of steps with a constant rig under a hypothesis: the first step of each.
     fn stretches(&self, hypothesis: &Hypothesis) -> Vec<usize> {
         let shares = |step: usize| {
             hypothesis
@@ -305,8 +305,8 @@ impl Study {
         (0..last).filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1))).collect()
     }
 
-    /// Drives the model of a hypothesis through the recording. `on_sample` gets the index of each of `times_s`, the rig, how
-    /// it runs, and the model there.
+    /// Drives the model of a hypothesis through the recording. `on_sample` receives the index of each of `times_s`, the rig, its
+    /// circumstances, and the model state.
     fn drive(
         &self,
         hypothesis: &Hypothesis,
@@ -342,7 +342,7 @@ impl Study {
             let grid = self.grid.part(from_s, end_s);
             let mut ended = drive(&rig.model, &inputs, start, &grid, &times_s[done..until], sample)?;
             done = until;
-            // A probe that follows at once has no state of its own until one follows slowly.
+            // An instantaneous probe has no state until a slow probe replaces it.
             if rig.model.params.t2_probe_diameter_m == 0.0 {
                 let boundary = inputs.at(end_s - 1e-6);
                 ended.t2_tip_k = rig.model.prepare(&boundary).evaluate(&ended).t2_k;
@@ -352,10 +352,10 @@ impl Study {
         Ok(())
     }
 
-    /// What the model gives.
+    /// Predicts the recording.
     ///
     /// # Errors
-    /// [`PredictError`] where a value is out of its range or the model cannot follow.
+    /// [`PredictError`] if a value is out of its range or the model cannot follow.
     pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
         let mut followers =
             OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
@@ -376,7 +376,7 @@ impl Study {
                     Some(command) if *channel == Channel::P3 => command.p3_pa(t_s),
                     _ => true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN),
                 };
-                // T4 is what is left of T3' after a drop that is known to a few per cent only.
+                // T4 is T3' minus a temperature drop that is known only to a few per cent.
                 let seen = if *channel == Channel::T4 {
                     seen - circumstances.t4_drop_ratio * (outputs.turbine.t3_prime_k - outputs.turbine.t4_k)
                 } else {
@@ -402,7 +402,7 @@ impl Study {
         Ok(Prediction { values, slopes })
     }
 
-    /// For each step, its blocks' times after its start, s, and the place on the speed line there (beyond 1: surge).
+    /// For each step, its blocks' times after its start, s, and their position on the speed line (beyond 1: surge).
     pub(crate) fn surge_positions(
         &self,
         hypothesis: &Hypothesis,
@@ -417,7 +417,7 @@ impl Study {
         Ok(positions)
     }
 
-    /// The model at the end of each step.
+    /// Model state at the end of each step.
     ///
     /// # Errors
     /// [`PredictError`].
@@ -425,8 +425,8 @@ impl Study {
         Ok(self.points_beside(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
     }
 
-    /// The model at the end of each step, and what the models of other hypotheses say of the same instant: their efficiency and
-    /// h at the same speed, pressures and metal temperatures.
+    /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
+    /// temperatures.
     ///
     /// # Errors
     /// [`PredictError`].
@@ -473,8 +473,8 @@ impl Study {
         slopes
     }
 
-    /// Rest under the first inputs, shifted as the circumstances say; where the metal had not come to rest when the recording
-    /// began, rest of all else around the metal as measured.
+    /// Settled state under the first inputs, shifted by the circumstances. If the metal had not settled when the recording began, its
+    /// measured temperature is kept.
     fn start(
         &self,
         rig: &Rig,
@@ -483,7 +483,7 @@ impl Study {
     ) -> Result<State, DriveError> {
         let start_s = self.grid.nodes_s().first().copied().unwrap_or(0.0);
         let boundary = inputs.at(start_s);
-        // Not from the recording's own begin, where the machine may still stand.
+        // Not from the very start of the recording, where the machine may still be at standstill.
         let read = |channel: Channel| {
             let column = &self.table.column(channel)?[self.table.range(start_s, f64::INFINITY)];
             mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())

@@ -1,4 +1,4 @@
-//! The calibrated twin: machine, effects and tolerances as a diagnosis found them, what it forecasts, and how the forecast held.
+//! Calibrated model: machine, effects and tolerances from a diagnosis, its forecasts, and their verification.
 
 use crate::coordinate::coordinates;
 use crate::diagnose::Diagnosed;
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 pub struct FoundEffect {
     /// Its id.
     pub id: String,
-    /// A value for each of its parameters, in their units.
+    /// One value per parameter, in its unit.
     pub values: Vec<f64>,
 }
 
@@ -27,31 +27,31 @@ pub struct FoundEffect {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FoundTolerance {
-    /// What may be off.
+    /// Name of the tolerance.
     pub name: String,
-    /// By how much it is, in the unit of what it changes; ratios for gains and scales.
+    /// Fitted value, in the unit of what it changes; ratios for gains and scales.
     pub value: f64,
-    /// By how much it may be, one sigma.
+    /// Prior standard deviation.
     pub sigma: f64,
 }
 
-/// A machine as a diagnosis found it.
+/// A machine as identified by a diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Found {
-    /// Named effects; none where nothing is named.
+    /// Named effects; empty if none is named.
     pub effects: Vec<FoundEffect>,
-    /// Everything that may be off besides.
+    /// All tolerances and offsets.
     pub tolerances: Vec<FoundTolerance>,
-    /// Covariance of the tolerances, in their sigmas, and of the effects behind them, in the coordinates of the search (typical
-    /// steps, or logarithms of what spans decades).
+    /// Covariance of the tolerances in their sigmas, followed by the effects in search coordinates (typical steps, or logarithms if they
+    /// span decades).
     pub covariance: Vec<Vec<f64>>,
 }
 
-/// Why a twin cannot be held against a recording.
+/// Errors that prevent the verification of a calibrated model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TwinError {
-    /// Other things may be off here than there.
+    /// The nuisance parameters differ.
     #[error(
         "the diagnosis knows other tolerances than this campaign and recording ({theirs} and {ours}): take the campaign, channels and sensors of the diagnosis"
     )]
@@ -61,13 +61,13 @@ pub enum TwinError {
         /// Here.
         ours: usize,
     },
-    /// An effect that is not known here.
+    /// An unknown effect.
     #[error("effect `{0}` of the diagnosis is not in the catalogue; give it with --effect")]
     Effect(String),
-    /// Not a covariance.
+    /// Invalid covariance.
     #[error("the covariance of the diagnosis is not one of its {0} tolerances and parameters")]
     Covariance(usize),
-    /// The twin cannot follow.
+    /// The model cannot follow the recording.
     #[error(transparent)]
     Predict(#[from] crate::study::PredictError),
 }
@@ -77,7 +77,7 @@ fn is_start(name: &str) -> bool {
 }
 
 impl Found {
-    /// What a diagnosis found; `None` where the covariance cannot be formed.
+    /// Result of a diagnosis; `None` if the covariance cannot be formed.
     pub fn of(diagnosed: &Diagnosed) -> Option<Found> {
         let named = matches!(diagnosed.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
         let best = diagnosed.fits.first().filter(|_| named).unwrap_or(&diagnosed.null);
@@ -106,7 +106,7 @@ impl Found {
         })
     }
 
-    /// The hypothesis of a twin in another recording, and its covariance: of that recording's own start nothing is known yet.
+    /// Hypothesis of a calibrated model for another recording, with its covariance; that recording's start is still unknown.
     fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), TwinError> {
         let same = study.nuisances.len() == self.tolerances.len()
             && study
@@ -144,12 +144,12 @@ impl Found {
     }
 }
 
-/// How a forecast of one channel held.
+/// Verification of one channel's forecast.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldChannel {
     /// Root mean square of measured minus forecast, in the channel's unit.
     pub rms: f64,
-    /// Residual in units of the noise: 1 is noise.
+    /// Residual relative to the noise: 1 is pure noise.
     pub ratio: f64,
     /// Share of the values within the 95 % band.
     pub inside: f64,
@@ -157,10 +157,10 @@ pub struct HeldChannel {
     pub unit: String,
 }
 
-/// How a forecast held.
+/// Verification of a forecast.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Held {
-    /// Residual of all channels in units of the noise: 1 is noise.
+    /// Residual of all channels relative to the noise: 1 is pure noise.
     pub ratio: f64,
     /// Share of all values within the 95 % band.
     pub inside: f64,
@@ -170,9 +170,8 @@ pub struct Held {
     pub channels: BTreeMap<String, HeldChannel>,
 }
 
-/// Holds a twin against a recording that it has not seen: driven by what was recorded of the inputs, nothing fitted. Values are
-/// means over the blocks of a step with the noise's memory taken out; the band of each is the noise and what the twin is not
-/// sure of.
+/// Compares a calibrated model with a recording it was not fitted to, driven by the recorded inputs. Values are decorrelated block means
+/// within a step; each band includes noise and the model's uncertainty.
 ///
 /// # Errors
 /// [`TwinError`].
@@ -219,20 +218,20 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
     })
 }
 
-/// What a twin expects at the end of a step.
+/// Forecast at the end of a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
-    /// Place of the step, from 0; files have its number, from 1.
+    /// Index of the step, from 0; files use its number, from 1.
     #[serde(with = "mapper_core::step_number")]
     pub step: usize,
     /// Each channel: value and half the width of its 95 % band, in the channel's unit.
     pub channels: BTreeMap<String, [f64; 2]>,
 }
 
-/// The ends of planned steps by a twin, inputs as the campaign has them.
+/// Forecasts the ends of planned steps with the campaign's inputs.
 ///
 /// # Errors
-/// [`TwinError`]; no steps where the nominal machine cannot rest at the first.
+/// [`TwinError`]; no steps if the nominal machine cannot settle at the first.
 pub fn forecast_steps(
     like: Alike,
     steps: Vec<StepMarker>,
@@ -243,10 +242,10 @@ pub fn forecast_steps(
     study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
 }
 
-/// Samples of a forecast, s apart.
+/// Sample interval of a forecast, s.
 const INTERVAL_S: f64 = 0.5;
 
-/// The ends of the steps of a study by a twin, with bands of what the twin is not sure of and of the noise of a reading.
+/// Forecasts the ends of a study's steps; the bands include model uncertainty and the noise of a reading.
 ///
 /// # Errors
 /// [`TwinError`].

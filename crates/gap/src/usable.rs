@@ -1,4 +1,4 @@
-//! Whether a recording can be diagnosed at all, before any fit.
+//! Checks whether a recording can be diagnosed, before any fit.
 
 use crate::nuisance::OUTPUTS;
 use crate::problem::Problem;
@@ -9,10 +9,10 @@ use mapper_observe::declared::Declared;
 use mapper_observe::plausible::check_running;
 use mapper_observe::table::Table;
 
-/// Looks at a recording; warnings for what can be lived with.
+/// Checks a recording; returns warnings for tolerable defects.
 ///
 /// # Errors
-/// [`Problem`] for what cannot.
+/// [`Problem`] for others.
 pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Result<Vec<String>, Problem> {
     let mut warnings = Vec::new();
     let present: Vec<Channel> = OUTPUTS
@@ -36,7 +36,7 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
     if let Some(step) = recording.steps.iter().find(|step| !step.valve_opening_ratio.is_finite()) {
         return Err(Problem::NoValve { step: step.index });
     }
-    // A rest before the first step may be longer than all steps.
+    // A soak before the first step may be longer than all steps.
     let starts_s = recording.steps.first().map_or(f64::NEG_INFINITY, |step| step.start_s);
     let running = table.range(starts_s, f64::INFINITY);
     for (channel, values) in &table.columns {
@@ -87,9 +87,9 @@ fn commanded(recording: &Recording, table: &Table) -> Result<(), Problem> {
     let Some(values) = table.column(Channel::P3) else { return Ok(()) };
     let mut away: Vec<(f64, f64, f64)> = Vec::new();
     for step in &recording.steps {
-        // The last fifth: whatever the actuator does, it has arrived.
+        // The last fifth: any actuator has arrived by then.
         let range = table.range(step.end_s - 0.2 * (step.end_s - step.start_s), step.end_s);
-        // A loop that holds the speed has moved the command since the step began.
+        // A speed controller has moved the command since the step began.
         let held_pa =
             recording.series.get(&Channel::P3Command).filter(|_| step.to.is_some()).and_then(|command| {
                 let inside =

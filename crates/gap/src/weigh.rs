@@ -1,4 +1,4 @@
-//! Scores turned into probabilities, and what is said of each cause.
+//! Converts scores into probabilities and describes each cause.
 
 use crate::adequacy::Adequacy;
 use crate::calibration::Calibration;
@@ -12,26 +12,26 @@ use crate::study::{Hypothesis, Study};
 use mapper_core::half_width_95;
 use std::collections::BTreeMap;
 
-/// Scores turned into probabilities.
+/// Probabilities of the causes.
 pub(crate) struct CauseProbabilities {
-    /// Causes, best first; what only adds to a better one is not among them.
+    /// Causes, best first, without supersets of a better one.
     pub candidates: Vec<Candidate>,
-    /// The fit of each candidate, by its place.
+    /// For each candidate, the index of its fit.
     pub shown: Vec<usize>,
-    /// Probability that nothing is beyond tolerance.
+    /// Probability that everything is within tolerance.
     pub none: f64,
-    /// Probability of a cause outside the catalogue, by what the best fit leaves.
+    /// Probability of an unmodelled cause, from the residual of the best fit.
     pub outside: f64,
-    /// Whether a cause is named at all.
+    /// Whether a cause is named.
     pub named: bool,
 }
 
-/// Share of causes that begin with a step among all. Judgement: one in two hundred, for what begins is seldom and looks like a cause of
-/// another kind.
+/// Prior share of causes that begin during the recording. Judgement: one in two hundred, because they are rare and can imitate other
+/// causes.
 const LATE_RATIO: f64 = 0.005;
 
-/// Logarithm of what is known of a cause before any data: pairs are rarer than singles, and many; causes that begin while a
-/// recording is made are rarer still, and may begin with any step.
+/// Logarithm of the prior of a cause. Pairs are rarer than singles, and there are many pairs. Causes that begin during the recording are
+/// rarer still, and may begin with any step.
 pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
     let count = study.catalogue.max(2) as f64;
     let effects = hypothesis.effects.len();
@@ -48,12 +48,12 @@ pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypot
     of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
 }
 
-/// Evidence of a fit, prior included.
+/// Evidence of a fit, including its prior.
 pub fn weight(calibration: &Calibration, study: &Study, fit: &Fit) -> f64 {
     fit.score + prior(calibration, study, &fit.hypothesis)
 }
 
-/// Whether all effects of `part` are among those of `whole`, whenever they begin.
+/// Whether `whole` includes all effects of `part`, regardless of their onset.
 fn holds(study: &Study, whole: &Fit, part: &Fit) -> bool {
     let whole = ids(study, whole);
     ids(study, part).iter().all(|effect| whole.contains(effect))
@@ -74,10 +74,10 @@ pub(crate) fn weigh(
     let best_cause = scores.iter().skip(1).copied().fold(f64::NEG_INFINITY, f64::max);
     let named = best_cause - scores[0] > calibration.threshold;
     let outside = calibration.outside(left.features());
-    // Where nothing is named, an inadequate fit speaks for an outside cause likewise.
+    // If no cause is named, an inadequate fit also supports an unmodelled cause.
     let inside = 1.0 - outside;
     let none = inside * weights[0] / total;
-    // What only adds to a better cause is that cause, with something too weak to tell.
+    // A superset of a better cause counts as that cause with an additional effect too weak to detect.
     let mut shown: Vec<usize> = Vec::new();
     let mut probabilities: Vec<f64> = Vec::new();
     for (place, fit) in fits.iter().enumerate() {
@@ -134,11 +134,10 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
     begun.collect()
 }
 
-/// Maximum number of causes named beside the first: a longer list helps nobody.
+/// Maximum number of alternatives named with the first cause; a longer list does not help.
 const MAX_EQUIVALENT: usize = 2;
 
-/// Other causes whose scores the data do not tell from the best's, the nearest first; a cause that only adds to a better one
-/// is none.
+/// Causes whose scores the data cannot distinguish from the best, nearest first, without supersets of a better cause.
 fn equivalents(
     study: &Study,
     calibration: &Calibration,
@@ -155,7 +154,7 @@ fn equivalents(
         .collect()
 }
 
-/// Parameters with their 95 % intervals, taken in the search's coordinate so that they stay within their range.
+/// Parameters with 95 % intervals, computed in the search coordinate so that they stay within range.
 pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<String, Estimate> {
     let coordinates = coordinates(study, &fit.hypothesis);
     let values = parameters(&fit.hypothesis);
@@ -189,7 +188,7 @@ pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> 
     estimates
 }
 
-/// Where no cause is named but one is more probable than nothing: the causes, and nothing among them, most probable first.
+/// If no cause is named but one is more probable than none: the causes and the null hypothesis, most probable first.
 pub(crate) fn suspicions<'a>(
     weighed: &CauseProbabilities,
     fits: &'a [Fit],
@@ -207,7 +206,7 @@ pub(crate) fn suspicions<'a>(
     Some(Rivals { fits, probabilities })
 }
 
-/// The causes that are still open, best first; `None` where the first is settled.
+/// Open causes, best first; `None` if the first is settled.
 pub(crate) fn rivals<'a>(weighed: &CauseProbabilities, fits: &'a [Fit]) -> Option<Rivals<'a>> {
     let probabilities: Vec<f64> = weighed.candidates.iter().map(|candidate| candidate.probability).collect();
     let total: f64 = probabilities.iter().sum();

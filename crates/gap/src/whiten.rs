@@ -1,4 +1,4 @@
-//! Residuals in units of what noise and imperfectly known inputs explain.
+//! Residuals scaled by the noise and the uncertainty of the inputs.
 
 use crate::nuisance::{NuisanceKind, OUTPUTS};
 use crate::study::{Hypothesis, PredictError, Prediction, Study};
@@ -11,12 +11,12 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The study linearised where nothing is off: predictions, whitening, and what each nuisance does.
+/// The study linearised at the nominal model: predictions, whitening, and nuisance derivatives.
 #[derive(Debug)]
 pub struct Linearised {
-    /// Prediction without any deviation.
+    /// Prediction of the nominal model.
     pub base: Prediction,
-    /// What is known of the noise.
+    /// Noise model.
     noise: Noise,
     /// Whitened change for one sigma of each nuisance.
     pub columns: Vec<Vec<f64>>,
@@ -33,7 +33,7 @@ struct Noise {
 
 impl Noise {
     fn new(covariances: Vec<DMatrix<f64>>) -> Noise {
-        // Positive definite by construction; independent values of the same spread stand in should rounding say otherwise.
+        // Positive definite by construction; if rounding breaks this, independent values of the same spread replace it.
         let factor = |covariance: &DMatrix<f64>| {
             WhiteningFactor::new(covariance.clone()).unwrap_or_else(|| {
                 let (n, variance) = (covariance.nrows(), covariance.diagonal().mean());
@@ -46,10 +46,10 @@ impl Noise {
 }
 
 impl Linearised {
-    /// Linearised where nothing is off.
+    /// Linearises at the nominal model.
     ///
     /// # Errors
-    /// [`PredictError`] where the nominal model cannot follow the recording.
+    /// [`PredictError`] if the nominal model cannot follow the recording.
     pub fn new(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
@@ -61,7 +61,7 @@ impl Linearised {
     /// Whitening by the noise of the outputs alone, without derivatives.
     ///
     /// # Errors
-    /// [`PredictError`] where the nominal model cannot follow the recording.
+    /// [`PredictError`] if the nominal model cannot follow the recording.
     pub fn of_noise_alone(study: &Study) -> Result<Linearised, PredictError> {
         let nothing = study.nothing();
         let base = study.predict(&nothing)?;
@@ -69,10 +69,10 @@ impl Linearised {
         Ok(Linearised { base, noise, columns: Vec::new(), products: Vec::new() })
     }
 
-    /// Linearised again at a hypothesis; the whitening stays.
+    /// Linearises at a hypothesis and keeps the whitening.
     ///
     /// # Errors
-    /// [`PredictError`] where the model cannot follow there.
+    /// [`PredictError`] if the model cannot follow there.
     pub fn at(&self, study: &Study, hypothesis: &Hypothesis) -> Result<Linearised, PredictError> {
         let base = study.predict(hypothesis)?;
         let changes = changes(study, hypothesis, &base);
@@ -97,7 +97,7 @@ impl Linearised {
         }
     }
 
-    /// Covariance of the values of one group by noise and by inputs that are not known better, unit squared.
+    /// Covariance of the values of one group due to noise and uncertain inputs, unit squared.
     pub(crate) fn covariance(&self, group: usize) -> &DMatrix<f64> {
         &self.noise.covariances[group]
     }
@@ -115,7 +115,7 @@ impl Linearised {
         residual
     }
 
-    /// Predicts and gives the whitened residual.
+    /// Predicts and returns the whitened residual.
     ///
     /// # Errors
     /// [`PredictError`].
@@ -124,7 +124,7 @@ impl Linearised {
     }
 }
 
-/// What one sigma of each nuisance changes at a hypothesis, over the cores.
+/// Change per sigma of each nuisance at a hypothesis, computed in parallel.
 fn changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>> {
     let indices: Vec<usize> = (0..study.nuisances.len()).collect();
     parallel::map(&indices, |index| {
@@ -139,20 +139,20 @@ fn changes(study: &Study, here: &Hypothesis, base: &Prediction) -> Vec<Vec<f64>>
             return change;
         }
         let mut moved = here.clone();
-        // Towards the middle, so that a nuisance at its end stays within.
+        // Step towards the centre, so that a nuisance at its limit stays within it.
         let step = if here.nuisances[*index] > 0.0 { -1.0 } else { 1.0 };
         moved.nuisances[*index] += step;
         match study.predict(&moved) {
             Ok(there) => {
                 there.values.iter().zip(&base.values).map(|(there, here)| (there - here) / step).collect()
             }
-            // A tolerance that stops the model says nothing: it stays where it is.
+            // A tolerance that stops the model gives no derivative and stays at its value.
             Err(_) => vec![0.0; base.values.len()],
         }
     })
 }
 
-/// Rows of a step: its groups lie one behind the other.
+/// Rows of a step; its groups are contiguous.
 pub fn rows_of_step(study: &Study, step: usize) -> std::ops::Range<usize> {
     let mut of_step = study.groups.iter().filter(|group| group.step == step);
     let first = of_step.next().map_or(0..0, |group| group.rows.clone());
@@ -178,17 +178,17 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Beyond this place on the speed line a jump leads along or across the surge line, where flow and outlet pressure
-/// during the jump hang on everything: they say nothing there.
+/// Position on the speed line beyond which a jump runs along or across the surge line. Flow and outlet pressure during the jump are then
+/// too sensitive to be used.
 const NEAR_SURGE: f64 = 0.975;
 /// Length of a jump, s.
 const JUMP_S: f64 = 3.0;
-/// Time after the last surge cycle in which no reading counts, s: when it ends is chaotic, and the shaft needs some seconds to forget it.
+/// Time after the last surge cycle in which no reading counts, s: its end is chaotic, and the shaft takes some seconds to recover.
 const AFTER_SURGE_S: f64 = 15.0;
-/// Factor on the noise of what says nothing.
+/// Factor on the noise of uninformative values.
 const SAYS_NOTHING: f64 = 1e4;
 
-/// For each step the time after its jump, s, in which flow and outlet pressure say nothing, and that in which no reading does.
+/// For each step, the time after its jump, s, in which flow and outlet pressure are uninformative, and that in which all readings are.
 fn lost_to_surge(study: &Study, nothing: &Hypothesis) -> Vec<(f64, f64)> {
     let Ok(positions) = study.surge_positions(nothing) else {
         return vec![(JUMP_S, 0.0); study.steps.len()];
@@ -214,7 +214,7 @@ fn covariances(
     changes: &[Vec<f64>],
 ) -> Vec<DMatrix<f64>> {
     let lost_to_surge = lost_to_surge(study, nothing);
-    // Response of every value to a unit of each input, from that of its offset.
+    // Response of every value to a unit of each input, from the response to its offset.
     let responses: Vec<(InputNoise, &Vec<f64>, f64)> = DRIVERS
         .iter()
         .zip(study.inputs.noise())
@@ -236,7 +236,7 @@ fn covariances(
                 group.blocks.iter().map(|i| study.steps[group.step].blocks[*i].clone()).collect();
             let times: Vec<&[f64]> =
                 blocks.iter().map(|block| &study.table.t_s[block.samples.clone()]).collect();
-            // Blocks alike to a tenth of a millisecond have one covariance.
+            // Blocks with times equal to a tenth of a millisecond share one covariance.
             let key = blocks
                 .iter()
                 .map(|b| (b.samples.len(), ((b.mean_s - blocks[0].mean_s) * 1e4).round() as i64))
@@ -256,7 +256,7 @@ fn covariances(
                     }
                 }
             }
-            // What moves is as uncertain as the times of its samples.
+            // Scatter of the sample times adds uncertainty to moving quantities.
             for (i, (block, row)) in blocks.iter().zip(group.rows.clone()).enumerate() {
                 let samples = block.samples.len().max(1) as f64;
                 covariance[(i, i)] += (base.slopes[row] * study.scatter_s).powi(2) / samples;

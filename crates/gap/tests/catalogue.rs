@@ -1,5 +1,5 @@
-//! Every effect of the catalogue, planted by a typical step: it shows as plainly as its signature says, and no other single
-//! effect explains the recording better than it does.
+//! Every library effect, planted with a typical step, is as visible as its signature predicts, and no other single effect explains the
+//! recording better.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -19,7 +19,7 @@ use mapper_physics::model::Model;
 
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3], dwell_s: 40.0 };
 
-/// Values so many typical steps from neutral, within the effect's range.
+/// Values a number of typical steps from neutral, within the effect's range.
 fn values(effect: &dyn Effect, steps: f64) -> Vec<f64> {
     let value = |p: &EffectParameter| (p.neutral + steps * p.typical_step).clamp(p.low, p.high);
     effect.info().parameters.iter().map(value).collect()
@@ -35,16 +35,16 @@ fn study(planted: Option<(&dyn Effect, &[f64])>, seed: u64) -> Study {
     Study::new(&recording, table, declared(), Model::nominal(), mapper_effects::catalogue())
 }
 
-/// Signatures at least so long, in sigmas, are planted: shorter ones hide behind tolerances.
+/// Minimum signature length of a planted effect, in sigmas: tolerances hide shorter ones.
 const PLAIN: f64 = 8.0;
-/// By how much one effect too many reduces the misfit by chance: of 25, one exceeds this in three campaigns of a thousand
-/// (chi-square with one degree of freedom).
+/// Misfit reduction by a superfluous effect due to chance: of 25, one exceeds this in three campaigns of a thousand (chi-square with one
+/// degree of freedom).
 const CHANCE: f64 = 15.0;
-/// Rivals that promise most are fitted.
+/// Number of the most promising rivals that are fitted.
 const RIVALS: usize = 1;
-/// Heat to the oil moves the metal over many minutes: on a campaign of three its whole range stays within tolerances.
+/// Heat to the oil changes the metal over many minutes: in a campaign of three, its whole range stays within tolerances.
 const TOO_SLOW: &str = "oil_scale";
-/// Convection before the wheel has no place on the nominal machine, which has no area there.
+/// Convection upstream of the wheel has no influence on the nominal machine, which has no area there.
 const WITHOUT_PLACE: &str = "inlet_htc";
 
 #[test]
@@ -61,7 +61,7 @@ fn every_effect_shows_as_its_signature_says_and_none_explains_it_better() {
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
-/// What is wrong with how one effect is seen; `None` where nothing is.
+/// Error in the visibility of one effect; `None` if correct.
 fn complaint(clean: &Study, nominal: &Linearised, index: usize, effect: &dyn Effect) -> Option<String> {
     let planted = [1.0, 3.0, 8.0].into_iter().find_map(|steps| {
         let values = values(effect, steps);
@@ -79,13 +79,13 @@ fn complaint(clean: &Study, nominal: &Linearised, index: usize, effect: &dyn Eff
         fit(&study, nominal, &Hypothesis { effects, ..study.nothing() }, &everywhere, effort).unwrap()
     };
     let (null, own) = (fit_of(Vec::new()), fit_of(vec![(index, values)]));
-    // The misfit falls by the square of the signature, whose root scatters by one; four of them, and as much as the inputs'
-    // noise and tolerances change a strong one.
+    // The misfit falls by the squared signature, whose root scatters by one. Allow four of them, plus the influence of input noise and
+    // tolerances on a strong effect.
     let gained = (null.cost - own.cost).max(0.0).sqrt();
     if gained < 0.9 * length - 4.0 {
         return Some(format!("its signature is {length:.1} sigma long, {gained:.1} are found"));
     }
-    // What is left is noise: chi-square within four standard deviations.
+    // The residual is noise: chi-square within four standard deviations.
     let count = own.residual.len() as f64;
     if (own.cost - count).abs() > 4.0 * (2.0 * count).sqrt() {
         return Some(format!("it leaves a misfit of {:.0} in {count} values", own.cost));

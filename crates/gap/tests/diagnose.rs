@@ -38,8 +38,8 @@ fn record_of(rig: &Rig, seed: u64) -> Recording {
     common::record_of(rig, &VISITS, seed)
 }
 
-/// A run in real time through a controller: told its steps up to 0.4 s late, its samples taken 8 ms off their times. A shaft that loses 50 krpm
-/// in a second is 400 rpm off then, and nothing is wrong with it.
+/// A real-time run through a controller: step commands are up to 0.4 s late, and sample times scatter by 8 ms. A shaft that loses 50 krpm
+/// in a second then appears 400 rpm off, without any fault.
 #[test]
 fn a_run_in_real_time_is_late_and_its_rig_is_not_to_blame() {
     let late_s = [0.0, 0.41, 0.07, 0.03, 0.15, 0.05, 0.26];
@@ -48,7 +48,7 @@ fn a_run_in_real_time_is_late_and_its_rig_is_not_to_blame() {
     assert_eq!(diagnosed.diagnosis.verdict, Verdict::WithinTolerance, "{:?}", diagnosed.diagnosis.r#where);
     assert!((diagnosed.study.scatter_s / 8e-3 - 1.0).abs() < 0.4, "{}", diagnosed.study.scatter_s);
 
-    // What is wrong with a rig is seen all the same.
+    // A real fault is still detected.
     let mut rig = Rig::new(Model::nominal());
     add(&mut rig, mapper_effects::find("bearing_friction").unwrap().as_ref(), &[1e-6]).unwrap();
     let diagnosed = ask(&common::record_late(&rig, &VISITS, 5, &late_s, 8e-3)).unwrap();
@@ -59,7 +59,7 @@ fn a_run_in_real_time_is_late_and_its_rig_is_not_to_blame() {
     );
 }
 
-/// Another night of the same rig: other points.
+/// A second run of the same rig with other points.
 const NEXT: Visits = Visits { speeds_rpm: &[100e3, 65e3, 125e3, 85e3, 110e3], dwell_s: 60.0 };
 
 fn next_night(effects: &[(&str, &[f64])], seed: u64) -> Recording {
@@ -70,7 +70,7 @@ fn next_night(effects: &[(&str, &[f64])], seed: u64) -> Recording {
     common::record_of(&rig, &NEXT, seed)
 }
 
-/// With a few candidates only: the search over all of them is checked by `mapper gap blind`.
+/// With a few candidates only; `mapper gap blind` tests the search over all of them.
 fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
     ask_beside(recording, None)
 }
@@ -93,8 +93,8 @@ fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Di
     })
 }
 
-/// What several sensors have in common moves the prediction as their own offsets of the same size do together: the model sees both as
-/// shifted readings and shifted inputs.
+/// A common offset of several sensors changes the prediction like equal offsets of each: the model sees both as shifted readings and
+/// shifted inputs.
 #[test]
 fn a_common_offset_is_all_of_the_single_ones() {
     let recording = record(&[], 3);
@@ -131,14 +131,14 @@ fn nothing_is_called_nothing() {
         + diagnosis.probability_outside
         + diagnosis.candidates.iter().map(|c| c.probability).sum::<f64>();
     assert!((sum - 1.0).abs() < 1e-9, "{sum}");
-    // Mean square of whitened noise: 1 within four standard deviations (sqrt(2/n)), and a little less, for what the
-    // uncertainty of the inputs and of jumps near surge adds to the noise.
+    // Mean square of whitened noise: 1 within four standard deviations (sqrt(2/n)), and slightly less because of the input uncertainty and
+    // of jumps near surge.
     let n = diagnosed.null.residual.len() as f64;
     let mean_square = diagnosed.null.residual.iter().map(|r| r * r).sum::<f64>() / n;
     assert!((0.8..1.0 + 4.0 * (2.0 / n).sqrt()).contains(&mean_square), "{mean_square}");
 }
 
-/// A soak before the first step may be longer than all steps: the shaft stands for most of such a recording.
+/// A soak before the first step may be longer than all steps: the shaft is at standstill for most of such a recording.
 #[test]
 fn a_rest_longer_than_all_steps_is_no_reason_to_refuse() {
     let plain = record(&[], 5);
@@ -164,11 +164,11 @@ fn a_rest_longer_than_all_steps_is_no_reason_to_refuse() {
     usable(&recording, &table, &declared()).unwrap();
 }
 
-/// A step that was held out is told as well as noise lets it, the first one too, of which nobody else knows how warm it began.
+/// A held-out step is predicted within noise, even the first one, whose initial temperature is unknown to the other steps.
 #[test]
 fn the_first_step_is_no_gap_where_it_was_held_out() {
     let gap = ask(&record(&[], 5)).unwrap().diagnosis.gap;
-    // Mean over the steps of `|r|^2/n - 1`: a few hundredths of noise, and what tolerances fitted to two thirds miss.
+    // Mean over the steps of `|r|^2/n - 1`: a few hundredths from noise and from tolerances fitted to two thirds of the steps.
     assert!(gap.before.abs() < 0.3 && !gap.held_out_steps.is_empty(), "{}", gap.before);
 }
 
@@ -184,12 +184,12 @@ fn a_probe_of_two_millimetres_is_named_measured_and_closes_the_gap() {
     assert!((estimate.value - 2e-3).abs() < room && room < 2e-4, "{estimate:?}");
     assert_eq!(diagnosis.r#where[0].submodel, "t2_probe");
     assert_eq!(diagnosis.r#where[0].channel, "T2");
-    // Held-out steps: what is left is noise, of which nothing can be removed.
+    // On held-out steps the residual is noise, which no cause can remove.
     assert!(diagnosis.gap.shrink > 0.9 && !diagnosis.gap.held_out_steps.is_empty());
     assert!(diagnosis.gap.channels["T2"].after < 0.2 * diagnosis.gap.channels["T2"].before);
 }
 
-/// Neither hides the other, and the length of a signature is by how much its effect reduces the misfit.
+/// Neither hides the other, and each reduces the misfit by the square of its signature length.
 #[test]
 fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     let truth: [(&str, &[f64]); 2] = [("stem_conduction", &[0.03]), ("flowmeter_gain", &[1.02])];
@@ -199,7 +199,7 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     let mut named = diagnosis.candidates[0].effects.clone();
     named.sort();
     assert_eq!(named, ["flowmeter_gain", "stem_conduction"]);
-    // The gain of both beside that of the meter alone, and beside nothing.
+    // Gain of both compared with the meter alone and with none.
     let meter = 3;
     let study = &diagnosed.study;
     let alone =
@@ -209,7 +209,7 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
         diagnosed.fits.iter().find(named).map(|f| f.cost)
     };
     let (both, stem) = (fits(&[1, meter]).unwrap(), fits(&[1]).unwrap());
-    // A gain of d^2 has a standard deviation of 2 d, so its root one of 1; four of them.
+    // A gain of d^2 has a standard deviation of 2 d, so its root one of 1; allow four of them.
     let gained = (stem - both).sqrt();
     assert!((gained - alone[0]).abs() < 4.0, "{gained} for {}", alone[0]);
 }
@@ -239,7 +239,7 @@ fn bad_recordings_get_a_clear_word_and_no_culprit() {
         step.p3_pa *= 1.4;
     }
     assert!(word(&elsewhere).contains("do not belong together"), "{}", word(&elsewhere));
-    // A compressor half as large again at the same speeds and pressures.
+    // A compressor larger by half at the same speeds and pressures.
     let mut larger = good.clone();
     for value in &mut larger.series.get_mut(&Channel::CompressorFlow).unwrap().values {
         *value *= 1.5;
@@ -267,7 +267,7 @@ fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
     }
 }
 
-/// What a jump would show, for a slow probe and a probe that conducts along its stem, both fitted to a slow probe.
+/// Expected result of a jump for a slow probe and for stem conduction, both fitted to a slow probe.
 #[test]
 fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
     let diagnosed = ask(&record(&[("tip_diameter", &[1e-3])], 9)).unwrap();
@@ -297,15 +297,15 @@ fn a_jump_tells_a_slow_probe_from_its_rival_and_from_itself_nothing() {
     let long = apart(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
     let short = apart(&diagnosed.study, &jump(90e3, 91e3), &fits).unwrap();
     assert!(long[0][0].abs() < 1e-9 && long[1][1].abs() < 1e-9);
-    // A probe's lag shows where the temperature jumps; 80 krpm are some 100 K, one krpm is two.
+    // A probe's lag is visible when the temperature jumps; 80 krpm are some 100 K, one krpm is two.
     assert!(long[0][1] > 10.0 * short[0][1], "{long:?} {short:?}");
-    // Fitting the rival again can only bring it nearer; a close look takes five times as many samples, which hold at
-    // most five times as much.
+    // Refitting the rival can only reduce the distance. A detailed pass has five times as many samples, and at most five times the
+    // information.
     let blunt = apart_at_first_sight(&diagnosed.study, &jump(60e3, 140e3), &fits).unwrap();
     assert!(long[0][1] < 5.0 * blunt[0][1], "{long:?} {blunt:?}");
 }
 
-/// A user's suspicion, tried beside the built-in effects: the example that ships, on a rig that has it.
+/// A user's suspected effect, tried with the built-in effects: the shipped example, on a rig that has it.
 #[test]
 fn a_suspected_effect_in_rhai_is_named_and_measured() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/effects/coolant_passage.rhai");
@@ -326,8 +326,8 @@ fn a_suspected_effect_in_rhai_is_named_and_measured() {
     assert!((estimate.value - 4.0).abs() < room && room < 1.0, "{estimate:?}");
 }
 
-/// Convection before the wheel acts much as the share of the area there does: on a machine that has such a share it is named
-/// or left open beside it, never ruled out; on one that has none it is no candidate.
+/// Convection upstream of the wheel acts much like the area share there. On a machine with such an area it is named or left open, never
+/// ruled out; on one without it is not a candidate.
 #[test]
 fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     let mut model = Model::nominal();
@@ -362,8 +362,8 @@ fn convection_before_the_wheel_is_never_ruled_out_for_its_area() {
     assert!(named.into_iter().all(|id| id != "inlet_htc"));
 }
 
-/// What one night found forecasts another with other points, nothing fitted: what is left is noise, and the 95 % band holds what
-/// it says. A covariance that belongs to something else is refused.
+/// One recording's result predicts another with other points, without a fit: the residual is noise within the 95 % band. A covariance with
+/// the wrong dimensions is refused.
 #[test]
 fn the_twin_of_one_night_forecasts_the_next() {
     let truth: [(&str, &[f64]); 2] = [("tip_diameter", &[2e-3]), ("bearing_friction", &[6e-7])];
@@ -378,8 +378,8 @@ fn the_twin_of_one_night_forecasts_the_next() {
     assert!(hold(&study, &nominal).is_err(), "its covariance is of another machine");
 }
 
-/// Two nights of one rig with a slow probe, a third after the probe was changed and the bearing had begun to rub: each cause has
-/// its fate, and two nights know the probe better than one, but not better than two that share nothing would.
+/// Two recordings of a rig with a slow probe, and a third with a new probe and a rubbing bearing: each cause has its fate. Two recordings
+/// know the probe better than one, but not better than two independent ones.
 #[test]
 fn causes_persist_come_and_go_over_the_nights() {
     let probe: (&str, &[f64]) = ("tip_diameter", &[2e-3]);
@@ -404,12 +404,12 @@ fn causes_persist_come_and_go_over_the_nights() {
     assert!(together < narrowest && together > 0.99 * apart, "{together} {narrowest} {apart}");
 }
 
-/// The bearing begins to rub in the middle of a recording.
+/// The bearing begins to rub during a recording.
 #[test]
 fn a_cause_that_begins_with_a_step_is_named_with_its_step() {
     let mut recording = record(&[], 41);
     let late = record(&[("bearing_friction", &[1e-6])], 41);
-    // The same seed has the same noise and offsets; the machine before and after meet in the jump of step 4.
+    // The same seed gives the same noise and offsets; the two machines are joined at the jump of step 4.
     let start_s = recording.steps[3].start_s;
     for (channel, series) in &mut recording.series {
         let other = &late.series[channel];
@@ -426,7 +426,7 @@ fn a_cause_that_begins_with_a_step_is_named_with_its_step() {
     assert!(!first.onsets["bearing_friction"].grows);
 }
 
-/// Where nothing is named, what is said to be seen is seen: planted at twice that size it is named, at a third it is not.
+/// The smallest detectable size is correct if no cause is named: planted at twice that size an effect is named, at a third it is not.
 #[test]
 fn the_smallest_size_that_is_seen_is_seen() {
     let clean = ask(&record(&[], 51)).unwrap().diagnosis;

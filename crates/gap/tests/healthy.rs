@@ -1,4 +1,4 @@
-//! What changed since a healthy recording, on recordings of the adaptive simulator.
+//! Changes since a reference recording, on recordings of the adaptive simulator.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -41,8 +41,8 @@ fn rubbing(friction_w_s2: f64) -> Rig {
     rig
 }
 
-/// Where the model has the right structure a healthy recording changes nothing of what is found: the same cause, its size within both intervals. What
-/// was there already in the healthy one is no change.
+/// If the model structure is correct, a reference recording does not change the result: same cause, size within both intervals. A fault
+/// already in the reference recording is not a change.
 #[test]
 fn a_cause_is_found_with_a_healthy_recording_as_without() {
     let truth = 1e-6;
@@ -62,7 +62,7 @@ fn a_cause_is_found_with_a_healthy_recording_as_without() {
     assert_eq!(diagnosis.verdict, Verdict::WithinTolerance, "{:?}", diagnosis.candidates);
 }
 
-/// Only the same steps can be compared, and of them only what both recordings hold.
+/// Only identical steps can be compared, and only channels present in both recordings.
 #[test]
 fn other_steps_are_refused_and_what_one_lacks_is_left_out() {
     let rig = Rig::new(Model::nominal());

@@ -1,4 +1,4 @@
-//! What next: what experiments are expected to tell, on recordings of the adaptive simulator.
+//! Expected results of experiments, on recordings of the adaptive simulator.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -26,7 +26,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use std::sync::Arc;
 
-/// Four steps, after which heat to the oil and to the cell look much alike.
+/// Four steps, after which heat to the oil and heat to the cell are hardly distinguishable.
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 130e3, 70e3, 110e3], dwell_s: 120.0 };
 
 fn ask(truth: (&str, f64), candidates: &[&str]) -> Diagnosed {
@@ -84,7 +84,7 @@ fn fit_of<'a>(diagnosed: &'a Diagnosed, id: &str) -> &'a Fit {
     diagnosed.fits.iter().find(is_it).unwrap()
 }
 
-/// Heat to the oil or to the cell: an oil step moves what drives the one and not the other.
+/// Heat to the oil or to the cell: an oil step changes the driving temperature of only one of them.
 #[test]
 fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
     let diagnosed = ask(("ventilation", 2.0), &["ventilation", "oil_scale"]);
@@ -99,7 +99,7 @@ fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
     let none = nearest(&oil_step(70e3, 0.0), &pair, &diagnosed);
     assert!(step > 3.0 * none && small < 0.5 * step, "{step} {small} {none}");
 
-    // Lag of a probe and of a meter: neither shows where nothing moves quickly.
+    // Lag of a probe and of a meter: neither is visible without fast changes.
     let diagnosed = ask(("tip_diameter", 1e-3), &["tip_diameter", "stem_conduction"]);
     let pair = [fit_of(&diagnosed, "tip_diameter"), fit_of(&diagnosed, "stem_conduction")];
     let step = nearest(&oil_step(70e3, 40.0), &pair, &diagnosed);
@@ -107,7 +107,7 @@ fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
     assert!(step < 0.1 * jumped, "{step} {jumped}");
 }
 
-/// At rest T1, T2 and Tc read alike but for their offsets.
+/// At rest T1, T2 and Tc read the same apart from their offsets.
 #[test]
 fn a_soak_tells_more_the_evener_it_is() {
     let soak = |left_k: f64| {
@@ -117,13 +117,13 @@ fn a_soak_tells_more_the_evener_it_is() {
     let diagnosed = ask(("t2_offset", 2.0), &["t1_offset", "t2_offset"]);
     let pair = [fit_of(&diagnosed, "t2_offset"), fit_of(&diagnosed, "t1_offset")];
     let told = |left_k: f64| apart(&diagnosed.study, &soak(left_k), &pair).unwrap();
-    // The evener the rest, the more it tells; what all read together is never known, and from itself nothing differs.
+    // A more uniform soak gives more information; the common temperature stays unknown, and a cause does not differ from itself.
     let [even, uneven, useless] = [0.02, 0.3, 100.0].map(|left_k| told(left_k)[0][1]);
     assert!(told(0.02)[0][0].abs() < 1e-9 && even > uneven && uneven > useless, "{even} {uneven} {useless}");
     assert!(useless < 0.01, "sensors that rest unevenly by 100 K tell nothing: {useless}");
 }
 
-/// The list is ranked by what a minute answers, its first is what is to be done next, and only what was offered stands in it.
+/// The list is ranked by information per minute, its first entry is `next`, and it contains only allowed experiments.
 #[test]
 fn what_is_offered_is_ranked_and_the_first_is_next() {
     let offered =
@@ -147,7 +147,7 @@ fn what_is_offered_is_ranked_and_the_first_is_next() {
     assert!(experiments.iter().all(|e| e.kind != Kind::T3Step));
 }
 
-/// How far the smoothed course of a T3 or oil step is from the step, with and without noise.
+/// Distance of the smoothed T3 or oil history from the true step, with and without noise.
 #[test]
 fn the_smoother_follows_a_step_of_t3_and_oil() {
     let t_s: Vec<f64> = (0..6_000).map(|i| 0.1 * f64::from(i)).collect();
@@ -165,7 +165,7 @@ fn the_smoother_follows_a_step_of_t3_and_oil() {
             valve_opening_ratio: 0.9,
         })
         .collect();
-    // Of 100 K of T3 and 40 K of oil at most so much is lost around the corner.
+    // Of 100 K of T3 and 40 K of oil, at most this much is lost around the corner.
     for (beside, most_k) in [
         (Beside::T3 { from_k: t3_k, to_k: t3_k - 100.0 }, 4.0),
         (Beside::Oil { from_k: oil_k, to_k: oil_k + 40.0 }, 1.5),

@@ -18,24 +18,24 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// How long a driver has for its answers.
+/// Timeouts for a driver's responses.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
-    /// For hello.
+    /// For the handshake.
     pub hello: Duration,
-    /// For settings, description, arming and giving back: connections are made there.
+    /// For settings, description, arming and release, which may open connections.
     pub slow: Duration,
     /// For setpoints and the safe state.
     pub call: Duration,
-    /// For simulated time to go on, at each call.
+    /// For simulated time to advance, per call.
     pub simulation: Duration,
-    /// For a sample in real time, after its time.
+    /// For a sample in real time, after its due time.
     pub late: Duration,
-    /// Without a call for so long a rig in real time is given up by its lease.
+    /// Without calls for this long, the lease of a rig in real time is no longer renewed.
     pub silence: Duration,
 }
 
-/// As docs/protocol.md has it.
+/// Values of docs/protocol.md.
 pub const PATIENCE: Patience = Patience {
     hello: Duration::from_secs(5),
     slow: Duration::from_secs(10),
@@ -45,15 +45,15 @@ pub const PATIENCE: Patience = Patience {
     silence: Duration::from_secs(5),
 };
 
-/// Time for a driver to end by itself.
+/// Time for a driver to exit by itself.
 const LEAVING: Duration = Duration::from_secs(2);
 
-/// A rig behind a driver.
+/// A rig controlled by a driver.
 pub struct Driver {
     name: String,
     link: Link,
     session: Option<String>,
-    /// An older driver does not know the word: setpoints hold there by themselves.
+    /// Whether the driver knows the hold command. Older drivers hold setpoints without it.
     knows_hold: bool,
     description: Option<RigDescription>,
     secrets: Secrets,
@@ -61,19 +61,19 @@ pub struct Driver {
     /// Number of the last request.
     asked: u64,
     armed: Option<Lease>,
-    /// Whether arming was ever asked for without giving back: who holds the rig is not known then.
+    /// Whether arming was requested without a later release, so that the rig's owner is unknown.
     in_doubt: bool,
     pending: Pending,
-    /// What was wrong with samples since the last poll.
+    /// Errors in samples since the last poll.
     spoiled: Option<DriverError>,
     now_s: f64,
 }
 
 impl Driver {
-    /// Finds the driver called `name`, starts it and gives it its settings. `built_in`: names of other backends, for people.
+    /// Finds the driver called `name`, starts it and sends its settings. `built_in`: names of other backends, for the error message.
     ///
     /// # Errors
-    /// [`BackendError::Settings`] where there is no such driver, or it is not one, or it refuses its settings.
+    /// [`BackendError::Settings`] if the driver is missing, is not a driver, or refuses its settings.
     pub fn find(
         places: &Places,
         name: &str,
@@ -99,14 +99,14 @@ impl Driver {
             }));
         };
         let variable = |name: &str| std::env::var(name).ok();
-        // One that was there before has an environment of its own.
+        // A driver that was already running has its own environment.
         let needed = matches!(at, At::Program(_));
         let secrets = Secrets::of(settings, &variable, needed)
             .map_err(|(path, error)| settings_error(name, path, error))?;
         Driver::start(&at, name, settings, secrets, PATIENCE)
     }
 
-    /// Starts the program of a driver, without secrets.
+    /// Starts a driver program, without secrets.
     ///
     /// # Errors
     /// As [`Driver::find`].
@@ -119,7 +119,7 @@ impl Driver {
         Driver::start(&At::Program(program.to_owned()), name, settings, Secrets::default(), patience)
     }
 
-    /// Connects to a driver that listens at a socket, without secrets.
+    /// Connects to a driver that listens on a socket, without secrets.
     ///
     /// # Errors
     /// As [`Driver::find`].
@@ -177,7 +177,7 @@ impl Driver {
         Ok(driver)
     }
 
-    /// Hello both ways. Gives the version of the driver.
+    /// Exchanges hello messages and returns the driver's version.
     fn greet(&mut self) -> Result<String, BackendError> {
         let hello = Hello {
             magic: MAGIC.to_owned(),
@@ -187,7 +187,7 @@ impl Driver {
             frame_limit_bytes: mapper_protocol::FRAME_LIMIT_BYTES,
         };
         let answer = self.ask("hello", &hello, self.patience.hello)?;
-        // Without what it may have said of a secret.
+        // Secrets are removed from the driver's text.
         let wrong = |error| self.lost(error);
         let welcome: Welcome = serde_json::from_value(answer)
             .map_err(|error| wrong(DriverError::NoDriver(format!("its hello lacks something: {error}"))))?;
@@ -221,14 +221,14 @@ impl Driver {
 
     fn lost(&self, error: DriverError) -> BackendError {
         let source = Box::new(DriverError::Said(self.secrets.hide(&error.to_string())));
-        // Before it is described there is no rig that could be lost.
+        // Before the description arrives there is no rig to lose.
         match self.description {
             Some(_) => BackendError::Lost { t_s: self.now_s, source },
             None => BackendError::Settings { backend: self.name.clone(), path: String::new(), source },
         }
     }
 
-    /// Asks and waits for the answer; samples that come before it are kept.
+    /// Sends a request and waits for the response. Samples that arrive earlier are kept.
     fn ask(
         &mut self,
         call: &'static str,
@@ -260,7 +260,7 @@ impl Driver {
             match (message.id, message.error, message.result) {
                 (Some(id), Some(failure), _) if id == self.asked => {
                     let mut message = failure.message;
-                    // What was lost meanwhile says more than that the lease has ended.
+                    // An earlier sample error explains more than the end of the lease.
                     if let (Code::LeaseEnded, Some(spoiled)) = (failure.code, &self.spoiled) {
                         message = format!("{message}; {spoiled}");
                     }
@@ -268,21 +268,21 @@ impl Driver {
                     return Err(self.refused(failure, call));
                 }
                 (Some(id), None, result) if id == self.asked => return Ok(result.unwrap_or(Value::Null)),
-                // An answer that came too late.
+                // A late response to an earlier request.
                 (Some(_), ..) => {}
                 (None, ..) => self.take_note(message.method.as_deref(), message.params),
             }
             if left.is_zero() {
-                // A driver that talks without end does not answer either.
+                // A driver that sends endless messages does not count as responding.
                 return Err(BackendError::Deadline { call, limit_s: within.as_secs_f64() });
             }
         }
     }
 
-    /// A refusal, as the error of a rig.
+    /// Converts a refusal to a rig error.
     fn refused(&self, failure: Failure, call: &'static str) -> BackendError {
         match rig_error(failure, &self.name, call, self.now_s) {
-            // Before it is described there is no rig that could be lost.
+            // Before the description arrives there is no rig to lose.
             BackendError::Lost { source, .. } if self.description.is_none() => {
                 BackendError::Settings { backend: self.name.clone(), path: String::new(), source }
             }
@@ -290,7 +290,7 @@ impl Driver {
         }
     }
 
-    /// Samples and remarks.
+    /// Processes samples and notes.
     fn take_note(&mut self, method: Option<&str>, params: Value) {
         let (Some(rig), true) = (&self.description, self.spoiled.is_none()) else { return };
         match method {
@@ -329,7 +329,7 @@ impl Driver {
         }
     }
 
-    /// Waits until a rig in real time has delivered what is due at `until_s`, or is late with it.
+    /// Waits until a rig in real time has delivered the samples due at `until_s`, or is late.
     fn wait_for(&mut self, until_s: f64) -> Result<(), BackendError> {
         let sample_s = 1.0 / self.rig()?.sample_rate_hz;
         let ahead = Duration::try_from_secs_f64((until_s - self.now_s).max(0.0)).unwrap_or(Duration::MAX);
@@ -338,7 +338,7 @@ impl Driver {
         if let Some(lease) = &self.armed {
             lease.called();
         }
-        // The next sample would be beyond it.
+        // The next sample would be later than that.
         while !self.pending.reaches(until_s - 0.999 * sample_s) && self.spoiled.is_none() {
             let left = end.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
             let Some(message) = self.link.next(left).map_err(|error| self.lost(error))? else { break };
@@ -346,7 +346,7 @@ impl Driver {
                 self.take_note(message.method.as_deref(), message.params);
             }
         }
-        // What has come besides.
+        // Processes messages that have already arrived.
         while let Ok(Some(message)) = self.link.next(Duration::ZERO) {
             if message.id.is_none() {
                 self.take_note(message.method.as_deref(), message.params);
@@ -388,7 +388,7 @@ impl Backend for Driver {
         (self.pending, self.spoiled, self.now_s) = (Pending::default(), None, 0.0);
         let answer = self.ask("arm", &json!({}), self.patience.slow);
         if let Err(error) = answer {
-            // A refusal leaves the rig with whoever had it.
+            // After a refusal the rig stays with its earlier owner.
             self.in_doubt = matches!(error, BackendError::Deadline { .. });
             return Err(error);
         }
@@ -399,7 +399,7 @@ impl Backend for Driver {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        // What is no number cannot be written in a frame, whatever the rig accepts.
+        // Non-finite numbers cannot be written in a frame, whatever range the rig accepts.
         let any = SetpointRange { low: f64::MIN, high: f64::MAX };
         let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
         self.rig()?.accepts.unwrap_or(all).check(setpoints)?;
@@ -420,7 +420,7 @@ impl Backend for Driver {
             return Err(self.lost(error));
         }
         let channels = self.rig()?.channels.clone();
-        // Simulated time is the driver's own to the last bit, and nothing is waiting for it.
+        // The driver's own simulated time is exact, and no sample waits for it.
         let rounding_s = if self.simulated() { 0.0 } else { ROUNDING_S };
         Ok(self.pending.take(until_s, rounding_s, &channels))
     }
@@ -448,7 +448,7 @@ impl Backend for Driver {
 
 impl Drop for Driver {
     fn drop(&mut self) {
-        // The lease's thread holds the pipe too.
+        // The thread of the lease also holds the pipe.
         self.armed = None;
         self.link.close(self.in_doubt, LEAVING);
     }

@@ -1,23 +1,23 @@
-//! What goes wrong with a driver before it is a rig.
+//! Driver errors before the rig is available.
 
 use mapper_protocol::{Unusable, Version};
 use std::path::PathBuf;
 
-/// Why there is no driver, or why it cannot be used.
+/// Why a driver is missing or unusable.
 #[derive(Debug, thiserror::Error)]
 pub enum DriverError {
-    /// No program of this name.
+    /// No program has this name.
     #[error(
         "there is no such backend. Built in: {built_in}. A driver would be a program `{program}`, which is not in {looked}{hint}"
     )]
     NotFound {
-        /// File name looked for.
+        /// File name searched.
         program: String,
-        /// Backends of the program itself.
+        /// Built-in backends of the program.
         built_in: String,
-        /// Where was looked.
+        /// Searched locations.
         looked: String,
-        /// What else may help, a sentence with its blank before it, or nothing.
+        /// A hint: a sentence with a leading space, or empty.
         hint: String,
     },
     /// It cannot be started.
@@ -25,10 +25,10 @@ pub enum DriverError {
     NotStarted {
         /// The program.
         program: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// Nobody listens at its socket.
+    /// No driver listens on the socket.
     #[error(
         "nobody listens at the socket {}: {source}. Start the driver that belongs to it (`mapper-backend-NAME --socket PATH`), or remove the file: a \
          driver that is found as a program is started then",
@@ -37,57 +37,57 @@ pub enum DriverError {
     Away {
         /// The socket.
         socket: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// The program may not be started.
+    /// The program is not executable.
     #[error("{} is there, but may not be executed; `chmod +x {}`", program.display(), program.display())]
     NotExecutable {
         /// The program.
         program: PathBuf,
     },
-    /// It is no driver, or one of another time.
+    /// The driver's protocol version is incompatible.
     #[error("it speaks version {}.{} of the protocol; this program speaks {}.{}. Use a driver of the same major version", theirs.major, theirs.minor, ours.major, ours.minor)]
     Version {
         /// Its version.
         theirs: Version,
-        /// Ours.
+        /// This program's version.
         ours: Version,
     },
-    /// It answers with something else.
+    /// The response is not that of a driver.
     #[error("it is not a driver for mapper: {0}")]
     NoDriver(String),
-    /// It calls itself otherwise.
+    /// The driver reports a different name.
     #[error("it calls itself `{0}`; the program's file name has to end with the name of the driver")]
     Name(String),
-    /// What it says cannot be.
+    /// The driver's data are inconsistent.
     #[error(transparent)]
     Unusable(#[from] Unusable),
-    /// It has ended, or closed its output.
+    /// The driver has exited or closed its output.
     #[error("the driver has ended{0}")]
     Ended(String),
-    /// It sent what is not a message.
+    /// The driver sent an invalid message.
     #[error("the driver sent what no driver sends: {0}")]
     Garbage(String),
-    /// It does not read what it is sent.
+    /// The driver does not read its input.
     #[error("the driver does not read what it is sent")]
     Deaf,
-    /// Its own words.
+    /// An error reported by the driver.
     #[error("{0}")]
     Said(String),
-    /// A secret in the campaign.
+    /// The campaign contains a secret.
     #[error(
         "a secret does not belong into a campaign; write `{{env: NAME}}` and put it into the environment variable NAME"
     )]
     Secret,
-    /// A variable that is not set.
+    /// An environment variable is not set.
     #[error("the environment variable {0} is not set")]
     NotSet(String),
 }
 
-/// What is usual for a script that the system does not start.
+/// Hint on the usual cause if the system cannot start a script.
 fn first_line(source: &std::io::Error) -> &'static str {
-    /// Of Unix: neither a program nor a script with a first line.
+    /// Unix error code for a file that is neither a program nor a script with an interpreter line.
     const ENOEXEC: i32 = 8;
     match source.kind() {
         std::io::ErrorKind::NotFound => ", although it is there: look at the interpreter in its first line",

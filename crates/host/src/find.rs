@@ -1,48 +1,48 @@
-//! Where drivers are: those that listen at a socket, then programs beside this one and in the directories of `PATH`.
+//! Finds drivers: first sockets, then programs in this program's directory and in the directories of `PATH`.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// What the file name of a driver begins with; the rest is the name that campaigns write.
+/// Prefix of a driver's file name; the remainder is the name in campaigns.
 pub const PREFIX: &str = "mapper-backend-";
-/// What the file name of a socket ends with; the rest is the name that campaigns write.
+/// Suffix of a socket's file name; the remainder is the name in campaigns.
 const SOCKET: &str = ".socket";
 
-/// Where drivers are looked for.
+/// Search locations of drivers.
 #[derive(Debug, Clone, Default)]
 pub struct Places {
-    /// Directories of programs, first one first.
+    /// Program directories in search order.
     pub programs: Vec<PathBuf>,
-    /// The directory of sockets at which drivers listen; those come before programs.
+    /// Directory of driver sockets, which take precedence over programs.
     pub sockets: Option<PathBuf>,
 }
 
-/// A driver's place.
+/// Location of a driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum At {
-    /// A program, which is started for each run.
+    /// A program that is started for each run.
     Program(PathBuf),
-    /// A socket, at which one listens that somebody has started.
+    /// The socket of a driver that is already running.
     Socket(PathBuf),
 }
 
-/// A driver that is there.
+/// An available driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DriverLocation {
     /// Name in campaigns.
     pub name: String,
-    /// Where.
+    /// Its location.
     pub at: At,
 }
 
 impl Places {
-    /// The directory of `program`, those of a variable like `PATH`, and a directory of sockets.
+    /// The directory of `program`, the directories of a `PATH` variable, and a directory of sockets.
     pub fn new(program: Option<&Path>, path: Option<&OsStr>, sockets: Option<PathBuf>) -> Places {
-        let beside = program.and_then(Path::parent).map(Path::to_owned);
+        let program_directory = program.and_then(Path::parent).map(Path::to_owned);
         let on_path = path.map(|path| std::env::split_paths(path).collect::<Vec<_>>()).unwrap_or_default();
         let mut programs: Vec<PathBuf> = Vec::new();
-        // A relative entry, the empty one in particular, would be whatever directory somebody stands in.
-        for place in beside.into_iter().chain(on_path).filter(|place| place.is_absolute()) {
+        // A relative or empty entry would depend on the working directory.
+        for place in program_directory.into_iter().chain(on_path).filter(|place| place.is_absolute()) {
             if !programs.contains(&place) {
                 programs.push(place);
             }
@@ -50,7 +50,7 @@ impl Places {
         Places { programs, sockets: sockets.filter(|place| place.is_absolute()) }
     }
 
-    /// What drives rigs for `backend: NAME`.
+    /// The driver for `backend: NAME`.
     pub fn find(&self, name: &str) -> Option<At> {
         let file = file_name(name)?;
         let socket = self.sockets.as_ref().map(|place| place.join(format!("{name}{SOCKET}")));
@@ -60,13 +60,13 @@ impl Places {
         socket.or_else(|| program().map(At::Program))
     }
 
-    /// A file that has the name of the program, but may not be started.
+    /// A file with the program's name that is not executable.
     pub(crate) fn not_executable(&self, name: &str) -> Option<PathBuf> {
         let file = file_name(name)?;
         self.programs.iter().map(|place| place.join(&file)).find(|program| program.is_file())
     }
 
-    /// All drivers, by name; the one that would be used where there are several.
+    /// All drivers by name; of several with one name, the one that would be used.
     pub fn all(&self) -> Vec<DriverLocation> {
         let mut found: Vec<DriverLocation> = Vec::new();
         let inside = |place: &PathBuf| place.read_dir().into_iter().flatten().flatten();
@@ -91,7 +91,7 @@ impl Places {
     }
 }
 
-/// The file name of a driver; `None` for what is not a name. It comes from a campaign: it names no other directory.
+/// The file name of a driver; `None` for an invalid name. The name comes from a campaign and must not lead to another directory.
 pub(crate) fn file_name(name: &str) -> Option<String> {
     let right = |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '_';
     let is_name = !name.is_empty() && name.len() <= 64 && name.chars().all(right);

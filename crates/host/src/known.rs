@@ -1,6 +1,6 @@
-//! Drivers that are not there need not be guessed at.
+//! Drivers that come with the source, so that a missing driver can be reported with its build command.
 
-/// Drivers that come with the source and are built by themselves: name, what for, the line that builds it.
+/// Drivers that come with the source and are built separately: name, purpose, build command.
 pub const KNOWN: &[(&str, &str, &str)] = &[
     (
         "lab",

@@ -1,4 +1,4 @@
-//! The lease: an armed driver hears from its host twice a second, or flies its safe trajectory.
+//! The lease: the host sends an armed driver a message twice a second, otherwise the driver executes its safe trajectory.
 
 use crate::link::Outlet;
 use mapper_core::BackendError;
@@ -7,7 +7,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// A lease that is renewed until it is dropped, by a thread of its own, as long as somebody calls.
+/// A lease, renewed by a separate thread until it is dropped, as long as calls arrive.
 pub(crate) struct Lease {
     called: Arc<Mutex<Instant>>,
     /// Dropped with the lease, which ends the thread.
@@ -15,8 +15,8 @@ pub(crate) struct Lease {
 }
 
 impl Lease {
-    /// A lease of this session. `silence`: without a call for so long it is not renewed, because who should look at the rig
-    /// does not; `None`: of a simulation, which may wait.
+    /// The lease of this session. Without calls for `silence` it is not renewed, because the runner no longer supervises the rig. `None`: a
+    /// simulation, which may wait.
     pub(crate) fn new(
         outlet: Outlet,
         session: String,
@@ -30,7 +30,7 @@ impl Lease {
             while dropped.recv_timeout(Duration::from_secs_f64(RENEW_S)) == Err(RecvTimeoutError::Timeout) {
                 let silent = last.lock().map_or(Duration::MAX, |last| last.elapsed());
                 if silence.is_none_or(|silence| silent < silence) && outlet.send(&note).is_err() {
-                    // Deaf or gone: the next call says so.
+                    // The driver does not read or has exited; the next call reports it.
                     break;
                 }
             }
@@ -42,7 +42,7 @@ impl Lease {
         Ok(Lease { called, _held: held })
     }
 
-    /// Somebody has called.
+    /// Records a call.
     pub(crate) fn called(&self) {
         if let Ok(mut called) = self.called.lock() {
             *called = Instant::now();

@@ -1,5 +1,5 @@
-//! Drivers as backends: a program of its own, found by its name, behind the seam [`Backend`](mapper_core::Backend). No call
-//! hangs and nothing grows without bound, whatever the driver sends; docs/protocol.md is what both sides keep to.
+//! Drivers as backends: separate programs, found by name, behind the interface [`Backend`](mapper_core::Backend). Whatever the driver sends, all
+//! calls have timeouts and all queues have limits. docs/protocol.md defines the protocol.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,4 +1,4 @@
-//! The pipes or the socket to a driver. Two threads read and write, so that nobody waits for longer than he said.
+//! The pipes or the socket to a driver. Separate threads read and write, so that no call exceeds its timeout.
 
 use crate::error::DriverError;
 use mapper_protocol::{
@@ -12,17 +12,17 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Messages that wait in each direction.
+/// Queue length in each direction, messages.
 const WAITING: usize = 64;
-/// How long they are waited for once its output has ended.
+/// Wait for the driver's final error output after its output has ended.
 const LAST_WORDS_WITHIN: Duration = Duration::from_millis(200);
-/// What is kept of a driver's last words, bytes.
+/// Size of the stored final error output, bytes.
 const LAST_WORDS_BYTES: usize = 2_000;
 
-/// What comes from a driver.
-type Came = Result<Message, DriverError>;
+/// An incoming message.
+type Incoming = Result<Message, DriverError>;
 
-/// Sends, from any thread, as the driver writes itself: JSON until it has said anything, which everybody reads.
+/// Sends from any thread in the driver's own encoding. Before the first message from the driver it uses JSON, which every driver reads.
 #[derive(Clone)]
 pub(crate) struct Outlet {
     to_write: SyncSender<Vec<u8>>,
@@ -42,23 +42,23 @@ impl Outlet {
     }
 }
 
-/// Who is at the other end.
+/// The other end of the link.
 enum Peer {
-    /// A program that was started for this run, and ends with it.
+    /// A program started for this run, which ends with the run.
     Program(Child),
-    /// One that was there before.
+    /// A driver that was already running.
     #[cfg(unix)]
     Socket(std::os::unix::net::UnixStream),
 }
 
-/// A driver, and the way to it.
+/// A connection to a driver.
 pub(crate) struct Link {
     peer: Peer,
     outlet: Option<Outlet>,
-    inlet: Receiver<Came>,
+    inlet: Receiver<Incoming>,
     frame_limit: Arc<AtomicU32>,
     last_words: Arc<Mutex<Vec<u8>>>,
-    /// Closed by the thread that listens, once it has heard everything.
+    /// Closed by the reading thread after the last message.
     heard: Receiver<()>,
 }
 
@@ -68,7 +68,7 @@ impl Link {
         let not_started = |source| DriverError::NotStarted { program: program.to_owned(), source };
         let mut command = Command::new(program);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // Ctrl-C in a terminal reaches a whole group: what is to be done about it, the runner decides.
+        // Ctrl-C in a terminal reaches the whole process group; the runner decides on the reaction.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(not_started)?;
@@ -80,7 +80,7 @@ impl Link {
         Link::over(stdin, stdout, Some(stderr), Peer::Program(child)).map_err(not_started)
     }
 
-    /// Connects to a driver that listens at this socket.
+    /// Connects to a driver that listens on this socket.
     #[cfg(unix)]
     pub(crate) fn connect(socket: &Path) -> Result<Link, DriverError> {
         let away = |source| DriverError::Away { socket: socket.to_owned(), source };
@@ -98,24 +98,24 @@ impl Link {
     ) -> std::io::Result<Link> {
         let frame_limit = Arc::new(AtomicU32::new(mapper_protocol::FIRST_FRAME_LIMIT_BYTES));
         let (send, to_write) = sync_channel(WAITING);
-        let (tell, inlet) = sync_channel(WAITING);
+        let (to_inlet, inlet) = sync_channel(WAITING);
         let last_words = Arc::new(Mutex::new(Vec::new()));
         let packed = Arc::new(AtomicBool::new(false));
         let (listens, heard) = sync_channel::<()>(1);
         let (limit, words, its) = (frame_limit.clone(), last_words.clone(), packed.clone());
-        // None of them is waited for: each ends with its pipe.
+        // These threads are not joined: each ends with its pipe.
         std::thread::Builder::new()
             .name("to driver".to_owned())
             .spawn(move || write_all(input, &to_write, &limit))
             .and_then(|_| {
                 std::thread::Builder::new()
                     .name("from driver".to_owned())
-                    .spawn(move || read_all(output, &tell, &its))
+                    .spawn(move || read_all(output, &to_inlet, &its))
             })
             .and_then(|_| {
                 std::thread::Builder::new().name("driver's words".to_owned()).spawn(move || {
-                    if let Some(said) = words_of {
-                        listen(said, &words);
+                    if let Some(stderr) = words_of {
+                        listen(stderr, &words);
                     }
                     drop(listens);
                 })
@@ -130,28 +130,28 @@ impl Link {
         })
     }
 
-    /// Where to send.
+    /// The sender.
     pub(crate) fn outlet(&self) -> Result<&Outlet, DriverError> {
         self.outlet.as_ref().ok_or_else(|| DriverError::Ended(String::new()))
     }
 
-    /// Largest frame that the driver takes, bytes.
+    /// Sets the maximum frame size of the driver, bytes.
     pub(crate) fn limit_frames(&self, bytes: u32) {
         self.frame_limit.store(bytes, Ordering::Relaxed);
     }
 
-    /// The next message; `None` where none has come in time.
+    /// The next message; `None` if none arrives in time.
     pub(crate) fn next(&self, within: Duration) -> Result<Option<Message>, DriverError> {
         match self.inlet.recv_timeout(within) {
-            Ok(came) => came.map(Some),
+            Ok(incoming) => incoming.map(Some),
             Err(RecvTimeoutError::Timeout) => Ok(None),
             Err(RecvTimeoutError::Disconnected) => Err(DriverError::Ended(self.words())),
         }
     }
 
-    /// What the driver said last on standard error, to be put behind a sentence.
+    /// The driver's final error output, to be appended to a sentence.
     fn words(&self) -> String {
-        // Its output has ended; its last words may still be on their way.
+        // The output has ended, but the final error output may still be on its way.
         let _ = self.heard.recv_timeout(LAST_WORDS_WITHIN);
         let Ok(words) = self.last_words.lock() else { return String::new() };
         let text = String::from_utf8_lossy(&words);
@@ -159,12 +159,12 @@ impl Link {
         line.map_or_else(String::new, |line| format!("; its last words: {line}"))
     }
 
-    /// Closes the driver's input, which ends it, or its session where it listens at a socket. One that holds a rig is left to its own: it
-    /// flies its safe trajectory. Any other has so much time, and is killed or hung up on then.
+    /// Closes the driver's input, which ends the driver or, for a socket, its session. A driver that holds a rig is left to execute its safe
+    /// trajectory. Any other is killed or disconnected after this time.
     pub(crate) fn close(&mut self, holds_a_rig: bool, within: Duration) {
         self.outlet = None;
         let end = Instant::now() + within;
-        // Its output ends with it.
+        // The driver's output ends when it exits.
         while let Some(left) = end.checked_duration_since(Instant::now()) {
             if matches!(self.inlet.recv_timeout(left), Err(RecvTimeoutError::Disconnected)) {
                 break;
@@ -173,7 +173,7 @@ impl Link {
         match &mut self.peer {
             Peer::Program(child) => {
                 if !holds_a_rig && !matches!(child.try_wait(), Ok(Some(_))) {
-                    // Where it has closed its output it is about to end; killing it then harms nobody.
+                    // If its output is closed it is about to exit, so killing it is safe.
                     let _ = child.kill();
                     let _ = child.wait();
                 }
@@ -181,14 +181,14 @@ impl Link {
             #[cfg(unix)]
             Peer::Socket(stream) => {
                 use std::net::Shutdown::{Both, Write};
-                // It may have gone already.
+                // The driver may have gone already.
                 let _ = stream.shutdown(if holds_a_rig { Write } else { Both });
             }
         }
     }
 }
 
-/// The writing half of a socket: it ends with its writer, as a pipe does, whoever has the reading half.
+/// The writing half of a socket. Dropping it closes that direction, as with a pipe, while the reading half stays open.
 #[cfg(unix)]
 struct HalfClosing(std::os::unix::net::UnixStream);
 
@@ -206,7 +206,7 @@ impl Write for HalfClosing {
 #[cfg(unix)]
 impl Drop for HalfClosing {
     fn drop(&mut self) {
-        // Where the other side has gone there is nothing to close.
+        // If the other side has gone there is nothing to close.
         let _ = self.0.shutdown(std::net::Shutdown::Write);
     }
 }
@@ -219,9 +219,9 @@ fn write_all(mut stdin: impl Write, to_write: &Receiver<Vec<u8>>, limit: &Atomic
     }
 }
 
-fn read_all(mut stdout: impl Read, tell: &SyncSender<Came>, packed: &AtomicBool) {
+fn read_all(mut stdout: impl Read, to_inlet: &SyncSender<Incoming>, packed: &AtomicBool) {
     loop {
-        let came = match read_frame(&mut stdout, FRAME_LIMIT_BYTES) {
+        let incoming = match read_frame(&mut stdout, FRAME_LIMIT_BYTES) {
             Ok(Some(body)) => {
                 packed.store(Encoding::of(&body) == Encoding::MessagePack, Ordering::Relaxed);
                 decode(&body)
@@ -229,10 +229,10 @@ fn read_all(mut stdout: impl Read, tell: &SyncSender<Came>, packed: &AtomicBool)
             Ok(None) => break,
             Err(error) => Err(error),
         };
-        let came = came.map_err(|error: FrameError| DriverError::Garbage(error.to_string()));
-        let lost = came.is_err();
-        // After garbage nobody knows where the next frame begins.
-        if tell.send(came).is_err() || lost {
+        let incoming = incoming.map_err(|error: FrameError| DriverError::Garbage(error.to_string()));
+        let lost = incoming.is_err();
+        // After an invalid message the start of the next frame is unknown.
+        if to_inlet.send(incoming).is_err() || lost {
             break;
         }
     }

@@ -1,4 +1,4 @@
-//! Samples that have come and nobody has asked for yet.
+//! Queue of samples that have arrived but have not been polled.
 
 use mapper_core::{
     Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality, SampleBatch, TruthColumn,
@@ -6,37 +6,36 @@ use mapper_core::{
 use mapper_protocol::Unusable;
 use std::collections::VecDeque;
 
-/// Most values that wait, of all columns, at 8 bytes each, names and words counted likewise: three hours of 19 channels at 10 Hz,
-/// 32 MB.
+/// Maximum number of queued values over all columns, at 8 bytes each, including names and texts: three hours of 19 channels at 10 Hz, 32 MB.
 const MAX_VALUES: usize = 4_000_000;
-/// A sample so far beyond the time that was asked for is due, s: that time is a sum of periods, the sample's a multiple.
+/// Tolerance for due samples, s: the requested time is a sum of periods, the sample's time a multiple.
 pub(crate) const ROUNDING_S: f64 = 1e-7;
-/// Most events that wait.
+/// Maximum number of queued events.
 const MAX_EVENTS: usize = 10_000;
-/// Events beyond which a driver's remarks are left out.
+/// Number of events above which a driver's notes are dropped.
 const MAX_NOTES: usize = 100;
 
-/// Batches in the order they came, checked: one follows the other.
+/// Checked batches in order of arrival, without gaps.
 #[derive(Default)]
 pub(crate) struct Pending {
     batches: VecDeque<SampleBatch>,
     events: Vec<Event>,
-    /// Number of the next sample to come, and of the next one to hand out.
+    /// Index of the next sample to arrive and of the next sample to return.
     expected: u64,
     next: u64,
     last_s: Option<f64>,
-    /// Time of the last sample that was handed out, s.
+    /// Time of the last returned sample, s.
     taken_s: Option<f64>,
     values: usize,
 }
 
 impl Pending {
-    /// Takes what has come.
+    /// Adds a batch.
     ///
     /// # Errors
-    /// [`Unusable`] for samples that do not follow those before, or that are too many.
+    /// [`Unusable`] if the samples do not follow the previous ones, or are too many.
     pub(crate) fn push(&mut self, mut batch: SampleBatch) -> Result<(), Unusable> {
-        // An event of another clock would never be due, a rig that trips least of all.
+        // An event from another clock might never be due. That must not happen to a trip of the rig.
         let latest_s = batch.t_s.last().copied().or(self.last_s).unwrap_or(0.0);
         for event in &mut batch.events {
             event.t_s = if event.t_s.is_finite() { event.t_s.min(latest_s) } else { latest_s };
@@ -63,19 +62,19 @@ impl Pending {
         Ok(())
     }
 
-    /// A remark at this run time, s, for the next batch; no more than a few are kept.
+    /// Adds a note at this run time, s, to the next batch; only a few are kept.
     pub(crate) fn note(&mut self, t_s: f64, words: &str) {
         if self.events.len() < MAX_NOTES {
             self.events.push(Event { t_s, kind: EventKind::Note, message: words.to_owned() });
         }
     }
 
-    /// Whether a sample has come from `t_s` or later.
+    /// Whether a sample at or after `t_s` has arrived.
     pub(crate) fn reaches(&self, t_s: f64) -> bool {
         self.last_s.is_some_and(|last_s| last_s >= t_s)
     }
 
-    /// Everything up to `until_s`, one within `rounding_s` beyond it as if it were of then, with a column for each of `channels`: NaN where there is no reading.
+    /// Returns all samples up to `until_s` plus `rounding_s`, with a column for each of `channels`: NaN if there is no reading.
     pub(crate) fn take(&mut self, until_s: f64, rounding_s: f64, channels: &[Channel]) -> SampleBatch {
         let mut whole = SampleBatch {
             first_sequence: self.next,
@@ -117,12 +116,12 @@ fn width(batch: &SampleBatch) -> usize {
     1 + batch.columns.len() + batch.elements.len() + batch.truth.len() + 2 * batch.provenance.len()
 }
 
-/// What the names of a batch take, in values.
+/// Memory of the names in a batch, in values.
 fn names(batch: &SampleBatch) -> usize {
     batch.truth.iter().map(|column| column.name.len() + column.unit.len()).sum::<usize>() / 8
 }
 
-/// What comes after the first `at` samples. All columns are of one length: they were read that way.
+/// Splits off the samples after the first `at`. All columns have equal length, because the reader ensures it.
 fn split(batch: &mut SampleBatch, at: usize) -> SampleBatch {
     fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
         values.split_off(at.min(values.len()))
@@ -205,7 +204,7 @@ fn append(whole: &mut SampleBatch, part: SampleBatch) {
         }
     }
     whole.t_s.extend(&part.t_s);
-    // A column that this part lacks.
+    // A column that is missing in this part.
     whole.columns.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
     whole.elements.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
     whole.truth.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
@@ -257,7 +256,7 @@ mod tests {
         assert_eq!((rest.first_sequence, &rest.t_s[..]), (3, &[0.3][..]));
     }
 
-    /// 0.1 seven times is a bit less than seven times 0.1: a sample that waits for the next poll reaches its guard a tenth of a second later.
+    /// Seven times 0.1 added up is slightly less than 0.7. Without the tolerance, a sample would reach its guard one poll later.
     #[test]
     fn a_sample_is_not_late_by_rounding() {
         let mut pending = Pending::default();

@@ -1,27 +1,26 @@
-//! Secrets stand in the environment, and nowhere else.
+//! Secrets are read from the environment only.
 
 use crate::error::DriverError;
 use serde_json::Value;
 
-/// Keys whose values are secret, wherever they contain one of these.
+/// A setting is secret if its key contains one of these.
 const SECRET: [&str; 5] = ["password", "passphrase", "secret", "token", "private_key_text"];
-/// What stands in place of a secret.
+/// Replacement for a secret.
 const HIDDEN: &str = "[secret]";
-/// Letters below which a secret is only looked for as a word: as a part of others it would blot out whole sentences.
+/// Shorter secrets are hidden only as whole words, because replacing them inside other words would remove whole sentences.
 const SHORT: usize = 6;
-/// Deepest nesting of settings that is looked into: YAML is read less deep.
+/// Maximum nesting of settings that is searched; the YAML reader allows less.
 const DEEPEST: usize = 64;
 
-/// Values of the environment that settings name.
+/// Environment values that settings refer to.
 #[derive(Default)]
 pub(crate) struct Secrets(Vec<String>);
 
 impl Secrets {
-    /// What `settings` name; `variable` gives the value of an environment variable. `needed`: each has to be there.
+    /// Collects the values that `settings` refer to; `variable` reads an environment variable. `needed`: every variable must be set.
     ///
     /// # Errors
-    /// The key path and [`DriverError::Secret`] where a secret stands in the settings, [`DriverError::NotSet`] for an absent
-    /// variable.
+    /// The key path and [`DriverError::Secret`] if the settings contain a secret, [`DriverError::NotSet`] for a missing variable.
     pub(crate) fn of(
         settings: &Value,
         variable: &dyn Fn(&str) -> Option<String>,
@@ -29,7 +28,7 @@ impl Secrets {
     ) -> Result<Secrets, (String, DriverError)> {
         let mut secrets = Secrets::default();
         secrets.look(settings, &mut Vec::new(), variable, needed)?;
-        // The longest first: one that begins another must not leave that one's end.
+        // Longest first: otherwise a secret that is a prefix of another would leave the remainder visible.
         secrets.0.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         Ok(secrets)
     }
@@ -69,7 +68,7 @@ impl Secrets {
         Ok(())
     }
 
-    /// A driver's words without them.
+    /// Replaces the secrets in a driver's text.
     pub(crate) fn hide(&self, text: &str) -> String {
         self.0.iter().fold(text.to_owned(), |text, secret| match secret.chars().count() < SHORT {
             true => without_word(&text, secret),
@@ -78,7 +77,7 @@ impl Secrets {
     }
 }
 
-/// A text without a word.
+/// Replaces a word in a text.
 fn without_word(text: &str, word: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut from = 0;
@@ -94,7 +93,7 @@ fn without_word(text: &str, word: &str) -> String {
     out
 }
 
-/// The variable that `{env: NAME}` names.
+/// The variable in `{env: NAME}`.
 fn environment(value: &Value) -> Option<&str> {
     let map = value.as_object().filter(|map| map.len() == 1)?;
     map.get("env")?.as_str()
@@ -126,7 +125,7 @@ mod tests {
         let (path, error) = read(json!({"token": {"env": "NOT_THERE"}})).err().unwrap();
         assert_eq!((path.as_str(), error.to_string().contains("NOT_THERE")), ("token", true));
         assert!(read(json!({"password": null, "host": "x"})).is_ok());
-        // Of a driver that has an environment of its own what is known here is hidden, and what is not is its own matter.
+        // For a driver with its own environment, variables known here are hidden and missing ones are not an error.
         let both = json!([{"env": "PLC"}, {"env": "NOT_THERE"}]);
         let secrets = Secrets::of(&both, &variable, false).ok().unwrap();
         assert_eq!(secrets.hide("with hunter2"), "with [secret]");

@@ -1,4 +1,4 @@
-//! One step of 1000 samples, everything included: window, fit, uncertainty, warnings.
+//! One step of 1000 samples, complete: window, fit, uncertainty, warnings.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 #[path = "../tests/common/mod.rs"]

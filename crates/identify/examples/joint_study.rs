@@ -1,8 +1,7 @@
 //! Error and coverage of the joint method over seeded campaigns of the lumped model:
 //! `cargo run --release -p mapper-identify --example joint_study -- ALPHA PROBE_MM DIRECTION NOISE OFFSETS SEEDS FIRST OWN ASK DECLARED`
-//! (noise and offsets in multiples of a good rig's; FIRST is the first seed, 0 where it is left out; OWN 1 gives the machine
-//! h of its own before the wheel; ASK 0 does not ask the recording for it; DECLARED is an alpha_A that is held, sought where
-//! it is left out).
+//! (noise and offsets in multiples of a good rig's; FIRST is the first seed, default 0; OWN 1 gives the machine its own law of h before the
+//! wheel; ASK 0 does not compare the two laws; DECLARED is a fixed alpha_A, fitted by default).
 #![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]
 #[allow(clippy::unwrap_used, reason = "shared with the tests")]

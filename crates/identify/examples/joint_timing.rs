@@ -1,6 +1,6 @@
 //! Time of a joint fit of 30 points at 10 Hz on one core, the identification alone:
 //! `cargo run --release -p mapper-identify --example joint_timing -- ROUNDS DIRECTORY`
-//! With a directory it writes the samples (`samples.csv`) and what was found (`found.csv`, `points.csv`) there for
+//! With a directory it writes the samples (`samples.csv`) and the results (`found.csv`, `points.csv`) there for
 //! `benches/peers/joint_scipy.py`.
 #![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]

@@ -1,7 +1,7 @@
-//! What the declared uncertainty of each sensor makes of T2, and of the fitted parameters.
+//! Effect of each sensor's declared uncertainty on T2 and on the fitted parameters.
 //!
-//! Linearised: an offset of a sensor changes the fitted T2 by its sensitivity; the parameters answer as they would to
-//! that change of the measured T2, with the sign turned. Sensors are independent, so squares add.
+//! Linearised: a sensor offset changes the fitted T2 by its sensitivity. The parameters respond as to the same change of the measured T2, with
+//! opposite sign. Sensors are independent, so squares add.
 
 use crate::IdentifyConfig;
 use crate::fit::{Fit, Geometry, Row, rows, t2_k};
@@ -18,13 +18,13 @@ const ENTERING: [Channel; 6] =
 pub(crate) struct DeclaredEffect {
     /// Standard errors of eta and h from fixed offsets and gains.
     pub(crate) bias_standard_errors: [f64; 2],
-    /// What each offset, each gain and the assumed alpha_A change by one standard deviation, with sign: all points share
-    /// them. In an order that depends on the declaration alone.
+    /// Signed effect of one standard deviation of each offset, each gain and the assumed alpha_A, which all points share. The order depends on
+    /// the declaration alone.
     pub(crate) common: [Vec<f64>; 2],
-    /// What the assumed alpha_A may cost eta and h, one standard deviation.
+    /// Effect of the assumed alpha_A on eta and h, one standard deviation.
     pub(crate) assumed_alpha: [f64; 2],
-    /// Variance of (measured minus fitted T2) from sample noise, K2; for a probe with inertia an upper bound, since it evens
-    /// out what the noise of the other channels makes of the gas.
+    /// Variance of (measured minus fitted T2) from sample noise, K2. It is an upper bound for a probe with inertia, which smooths the
+    /// gas-temperature noise from the other channels.
     pub(crate) noise_k2: f64,
 }
 
@@ -42,7 +42,7 @@ pub(crate) fn declared_effect(
         let values = column(samples, channel);
         let sensitivity = sensitivity(fit, samples, geometry, channel);
         let read = |change_k: Vec<f64>| {
-            // The probe's own error is not seen through the probe.
+            // The probe's lag does not act on its own offset.
             let change_k = if channel == Channel::T2 { change_k } else { fit.read(change_k) };
             fit.response(change_k.into_iter())
         };
@@ -63,12 +63,12 @@ pub(crate) fn declared_effect(
     }
     effect.bias_standard_errors = squares.map(f64::sqrt);
     if config.alpha_area_sigma_ratio > 0.0 {
-        // As if T2 had been measured off by what the other alpha_A makes of it.
+        // The effect of another alpha_A equals that of the same error of the measured T2.
         let fitted_k = |row: Row, by: f64| {
             let geometry = Geometry { alpha_area_ratio: geometry.alpha_area_ratio + by, ..geometry };
             t2_k(geometry, row, fit.eta, fit.h_w_m2k)
         };
-        // Towards the middle, so that the share stays one.
+        // Step towards the middle, so that the share stays valid.
         let away = if geometry.alpha_area_ratio > 0.5 { -1.0 } else { 1.0 };
         let sigma = away * config.alpha_area_sigma_ratio;
         let moved_k = rows(samples).map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0)).collect();

@@ -1,4 +1,4 @@
-//! Samples that are no measurement: spikes, and readings that stand still where noise is declared.
+//! Removes samples that are not measurements: spikes, and constant readings of a channel with declared noise.
 
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
@@ -6,22 +6,22 @@ use crate::samples::Samples;
 use mapper_core::Channel;
 use mapper_numerics::statistics::{median_of_sorted, robust_sigma};
 
-/// Samples on either side whose median a spike is held against.
+/// Number of samples on either side whose median a spike is compared with.
 const NEIGHBOURS: usize = 7;
 /// Robust standard deviations beyond which a sample is a spike.
 const SIGMAS: f64 = 8.0;
-/// Time for which a noisy channel may show one and the same value, s.
+/// Time for which a noisy channel may repeat one value, s.
 const STUCK_S: f64 = 5.0;
 
-/// The samples without spikes; says so in `findings`.
+/// The samples without spikes; reports removals in `findings`.
 pub(crate) fn without_spikes(samples: Samples, findings: &mut Findings) -> Samples {
-    // Where nothing is declared nothing is taken for stuck.
+    // A channel without declared noise is never treated as stuck.
     cleaned(samples, &IdentifyConfig::default(), findings)
 }
 
-/// The samples without spikes and without those of a stuck channel; says so in `findings`.
+/// The samples without spikes and without those of a stuck channel; reports removals in `findings`.
 pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut Findings) -> Samples {
-    // Smallest distances that count, K, and shares of the reading for flow and pressures.
+    // Smallest relevant differences: K for temperatures, share of the reading for flow and pressures.
     let columns: [(Channel, &[f64], f64); 6] = [
         (Channel::T1, &samples.t1_k, 1.0),
         (Channel::T2, &samples.t2_k, 1.0),
@@ -62,11 +62,11 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         }
     }
     if spikes > 0 {
-        let said = match spikes {
+        let remark = match spikes {
             1 => "1 sample far from its neighbours is left out".to_owned(),
             _ => format!("{spikes} samples far from their neighbours are left out"),
         };
-        findings.remark(code::OUTLIERS, said);
+        findings.remark(code::OUTLIERS, remark);
     }
     if kept.iter().all(|keep| *keep) {
         return samples;
@@ -75,7 +75,7 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
 }
 
 fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
-    // The neighbours in order; from one sample to the next one of them comes and one goes.
+    // The sorted neighbours; from one sample to the next, one enters and one leaves.
     let mut sorted: Vec<f64> = Vec::with_capacity(2 * NEIGHBOURS + 2);
     let place = |sorted: &[f64], value: f64| sorted.partition_point(|other| other.total_cmp(&value).is_lt());
     for value in column.iter().take(NEIGHBOURS) {

@@ -1,15 +1,15 @@
-//! The commands of a step: whether they begin with a jump, and when they come to rest.
+//! The commands of a step: whether they begin with a jump, and when they settle.
 //!
-//! A closed loop that holds the speed goes on moving P3 a little: that is no jump, and no unrest.
+//! A closed loop that holds the speed keeps moving P3 a little. That counts neither as a jump nor as unsettled.
 
 use mapper_core::{Channel, Recording, StepMarker};
 
-/// Change of a command below which it counts as held, ratio.
+/// Change of a command below which it counts as constant, ratio.
 const HELD_RATIO: f64 = 1e-6;
-/// P3 within this share of where it ends is held by a loop: the housings' slow warming asks for no more.
+/// Share of the final P3 within which a loop is holding it: the housings' slow warming needs no more.
 const TRIM_RATIO: f64 = 5e-3;
 
-/// A step that begins later than this after the one before, s, comes from somewhere else.
+/// Gap to the previous step above which the previous command is not the starting point, s.
 const LEADS_ON_S: f64 = 60.0;
 
 fn changed(before: f64, after: f64) -> bool {
@@ -18,7 +18,7 @@ fn changed(before: f64, after: f64) -> bool {
 
 /// Whether the step at `position` of `steps` begins with a change of what was commanded.
 ///
-/// The first step has none, unless its marker says where it came from.
+/// The first step has none, unless its marker has the previous command.
 pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
     let Some(step) = steps.get(position) else { return false };
     if let (Some(from), Some(to)) = (step.from, step.to) {
@@ -32,8 +32,8 @@ pub(crate) fn begins_with_jump(steps: &[StepMarker], position: usize) -> bool {
     })
 }
 
-/// Time of the last change of P3 and valve commands within the step (its start where none is recorded), s. Of P3 the changes
-/// count up to where it stays within [`TRIM_RATIO`] of its last value.
+/// Time of the last change of P3 and valve commands within the step (its start if none is recorded), s. Changes of P3 count until it stays
+/// within [`TRIM_RATIO`] of its last value.
 pub(crate) fn at_rest_s(recording: &Recording, step: &StepMarker) -> f64 {
     let mut settled_s = step.start_s;
     for channel in [Channel::P3Command, Channel::ValveCommand] {

@@ -1,16 +1,16 @@
-//! Standard errors of the fit under noise that is correlated in time.
+//! Standard errors of the fit under noise with time correlation.
 //!
-//! The residual is taken for the sum of a white and a first-order process. Their variances come from two quadratic
-//! forms of the residual, corrected for what the fit has taken out of it (Rao's MINQUE, which is unbiased), and the
-//! parameters' covariance is `(J'J)^-1 J' Omega J (J'J)^-1`: least squares as done, noise as it is. The noise of the
-//! regressors (T1, Tc, flow, pressures) is in the residual and thus in the result.
+//! The residual is modelled as the sum of a white and a first-order process. Two quadratic forms of the residual give their variances,
+//! corrected for the degrees of freedom of the fit (Rao's MINQUE, which is unbiased). The parameters' covariance is `(J'J)^-1 J' Omega J
+//! (J'J)^-1`: ordinary least squares with the actual noise. The noise of the regressors (T1, Tc, flow, pressures) is in the residual and thus
+//! in the result.
 
 use crate::NoiseColour;
 use crate::config::coloured;
 use crate::fit::Fit;
 use mapper_numerics::coloured_noise::correlate;
 
-/// Variances of the residual's two parts, K2.
+/// Variances of the two parts of the residual, K2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NoiseVariances {
     pub(crate) white_k2: f64,
@@ -18,7 +18,7 @@ pub(crate) struct NoiseVariances {
 }
 
 impl NoiseVariances {
-    /// A total variance, K2, split as declared.
+    /// Splits a total variance, K2, as declared.
     pub(crate) fn split(total_k2: f64, colour: NoiseColour) -> Self {
         let noise = coloured(colour);
         NoiseVariances {
@@ -28,7 +28,7 @@ impl NoiseVariances {
     }
 }
 
-/// The correlation matrix of the first-order part, by what it does to the fit's columns.
+/// Products of the first-order part's correlation matrix with the columns of the fit.
 pub(crate) struct Correlation {
     /// `J' R J`.
     jrj: [[f64; 2]; 2],
@@ -37,7 +37,7 @@ pub(crate) struct Correlation {
 }
 
 impl Correlation {
-    /// Works out the noise of a fit whose samples lie at `t_s`.
+    /// Prepares the noise estimate of a fit with samples at `t_s`.
     pub(crate) fn of(fit: &Fit, t_s: &[f64], colour: NoiseColour) -> Self {
         let (g, jacobian) = (&fit.inverse_normal, &fit.jacobian);
         let smoothed = [
@@ -48,7 +48,7 @@ impl Correlation {
         let jrrj = products(&smoothed, &smoothed);
         let n = t_s.len() as f64;
         let g_jrj = multiply(g, &jrj);
-        // Sum of squared correlations: a first-order correlation squared is one of half the time constant.
+        // Sum of squared correlations: the square of a first-order correlation has half the time constant.
         let ones = vec![1.0; t_s.len()];
         let squares: f64 = correlate(t_s, &ones, 0.5 * colour.time_constant_s).iter().sum();
         // Traces of M, M R and M R M R with M = 1 - J (J'J)^-1 J'.

@@ -13,31 +13,31 @@ use mapper_core::{EstimateUncertainty, Recording, Window};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 
-/// Isentropic temperature rise over inlet temperature below which there is nothing to compress.
+/// Ratio of isentropic temperature rise to inlet temperature below which there is no compression.
 const SMALLEST_RISE_RATIO: f64 = 1e-3;
-/// A residual this many robust standard deviations, and [`OUTLIER_K`], off those around it is not noise.
+/// A residual this many robust standard deviations, and [`OUTLIER_K`], from its neighbours is an outlier.
 const OUTLIER_SIGMAS: f64 = 8.0;
-/// How many samples on either side are looked at: a lag of the probe moves them all, a spike a few.
+/// Number of neighbours on either side: a lag of the probe moves them all, a spike only a few.
 const OUTLIER_NEIGHBOURS: usize = 10;
 /// Distance below which a sample is never taken for an outlier, K.
 const OUTLIER_K: f64 = 1.0;
-/// Blocks over which the residual is averaged to see whether it has a shape, s.
+/// Block length over which the residual is averaged to detect a trend, s.
 const STRUCTURE_BLOCK_S: f64 = 10.0;
 
-/// Means over such a block keep about this much of the noise at most (first-order part, 2 s): four tenths of 0.6, twice.
+/// Maximum share of the noise that remains in block means (first-order part, 2 s): four tenths of 0.6, twice.
 const STRUCTURE_OVER_NOISE_RATIO: f64 = 0.75;
 
-/// What helps where the model does not fit.
+/// Advice if the model does not fit.
 const POOR_FIT_REMEDY: &str = "declare the noise and the probe that T2 really has; `joint` finds probe and alpha_A, `mapper gap` looks for other causes";
 
-/// What a method makes of one step.
+/// Result of a method for one step.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Estimate {
     pub(crate) eta: Option<(f64, Option<EstimateUncertainty>)>,
     pub(crate) h_w_m2k: Option<(f64, Option<EstimateUncertainty>)>,
-    /// 95 % intervals of eta and h where they are not those of a normal distribution.
+    /// 95 % intervals of eta and h if they are not normally distributed.
     pub(crate) intervals: Option<[(f64, f64); 2]>,
-    /// What the errors that points share do to eta and h: see [`CommonErrors`](mapper_core::CommonErrors).
+    /// Effect of the points' common errors on eta and h: see [`CommonErrors`](mapper_core::CommonErrors).
     pub(crate) common: [Vec<f64>; 2],
     pub(crate) window: Option<Window>,
     pub(crate) residual_rms_k: Option<f64>,
@@ -45,7 +45,7 @@ pub(crate) struct Estimate {
     pub(crate) dtc_k: Option<f64>,
 }
 
-/// Identifies each step that has a state, with what speaks against it; the others get nothing.
+/// Identifies each step that has an end state and adds findings; other steps get no result.
 pub(crate) fn alone<S: Sync, E: Sync>(
     recording: &Recording,
     states: &[Result<S, E>],
@@ -129,7 +129,7 @@ pub(crate) fn estimate(
     estimate
 }
 
-/// Whether the window holds enough complete samples; says so where it does not.
+/// Checks that the window holds enough complete samples, and adds a finding if not.
 pub(crate) fn enough(samples: &Samples, config: &IdentifyConfig, findings: &mut Findings) -> bool {
     let limits = &config.thresholds;
     let (kept, lost) = (samples.len(), samples.lost);
@@ -152,7 +152,7 @@ pub(crate) fn enough(samples: &Samples, config: &IdentifyConfig, findings: &mut 
     true
 }
 
-/// Fits; leaves out what lies far off the fit, if it is little, and fits again.
+/// Fits, removes outliers if they are few, and fits again.
 fn fit_without_outliers(
     samples: Samples,
     geometry: Geometry,
@@ -173,7 +173,7 @@ fn fit_without_outliers(
         .collect();
     let inlier = |i: usize| kept.get(i).copied().unwrap_or(false);
     let outliers = (0..samples.len()).filter(|i| !inlier(*i)).count();
-    // More than a few are not accidents: then the fit is poor, and says so.
+    // Many outliers are not accidental: the fit is then poor and gets a finding.
     if outliers == 0 || outliers * 20 > samples.len() {
         return Some((samples, first));
     }
@@ -195,7 +195,7 @@ fn uncertainties(
 ) -> [EstimateUncertainty; 2] {
     let correlation = Correlation::of(fit, &samples.t_s, config.noise_colour);
     let found = correlation.standard_errors();
-    // A short residual may look quieter than the sensors are.
+    // A short residual may have less noise than the sensors.
     let expected =
         correlation.standard_errors_for(NoiseVariances::split(declared.noise_k2, config.noise_colour));
     let moving = drift.map_or([0.0; 2], |drift| [drift.eta, drift.h_w_m2k]);
@@ -206,16 +206,16 @@ fn uncertainties(
     })
 }
 
-/// A fit with what it was made from.
+/// A fit with its data.
 struct View<'a> {
     fit: &'a Fit,
     samples: &'a Samples,
     config: &'a IdentifyConfig,
-    /// Standard deviation of (measured minus fitted T2) that the declared noise explains, K.
+    /// Standard deviation of (measured minus fitted T2) due to the declared noise, K.
     noise_k: f64,
 }
 
-/// Whether enough happens in the window, and is seen. `eta`: from noise and declared offsets.
+/// Checks that the signal in the window is large enough. `eta`: uncertainty from noise and declared offsets.
 fn judge_width(view: &View<'_>, eta: EstimateUncertainty, dt2_k: Option<f64>, findings: &mut Findings) {
     let limits = &view.config.thresholds;
     let (sigma_eta, dt2_k) = (eta.combined_standard_error(), dt2_k.unwrap_or(0.0));
@@ -230,7 +230,7 @@ fn judge_width(view: &View<'_>, eta: EstimateUncertainty, dt2_k: Option<f64>, fi
     }
 }
 
-/// Whether the assumed alpha_A is known well enough. `off_eta`: what it may cost, one standard deviation.
+/// Checks that the assumed alpha_A is known well enough. `off_eta`: its error of eta, one standard deviation.
 fn judge_assumption(off_eta: f64, config: &IdentifyConfig, findings: &mut Findings) {
     if off_eta.abs() <= config.thresholds.sigma_eta {
         return;
@@ -244,7 +244,7 @@ fn judge_assumption(off_eta: f64, config: &IdentifyConfig, findings: &mut Findin
     findings.doubt(code::ASSUMED_ALPHA, message);
 }
 
-/// Whether the flow held still enough for a constant h.
+/// Checks that the flow was constant enough for a constant h.
 fn judge_flow(drift: Option<FlowDrift>, config: &IdentifyConfig, findings: &mut Findings) {
     let Some(drift) = drift.filter(|drift| drift.eta.abs() > config.thresholds.flow_drift_eta) else {
         return;
@@ -258,7 +258,7 @@ fn judge_flow(drift: Option<FlowDrift>, config: &IdentifyConfig, findings: &mut 
     findings.doubt(code::FLOW_MOVED, message);
 }
 
-/// Whether the fit leaves more than noise.
+/// Checks that the residual is only noise.
 fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) {
     let (fit, noise_k) = (view.fit, view.noise_k);
     let limits = &view.config.thresholds;
@@ -293,7 +293,7 @@ fn slow_rms_k(fit: &Fit, samples: &Samples) -> f64 {
     let (mut start, mut sum, mut blocks) = (0, 0.0, 0.0);
     while start < samples.len() {
         let end_s = samples.t_s[start] + STRUCTURE_BLOCK_S;
-        // At least one sample, so that the loop ends whatever the times are.
+        // At least one sample, so that the loop ends for any times.
         let end = samples.t_s.partition_point(|t| *t < end_s).max(start + 1);
         let block = mean(&fit.residual_k[start..end]).unwrap_or(0.0);
         (start, sum, blocks) = (end, sum + block * block, blocks + 1.0);

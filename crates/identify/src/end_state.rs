@@ -1,4 +1,4 @@
-//! Where on the map a step ended: means over its last seconds.
+//! The position on the map at which a step ended: means over its last seconds.
 
 use crate::findings::{Findings, code};
 use crate::{IdentifyConfig, StepError, taps};
@@ -19,7 +19,7 @@ pub(crate) struct EndState {
     pub(crate) pressure_ratio: f64,
 }
 
-/// Means over the last seconds of the step; where a channel gave nothing then, over the last stretch in which it did.
+/// Means over the last seconds of the step; if a channel has no values there, over its last segment with values.
 pub(crate) fn end_state(
     recording: &Recording,
     step: &StepMarker,
@@ -46,7 +46,7 @@ pub(crate) fn end_state(
     let p1_pa = taps::total_pa(config.inlet_tap, at(Channel::P1)?, flow_kg_s, t1_k);
     let p2_pa = taps::total_pa(config.outlet_tap, at(Channel::P2)?, flow_kg_s, t2_k);
     let state = EndState { speed_rpm, flow_kg_s, t1_k, p1_pa, pressure_ratio: p2_pa / p1_pa };
-    // A static tap's correction has no bound of its own.
+    // The correction of a static tap is unbounded.
     for (channel, value) in [(Channel::P1, p1_pa), (Channel::P2, p2_pa)] {
         if !is_reading(channel, value) {
             return Err(StepError::NoState {
@@ -60,7 +60,7 @@ pub(crate) fn end_state(
     Ok(state)
 }
 
-/// Mean of the usable values in the last `seconds` up to the last one in the step, and that one's time.
+/// Mean of the usable values in the last `seconds` before the last one in the step, and the time of that one.
 fn last_mean(channel: Channel, series: &Series, step: &StepMarker, seconds: f64) -> Option<(f64, f64)> {
     let range = series.range(step.start_s, step.end_s);
     let (t_s, values) = (&series.t_s[range.clone()], &series.values[range]);
@@ -72,11 +72,11 @@ fn last_mean(channel: Channel, series: &Series, step: &StepMarker, seconds: f64)
     Some((mean(without_spikes(&finite))?, last_s))
 }
 
-/// The values without those far from the middle one: a single spike would move the point.
+/// The values without those far from the median: a single spike would move the point.
 fn without_spikes(values: &[f64]) -> Vec<f64> {
     let Some(middle) = median(values) else { return Vec::new() };
     let sigma = robust_sigma(values.iter().map(|value| value - middle)).unwrap_or(0.0);
-    // What hardly varies has no scale to judge by.
+    // Values that hardly vary give no scale for outliers.
     let limit = if sigma > 0.0 { SPIKE_SIGMAS * sigma } else { f64::INFINITY };
     values.iter().copied().filter(|value| (value - middle).abs() <= limit).collect()
 }

@@ -1,5 +1,4 @@
-//! What a method that looks at one step alone will make of it when it was only forecast: for planning, before anything is
-//! measured. `joint` stands in `joint/expected.rs`.
+//! Predicts the result of a single-step method for a forecast step, for planning before the measurement. For `joint` see `joint/expected.rs`.
 
 use crate::IdentifyConfig;
 use crate::bias::declared_effect;
@@ -9,7 +8,7 @@ use crate::samples::Samples;
 use crate::steady::{Means, uncertainty};
 use mapper_physics::compression::isentropic_rise_ratio;
 
-/// Interval of the samples whose noise a campaign declares, s.
+/// Sample interval to which the declared noise of a campaign refers, s.
 pub(crate) const DECLARED_INTERVAL_S: f64 = 0.1;
 
 /// One instant of a forecast, total values.
@@ -33,23 +32,23 @@ pub struct ExpectedRow {
     pub flow_kg_s: f64,
 }
 
-/// What the dynamic method makes of a forecast window.
+/// Expected result of the dynamic method for a forecast window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected {
-    /// Efficiency it will find without noise, fraction.
+    /// Expected efficiency without noise, fraction.
     pub eta: f64,
-    /// Standard error of it from declared noise, fixed offsets and gains, fraction.
+    /// Its standard error from declared noise, fixed offsets and gains, fraction.
     pub sigma_eta: f64,
-    /// Heat-transfer coefficient it will find without noise, W/(m2 K).
+    /// Expected heat-transfer coefficient without noise, W/(m2 K).
     pub h_w_m2k: f64,
-    /// Standard error of it, W/(m2 K).
+    /// Its standard error, W/(m2 K).
     pub sigma_h_w_m2k: f64,
 }
 
-/// Fits noise-free rows as a recording is fitted, and says what the declared uncertainties will do to the result.
+/// Fits noise-free rows like a recording, and propagates the declared uncertainties.
 ///
-/// `interval_s` is that of the rows. Rows sparser than a recording's 10 Hz stand for the means of its samples: the white
-/// part of the noise averages out among them, the first-order part does not. `None` where the fit does not converge.
+/// `interval_s` is that of the rows. Rows sparser than a recording's 10 Hz represent means of its samples: the white part of the noise
+/// averages out, the first-order part does not. `None` if the fit does not converge.
 pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) -> Option<Expected> {
     let column = |value: fn(&ExpectedRow) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
     let samples = Samples {
@@ -78,8 +77,8 @@ pub fn expected(rows: &[ExpectedRow], interval_s: f64, config: &IdentifyConfig) 
     (found.eta.is_finite() && found.sigma_eta.is_finite() && found.sigma_h_w_m2k.is_finite()).then_some(found)
 }
 
-/// Apparent efficiency of a settled point (conventional mapping), and its standard error from declared offsets and gains,
-/// fractions. `None` where the temperature rise gives no efficiency.
+/// Apparent efficiency of a settled point (conventional mapping), and its standard error from declared offsets and gains, fractions. `None` if
+/// the temperature rise gives no efficiency.
 pub fn expected_steady(row: &ExpectedRow, config: &IdentifyConfig) -> Option<(f64, f64)> {
     let means = Means { t1_k: row.t1_k, t2_k: row.t2_k, p1_pa: row.p1_pa, p2_pa: row.p2_pa, air: config.air };
     let eta = means.apparent_eta();

@@ -1,4 +1,4 @@
-//! Remarks and doubts about a point while it is made.
+//! Collects the warnings and remarks about a point.
 
 use mapper_core::{Verdict, Warning};
 
@@ -6,81 +6,81 @@ use mapper_core::{Verdict, Warning};
 pub mod code {
     /// The step has no jump before it.
     pub const NO_TRANSIENT: &str = "no_transient";
-    /// The window holds too few complete samples.
+    /// The window has too few complete samples.
     pub const TOO_FEW_SAMPLES: &str = "too_few_samples";
     /// Samples were lost (NaN, gaps).
     pub const LOST_SAMPLES: &str = "lost_samples";
-    /// Samples far off the fit were left out.
+    /// Outliers of the fit were removed.
     pub const OUTLIERS: &str = "outliers";
     /// Speed, flow or pressure ratio did not stabilise in time.
     pub const NOT_STABILISED: &str = "not_stabilised";
-    /// The window asked for does not fit into the step.
+    /// The requested window does not fit into the step.
     pub const WINDOW_CUT: &str = "window_cut";
-    /// Too little happens in the window to tell efficiency from heat transfer.
+    /// The signal in the window is too small to separate efficiency from heat transfer.
     pub const SMALL_GRADIENT: &str = "small_gradient";
-    /// Declared offsets leave the efficiency uncertain, however much happens.
+    /// Declared offsets make the efficiency uncertain, whatever the signal.
     pub const OFFSETS_DOMINATE: &str = "offsets_dominate";
-    /// Noise leaves the efficiency uncertain, although enough happens.
+    /// Noise makes the efficiency uncertain, although the signal is large enough.
     pub const NOISE_DOMINATES: &str = "noise_dominates";
-    /// The fit leaves more than noise.
+    /// The residual is larger than noise.
     pub const POOR_FIT: &str = "poor_fit";
-    /// The flow, and h with it, moved within the window.
+    /// The flow, and therefore h, changed within the window.
     pub const FLOW_MOVED: &str = "flow_moved";
     /// The best fit lies on a bound.
     pub const AT_BOUND: &str = "at_bound";
     /// The fit did not converge.
     pub const FIT_FAILED: &str = "fit_failed";
-    /// Temperatures still drift (steady method).
+    /// Temperatures are still drifting (steady method).
     pub const NOT_SETTLED: &str = "not_settled";
     /// The efficiency includes heat transfer (steady method).
     pub const APPARENT: &str = "apparent";
-    /// No compression: efficiency has no meaning.
+    /// No compression: the efficiency is undefined.
     pub const NO_COMPRESSION: &str = "no_compression";
     /// No sensor uncertainty was declared.
     pub const NOTHING_DECLARED: &str = "nothing_declared";
     /// A channel is frozen or saturated.
     pub const FROZEN_CHANNEL: &str = "frozen_channel";
-    /// A channel reads what no running machine has.
+    /// A channel is outside the range of a running machine.
     pub const DEAD_CHANNEL: &str = "dead_channel";
-    /// A channel is scaled, off or creeps.
+    /// A channel has a wrong scale, an offset or a drift.
     pub const SCALED_CHANNEL: &str = "scaled_channel";
-    /// Two channels are exchanged.
+    /// Two channels are swapped.
     pub const SWAPPED_CHANNELS: &str = "swapped_channels";
     /// Channels contradict each other.
     pub const CONTRADICTED_CHANNEL: &str = "contradicted_channel";
     /// A channel has far more noise than declared.
     pub const NOISY_CHANNEL: &str = "noisy_channel";
-    /// A channel is late against the others.
+    /// A channel lags the others.
     pub const LATE_CHANNEL: &str = "late_channel";
     /// Steps overlap, or share an index.
     pub const STEPS_CONTRADICT: &str = "steps_contradict";
-    /// A noisy channel stood still.
+    /// A noisy channel was stuck.
     pub const STUCK: &str = "stuck";
-    /// The efficiency rests on an alpha_A that is not known well enough (dynamic method).
+    /// The efficiency depends on an alpha_A that is not known well enough (dynamic method).
     pub const ASSUMED_ALPHA: &str = "assumed_alpha";
-    /// The step has no say in what the points share (joint method).
+    /// The step is excluded from the shared parameters (joint method).
     pub const LEFT_OUT: &str = "left_out";
-    /// The point's h is far off the law of the others (joint method).
+    /// The point's h is far from the convection law of the others (joint method).
     pub const OFF_THE_LAW: &str = "off_the_law";
-    /// Something speaks against the joint model as a whole.
+    /// The joint model as a whole is doubtful.
     pub const MODEL_DOUBTED: &str = "model_doubted";
-    /// The efficiencies lie off the nominal map beyond its declared tolerances (joint method).
+    /// The efficiencies differ from the nominal map by more than its declared tolerances (joint method).
     pub const OFF_THE_NOMINAL_MAP: &str = "off_the_nominal_map";
-    /// The step has no transient of its own: its efficiency rests on what is shared (joint method).
+    /// The step has no transient of its own: its efficiency depends on the shared parameters (joint method).
     pub const THROUGH_THE_LAW: &str = "through_the_law";
-    /// The recording is too short, or its gradients too small, to find what was declared if it does not hold.
+    /// The recording is too short, or its gradients too small, to detect a wrong declaration.
     pub const RESTS_ON_DECLARATION: &str = "rests_on_declaration";
-    /// The step ended off the speed that it was asked for.
+    /// The step did not reach its speed setpoint.
     pub const SPEED_NOT_REACHED: &str = "speed_not_reached";
     /// Part of the state at the step's end is not from its last seconds.
     pub const END_STATE: &str = "end_state";
 }
 
-/// Warnings with the verdict they amount to.
+/// Warnings with the resulting verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Findings {
     pub(crate) verdict: Verdict,
-    /// Doubts first, then remarks.
+    /// Doubts before remarks.
     pub(crate) warnings: Vec<Warning>,
     doubts: usize,
 }
@@ -90,12 +90,12 @@ impl Findings {
         Findings { verdict: Verdict::Good, warnings: Vec::new(), doubts: 0 }
     }
 
-    /// Something to know that is no reason to doubt.
+    /// Adds a remark, which does not affect the verdict.
     pub(crate) fn remark(&mut self, code: &str, message: String) {
         self.warnings.push(Warning { code: code.to_owned(), message });
     }
 
-    /// Adds what another has found.
+    /// Adds the findings of another check.
     pub(crate) fn take(&mut self, other: Findings) {
         let mut doubts = other.warnings;
         self.warnings.extend(doubts.split_off(other.doubts));
@@ -114,7 +114,7 @@ impl Findings {
         self.verdict = self.verdict.doubted();
     }
 
-    /// A doubt before all others: what speaks against the readings themselves.
+    /// Adds a doubt about the readings themselves, before all others.
     pub(crate) fn doubt_first(&mut self, code: &str, message: String) {
         self.warn(0, Warning { code: code.to_owned(), message });
         self.verdict = self.verdict.doubted();
@@ -125,7 +125,7 @@ impl Findings {
         self.verdict = Verdict::Unusable;
     }
 
-    /// A doubt at its place: a first look shows no more than the first warning, which is to be the reason why a point is not good.
+    /// Adds a doubt in order: short displays show only the first warning, which must be the reason for the verdict.
     fn warn(&mut self, place: usize, doubt: Warning) {
         self.warnings.insert(place, doubt);
         self.doubts += 1;

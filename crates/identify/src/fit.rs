@@ -11,28 +11,28 @@ use mapper_physics::inlet_convection::InletLaw;
 use mapper_physics::params::Params;
 use rmpfit::{MPConfig, MPFitter, MPPar, MPResult, MPSide};
 
-/// Efficiencies searched, fraction. Above 1 is impossible, and said so; the fit may go there to be seen.
+/// Search range of the efficiency, fraction. Above 1 is impossible and is reported; the fit may go there to show it.
 pub(crate) const ETA_BOUNDS: (f64, f64) = (0.05, 2.0);
-/// Heat-transfer coefficients searched, W/(m2 K).
+/// Search range of the heat-transfer coefficient, W/(m2 K).
 pub(crate) const H_BOUNDS_W_M2K: (f64, f64) = (0.0, 1e5);
 /// Relative step of the two-sided derivatives: rounding and curvature are both below 1e-9 there.
 const DERIVATIVE_STEP_RATIO: f64 = 1e-5;
-/// Steps and bounds for h near zero, W/(m2 K).
+/// Scale of steps and bounds for h near zero, W/(m2 K).
 const DERIVATIVE_STEP_H_W_M2K: f64 = 1e-2;
 
-/// What eqs. 1-3 need besides the samples.
+/// Parameters of eqs. 1-3 in addition to the samples.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Geometry {
     pub(crate) alpha_area_ratio: f64,
     pub(crate) internal_area_m2: f64,
-    /// The law of h before the wheel, where it is not h.
+    /// The law of h before the wheel, if it differs from h.
     pub(crate) inlet: Option<InletLaw>,
     pub(crate) probe: Probe,
     pub(crate) air: Air,
 }
 
 impl Geometry {
-    /// As declared. The exponent of the inlet's law is Appendix A's: a step by itself tells none.
+    /// As declared. The exponent of the inlet's law is that of Appendix A: a single step does not determine one.
     pub(crate) fn of(config: &IdentifyConfig) -> Self {
         let own = InletLaw {
             exponent: Params::default().compressor.nusselt_exponent,
@@ -48,32 +48,32 @@ impl Geometry {
         }
     }
 
-    /// h before the wheel over h after it.
+    /// Ratio of h before the wheel to h after it.
     fn inlet_h_ratio(&self, row: Row, eta: f64) -> f64 {
         let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta);
         self.inlet.map_or(1.0, |law| law.h_ratio(row.t1_k, bulk_k()))
     }
 }
 
-/// A fit with what it takes to judge it.
+/// A fit with the data needed to judge it.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
     pub(crate) eta: f64,
     pub(crate) h_w_m2k: f64,
     /// Measured minus fitted T2, K.
     pub(crate) residual_k: Vec<f64>,
-    /// Derivatives of the probe's reading by eta (K) and by h (K m2 K/W), without what its first reading can take up.
+    /// Derivatives of the probe's reading by eta (K) and by h (K m2 K/W), after projecting out its first reading.
     pub(crate) jacobian: [Vec<f64>; 2],
     /// Derivative of the gas's own T2 by h, K m2 K/W.
     pub(crate) gas_by_h: Vec<f64>,
-    /// How the probe follows the gas; `None` where it has no inertia.
+    /// Response of the probe to the gas; `None` without inertia.
     pub(crate) followed: Option<Followed>,
     /// `(J'J)^-1`.
     pub(crate) inverse_normal: [[f64; 2]; 2],
 }
 
 impl Fit {
-    /// What the probe reads of a change of the gas's T2.
+    /// The probe's response to a change of the gas's T2.
     pub(crate) fn read(&self, gas_change_k: Vec<f64>) -> Vec<f64> {
         match &self.followed {
             Some(followed) => followed.read(&gas_change_k),
@@ -81,7 +81,7 @@ impl Fit {
         }
     }
 
-    /// Least-squares parameters that a change of the reading would add: `(J'J)^-1 J' y`.
+    /// Parameter change due to a change of the reading: `(J'J)^-1 J' y`.
     pub(crate) fn response(&self, t2_change_k: impl Iterator<Item = f64>) -> [f64; 2] {
         let mut right = [0.0; 2];
         for (i, change_k) in t2_change_k.enumerate() {
@@ -98,7 +98,7 @@ impl Fit {
         (sum / self.residual_k.len().max(1) as f64).sqrt()
     }
 
-    /// Name of the parameter that lies on its bound, if one does.
+    /// Name of a parameter on its bound, if any.
     pub(crate) fn at_bound(&self) -> Option<String> {
         let near = |value: f64, bound: f64, size: f64| (value - bound).abs() < 1e-6 * size;
         if near(self.eta, ETA_BOUNDS.0, 1.0) || near(self.eta, ETA_BOUNDS.1, 1.0) {
@@ -129,7 +129,7 @@ pub(crate) fn t2_k(geometry: Geometry, row: Row, eta: f64, h_w_m2k: f64) -> f64 
     compress(&inputs, None).t2_k
 }
 
-/// What eqs. 1-3 need of one sample.
+/// Inputs of eqs. 1-3 from one sample.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
     pub(crate) t1_k: f64,
@@ -205,7 +205,7 @@ fn parameter((low, high): (f64, f64), step: f64, rel_step: f64) -> MPPar {
     }
 }
 
-/// The least-squares fit; `None` where it comes to no finite end (fewer than 3 samples among them).
+/// The least-squares fit; `None` if it does not converge (or for fewer than 3 samples).
 pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
     if samples.len() < 3 {
         return None;
@@ -263,7 +263,7 @@ fn judged(
     Some(Fit { eta, h_w_m2k, residual_k, jacobian, gas_by_h, followed, inverse_normal })
 }
 
-/// Inverse of a symmetric positive definite matrix; `None` where it is singular to rounding.
+/// Inverse of a symmetric positive definite matrix; `None` if it is numerically singular.
 pub(crate) fn inverted(m: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     let determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
     let usable = determinant.is_finite() && determinant > 1e-13 * m[0][0] * m[1][1];
@@ -272,8 +272,8 @@ pub(crate) fn inverted(m: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     })
 }
 
-/// Start values: with the measured T2 in the heat terms, eqs. 1-3 are linear in 1/eta and h but for one product,
-/// which takes 1/eta from the temperature rise.
+/// Start values: with the measured T2 in the heat terms, eqs. 1-3 are linear in 1/eta and h except for one product, which takes 1/eta from the
+/// temperature rise.
 fn start(samples: &Samples, geometry: Geometry) -> [f64; 2] {
     let (mut rise_k, mut isentropic_k) = (0.0, 0.0);
     for (row, t2_k) in rows(samples).zip(&samples.t2_k) {

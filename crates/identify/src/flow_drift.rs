@@ -1,5 +1,4 @@
-//! What the assumption of a constant h costs where h moves within the window: with the flow above all, and with the
-//! viscosity at the wall.
+//! The error of a constant h if h changes within the window, mainly with the flow and with the viscosity at the wall.
 
 use crate::fit::Fit;
 use crate::samples::Samples;
@@ -8,19 +7,19 @@ use mapper_physics::compression::compressed_k;
 use mapper_physics::nusselt::coefficient_w_m2k;
 use mapper_physics::params::{CompressorParams, Params};
 
-/// How far flow and h moved and what it did.
+/// Changes of flow and h, and their effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FlowDrift {
-    /// Flow at the window's end over that at its start, less 1.
+    /// Ratio of the flow at the window's end to that at its start, minus 1.
     pub(crate) flow_ratio: f64,
     /// Estimated error of the fitted eta, fraction.
     pub(crate) eta: f64,
-    /// Estimated error of the fitted h against h at the window's end, W/(m2 K).
+    /// Estimated error of the fitted h relative to h at the window's end, W/(m2 K).
     pub(crate) h_w_m2k: f64,
 }
 
-/// Estimates the error of a fit with constant h if h really followed the correlation of Appendix A: the fit's answer to
-/// the change of T2 that the moving h makes. Only how h changes matters, not how large the correlation says it is.
+/// Estimates the error of a fit with constant h if h really followed the correlation of Appendix A: the fit's response to the T2 change from
+/// the variable h. Only the change of h matters, not the level of the correlation.
 pub(crate) fn flow_drift(fit: &Fit, samples: &Samples, end_s: f64) -> Option<FlowDrift> {
     let late = samples.t_s.partition_point(|t| *t < samples.t_s.last().copied().unwrap_or(0.0) - end_s);
     let flow_end_kg_s = mean(&samples.flow_kg_s[late..])?;
@@ -39,8 +38,7 @@ pub(crate) fn flow_drift(fit: &Fit, samples: &Samples, end_s: f64) -> Option<Flo
     (drift.flow_ratio.is_finite() && drift.eta.is_finite() && drift.h_w_m2k.is_finite()).then_some(drift)
 }
 
-/// The correlation's h of a sample: properties at the temperature after adiabatic compression, the skin's at that of the
-/// housing.
+/// The correlation's h of a sample: gas properties at the temperature after adiabatic compression, wall viscosity at the housing temperature.
 fn relative_h(fit: &Fit, samples: &Samples, compressor: &CompressorParams, i: usize) -> f64 {
     let bulk_k = compressed_k(samples.t1_k[i], samples.rise_ratio[i], fit.eta);
     coefficient_w_m2k(

@@ -17,15 +17,14 @@ use mapper_core::{
 };
 use mapper_inference::hypotheses::{Likelihood, Priors};
 
-/// Identifies every step of a recording, in order. Steps of which not even the place on the map is known are left
-/// out; [`identify_each`] says which and why.
+/// Identifies every step of a recording, in order. Steps without a known position on the map are left out; [`identify_each`] names them with
+/// the reason.
 ///
 /// The state of a point (speed, flow, pressure ratio, T1, P1) is the mean over the last
 /// [`end_mean_s`](crate::Thresholds::end_mean_s) of its step.
 ///
 /// # Errors
-/// [`IdentifyError`] where a channel that the method needs is missing, there are no steps, or the configuration is out
-/// of range.
+/// [`IdentifyError`] if a channel that the method needs is missing, there are no steps, or the configuration is out of range.
 pub fn identify(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -33,7 +32,7 @@ pub fn identify(
     Ok(identify_each(recording, config)?.into_iter().filter_map(Result::ok).collect())
 }
 
-/// As [`identify`], with the reason for every step that gives no point.
+/// Like [`identify`], with the reason for every step that gives no point.
 ///
 /// # Errors
 /// As [`identify`].
@@ -44,23 +43,23 @@ pub fn identify_each(
     Ok(identify_recording(recording, config)?.points)
 }
 
-/// What a recording gives.
+/// Result of the identification of a recording.
 #[derive(Debug)]
 pub struct Identified {
-    /// One for each step, in order; with the reason where a step gives no point.
+    /// One for each step, in order; with the reason if a step gives no point.
     pub points: Vec<Result<IdentifiedPoint, StepError>>,
-    /// What the points share; `None` where the method finds nothing of the kind.
+    /// Shared parameters of the points; `None` if the method has none.
     pub thermal: Option<ThermalModel>,
-    /// What the two-parameter method makes of the same steps, where it makes anything of them and was not the one asked for.
+    /// Result of the two-parameter method for the same steps, if it gives one and was not the requested method.
     pub two_parameter: Vec<TwoParameter>,
-    /// Faults of sensors or machine without which the recording contradicts itself; empty where none is needed.
+    /// Faults of sensors or machine that explain contradictions in the recording; empty if there are none.
     pub faults: Vec<FoundFault>,
-    /// One standard error with which the recording tells the size of each fault that is looked for, in the fault's unit; infinite where it
-    /// does not tell one. A fault of six is found in 95 of 100 recordings.
+    /// One standard error of the size of each possible fault, in the fault's unit; infinite if the recording does not determine it. A fault of
+    /// six standard errors is found in 95 of 100 recordings.
     pub tells: Vec<(Suspect, f64)>,
 }
 
-/// As [`identify_each`], with what the points share (joint method alone).
+/// Like [`identify_each`], with the shared parameters of the points (joint method alone).
 ///
 /// # Errors
 /// As [`identify`].
@@ -71,8 +70,8 @@ pub fn identify_recording(
     identify_beside(recording, config, None)
 }
 
-/// As [`identify_recording`], beside a rig that is declared to be known: flow, speed and efficiencies that lie off it by more than
-/// its tolerances make the points doubtful.
+/// Like [`identify_recording`], compared with a declared rig: points are doubtful if flow, speed or efficiencies differ from it by more than
+/// its tolerances.
 ///
 /// # Errors
 /// As [`identify`].
@@ -104,13 +103,13 @@ pub fn identify_beside(
             Ok(state)
         })
         .collect();
-    let (alone, told) = if recording.require(Channel::Tc).is_ok() {
+    let (alone, own_findings) = if recording.require(Channel::Tc).is_ok() {
         dynamic::alone(recording, &states, config)
     } else {
         Default::default()
     };
     let (mut objections, ends) = objections(recording, config);
-    // Where half of the recording is refused already, what is left contradicts itself for that reason.
+    // If half of the recording is already refused, the remainder contradicts itself for that reason.
     let whole = objections.iter().all(|objection| 2 * objection.steps.len() <= ends.len());
     let likelihood = |fitted: Option<&FittedEfficiencies>| {
         whole.then(|| faults::likelihood(recording, &ends, fitted, config, nominal.as_ref()))?
@@ -121,21 +120,21 @@ pub fn identify_beside(
     let known: Vec<Option<EndState>> = states.iter().map(|state| state.as_ref().ok().copied()).collect();
     let condemned = faults.iter().any(|fault| fault.touches_points)
         || (0..known.len()).all(|step| objections.iter().any(|objection| objection.steps.contains(&step)));
-    let together = |findings: &mut [Findings], alone: Vec<Estimate>, told: Vec<Findings>| {
+    let together = |findings: &mut [Findings], alone: Vec<Estimate>, own_findings: Vec<Findings>| {
         let known = without_the_refused(known.clone(), &objections, findings);
-        joint::estimate(recording, &known, (alone, told), config, condemned, findings)
+        joint::estimate(recording, &known, (alone, own_findings), config, condemned, findings)
     };
     let (mut thermal, mut two_parameter, mut fitted) = (None, Vec::new(), None);
     let estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
-            let joint = together(&mut findings, alone, told);
+            let joint = together(&mut findings, alone, own_findings);
             (thermal, two_parameter, fitted) = (joint.thermal, joint.two_parameter, joint.fitted);
             joint.estimates
         }
         method => {
             if whole && nominal.is_some() && !alone.is_empty() {
-                // Only the joint fit knows what an error of each sensor does to the efficiencies. The points stay those of the method.
-                fitted = together(&mut findings.clone(), alone.clone(), told.clone()).fitted;
+                // Only the joint fit computes the effect of each sensor error on the efficiencies. The points stay those of the method.
+                fitted = together(&mut findings.clone(), alone.clone(), own_findings.clone()).fitted;
             }
             if method == Method::Steady {
                 let steps = findings.iter_mut().enumerate();
@@ -145,13 +144,13 @@ pub fn identify_beside(
                 };
                 steps.map(estimate).collect()
             } else {
-                findings.iter_mut().zip(told).for_each(|(findings, told)| findings.take(told));
+                findings.iter_mut().zip(own_findings).for_each(|(findings, own)| findings.take(own));
                 alone
             }
         }
     };
     if let Some(fitted) = &fitted {
-        // The efficiencies say more, and of more channels.
+        // The efficiencies carry more information, and about more channels.
         balances = likelihood(Some(fitted));
         faults = balances.as_ref().map(find).unwrap_or_default();
     }
@@ -159,7 +158,7 @@ pub fn identify_beside(
     if let Some(remark) = faults::remark(&faults) {
         findings.iter_mut().for_each(|findings| findings.remark(code::OFF_THE_NOMINAL_MAP, remark.clone()));
     }
-    // First what speaks against the readings: whatever else is said of a point rests on them.
+    // Doubts about the readings come first: all other findings depend on them.
     for objection in objections.iter().rev() {
         for position in &objection.steps {
             findings[*position].doubt_first(objection.code, objection.message.clone());
@@ -177,8 +176,8 @@ pub fn identify_beside(
     Ok(Identified { points, thermal, two_parameter, faults, tells: tells.unwrap_or_default() })
 }
 
-/// The steps that may have a say in what all share: where an objection is to a few, they would spoil the others. Samples of a channel that
-/// is frozen for a while are left out by themselves, and the rest of the step speaks.
+/// The steps that contribute to the shared parameters: steps with a failed check would bias the others. Samples of a temporarily frozen
+/// channel are omitted, and the rest of the step is used.
 fn without_the_refused(
     mut known: Vec<Option<EndState>>,
     objections: &[Objection],
@@ -198,12 +197,12 @@ fn without_the_refused(
     known
 }
 
-/// Remarks that the run has told that a step's speed was not reached: the point is as good as any, but elsewhere on the map.
+/// Adds the run's remarks that a step's speed was not reached: the point is valid, but elsewhere on the map.
 fn speed_not_reached(recording: &Recording, step: &StepMarker, state: &EndState, findings: &mut Findings) {
-    let told = |event: &Event| {
+    let reported = |event: &Event| {
         event.kind == EventKind::SpeedNotReached && event.t_s > step.start_s && event.t_s <= step.end_s
     };
-    if let (Some(asked), true) = (step.to, recording.events.iter().any(told)) {
+    if let (Some(asked), true) = (step.to, recording.events.iter().any(reported)) {
         let message = format!(
             "{:.2} krpm were asked for and {:.2} krpm reached",
             asked.speed_rpm / 1e3,
@@ -308,12 +307,12 @@ fn point(
     }
 }
 
-/// What all points share: of their numbers as the method has it, of their place as declared.
+/// Common errors of all points: of their numbers as the method reports them, of their position as declared.
 fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig) -> CommonErrors {
     let relative = |channel: Channel, reading: f64| {
         let declared = config.declared.get(&channel).copied().unwrap_or_default();
         let relative = (declared.offset_sigma / reading).hypot(declared.gain_sigma_ratio);
-        // A reading of 0 has no relative error, and no place on a map.
+        // A reading of 0 has no relative error and no position on a map.
         if relative.is_finite() { relative } else { 0.0 }
     };
     let flow = relative(Channel::CompressorFlow, state.flow_kg_s);
@@ -323,7 +322,7 @@ fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig)
     CommonErrors {
         eta_changes,
         h_changes_w_m2k,
-        // Corrected flow goes with the root of T1 and with 1/P1.
+        // Corrected flow is proportional to the root of T1 and to 1/P1.
         flow_corrected_standard_error_ratio: flow.hypot(p1).hypot(0.5 * relative(Channel::T1, state.t1_k)),
         pressure_ratio_standard_error: state.pressure_ratio * p1.hypot(p2),
     }

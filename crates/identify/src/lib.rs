@@ -1,8 +1,8 @@
-//! From a recording to identified points: efficiency and heat-transfer coefficient, and how sure they are.
+//! Identifies points from a recording: efficiency and heat-transfer coefficient, with their uncertainty.
 //!
 //! [`identify`] is a function from a [`Recording`](mapper_core::Recording) to points, one for each step.
-//! `dynamic` is the method of Burke et al., section 3; `steady` is conventional mapping. Nothing here knows what a
-//! simulator knows.
+//! `dynamic` is the method of Burke et al., section 3; `steady` is conventional mapping. This crate has no access to a simulator's true
+//! values.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,8 +1,8 @@
-//! What each method needs of a recording.
+//! Channels that each method needs.
 
 use mapper_core::{Channel, Method, Recording};
 
-/// What every point needs: its place on the map, and the temperature rise.
+/// Channels that every point needs: its position on the map, and the temperature rise.
 const EVERY: [Channel; 6] =
     [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::T1, Channel::P2, Channel::T2];
 
@@ -12,13 +12,13 @@ pub fn needs(method: Method) -> Vec<Channel> {
     EVERY.into_iter().chain(housing).collect()
 }
 
-/// Channels that a method needs and the recording has not.
+/// Channels that a method needs and the recording does not have.
 pub fn missing(recording: &Recording, method: Method) -> Vec<Channel> {
     needs(method).into_iter().filter(|channel| recording.require(*channel).is_err()).collect()
 }
 
-/// The method for a recording where nobody asked for one by name, and why it is another than `usual`. Without a housing
-/// temperature there is no heat transfer to be had, and the apparent efficiency is what is left.
+/// The default method for a recording, and why it differs from `usual`. Without a housing temperature there is no heat-transfer model, so only
+/// the apparent efficiency remains.
 pub fn method_for(recording: &Recording, usual: Method) -> (Method, Option<String>) {
     let lost = missing(recording, usual);
     if lost.is_empty() || usual == Method::Steady || !missing(recording, Method::Steady).is_empty() {

@@ -1,4 +1,4 @@
-//! What the declared map has for a measured point: the speed that belongs to its flow and pressure ratio, and the efficiency there.
+//! Predictions of the declared map for a measured point: the speed at its flow and pressure ratio, and the efficiency there.
 
 use crate::faults::readings::Readings;
 use mapper_core::ModelTolerances;
@@ -6,7 +6,7 @@ use mapper_numerics::polyline::NearestOnPolyline;
 use mapper_numerics::root::bisect;
 use mapper_physics::model::Model;
 
-/// What a campaign declares of its rig, and how far it may be off it.
+/// The declared rig of a campaign with its tolerances.
 #[derive(Debug, Clone, Copy)]
 pub struct NominalRig<'a> {
     /// Map, valve and geometry.
@@ -15,17 +15,17 @@ pub struct NominalRig<'a> {
     pub tolerances: &'a ModelTolerances,
 }
 
-/// Range about the measured speed in which the map's own is sought.
+/// Range about the measured speed in which the map's speed is searched.
 const SPEEDS: (f64, f64) = (0.4, 2.5);
 /// Relative error of that speed, far below all tolerances.
 const SPEED_ERROR: f64 = 1e-7;
-/// Places of a speed line among which the nearest is sought.
+/// Number of positions on a speed line among which the nearest is searched.
 const PLACES: usize = 200;
-/// Beyond the surge point, share of the line's PR - 1: a rig may reach further than its map.
+/// Extension beyond the surge point, share of the line's PR - 1: a rig may reach further than its map.
 const BEYOND_SURGE: f64 = 0.03;
 
 impl NominalRig<'_> {
-    /// Physical speed at which the map has a point's flow and pressure ratio, rpm; `None` where none near the measured one has.
+    /// Physical speed at which the map has a point's flow and pressure ratio, rpm; `None` if there is none near the measured speed.
     pub(crate) fn speed_rpm(&self, readings: &Readings) -> Option<f64> {
         let map = self.model.map.as_ref();
         let reference = map.reference();
@@ -42,9 +42,8 @@ impl NominalRig<'_> {
         Some(bisect(low, high, SPEED_ERROR * speed_rpm, |speed_rpm| missing_kg_s(speed_rpm) < 0.0).0)
     }
 
-    /// Efficiency of the map at the place of the speed line that is nearest to a point, and its slope along the line per unit of the
-    /// line's largest flow and largest PR - 1. By flow near choke and by pressure ratio near surge at once: each alone says little of the
-    /// place at the other end.
+    /// Efficiency of the map at the nearest position of the speed line. Also its slope along the line, per unit of the line's largest flow and
+    /// largest PR - 1. The distance uses flow and pressure ratio together: flow resolves the position near choke, pressure ratio near surge.
     pub(crate) fn efficiency(&self, readings: &Readings) -> Option<(f64, f64)> {
         let map = self.model.map.as_ref();
         let reference = map.reference();

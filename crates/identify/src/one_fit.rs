@@ -1,4 +1,4 @@
-//! One least-squares fit of all steps by itself, for those who measure it beside another program.
+//! A single least-squares fit of all steps, for timing comparisons with another program.
 
 use crate::dynamic::Estimate;
 use crate::end_state::end_state;
@@ -10,7 +10,7 @@ use crate::joint::start;
 use crate::{IdentifyConfig, identify};
 use mapper_core::Recording;
 
-/// What one fit found.
+/// Result of one fit.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct OneFit {
@@ -22,11 +22,11 @@ pub struct OneFit {
     pub etas: Vec<f64>,
 }
 
-/// Spreads of the points about surface (fraction) and law (ratio) that a fit starts with.
+/// Start values for the spreads of the points about surface (fraction) and law (ratio).
 const SPREADS: (f64, f64) = (0.005, 0.01);
 
-/// Prepares rows, weights and start values, and hands out a function that fits once from there; `None` where there is
-/// nothing to fit. The weights are those of the declared noise; nothing is learned, judged or corrected.
+/// Prepares rows, weights and start values, and returns a function that fits once from there; `None` if there is nothing to fit. The weights
+/// are those of the declared noise, without re-estimation, checks or corrections.
 #[doc(hidden)]
 pub fn one_fit<R>(
     recording: &Recording,

@@ -1,9 +1,9 @@
-//! The reading of a probe that follows the gas with a lag, along the rows of a step.
+//! The reading of a probe that lags the gas, along the rows of a step.
 
 use mapper_physics::thermocouple;
 
-/// One step of the probe: what remains of its last reading, and the weights of the gas before and now. Exact for a gas
-/// temperature that is linear in between.
+/// One time step of the probe: the weights of its last reading and of the gas before and now. Exact for a gas temperature that is linear in
+/// between.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lag {
     pub(crate) kept: f64,
@@ -29,8 +29,8 @@ impl Lag {
     }
 }
 
-/// The lags between the rows of a course, each by time, s, flow, kg/s, and gas temperature, K; one fewer than rows. Between two
-/// rows the probe has the mean of their time constants.
+/// The lags between rows; one fewer than rows. Each row has time, s, flow, kg/s, and gas temperature, K. Between two rows the probe has the
+/// mean of their time constants.
 pub(crate) fn lags(
     rows: impl Iterator<Item = (f64, f64, f64)>,
     probe_diameter_m: f64,
@@ -48,7 +48,7 @@ pub(crate) fn lags(
     lags
 }
 
-/// What the probe reads along a course of the gas, from its reading at the first row on.
+/// The probe's reading along a gas temperature history, from its reading at the first row on.
 pub(crate) fn follow(lags: &[Lag], first: f64, course: &[f64]) -> Vec<f64> {
     let mut reading = first;
     let mut readings = Vec::with_capacity(course.len());
@@ -64,7 +64,7 @@ pub(crate) fn follow(lags: &[Lag], first: f64, course: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A ramp is followed at a distance of rate times time constant; a jump exponentially.
+    /// The lag behind a ramp is rate times time constant; the response to a jump is exponential.
     #[test]
     fn ramps_and_jumps_have_their_known_answers() {
         let (interval_s, tau_s) = (0.5, 3.0);

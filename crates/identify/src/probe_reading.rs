@@ -1,14 +1,13 @@
 //! T2 as a declared probe reads it (eqs. 11-12), for a fit of one step.
 //!
-//! The probe comes into a window with a reading that earlier seconds have made. That first reading enters linearly and fades
-//! with the probe's time constant; it is not a number anyone wants, so it is projected out of residual and derivatives
-//! (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10:413, 1973). What is left is a fit of as many
-//! parameters as without a probe.
+//! At the start of a window the probe's reading depends on the seconds before it. That first reading enters linearly and fades with the
+//! probe's time constant. It is a nuisance parameter, so it is projected out of residual and derivatives (variable projection: Golub and
+//! Pereyra, SIAM J. Numer. Anal. 10:413, 1973). The remaining fit has as many parameters as without a probe.
 
 use crate::probe::{Lag, follow, lags};
 use crate::samples::Samples;
 
-/// The declared probe and the pipe it stands in.
+/// The declared probe and its pipe.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Probe {
     /// Diameter of its tip, m; 0 for a probe without inertia.
@@ -17,18 +16,18 @@ pub(crate) struct Probe {
     pub(crate) pipe_diameter_m: f64,
 }
 
-/// The probe along the rows of a window.
+/// The probe response over the rows of a window.
 #[derive(Debug, Clone)]
 pub(crate) struct Followed {
     lags: Vec<Lag>,
-    /// What is left of the first reading at each row.
+    /// Remaining share of the first reading at each row.
     memory: Vec<f64>,
     /// Sum of its squares.
     memory_square: f64,
 }
 
 impl Followed {
-    /// `None` for a probe without inertia, which reads what the gas has.
+    /// `None` for a probe without inertia, which reads the gas temperature.
     pub(crate) fn of(samples: &Samples, probe: Probe) -> Option<Self> {
         if probe.diameter_m <= 0.0 || samples.len() < 2 {
             return None;
@@ -41,12 +40,12 @@ impl Followed {
         Some(Followed { lags, memory, memory_square })
     }
 
-    /// What the probe makes of a course of the gas, but for what its first reading adds.
+    /// Response of the probe to a time history of the gas, without the contribution of its first reading.
     pub(crate) fn read(&self, gas: &[f64]) -> Vec<f64> {
         follow(&self.lags, 0.0, gas)
     }
 
-    /// Takes out of a column of readings what some first reading would explain of it.
+    /// Removes from a column of readings the part that a first reading would explain.
     pub(crate) fn without_first_reading(&self, column: &mut [f64]) {
         let along: f64 = column.iter().zip(&self.memory).map(|(value, share)| value * share).sum();
         for (value, share) in column.iter_mut().zip(&self.memory) {

@@ -1,26 +1,26 @@
-//! Where a reading that relaxes is going: a housing at rest comes to the cell's temperature within an hour, a soak is shorter.
+//! Extrapolates a relaxing reading to its limit: a stopped housing reaches the cell's temperature within an hour, a soak is shorter.
 
-/// Time constants that housings of turbochargers have at rest, s: 1 to 2 kg of aluminium at 1 to 2 W/K. Longer ones that the
-/// readings cannot exclude would draw the limit their way.
+/// Time constants of stopped turbocharger housings, s: 1 to 2 kg of aluminium at 1 to 2 W/K. Longer ones, which the readings cannot exclude,
+/// would bias the limit.
 const TIME_CONSTANTS_S: [f64; 5] = [400.0, 550.0, 700.0, 900.0, 1200.0];
-/// How far it may be from there at the beginning, one standard deviation beforehand, K.
+/// Prior standard deviation of the initial distance from the limit, K.
 const START_SIGMA_K: f64 = 3.0;
 
-/// How far a usual housing is from there after `t_s` of rest, K: a kelvin at the beginning, with the middle time constant. From the
-/// readings of one that has long come to rest no time constant follows, and none is needed; this one's limit is known least.
+/// Distance of a typical housing from its limit after `t_s` of soak, K: a kelvin at the beginning, with the middle time constant. A housing
+/// that settled long ago determines no time constant and needs none; the limit of this one is the least certain.
 pub(crate) fn usual_k(t_s: f64) -> f64 {
     (-t_s / TIME_CONSTANTS_S[TIME_CONSTANTS_S.len() / 2]).exp()
 }
 
-/// The limit of `values` (at `t_s`, each with the standard error `sigma`) under `limit + start exp(-t/tau)`, and its
-/// standard error. Limit and start are found by least squares for each time constant; these are averaged over with the weights
-/// that the values give them. `None` for fewer than six values.
+/// The limit of `values` (at `t_s`, each with the standard error `sigma`) under `limit + start exp(-t/tau)`, and its standard error. Limit and
+/// start are found by least squares for each time constant, and averaged with the posterior weights of the time constants. `None` for fewer
+/// than six values.
 pub(crate) fn limit(t_s: &[f64], values: &[f64], sigma: f64) -> Option<(f64, f64)> {
     let first_s = *t_s.first()?;
     if values.len() < 6 || values.len() != t_s.len() || sigma.is_nan() || sigma <= 0.0 {
         return None;
     }
-    // Around the first value, so that sums of squares keep their digits.
+    // Relative to the first value, so that sums of squares keep their digits.
     let origin = *values.first()?;
     let weight = sigma.powi(-2);
     let fits: Vec<(f64, f64, f64)> = TIME_CONSTANTS_S
@@ -59,7 +59,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64;
 
-    /// 0.5 K above the cell at the beginning, 0.09 K at the end: the mean of the last half would be 0.14 K off.
+    /// 0.5 K above the cell at the beginning, 0.09 K at the end: the mean of the last half would be wrong by 0.14 K.
     #[test]
     fn the_limit_is_found_and_its_error_is_that_of_many_draws() {
         let t_s: Vec<f64> = (0..40).map(|i| 30.0 * f64::from(i)).collect();
@@ -73,15 +73,14 @@ mod tests {
             squares += (found - 298.15).powi(2) / 200.0;
             claimed += sigma * sigma / 200.0;
         }
-        // Half of what the mean is off; the time constant is known to a factor of two from such data.
+        // Half the error of the mean; such data determine the time constant to a factor of two.
         assert!(squares.sqrt() < 0.07, "{} K rms", squares.sqrt());
-        // 200 draws know their standard deviation to 5 %; the weights of five time constants are no exact posterior.
+        // 200 draws determine their standard deviation to 5 %; the weights of five time constants are only an approximate posterior.
         let ratio = (squares / claimed).sqrt();
         assert!((0.75..1.25).contains(&ratio), "errors are {ratio} of what is claimed");
     }
 
-    /// What is forecast of a usual housing, from readings without noise, is what draws of it claim: after half an hour four times as
-    /// much as after an hour.
+    /// The forecast standard error of a typical housing equals that of random draws: after half an hour it is four times that after an hour.
     #[test]
     fn the_error_of_a_usual_housing_is_that_of_readings_without_noise() {
         let mut random = Pcg64::seed_from_u64(2);
@@ -98,7 +97,7 @@ mod tests {
                 limit(&t_s, &values, sigma_k).unwrap().1
             });
             let claimed = claimed.sum::<f64>() / 100.0;
-            // Draws weigh the time constants each in its own way.
+            // Each draw gives the time constants different weights.
             assert!((0.8..1.25).contains(&(claimed / forecast)), "{soak_s} s: {claimed} K of {forecast} K");
             forecasts.push(forecast);
         }

@@ -7,7 +7,7 @@ use mapper_numerics::statistics::mean;
 use mapper_observe::plausible::is_reading;
 use mapper_physics::compression::isentropic_rise_ratio;
 
-/// Longest stretch between two samples of a channel that is bridged by interpolation, s: slower loggers have 1 Hz.
+/// Longest gap between two samples of a channel that is interpolated, s: slower loggers have 1 Hz.
 const LONGEST_BRIDGE_S: f64 = 2.5;
 
 /// Flow below which eqs. 1-3 are not evaluated (they divide by it), kg/s.
@@ -19,14 +19,14 @@ pub(crate) struct Samples {
     pub(crate) t_s: Vec<f64>,
     pub(crate) t1_k: Vec<f64>,
     pub(crate) t2_k: Vec<f64>,
-    /// NaN where the recording has no housing temperature (steady method).
+    /// NaN if the recording has no housing temperature (steady method).
     pub(crate) tc_k: Vec<f64>,
     pub(crate) p1_pa: Vec<f64>,
     pub(crate) p2_pa: Vec<f64>,
     pub(crate) flow_kg_s: Vec<f64>,
     /// `PR^kappa - 1`.
     pub(crate) rise_ratio: Vec<f64>,
-    /// Rows left out because a value was lost or not physical.
+    /// Rows omitted because a value was missing or not physical.
     pub(crate) lost: usize,
 }
 
@@ -81,7 +81,7 @@ impl Samples {
         samples
     }
 
-    /// The rows for which `keep` holds, by index.
+    /// The rows with a true `keep`, by index.
     pub(crate) fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
         let pick = |column: &[f64]| {
             column.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, value)| *value).collect()
@@ -110,8 +110,7 @@ impl Samples {
     }
 }
 
-/// A channel at given times: its own values where it was sampled together with them, else interpolated over short
-/// gaps, NaN elsewhere.
+/// A channel at given times: its own samples if the times agree, otherwise interpolated over short gaps, NaN elsewhere.
 fn aligned(series: Option<&Series>, t_s: &[f64]) -> Vec<f64> {
     let (Some(series), Some(first_s), Some(last_s)) = (series, t_s.first(), t_s.last()) else {
         return vec![f64::NAN; t_s.len()];

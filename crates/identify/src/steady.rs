@@ -1,7 +1,7 @@
 //! Conventional mapping: the apparent efficiency from the temperature rise at the end of the step.
 //!
-//! Whatever heat flows between gas and housing counts as work here; the error against the adiabatic efficiency is what
-//! the dynamic method is for (fig. 5 of the paper).
+//! Heat between gas and housing counts as work here. The dynamic method avoids the resulting error of the adiabatic efficiency (fig. 5 of the
+//! paper).
 
 use crate::cleaning::without_spikes;
 use crate::config::coloured;
@@ -15,8 +15,7 @@ use mapper_physics::air::Air;
 use mapper_physics::compression::isentropic_rise_ratio;
 use mapper_physics::thermocouple::time_constant_s;
 
-/// Stretch at the end of a step over which temperatures must not drift, s: noise of 0.1 K leaves their slope uncertain by
-/// less than 0.1 K/min then.
+/// Segment at the end of a step in which temperatures must not drift, s: with noise of 0.1 K its slope is then known to better than 0.1 K/min.
 const DRIFT_SPAN_S: f64 = 60.0;
 
 /// Means over the end of a step.
@@ -98,7 +97,7 @@ pub(crate) fn estimate(
         return estimate;
     }
     let (mut uncertainty, common) = uncertainty(&means, &samples, config);
-    // The drift is no line: as much as the correction itself may be wrong with it.
+    // The drift is not linear, so the correction may be wrong by its own size.
     let lag_eta = eta * lag_k / (means.t2_k - means.t1_k);
     uncertainty.bias_standard_error = uncertainty.bias_standard_error.hypot(lag_eta);
     for (name, column) in [("T2", &trend.t2_k), ("Tc", &trend.tc_k)] {
@@ -126,7 +125,7 @@ pub(crate) fn estimate(
     estimate
 }
 
-/// By how much the declared probe still lags behind the gas, K: its time constant times the drift of its reading.
+/// Remaining lag of the declared probe behind the gas, K: its time constant times the drift of its reading.
 fn lag_k(samples: &Samples, trend: &Samples, config: &IdentifyConfig) -> f64 {
     let (Some(flow_kg_s), Some(t2_k)) = (mean(&samples.flow_kg_s), mean(&samples.t2_k)) else { return 0.0 };
     let tau_s = time_constant_s(config.probe_diameter_m, config.outlet_diameter_m, flow_kg_s, t2_k);
@@ -144,8 +143,8 @@ fn slope_per_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
     (bottom > 0.0).then(|| top / bottom)
 }
 
-/// Noise from the scatter of the samples' own efficiencies (or the declared noise where that is more), offsets and
-/// gains one sensor at a time; what each of these changes is also returned, since all points share it.
+/// Noise from the scatter of the samples' own efficiencies (or the declared noise if larger), and offsets and gains one sensor at a time. Also
+/// returns the change due to each, since all points share it.
 pub(crate) fn uncertainty(
     means: &Means,
     samples: &Samples,

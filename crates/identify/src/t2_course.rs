@@ -1,4 +1,4 @@
-//! T2 of a step as its point's numbers give it, beside what was read: what a reader looks at to believe a point.
+//! Predicted and measured T2 of a step, so that a user can check a point.
 
 use crate::IdentifyConfig;
 use crate::fit::{Geometry, rows, t2_k};
@@ -14,19 +14,19 @@ pub struct T2Course {
     pub step: usize,
     /// Times of the rows, run time, s.
     pub t_s: Vec<f64>,
-    /// T2 as read, K.
+    /// Measured T2, K.
     pub read_k: Vec<f64>,
-    /// T2 by eqs. 1-3 from the readings of T1, Tc, flow and pressures with the point's efficiency and h held constant, as
-    /// the declared probe reads it, K; its mean is that of the readings.
+    /// T2 by eqs. 1-3 from the readings of T1, Tc, flow and pressures with the point's constant efficiency and h, through the declared probe,
+    /// K. Its mean equals that of the readings.
     pub model_k: Vec<f64>,
-    /// What was added to the model for that, K: offsets that `joint` finds, and what moves within the step.
+    /// Constant added to the model for equal means, K: offsets found by `joint`, and changes within the step.
     pub shift_k: f64,
 }
 
-/// The course of T2 over the window of a point; `None` where it has no efficiency, no h or no window, or nothing was read.
+/// T2 over the window of a point; `None` without an efficiency, h, window or readings.
 ///
-/// `joint` lets efficiency and h move along the map within a step; here they stand still, as the table of points has them, so
-/// that the difference shows what is left to them.
+/// `joint` lets efficiency and h change along the map within a step. Here they are constant, as in the table of points, so the difference
+/// shows the effect of that change.
 pub fn t2_course(
     recording: &Recording,
     point: &IdentifiedPoint,
@@ -39,7 +39,7 @@ pub fn t2_course(
     let model_k = match Followed::of(&samples, geometry.probe) {
         None => gas_k,
         Some(followed) => {
-            // The probe's first reading is whatever it was: what it takes of the difference belongs to the model.
+            // The probe's first reading is unknown: the part of the difference that it explains belongs to the model.
             let read_k = followed.read(&gas_k);
             let mut left: Vec<f64> =
                 samples.t2_k.iter().zip(&read_k).map(|(read, model)| read - model).collect();

@@ -1,4 +1,4 @@
-//! What a pressure tap reads, as total pressure.
+//! Converts the reading of a pressure tap to total pressure.
 
 use crate::PressureTap;
 use mapper_physics::pressure_tap::static_to_total_pa;

@@ -1,4 +1,4 @@
-//! What the two-parameter method makes of a step that another method has identified.
+//! Result of the two-parameter method for a step that another method has identified.
 
 use serde::Serialize;
 

@@ -1,11 +1,10 @@
-//! Why an efficiency is uncertain, and what helps: too little happens, offsets hide it, or noise does.
+//! Explains why an efficiency is uncertain and what helps: too small a signal, offsets, or noise.
 
 use crate::findings::code;
 use mapper_core::EstimateUncertainty;
 
-/// Code and sentence for an efficiency with the standard errors `eta`, of a window in which T2 moves by `dt2_k`, K.
-/// `least_dt2_k`: the smallest such change that tells efficiency from heat transfer; `also`: what else than declared
-/// offsets is in the part that does not average out.
+/// Code and sentence for an efficiency with the standard errors `eta`, of a window in which T2 changes by `dt2_k`, K. `least_dt2_k`: the
+/// smallest change that separates efficiency from heat transfer; `also`: systematic sources in addition to declared offsets.
 pub(crate) fn cause(
     eta: EstimateUncertainty,
     dt2_k: f64,
@@ -41,7 +40,7 @@ pub(crate) fn cause(
     (code, format!("T2 moves by {dt2_k:+.1} K in the window; {what}: {remedy}"))
 }
 
-/// The same for a temperature rise that is read once it has settled, K.
+/// The same for a settled temperature rise, K.
 pub(crate) fn cause_of_rise(eta: EstimateUncertainty, rise_k: f64) -> (&'static str, String) {
     let (noise, bias) = (eta.noise_standard_error, eta.bias_standard_error);
     let (code, what, remedy) = if bias >= noise {

@@ -1,4 +1,4 @@
-//! The identification window: fixed, or found from where the operating point has settled.
+//! The identification window: fixed, or found from the settling of the operating point.
 
 use crate::commands;
 use crate::findings::{Findings, code};
@@ -6,10 +6,10 @@ use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Window, W
 use mapper_numerics::statistics::median;
 use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
-/// Maximum number of blocks looked at, from the step's end backwards: bounds the work on absurd step times.
+/// Maximum number of blocks checked, from the step's end backwards: bounds the work on absurd step times.
 const MAX_BLOCKS: usize = 20_000;
 
-/// The window of a step; `None` where the step has no room for any.
+/// The window of a step; `None` if the step is too short for one.
 pub(crate) fn choose(
     recording: &Recording,
     step: &StepMarker,
@@ -26,7 +26,7 @@ pub(crate) fn choose(
 fn fixed(step: &StepMarker, start_s: f64, end_s: f64, findings: &mut Findings) -> Option<Window> {
     let asked_end_s = step.start_s + end_s;
     let window = Window { start_s: step.start_s + start_s, end_s: asked_end_s.min(step.end_s) };
-    // A millisecond: step times of other loggers are rounded.
+    // A millisecond of tolerance: step times of other loggers are rounded.
     if window.end_s + 1e-3 < asked_end_s {
         let message = format!(
             "the window was asked to end {end_s:.1} s after the jump; the step ends after {:.1} s",
@@ -59,19 +59,19 @@ fn settled(
     Some(Window { start_s, end_s })
 }
 
-/// Since when an operating point has settled.
+/// Settling of an operating point.
 pub(crate) struct Rest {
-    /// What settles last.
+    /// The quantity that settles last.
     pub(crate) slowest: &'static str,
-    /// For how long it has at the step's end, s.
+    /// How long it has been settled at the step's end, s.
     pub(crate) settled_s: f64,
-    /// From where on that is looked at, s.
+    /// Earliest time checked, s.
     earliest_s: f64,
-    /// Whether nothing varied since then.
+    /// Whether all quantities were settled from then on.
     pub(crate) whole: bool,
 }
 
-/// Looks at a step from its end backwards; `None` for a step that ends before it is to be looked at.
+/// Checks a step from its end backwards; `None` for a step that ends before the earliest time.
 pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands) -> Option<Rest> {
     let earliest_s = commands::at_rest_s(recording, step) + WindowRule::EARLIEST_S;
     let end_s = step.end_s;
@@ -95,7 +95,7 @@ pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands
     Some(Rest { slowest, settled_s, earliest_s, whole: settled_blocks == block_count })
 }
 
-/// Medians over blocks counted backwards from `end_s`; NaN where a block has no value.
+/// Medians over blocks counted backwards from `end_s`; NaN for a block without values.
 fn block_medians(series: Option<&Series>, end_s: f64, count: usize) -> Vec<f64> {
     let Some(series) = series else { return vec![f64::NAN; count] };
     (0..count)

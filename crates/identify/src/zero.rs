@@ -1,9 +1,9 @@
-//! The isothermal zero: what sensors read when all of them must read the same.
+//! The isothermal zero: sensor offsets from a state in which all sensors must read the same.
 //!
-//! After a long soak at standstill (shaft at rest, oil and cell at one temperature) T1, T2, Tc and T_oil see one
-//! temperature, P1 and P2 one pressure. Their differences are offsets, to within how even the rig really was. What they
-//! have in common stays as uncertain as their declared offsets leave it. It shifts an efficiency by its share of the absolute temperature
-//! only, which is nothing; a diagnosis of the whole machine sees it.
+//! In a long soak at standstill the shaft is stopped, and oil and cell have one temperature. T1, T2, Tc and T_oil then see one temperature,
+//! and P1 and P2 one pressure. Their differences are offsets, up to the residual non-uniformity of the rig. Their common error keeps its
+//! declared uncertainty. It changes an efficiency only by its share of the absolute temperature, which is negligible, but it matters in a
+//! diagnosis of the whole machine.
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
@@ -17,25 +17,24 @@ use mapper_observe::plausible::is_reading;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How even a soak is, and how it is recognised.
+/// Residual non-uniformity of a soak, and the criteria by which a soak is recognised.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ZeroSettings {
-    /// One standard deviation of a sensor's true temperature about that of all, K, > 0.
+    /// Residual temperature non-uniformity (one standard deviation of a sensor from the mean), K, > 0.
     pub temperature_sigma_k: f64,
-    /// The same of the pressures, Pa, > 0.
+    /// Residual pressure non-uniformity, one standard deviation, Pa, > 0.
     pub pressure_sigma_pa: f64,
-    /// Longest stretch before the first step that is used, s: the last one of the standstill.
+    /// Longest segment before the first step that is used, s: the last one of the standstill.
     pub longest_s: f64,
-    /// Shortest stretch that will do, s.
+    /// Minimum length of the segment, s.
     pub shortest_s: f64,
-    /// Largest drift of a temperature over the stretch, K/min; a soak that drifts faster is not over.
+    /// Maximum drift of a temperature over the segment, K/min; a faster drift means an unfinished soak.
     pub drift_k_min: f64,
 }
 
 impl Default for ZeroSettings {
-    /// Even as a soak is if nothing is declared, recognised from the last minute to ten minutes that drift by less than
-    /// 0.1 K/min.
+    /// Default non-uniformity; accepts the last minute to ten minutes if they drift by less than 0.1 K/min.
     fn default() -> Self {
         ZeroSettings {
             temperature_sigma_k: Soak::TEMPERATURE_SIGMA_K,
@@ -48,7 +47,7 @@ impl Default for ZeroSettings {
 }
 
 impl From<Soak> for ZeroSettings {
-    /// Even as declared.
+    /// With the declared non-uniformity.
     fn from(soak: Soak) -> Self {
         ZeroSettings {
             temperature_sigma_k: soak.temperature_sigma_k,
@@ -58,29 +57,29 @@ impl From<Soak> for ZeroSettings {
     }
 }
 
-/// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
+/// Shaft speed below which the machine is at standstill, rpm: far below any idle, far above any sensor's noise.
 const AT_REST_RPM: f64 = 1000.0;
-/// Shortest rest from which the limit of a relaxing reading is found, s.
+/// Shortest soak from which the limit of a relaxing reading is estimated, s.
 const SHORTEST_RELAXATION_S: f64 = 600.0;
-/// Longest part of it that is looked at, s: three time constants of a heavy housing, however far apart the samples of a recording lie.
+/// Longest part of the soak that is used for it, s: three time constants of a heavy housing, for any sample interval.
 const LONGEST_RELAXATION_S: f64 = 3600.0;
-/// Stretches over which readings are averaged for that, s.
+/// Number of segments over which readings are averaged for it.
 const BLOCK_S: f64 = 30.0;
-/// Standard deviations by which readings may differ before the soak itself is in doubt.
+/// Standard deviations by which readings may differ before the soak itself is doubtful.
 const UNEVEN_SIGMAS: f64 = 5.0;
 
-/// Offsets found, and the stretch they were found in.
+/// The estimated offsets and their segment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct IsothermalZero {
-    /// Start of the stretch, s.
+    /// Start of the segment, s.
     pub start_s: f64,
-    /// End of the stretch, s.
+    /// End of the segment, s.
     pub end_s: f64,
-    /// Reading minus what all read together, K or Pa.
+    /// Reading minus the common reading, K or Pa.
     pub offsets: BTreeMap<Channel, f64>,
-    /// One standard deviation of what is left of each offset, K or Pa.
+    /// Remaining standard deviation of each offset, K or Pa.
     pub left_sigma: BTreeMap<Channel, f64>,
-    /// What is left of all offsets of one dimension in common: what sensors read together is no truer than their declared offsets let it be.
+    /// Remaining common error of all offsets of one dimension: the common reading is only as accurate as the declared offsets.
     #[serde(default)]
     pub common: Vec<CommonOffset>,
 }
@@ -88,15 +87,15 @@ pub struct IsothermalZero {
 /// Why a recording has no isothermal zero.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoZero {
-    /// The shaft never rested long enough before the first step.
+    /// The standstill before the first step was too short.
     #[error("the shaft rests for {found_s:.0} s before the first step; the zero needs {needed_s:.0} s")]
     NoSoak {
-        /// Time at rest, s.
+        /// Time at standstill, s.
         found_s: f64,
         /// Time needed, s.
         needed_s: f64,
     },
-    /// A temperature still moves.
+    /// A temperature is still drifting.
     #[error(
         "{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer"
     )]
@@ -105,7 +104,7 @@ pub enum NoZero {
         channel: Channel,
         /// Its drift, K/min.
         drift_k_min: f64,
-        /// Largest drift allowed, K/min.
+        /// Maximum drift, K/min.
         limit_k_min: f64,
     },
     /// Sensors differ by more than their declared offsets allow.
@@ -116,20 +115,20 @@ pub enum NoZero {
     Uneven {
         /// The channel.
         channel: Channel,
-        /// Reading minus that of all, K or Pa.
+        /// Reading minus the common reading, K or Pa.
         off: f64,
-        /// Standard deviation expected of it, K or Pa.
+        /// Its expected standard deviation, K or Pa.
         sigma: f64,
     },
 }
 
 /// Finds the offsets of T1, T2, Tc and T_oil against each other, and of P1 and P2.
 ///
-/// Channels without a declared offset count as exact. Common temperature and pressure are the means weighted by declared
-/// offset and evenness.
+/// Channels without a declared offset count as exact. Common temperature and pressure are means weighted by declared offset and
+/// non-uniformity.
 ///
 /// # Errors
-/// [`NoZero`] where the recording has no soak, or one that is none.
+/// [`NoZero`] if the recording has no soak, or an unsuitable one.
 pub fn isothermal_zero(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -138,11 +137,11 @@ pub fn isothermal_zero(
     zero_of(recording, config, settings, false)
 }
 
-/// As [`isothermal_zero`], of a rig on which one temperature sensor may be off by more than is declared: it is held against the
-/// others; oil that drifts is left out. Of two pressure taps that differ by more nobody knows which is off: what is declared of them stands.
+/// Like [`isothermal_zero`], for a rig on which one temperature sensor may exceed its declared offset: it is compared with the others, and
+/// drifting oil is left out. If two pressure taps differ by more, either may be wrong, so both keep their declared offsets.
 ///
 /// # Errors
-/// [`NoZero`] where the recording has no soak, or one that is none.
+/// [`NoZero`] if the recording has no soak, or an unsuitable one.
 pub fn isothermal_zero_with_a_fault(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -170,7 +169,7 @@ fn zero_of(
         for channel in group {
             let Some(reading) = soak_mean(recording, *channel, start_s, end_s) else { continue };
             let drifts = group.len() > 2 && reading.drift_per_min.abs() > settings.drift_k_min;
-            // A supply of oil that wanders says nothing of the cell, and nothing else hangs on it.
+            // A drifting oil supply is independent of the cell, and no other sensor depends on it.
             if drifts && a_fault && *channel == Channel::TOil {
                 continue;
             }
@@ -184,7 +183,7 @@ fn zero_of(
             let declared = config.declared.get(channel).copied().unwrap_or_default();
             let mut mean = reading.mean;
             let mut own = sigma.hypot(sigma_of_mean(declared.noise_sigma, end_s - start_s, config));
-            // The housing is the last to come to the cell's temperature, and drifts by less than shows.
+            // The housing reaches the cell's temperature last, and its drift is below the threshold.
             if *channel == Channel::Tc
                 && let Some((limit, error)) = housing_limit(recording, rest, config)
             {
@@ -197,8 +196,8 @@ fn zero_of(
             continue;
         }
         let uneven = |common: f64, at_fault: Option<Channel>| {
-            let mut sound = readings.iter().filter(|reading| Some(reading.channel) != at_fault);
-            sound.find(|reading| (reading.mean - common).abs() > UNEVEN_SIGMAS * reading.total)
+            let mut fault_free = readings.iter().filter(|reading| Some(reading.channel) != at_fault);
+            fault_free.find(|reading| (reading.mean - common).abs() > UNEVEN_SIGMAS * reading.total)
         };
         if let Some(first) = uneven(common, None) {
             let Reading { channel, mean, total, .. } = *first;
@@ -209,7 +208,7 @@ fn zero_of(
             if readings.len() < 3 {
                 continue;
             }
-            // The one without which the others agree best.
+            // Leave out the sensor without which the others agree best.
             let without = |channel: Channel| {
                 let others: Vec<Reading> =
                     readings.iter().filter(|other| other.channel != channel).copied().collect();
@@ -238,8 +237,8 @@ fn zero_of(
     if zero.offsets.is_empty() { Err(no_soak) } else { Ok(zero) }
 }
 
-/// The recording without the offsets, and the configuration with what is left of them as declared offset: prior of the
-/// joint method, bias of the others.
+/// The recording without the offsets, and the configuration with the remaining uncertainty as declared offset: prior of the joint method, bias
+/// of the others.
 pub fn zeroed(
     mut recording: Recording,
     mut config: IdentifyConfig,
@@ -257,7 +256,7 @@ pub fn zeroed(
     (recording, config)
 }
 
-/// What will be left of the declared offsets after a zero of `soak_s`, before it is recorded.
+/// Predicts the remaining offset uncertainty after a zero of `soak_s`.
 pub fn expected_after_zero(
     mut config: IdentifyConfig,
     settings: &ZeroSettings,
@@ -281,22 +280,21 @@ pub fn expected_after_zero(
     config
 }
 
-/// Standard error of the mean of a reading with the standard deviation `noise_sigma` over `stretch_s`. The white part of the
-/// noise averages over hundreds of samples.
+/// Standard error of the mean over `stretch_s` of a reading with the standard deviation `noise_sigma`. The white part of the noise averages
+/// over hundreds of samples.
 fn sigma_of_mean(noise_sigma: f64, stretch_s: f64, config: &IdentifyConfig) -> f64 {
     let colour = coloured(config.noise_colour);
     noise_sigma
         * variance_of_mean(colour.first_order_variance_ratio(), stretch_s, colour.time_constant_s).sqrt()
 }
 
-/// Channels that read alike at rest, and how even each group is.
+/// Channels that read the same at standstill, and the non-uniformity of each group.
 fn groups(settings: &ZeroSettings) -> [(&'static [Channel], f64); 2] {
     let [temperatures, pressures] = Soak::ALIKE;
     [(temperatures, settings.temperature_sigma_k), (pressures, settings.pressure_sigma_pa)]
 }
 
-/// The last stretch in which the shaft rests before the first step that leaves it running: where steps were found in the
-/// readings, the soak may count as one.
+/// The last standstill before the first step with a running machine. If steps were detected from the readings, the soak may count as a step.
 fn at_rest(recording: &Recording) -> (f64, f64) {
     let runs = |step: &&StepMarker| {
         let speed = recording.series.get(&Channel::ShaftSpeed);
@@ -309,12 +307,12 @@ fn at_rest(recording: &Recording) -> (f64, f64) {
     let rests = |i: usize| speed.values.get(i).is_some_and(|value| value.abs() < AT_REST_RPM);
     let Some(last) = (0..before).rev().find(|i| rests(*i)) else { return (0.0, 0.0) };
     let first = (0..last).rev().find(|i| !rests(*i)).map_or(0, |i| i + 1);
-    // The last sample at rest may already belong to the start of the machine.
+    // The last sample at standstill may already belong to the start of the machine.
     (speed.t_s[first], speed.t_s[last.saturating_sub(1).max(first)])
 }
 
-/// Where the housing's reading is going, K, by the last two thirds of the rest, and its standard error; `None` for a rest of
-/// less than ten minutes and for a sensor of which no noise is declared.
+/// Limit of the housing reading, K, from the last two thirds of the soak, and its standard error. `None` for a soak of less than ten minutes
+/// and for a sensor without declared noise.
 fn housing_limit(
     recording: &Recording,
     (start_s, end_s): (f64, f64),
@@ -341,7 +339,7 @@ fn housing_limit(
     relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
 }
 
-/// The standard error that [`housing_limit`] has after a rest of `soak_s`.
+/// The standard error of [`housing_limit`] after a soak of `soak_s`.
 fn expected_limit_error(noise_sigma: f64, soak_s: f64, config: &IdentifyConfig) -> Option<f64> {
     if soak_s < SHORTEST_RELAXATION_S {
         return None;
@@ -356,18 +354,18 @@ fn expected_limit_error(noise_sigma: f64, soak_s: f64, config: &IdentifyConfig) 
     relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
 }
 
-/// What a sensor reads at rest, K or Pa.
+/// Reading of a sensor at standstill, K or Pa.
 #[derive(Clone, Copy)]
 struct Reading {
     channel: Channel,
     mean: f64,
-    /// One standard deviation of what is left of its offset.
+    /// Remaining standard deviation of its offset.
     own: f64,
     /// The same with the declared offset.
     total: f64,
 }
 
-/// What sensors read together.
+/// The common reading of the sensors.
 fn common(readings: &[Reading]) -> f64 {
     let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
     readings.iter().map(|reading| reading.mean * reading.total.powi(-2)).sum::<f64>() / weight
@@ -378,7 +376,7 @@ struct SoakMean {
     drift_per_min: f64,
 }
 
-/// Mean of a channel over a stretch, and how it drifts from the first to the last third.
+/// Mean of a channel over a segment, and its drift from the first to the last third.
 fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) -> Option<SoakMean> {
     let series: &Series = recording.series.get(&channel)?;
     let third_s = (end_s - start_s) / 3.0;

@@ -1,4 +1,4 @@
-//! What came of the isothermal zero that a campaign asks for.
+//! Result of the isothermal zero that a campaign requests.
 
 use crate::IdentifyConfig;
 use crate::zero::{
@@ -12,35 +12,35 @@ use serde::{Serialize, Serializer};
 pub enum ZeroOutcome {
     /// Offsets were subtracted.
     Found(IsothermalZero),
-    /// A zero was asked for and the recording has none; the declared offsets stand.
+    /// A zero was requested but the recording has none; the declared offsets remain.
     Refused(NoZero),
-    /// No zero was asked for.
+    /// No zero was requested.
     #[default]
     NotAsked,
 }
 
 impl ZeroOutcome {
-    /// Looks for the zero of a recording where a soak was asked for.
+    /// Searches for the zero of a recording if a soak was requested.
     pub fn of(recording: &Recording, config: &IdentifyConfig, soak: Option<Soak>) -> Self {
         let Some(soak) = soak else { return ZeroOutcome::NotAsked };
         isothermal_zero(recording, config, &ZeroSettings::from(soak))
             .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
     }
 
-    /// The same of a rig of which a temperature sensor may be broken.
+    /// The same for a rig on which a temperature sensor may be broken.
     pub fn with_a_fault(recording: &Recording, config: &IdentifyConfig, soak: Option<Soak>) -> Self {
         let Some(soak) = soak else { return ZeroOutcome::NotAsked };
         isothermal_zero_with_a_fault(recording, config, &ZeroSettings::from(soak))
             .map_or_else(ZeroOutcome::Refused, ZeroOutcome::Found)
     }
 
-    /// The zero, where one was found.
+    /// The zero, if one was found.
     pub fn found(&self) -> Option<&IsothermalZero> {
         if let ZeroOutcome::Found(zero) = self { Some(zero) } else { None }
     }
 
-    /// Takes the offsets off a recording, and leaves what is not known of them in the configuration; both stay as they are
-    /// where no zero was found.
+    /// Subtracts the offsets from a recording, and declares their remaining uncertainty in the configuration; both are unchanged if no zero
+    /// was found.
     pub fn take_off(&self, recording: Recording, config: IdentifyConfig) -> (Recording, IdentifyConfig) {
         match self {
             ZeroOutcome::Found(zero) => zeroed(recording, config, zero),
@@ -49,7 +49,7 @@ impl ZeroOutcome {
     }
 }
 
-/// Offsets and what is left of them, K or Pa, with the stretch they come from; `{"refused": reason}`, or `null` where none was asked for.
+/// Offsets and their remaining uncertainty, K or Pa, with their segment; `{"refused": reason}`, or `null` if none was requested.
 impl Serialize for ZeroOutcome {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]

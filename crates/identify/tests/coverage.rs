@@ -1,4 +1,4 @@
-//! Intervals hold the truth as often as they say, under noise that is correlated in time.
+//! Intervals cover the truth as often as stated, under noise with time correlation.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 mod common;
@@ -40,11 +40,11 @@ fn point(transient: &Transient, seed: u64, with_offsets: bool, config: &Identify
     identify(&recording, config).unwrap().swap_remove(1)
 }
 
-/// Shares of the seeds whose intervals of eta and of h hold the truth.
+/// Shares of the seeds whose intervals of eta and of h cover the truth.
 fn coverage(with_offsets: bool, config: &IdentifyConfig) -> [f64; 2] {
     let transient = Transient::default();
     let mut held = [0.0; 2];
-    let (mut said, mut errors) = (0.0, 0.0);
+    let (mut stated, mut errors) = (0.0, 0.0);
     for seed in 0..SEEDS {
         let point = point(&transient, seed, with_offsets, config);
         let holds = |low: Option<f64>, high: Option<f64>, truth: f64| {
@@ -52,7 +52,7 @@ fn coverage(with_offsets: bool, config: &IdentifyConfig) -> [f64; 2] {
         };
         held[0] += holds(point.eta_low, point.eta_high, transient.eta);
         held[1] += holds(point.h_low_w_m2k, point.h_high_w_m2k, transient.h_w_m2k);
-        said += point.eta_uncertainty.unwrap().combined_standard_error().powi(2);
+        stated += point.eta_uncertainty.unwrap().combined_standard_error().powi(2);
         errors += (point.eta.unwrap() - transient.eta).powi(2);
     }
     let n = SEEDS as f64;
@@ -61,12 +61,12 @@ fn coverage(with_offsets: bool, config: &IdentifyConfig) -> [f64; 2] {
         held[0] / n,
         held[1] / n,
         (errors / n).sqrt(),
-        (said / n).sqrt()
+        (stated / n).sqrt()
     );
     held.map(|held| held / n)
 }
 
-/// 95 % is the aim; 300 seeds scatter by 1.3 %, and a residual of 100 s knows the slow part of its noise to a third.
+/// The target is 95 %; 300 seeds scatter by 1.3 %, and a residual of 100 s determines the slow part of its noise to a third.
 fn assert_honest(coverage: [f64; 2]) {
     assert!(coverage.iter().all(|share| (0.90..=0.99).contains(share)), "{coverage:?}");
 }
@@ -86,7 +86,7 @@ fn intervals_with_declared_noise_and_offsets_hold_the_truth() {
     assert_honest(coverage(true, &config(true, true)));
 }
 
-/// Taking the coloured noise for white would promise several times too much.
+/// Treating the coloured noise as white would give intervals several times too narrow.
 #[test]
 fn serial_correlation_matters() {
     let transient = Transient::default();

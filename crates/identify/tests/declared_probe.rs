@@ -1,4 +1,4 @@
-//! The two-parameter method behind a probe that lags: as good as without one where the probe is declared, biased where not.
+//! The two-parameter method with a lagging probe: as good as without one if the probe is declared, biased if not.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -11,7 +11,7 @@ use mapper_identify::{Identified, IdentifyConfig, identify_recording};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-/// Errors of eta (fraction) and h (ratio) of every point that has them.
+/// Errors of eta (fraction) and h (ratio) of every point with both.
 fn errors(campaign: &Campaign, recording: &Recording, config: &IdentifyConfig) -> Vec<(f64, f64)> {
     let Identified { points, .. } = identify_recording(recording, config).unwrap();
     let off = |(point, truth): (&IdentifiedPoint, &lab::Truth)| {
@@ -44,7 +44,7 @@ fn with_probe(probe_m: f64) -> Campaign {
     campaign(&eighteen(), 120.0, Machine { probe_m, ..Machine::default() })
 }
 
-/// Without noise what is left is what a constant h costs, probe or not; undeclared, 3 mm make h wrong by a third.
+/// Without noise the error is that of a constant h, probe or not; an undeclared 3 mm probe gives an error of h of a third.
 #[test]
 fn without_noise_a_declared_probe_costs_nothing() {
     let (fast, slow) = (with_probe(0.0), with_probe(PROBE_M));
@@ -54,7 +54,7 @@ fn without_noise_a_declared_probe_costs_nothing() {
     let (ideal, declared, silent) = (of(&fast, 0.0), of(&slow, PROBE_M), of(&slow, 0.0));
     assert_eq!(ideal.len(), declared.len());
     for (ideal, declared) in ideal.iter().zip(&declared) {
-        // The probe weighs the seconds of a window a little differently, in which eta and h move by what the method ignores.
+        // The probe changes the weights of the seconds in a window slightly, and with them the model error of eta and h.
         assert!(
             (ideal.0 - declared.0).abs() < 0.003 && (ideal.1 - declared.1).abs() < 0.02,
             "{ideal:?} {declared:?}"
@@ -63,7 +63,7 @@ fn without_noise_a_declared_probe_costs_nothing() {
     assert!(mean(silent.iter().map(|error| error.1)) > 0.2, "{silent:?}");
 }
 
-/// With the noise of a rig, the same draws for all: no worse than without a probe, and h not biased.
+/// With the noise of a rig, the same draws for all: no worse than without a probe, and no bias of h.
 #[test]
 fn with_noise_a_declared_probe_is_no_worse_than_none() {
     let (fast, slow) = (with_probe(0.0), with_probe(PROBE_M));
@@ -82,13 +82,13 @@ fn with_noise_a_declared_probe_is_no_worse_than_none() {
     // The standard error of the ratio of two such figures of 102 points, were they independent, is 10 %.
     assert!(eta(&declared) < 1.1 * eta(&ideal), "{} and {}", eta(&declared), eta(&ideal));
     assert!(h(&declared) < 1.1 * h(&ideal), "{} and {}", h(&declared), h(&ideal));
-    // The mean of 102 errors with a spread of 4 % is sure to 0.4 %, twice that for what the method ignores.
+    // The mean of 102 errors with a spread of 4 % is known to 0.4 %; allow twice that for the model error.
     let bias = |errors: &[(f64, f64)]| mean(errors.iter().map(|error| error.1));
     assert!((bias(&declared) - bias(&ideal)).abs() < 0.01, "{} and {}", bias(&declared), bias(&ideal));
     assert!(bias(&silent) > 0.2 && eta(&silent) > 1.5 * eta(&ideal), "{} {}", bias(&silent), eta(&silent));
 }
 
-/// The end of a step that still drifts: most of what the probe lags behind is made up for, and the rest lies in the interval.
+/// The end of a drifting step: most of the probe's lag is corrected, and the interval covers the remainder.
 #[test]
 fn the_steady_method_reads_ahead_of_a_declared_probe() {
     let (fast, slow) = (with_probe(0.0), with_probe(PROBE_M));
@@ -101,10 +101,10 @@ fn the_steady_method_reads_ahead_of_a_declared_probe() {
     let off = |found: &[IdentifiedPoint]| {
         rms(found.iter().zip(&ideal).map(|(found, ideal)| found.eta.unwrap() - ideal.eta.unwrap()))
     };
-    // The drift is that of a minute in which it falls: too much is made up for by as much as it falls.
+    // The drift is that of a minute in which it decreases: the correction is too large by that decrease.
     assert!(off(&declared) < 0.6 * off(&silent), "{} and {}", off(&declared), off(&silent));
     for (found, ideal) in declared.iter().zip(&ideal) {
-        // The settled first step has nothing to make up for but the simulator's own tolerance.
+        // The settled first step needs no correction beyond the simulator's own tolerance.
         let (low, high) =
             found.eta_low.zip(found.eta_high).map(|(low, high)| (low - 1e-6, high + 1e-6)).unwrap();
         assert!((low..=high).contains(&ideal.eta.unwrap()), "{} in {low} to {high}", ideal.eta.unwrap());

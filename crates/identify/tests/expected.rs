@@ -1,4 +1,4 @@
-//! What is expected of a forecast agrees with what recordings then scatter by.
+//! The expected result of a forecast agrees with the scatter of recordings.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -43,7 +43,7 @@ fn rows(transient: &Transient, every: usize) -> Vec<ExpectedRow> {
         .collect()
 }
 
-/// 200 seeds know a standard deviation to 5 %.
+/// 200 seeds determine a standard deviation to 5 %.
 #[test]
 fn two_hundred_seeds_scatter_as_expected() {
     let transient = Transient::default();
@@ -72,7 +72,7 @@ fn two_hundred_seeds_scatter_as_expected() {
     }
 }
 
-/// Rows five times sparser stand for means: the answer stays.
+/// Rows five times sparser represent means: the result stays the same.
 #[test]
 fn the_interval_of_the_rows_matters_little() {
     let transient = Transient::default();

@@ -1,4 +1,4 @@
-//! Faults of sensors on machines drawn at random: how often one is found that is not there, and how often one that is.
+//! Sensor faults on random machines: the rates of false alarms and of detections.
 //!
 //! `MAPPER_FAULT_MACHINES=200 cargo test --release -p mapper-identify --test faults -- --nocapture` prints the table of
 //! docs/validation/faults.md.
@@ -19,18 +19,18 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Size of the faults in standard errors with which the recording tells them.
+/// Size of the faults in standard errors of the recording.
 const SIGMAS: f64 = 6.0;
 
-/// A recording of a machine of its own, its declaration, and whether its map is declared.
+/// A recording of a random machine, its declaration, and whether its map is declared.
 struct Drawn {
     recording: Recording,
     config: IdentifyConfig,
     is_declared: bool,
 }
 
-/// A machine with its own area before the wheel, probe and ratio of heating and cooling, each as declared in one of two machines; points in
-/// an order of their own.
+/// A random machine with its own area before the wheel, probe and heating/cooling ratio, each declared in one of two machines; points in
+/// random order.
 fn drawn(seed: u64) -> Drawn {
     let mut rng = Pcg64::seed_from_u64(seed);
     let or = |rng: &mut Pcg64, neutral: f64, low: f64, high: f64| {
@@ -76,12 +76,12 @@ fn with(recording: &Recording, suspect: &Suspect, size: f64) -> Recording {
     doctored
 }
 
-/// What became of one fault in one recording.
+/// The outcome of one fault in one recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Outcome {
     found: bool,
     named: bool,
-    /// Distance of its size from the truth in its standard deviations, where it was named first.
+    /// Distance of its size from the truth in its standard deviations, if it was named first.
     off: Option<f64>,
 }
 
@@ -96,7 +96,7 @@ fn machines() -> u64 {
     std::env::var("MAPPER_FAULT_MACHINES").map_or(6, |count| count.parse().unwrap())
 }
 
-/// A valve of 5 % more area than declared is named with its size, and no point rests on it.
+/// A valve of 5 % more area than declared is named with its size, and no point depends on it.
 #[test]
 fn another_valve_is_named_and_leaves_the_points_as_they_are() {
     let drawn = drawn(9002);
@@ -114,14 +114,14 @@ fn another_valve_is_named_and_leaves_the_points_as_they_are() {
     assert_eq!(good_with_another, good_as_declared);
     let [fault] = faults.as_slice() else { panic!("{faults:?}") };
     assert_eq!(fault.suspect, Suspect::Machine(Machine::ValveArea));
-    // A tolerance of 0.5 % draws it towards none.
+    // A tolerance of 0.5 % shrinks it towards zero.
     assert!((fault.value - 0.05).abs() < 3.0 * fault.sigma.hypot(0.005), "{fault}");
 }
 
 #[test]
 fn faults_are_found_and_named_and_none_is_invented() {
     let seeds: Vec<u64> = (9000..9000 + machines()).collect();
-    // A fault of each kind in every tenth of the machines at least, each kind in turn.
+    // A fault of each kind in at least every tenth of the machines, each kind in turn.
     let per_machine = 4;
     let results = mapper_numerics::parallel::map(&seeds, |seed| {
         let drawn = drawn(*seed);
@@ -131,7 +131,7 @@ fn faults_are_found_and_named_and_none_is_invented() {
             .iter()
             .enumerate()
             .filter(|(index, _)| *index < CATALOGUE.len())
-            // Where a fault that is found would have to be larger than faults are, the recording does not tell it.
+            // If a detectable fault would exceed the usual fault size, the recording cannot find it.
             .filter(|(index, (_, error))| SIGMAS * error < 10.0 * CATALOGUE[*index].sigma)
             .map(|(index, (suspect, error))| (index, *suspect, *error))
             .collect();
@@ -178,9 +178,9 @@ fn faults_are_found_and_named_and_none_is_invented() {
     }
     let outcomes: Vec<Outcome> = all.iter().map(|(_, outcome)| *outcome).collect();
     let (found, named) = line("all", &outcomes);
-    // Two in a hundred, and none in a few.
+    // Two in a hundred, and none in a small sample.
     assert!(false_alarms.len() as u64 <= machines() / 50, "{false_alarms:?}");
-    // A fault of 6 standard errors scatters by one, and some 4.5 are needed: 95 of 100 are found. Of 24, chance leaves three more out once
+    // A fault of 6 standard errors scatters by one, and some 4.5 are needed: 95 of 100 are found. Of 24, three more are missed by chance once
     // in a hundred.
     assert!(found >= 85.0 && named >= 75.0, "{found:.0} % found, {named:.0} % named");
 }

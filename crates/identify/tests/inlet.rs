@@ -1,4 +1,4 @@
-//! Whether the joint method finds what h before the wheel follows, and is honest where it cannot.
+//! Whether the joint method finds the law of h before the wheel, and reports honestly if it cannot.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -23,7 +23,7 @@ fn found(recording: &Recording, config: &IdentifyConfig) -> (Vec<IdentifiedPoint
     (points.into_iter().map(Result::unwrap).collect(), thermal.unwrap())
 }
 
-/// Largest errors of eta (fraction) and h (ratio).
+/// Maximum errors of eta (fraction) and h (ratio).
 fn worst(points: &[IdentifiedPoint], campaign: &Campaign) -> (f64, f64) {
     points.iter().zip(&campaign.truth).fold((0.0, 0.0), |(eta, h), (point, truth)| {
         let off_eta = (point.eta.unwrap() - truth.eta).abs();
@@ -32,8 +32,8 @@ fn worst(points: &[IdentifiedPoint], campaign: &Campaign) -> (f64, f64) {
     })
 }
 
-/// With h of its own before the wheel (Appendix A: 40 mm) the shared reading would have alpha_A at 0.21; noise-free the
-/// recording decides, whatever was declared.
+/// If h before the wheel has its own law (Appendix A: 40 mm), the shared model would give alpha_A = 0.21. Without noise the recording decides,
+/// whatever was declared.
 #[test]
 fn without_noise_the_law_before_the_wheel_is_told() {
     for inlet in [InletConvection::Shared, InletConvection::Own] {
@@ -44,7 +44,7 @@ fn without_noise_the_law_before_the_wheel_is_told() {
             let told = thermal.inlet.unwrap();
             assert_eq!((told.convection, told.origin), (inlet, Origin::Fitted), "{told:?}");
             let ((eta, h), alpha) = (worst(&points, &campaign), thermal.alpha_area_ratio.value.unwrap());
-            // What the surface misses of the map at eighteen points, up to a third of a point.
+            // Error of the surface at eighteen points of the map, up to a third of a point.
             assert!(
                 (alpha - 0.3).abs() < 0.007 && eta < 0.0035 && h < 0.015,
                 "alpha {alpha}, eta {eta}, h {h}"
@@ -53,9 +53,9 @@ fn without_noise_the_law_before_the_wheel_is_told() {
     }
 }
 
-/// With a rig's noise it does not: then either reading lies in the interval of alpha_A, and so does the truth, as do eta
-/// and h, whichever machine it was. Six campaigns of each; what their points share is one draw, and of six intervals at
-/// 95 % five and more hold in 97 % of the cases.
+/// With a rig's noise it does not decide. Both models, and the truth, then lie in the interval of alpha_A, and the intervals of eta and h
+/// cover the truth for either machine. Six campaigns of each; the common errors of a campaign are one draw, and of six intervals at 95 % five
+/// and more cover it in 97 % of the cases.
 #[test]
 fn with_noise_either_law_before_the_wheel_lies_in_the_intervals() {
     for inlet in [InletConvection::Shared, InletConvection::Own] {
@@ -77,14 +77,14 @@ fn with_noise_either_law_before_the_wheel_lies_in_the_intervals() {
             }
         }
         assert!(alphas >= 5, "{inlet:?}: {alphas} of 6");
-        // The points of a campaign hold or miss together: five of six again.
+        // The points of a campaign cover the truth or miss it together: five of six again.
         assert!(eta.held() > 0.8 && h.held() > 0.8, "{inlet:?}: {} {}", eta.held(), h.held());
     }
 }
 
-/// A share that is held as declared: the readings are then some hundredths of alpha_A apart, for which small faults of the model
-/// pass as well. What is declared is kept, the right declaration is as good as not asking at all, and the intervals reach to the
-/// other reading: eta lies in them whichever was declared. Offsets as after a zero: what is looked at is the law.
+/// With a fixed alpha_A the models differ by some hundredths of alpha_A, which small model errors can also cause. The declared model is kept,
+/// the right declaration is as good as no comparison, and the intervals reach the other model: they cover eta for both declarations. Offsets
+/// as after a zero, to isolate the law.
 #[test]
 fn with_a_held_share_the_intervals_reach_to_the_other_law_before_the_wheel() {
     let held = JointSettings { alpha_area: Choice::Fixed, ..JointSettings::default() };
@@ -113,13 +113,13 @@ fn with_a_held_share_the_intervals_reach_to_the_other_law_before_the_wheel() {
                 assert!((point.eta.unwrap() - unasked.eta.unwrap()).abs() < 1e-4);
                 eta.add(point.eta, point.eta_low, point.eta_high, truth.eta);
             }
-            // Eighteen points that share their errors: one may miss.
+            // Eighteen points with common errors: one may miss.
             assert!(eta.held() > 0.9, "{inlet:?} declared {declared_inlet:?}: {}", eta.held());
         }
     }
 }
 
-/// Without area before the wheel nothing is asked, and nothing changes.
+/// Without area before the wheel there is no comparison, and nothing changes.
 #[test]
 fn without_a_share_before_the_wheel_its_law_makes_no_difference() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());

@@ -1,4 +1,4 @@
-//! The joint method on campaigns of the lumped model: what it must find without noise, and with it.
+//! The joint method on campaigns of the lumped model: required results without noise, and with it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -26,7 +26,7 @@ fn found(recording: &Recording, config: &IdentifyConfig) -> (Vec<IdentifiedPoint
     (points.into_iter().map(Result::unwrap).collect(), thermal.unwrap())
 }
 
-/// Largest errors of eta (fraction) and h (ratio).
+/// Maximum errors of eta (fraction) and h (ratio).
 fn worst(points: &[IdentifiedPoint], campaign: &Campaign) -> (f64, f64) {
     points.iter().zip(&campaign.truth).fold((0.0, 0.0), |(eta, h), (point, truth)| {
         let off_eta = (point.eta.unwrap() - truth.eta).abs();
@@ -39,8 +39,8 @@ fn value(shared: &mapper_core::SharedValue) -> f64 {
     shared.value.unwrap()
 }
 
-/// A jump to 50 krpm with constant h is 4 points off; with the law and the surface nothing is left but what a polynomial
-/// misses of the map. Also the first point, which has no transient.
+/// With constant h a jump to 50 krpm has an error of 4 points. With the law and the surface only the polynomial error of the map remains. Also
+/// the first point, which has no transient.
 #[test]
 fn without_noise_every_point_of_the_nominal_machine_is_right() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());
@@ -48,7 +48,7 @@ fn without_noise_every_point_of_the_nominal_machine_is_right() {
     let (eta, h) = worst(&points, &campaign);
     assert!(eta < 0.0015 && h < 0.015, "eta {eta}, h {h}");
     let law = thermal.convection.unwrap();
-    // MODEL.md's law: 0.004 and 1.13. A coefficient at Re = 1 lies three decades off the points.
+    // MODEL.md's law: 0.004 and 1.13. A coefficient at Re = 1 is three decades away from the points.
     assert!(
         (value(&law.exponent) - 1.13).abs() < 0.002 && (value(&law.coefficient) / 0.004 - 1.0).abs() < 0.02
     );
@@ -56,7 +56,7 @@ fn without_noise_every_point_of_the_nominal_machine_is_right() {
     assert!(points[0].warnings.iter().any(|warning| warning.code == code::THROUGH_THE_LAW));
 }
 
-/// The twelve reference jumps of the paper's table: each in a campaign of its own kind, two levels at three openings.
+/// The twelve reference jumps of the paper's table: each in its own kind of campaign, two levels at three openings.
 #[test]
 fn without_noise_the_reference_jumps_are_right() {
     let jumps = [(110e3, 50e3), (50e3, 110e3), (150e3, 90e3), (90e3, 150e3)];
@@ -99,7 +99,7 @@ fn without_noise_convection_that_depends_on_direction_is_found() {
     assert!((factor - 0.65).abs() < 0.02 && eta < 0.003, "factor {factor}, eta {eta}");
 }
 
-/// Switched off entirely it is the dynamic method, to the digit.
+/// With all extensions off it is the dynamic method, to the digit.
 #[test]
 fn with_every_refinement_off_it_is_the_dynamic_method() {
     let campaign = campaign(&eighteen()[..7], 120.0, Machine::default());
@@ -116,7 +116,7 @@ fn with_every_refinement_off_it_is_the_dynamic_method() {
     }
 }
 
-/// A refinement that is switched off is not looked for.
+/// A parameter with its prior switched off is not searched for.
 #[test]
 fn a_fixed_share_stays_what_it_was_declared() {
     let campaign = campaign(&eighteen()[..8], 120.0, Machine { alpha: 0.2, ..Machine::default() });
@@ -127,8 +127,8 @@ fn a_fixed_share_stays_what_it_was_declared() {
     assert!(worst(&points, &campaign).0 < 0.002);
 }
 
-/// 0.1 K of white noise on T2, as the figure of the issue has it: alpha_A within 0.015, eta within 0.6 points; the root
-/// mean square over seeds, since three standard errors of a single one are more.
+/// 0.1 K of white noise on T2, as in the figure of the issue: alpha_A within 0.015, eta within 0.6 points. Uses the root mean square over
+/// seeds, since three standard errors of a single one are more.
 #[test]
 fn with_noise_on_t2_the_share_is_found() {
     let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.2, ..Machine::default() });
@@ -143,15 +143,14 @@ fn with_noise_on_t2_the_share_is_found() {
             || -> f64 { rand_distr::Distribution::sample(&rand_distr::StandardNormal, &mut rng) };
         series.values.iter_mut().for_each(|value| *value += 0.1 * normal());
         let mut config = joint();
-        // What h before the wheel follows is known here: where it is not, intervals are wider by what that leaves open
-        // (tests/inlet.rs).
+        // The law of h before the wheel is known here; otherwise intervals are wider by its uncertainty (tests/inlet.rs).
         config.joint.inlet_h = Choice::Fixed;
         config.noise_colour.first_order_share_ratio = 0.0;
         let noise = DeclaredUncertainty { noise_sigma: 0.1, ..DeclaredUncertainty::default() };
         config.declared.insert(Channel::T2, noise);
         let (points, thermal) = found(&recording, &config);
         alpha_squares += (value(&thermal.alpha_area_ratio) - 0.2).powi(2);
-        // A standard error of 0.006 lets 0.1 stand out by some 17 of them; three are asked for, as squares.
+        // With a standard error of 0.006, 0.1 is significant by some 17 of them; three are required, as squares.
         let profile = &thermal.alpha_area_profile;
         assert_eq!(profile.len(), 9);
         for point in profile {
@@ -167,13 +166,13 @@ fn with_noise_on_t2_the_share_is_found() {
     let alpha_rms = f64::sqrt(alpha_squares / seeds as f64);
     let eta_rms = f64::sqrt(eta_squares / count);
     assert!(alpha_rms < 0.015 && eta_rms < 0.006, "alpha {alpha_rms}, eta {eta_rms}");
-    // The model is exact here but for the noise, which the method does not count on: intervals may be wider than the
-    // errors, so that all but one of a seed's eighteen hold; but no wider than four times what is asked of the errors.
+    // The model is exact here except for noise, which the method does not assume. Intervals may be wider than the errors, so that all but one
+    // of a seed's eighteen cover the truth, but at most four times the permitted error.
     assert!(honesty.held() > 0.94 && honesty.said_rms() < 0.012, "{} {}", honesty.held(), honesty.said_rms());
 }
 
-/// Noise on every channel, its slow part included: a probe that is ideal is not taken for a slow one (noise in T1 and
-/// flow, which a lag would smooth away, is what tempts the fit), and every interval is honest.
+/// Noise on every channel, with its slow part: an ideal probe must not be identified as a slow one, and every interval is honest. A lag would
+/// smooth the noise in T1 and flow, which biases the fit.
 #[test]
 fn noise_in_the_inputs_is_not_taken_for_a_probe() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());
@@ -184,7 +183,7 @@ fn noise_in_the_inputs_is_not_taken_for_a_probe() {
         let (points, thermal) = found(&recording, &config);
         let (eta, _) = worst(&points, &campaign);
         assert!(value(&thermal.probe_diameter_m) < 1e-3, "seed {seed}: {:?}", thermal.probe_diameter_m);
-        // Three standard errors at 50 krpm, where the two-parameter method is 4 points off without any noise.
+        // Three standard errors at 50 krpm, where the two-parameter method has an error of 4 points even without noise.
         assert!(eta < 0.01, "seed {seed}: {eta}");
     }
 }
@@ -195,17 +194,17 @@ fn noisy(seed: u64) -> (Campaign, Recording, IdentifyConfig) {
     (campaign, recording, IdentifyConfig { declared, ..joint() })
 }
 
-/// Spikes, gaps and a stuck sensor in single steps: those steps say so, the others stay right.
+/// Spikes, gaps and a stuck sensor in single steps: those steps get warnings, the others stay right.
 #[test]
 fn bad_data_in_one_step_does_not_spoil_the_others() {
     let (campaign, mut recording, config) = noisy(7);
     let t2 = recording.series.get_mut(&Channel::T2).unwrap();
-    // Spikes in step 3, nothing at all for half of step 5.
+    // Spikes in step 3, no values for half of step 5.
     for i in (3 * 1200 + 100..4 * 1200).step_by(97) {
         t2.values[i] += 40.0;
     }
     t2.values[5 * 1200..5 * 1200 + 600].fill(f64::NAN);
-    // Tc stands still in step 8, and the flow is 20 % off in step 11.
+    // Tc is stuck in step 8, and the flow has an error of 20 % in step 11.
     let tc = recording.series.get_mut(&Channel::Tc).unwrap();
     let stuck = tc.values[8 * 1200 + 300];
     tc.values[8 * 1200 + 300..9 * 1200].fill(stuck);
@@ -226,7 +225,7 @@ fn bad_data_in_one_step_does_not_spoil_the_others() {
     }
 }
 
-/// A window with nothing in it: no number, and a reason.
+/// An empty window: no number, and a reason.
 #[test]
 fn a_step_without_samples_has_no_number() {
     let (_, mut recording, config) = noisy(8);
@@ -244,21 +243,21 @@ fn the_result_is_repeatable() {
     assert_eq!(found(&recording, &config), found(&recording, &config));
 }
 
-/// A recording of a window rule that the joint method does not need is no reason to fail.
+/// A window rule that the joint method does not need is not an error.
 #[test]
 fn a_campaign_of_one_step_gives_what_it_can() {
     let campaign = campaign(&eighteen()[..1], 120.0, Machine::default());
     let config = IdentifyConfig { window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 }, ..joint() };
     let Identified { points, .. } = identify_recording(&campaign.recording, &config).unwrap();
     let point = points[0].as_ref().unwrap();
-    // Settled, alone: nothing tells efficiency from heat. There is a number, doubted, whose interval holds.
+    // Settled, and alone: efficiency and heat cannot be separated. The point is doubtful, but its interval covers the truth.
     assert_eq!(point.verdict, Verdict::Doubtful, "{point:?}");
     assert!(codes(point).contains(&code::RESTS_ON_DECLARATION), "{point:?}");
     let (low, high) = point.eta_low.zip(point.eta_high).unwrap();
     assert!((low..=high).contains(&campaign.truth[0].eta), "{low} to {high}");
 }
 
-/// Noise, then what a step may suffer, in step 7 of eighteen: what the point then says, and that the others stay right.
+/// Noise, then one fault in step 7 of eighteen: that point gets the warning, and the others stay right.
 fn spoilt(seed: u64, spoil: impl Fn(&mut Recording, std::ops::Range<usize>)) -> Vec<IdentifiedPoint> {
     let (campaign, mut recording, config) = noisy(seed);
     spoil(&mut recording, SPOILT * 1200..(SPOILT + 1) * 1200);
@@ -279,12 +278,12 @@ fn codes(point: &IdentifiedPoint) -> Vec<&str> {
     point.warnings.iter().map(|warning| warning.code.as_str()).collect()
 }
 
-/// The rig jumps 40 s after the step's begin: the step that holds the jump is doubted, and left out of what is shared.
+/// The rig jumps 40 s after the step's start: the step with the jump is doubtful, and excluded from the shared parameters.
 #[test]
 fn a_late_jump_is_not_called_good() {
     let points = spoilt(21, |recording, step| {
         for series in recording.series.values_mut() {
-            // The first 40 s still show the step before.
+            // The first 40 s still show the previous step.
             let before = series.values[step.start - 400..step.start].to_vec();
             series.values[step.start..step.start + 400].copy_from_slice(&before);
         }
@@ -293,7 +292,7 @@ fn a_late_jump_is_not_called_good() {
     assert_ne!(point.verdict, Verdict::Good, "{:?}", codes(point));
 }
 
-/// The flow swings by 3 % in 45 s to the end of the step, and the pressure ratio with it.
+/// The flow changes by 3 % in 45 s to the end of the step, and the pressure ratio with it.
 #[test]
 fn a_step_that_never_stabilises_is_doubted() {
     let points = spoilt(22, |recording, step| {
@@ -324,7 +323,7 @@ fn spikes_are_left_out_and_said() {
     assert!(points[SPOILT].eta.is_some());
 }
 
-/// A reading that stands still for the whole step has no number; for its last half, the first half speaks.
+/// A channel stuck for the whole step gives no number; if it is stuck for the last half, the first half is used.
 #[test]
 fn a_stuck_sensor_is_said() {
     for (seed, from) in [(24, 0), (25, 600)] {
@@ -340,7 +339,7 @@ fn a_stuck_sensor_is_said() {
     }
 }
 
-/// NaN throughout one channel of a step: no number. In a fifth of its samples: a number, and a doubt.
+/// NaN in one channel for a whole step: no number. In a fifth of its samples: a number, and a doubt.
 #[test]
 fn samples_that_are_no_number_are_said() {
     for (seed, share) in [(26, 1), (27, 5)] {
@@ -369,7 +368,7 @@ fn a_missing_channel_is_named() {
     }
 }
 
-/// Two steps and a noise ten times a good rig's: any alpha_A fits, and the profile and the missing number say so.
+/// Two steps with ten times the noise of a good rig: any alpha_A fits, so the profile shows it and there is no number.
 #[test]
 fn a_share_that_the_recording_can_not_tell_is_no_number() {
     let campaign = campaign(&eighteen()[..3], 120.0, Machine { alpha: 0.2, ..Machine::default() });
@@ -380,12 +379,11 @@ fn a_share_that_the_recording_can_not_tell_is_no_number() {
     assert_eq!(thermal.alpha_area_ratio.value, None, "{:?}", thermal.alpha_area_ratio);
 }
 
-/// Noise, offsets and a gain as declared, 8 campaigns of 18 points: the intervals of eta and of h hold, and are no wider
-/// than they have to be. What a campaign's points share is one draw for all of them, so 144 points count for some twenty.
-/// Of twenty at 95 % fewer than 16 hold in 0.3 % of the cases; of twenty at 68 % fewer than 7 or more than 18 in 0.3 % and
-/// 0.5 %; their root mean square is known to 16 %, of which three are allowed above a width of 1.4: the intervals also hold what a
-/// recording cannot exclude of alpha_A, the probe and the direction factor, none of which this machine has, and what all of h has
-/// in common are eight draws. `examples/joint_study.rs` has the hundreds of campaigns.
+/// Noise, offsets and a gain as declared, 8 campaigns of 18 points: the intervals of eta and of h cover the truth, and are no wider than
+/// necessary. The common errors of a campaign are one draw, so 144 points count for some twenty. Of twenty at 95 % fewer than 16 cover it in
+/// 0.3 % of the cases; of twenty at 68 % fewer than 7 or more than 18 in 0.3 % and 0.5 %. Their root mean square is known to 16 %; three of
+/// that are allowed above a width of 1.4. The intervals include what a recording cannot exclude of alpha_A, the probe and the heating/cooling
+/// ratio, none of which this machine has. The common error of h is eight draws. `examples/joint_study.rs` has the hundreds of campaigns.
 #[test]
 fn intervals_of_a_campaign_with_noise_and_offsets_hold_and_are_not_too_wide() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());

@@ -1,4 +1,4 @@
-//! Moist air: what is known of it makes the points right, what is not makes their intervals wider.
+//! Moist air: a known humidity makes the points right, an unknown one makes their intervals wider.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -19,8 +19,8 @@ fn joint(air: Air, humidity_sigma_kg_kg: f64) -> IdentifyConfig {
     IdentifyConfig { method: Method::Joint, air, humidity_sigma_kg_kg, ..IdentifyConfig::default() }
 }
 
-/// The model has h of moist air by its Prandtl number, which the convection law does not know: a third of 2.4 % of cp, in a coefficient that
-/// is found anyway. What is left is the solver's.
+/// In the model h of moist air depends on its Prandtl number, which the convection law ignores: a third of 2.4 % of cp, absorbed by the fitted
+/// coefficient. The remaining error is that of the solver.
 #[test]
 fn declared_humidity_gives_the_points_of_the_model() {
     let clean =
@@ -41,8 +41,8 @@ fn declared_humidity_gives_the_points_of_the_model() {
     assert!(wrong > clean.truth.len() / 2, "dry air is as good in all but {wrong} points");
 }
 
-/// A humidity that is not known lies between dry and saturated, and the intervals say so: over five draws of noise and offsets, in air of 25 degC
-/// that is half saturated.
+/// An unknown humidity is between dry and saturated, and the intervals include it: over five draws of noise and offsets, in air of 25 degC at
+/// half saturation.
 #[test]
 fn unknown_humidity_is_in_the_intervals() {
     let clean = campaign(&eighteen(), 120.0, Machine { humidity_kg_kg: 0.01, ..Machine::default() });
@@ -54,7 +54,7 @@ fn unknown_humidity_is_in_the_intervals() {
             let config = IdentifyConfig { declared: declared.clone(), ..joint(Air::DRY, sigma_kg_kg) };
             identify(&recording, &config).unwrap()
         };
-        // Saturated, it has 20 g/kg.
+        // Saturated air has 20 g/kg.
         let (unknown, known) = (points(0.02 / 3f64.sqrt()), points(0.0));
         for ((unknown, known), truth) in unknown.iter().zip(&known).zip(&clean.truth) {
             let eta = unknown.eta_low.unwrap()..=unknown.eta_high.unwrap();

@@ -1,8 +1,7 @@
-//! Nonsense is refused, whoever recorded it: doctored recordings by every method, beside the truth.
+//! Doctored recordings from any source are refused by every method; results are compared with the truth.
 //!
-//! What a point must not be: good, with an interval that misses the truth by more than chance makes it miss in a sound
-//! recording. The truth of `steady` is what it says of the readings without noise and fault: it claims no more than an
-//! apparent efficiency.
+//! A good point must not have an interval that misses the truth by more than chance does in a fault-free recording. The truth of `steady` is
+//! its own result for readings without noise and fault: it claims only an apparent efficiency.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![allow(clippy::print_stdout, reason = "the table is what a person looks at who changes a check")]
@@ -26,7 +25,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 
-/// Distance from the truth beyond which a good point is wrong, half intervals: 3.9 standard errors, one in ten thousand by chance.
+/// Distance from the truth above which a good point is wrong, half intervals: 3.9 standard errors, one in ten thousand by chance.
 const WORST: f64 = 2.0;
 
 const METHODS: [Method; 3] = [Method::Steady, Method::Dynamic, Method::Joint];
@@ -41,7 +40,7 @@ fn grid() -> Vec<(f64, f64)> {
 }
 
 fn config(method: Method, sound: &Sound) -> IdentifyConfig {
-    // The machine is as declared; steps of 100 s could not tell otherwise, and every point would be doubtful for that.
+    // The machine is as declared; steps of 100 s could not show otherwise, and every point would be doubtful.
     let joint = JointSettings {
         alpha_area: Choice::Fixed,
         probe: Choice::Fixed,
@@ -49,7 +48,7 @@ fn config(method: Method, sound: &Sound) -> IdentifyConfig {
         inlet_h: Choice::Fixed,
         ..JointSettings::default()
     };
-    // The truth of `steady` is what it says of clean readings, so it need not wait until they are settled.
+    // The truth of `steady` is its result for clean readings, so it need not wait until they have settled.
     let thresholds = Thresholds { steady_drift_k_min: 1e3, ..Thresholds::default() };
     IdentifyConfig {
         method,
@@ -60,7 +59,7 @@ fn config(method: Method, sound: &Sound) -> IdentifyConfig {
     }
 }
 
-/// A sound recording beside what it was made of.
+/// A fault-free recording with its clean source.
 struct Sound {
     clean: Campaign,
     recording: Recording,
@@ -73,13 +72,13 @@ fn sound(seed: u64, clean: &Campaign) -> Sound {
     Sound { clean, recording, declared }
 }
 
-/// Distance of a value from the truth in half intervals; `None` where there is no interval.
+/// Distance of a value from the truth in half intervals; `None` without an interval.
 fn off(value: Option<f64>, low: Option<f64>, high: Option<f64>, truth: f64) -> Option<f64> {
     let half = 0.5 * (high? - low?);
     Some((value? - truth).abs() / half)
 }
 
-/// What no number rests on, or what is seen through.
+/// Doctored channels that no result depends on, or that the methods correct.
 const HARMLESS: [&str; 5] = [
     "P3 frozen from 40 %",
     "1 % of T2 off by 20 K",
@@ -88,7 +87,7 @@ const HARMLESS: [&str; 5] = [
     "1 % of m_c off by 50 g/s",
 ];
 
-/// What a method makes of one recording.
+/// Result of a method for one recording.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Score {
     good: usize,
@@ -96,7 +95,7 @@ struct Score {
     bare: usize,
     /// Good points whose interval of eta or h misses: one bit for each step.
     missed: u64,
-    /// By how much at worst, half intervals.
+    /// The largest such miss, half intervals.
     worst_eta: f64,
     worst_h: f64,
     /// Good points whose speed or flow is more than 5 % off.
@@ -106,13 +105,13 @@ struct Score {
 fn score(recording: &Recording, sound: &Sound, method: Method) -> Score {
     let mut score = Score::default();
     let config = config(method, sound);
-    // As a campaign that declares tolerances does.
+    // As in a campaign that declares tolerances.
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let nominal = NominalRig { model: &model, tolerances: &tolerances };
     let Ok(Identified { points, .. }) = identify_beside(recording, &config, Some(nominal)) else {
         return score;
     };
-    // The same steps on readings without noise and fault: true place, and the truth of `steady`.
+    // The same steps on readings without noise and fault: true position, and the truth of `steady`.
     let mut clean = sound.clean.recording.clone();
     clean.steps.clone_from(&recording.steps);
     let apparent = identify_each(
@@ -155,7 +154,7 @@ fn cell(score: &Score) -> String {
     )
 }
 
-/// Draws of noise and offsets: the one by which the margins were chosen, or those asked for, as in `0-5,8`.
+/// Draws of noise and offsets: the one used to choose the margins, or the requested ones, as in `0-5,8`.
 fn draws() -> Vec<u64> {
     let Ok(asked) = std::env::var("MAPPER_NONSENSE_DRAWS") else { return vec![3] };
     let draws = |part: &str| {
@@ -172,7 +171,7 @@ fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// What is wrong with one draw of noise and offsets.
+/// The failures of one draw of noise and offsets.
 fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
     let sound = sound(seed, clean);
     let base = METHODS.map(|method| score(&sound.recording, &sound, method));
@@ -182,7 +181,7 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
         doctor(&mut recording);
         (*name, METHODS.map(|method| score(&recording, &sound, method)))
     });
-    // What is as wrong without the fault is not the fault's: `dynamic` holds h constant, and misses h by that in sound recordings too.
+    // Errors that occur without the fault do not count: `dynamic` keeps h constant, which gives an error of h in fault-free recordings too.
     let beyond = |worst: f64, sound: f64| worst > WORST.max(1.1 * sound);
     let wrong = |scores: &[Score; 3]| {
         scores.iter().zip(&base).any(|(score, base)| {
@@ -199,7 +198,7 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
     };
     let mut bad: Vec<String> =
         rows.iter().filter(|(_, scores)| wrong(scores)).map(|(name, scores)| said(name, scores)).collect();
-    // Not by refusing everything: the sound recording keeps its points, and so do harmless changes of it.
+    // Refusing everything is not enough: the fault-free recording keeps its points, and so do harmless changes of it.
     if base.iter().any(|score| score.good < 10) {
         bad.push(said("sound", &base));
     }
@@ -211,7 +210,7 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
     bad
 }
 
-/// What speaks against readings.
+/// Warnings about readings.
 const OBJECTIONS: [&str; 9] = [
     code::FROZEN_CHANNEL,
     code::DEAD_CHANNEL,
@@ -224,8 +223,8 @@ const OBJECTIONS: [&str; 9] = [
     code::OFF_THE_NOMINAL_MAP,
 ];
 
-/// Draws of noise and offsets, on the machine as declared and on one with a tenth of its area before the wheel and a slow probe, of which
-/// nothing is declared.
+/// Draws of noise and offsets, on two machines: as declared, and with an undeclared tenth of its area before the wheel and an undeclared slow
+/// probe.
 #[test]
 fn nothing_is_said_of_sound_recordings() {
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
@@ -248,7 +247,7 @@ fn nothing_is_said_of_sound_recordings() {
             })
         });
         let said: Vec<&Warning> = said.iter().flatten().flatten().collect();
-        // Three standard deviations of an offset come up in one draw of 370.
+        // Three standard deviations of an offset occur in one draw of 370.
         assert!(said.is_empty(), "{said:?}");
     }
 }

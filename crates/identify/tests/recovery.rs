@@ -1,4 +1,4 @@
-//! Data that follow eqs. 1-3 exactly give back the efficiency and the heat-transfer coefficient they were made with.
+//! Data that follow eqs. 1-3 exactly give back the efficiency and the heat-transfer coefficient they were made from.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -36,7 +36,7 @@ fn transients() -> impl Strategy<Value = Transient> {
 }
 
 proptest! {
-    // No files beside the sources.
+    // No files next to the sources.
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Rounding of T2 (6e-14 K) times the ill-conditioning of the worst of these transients stays far below 1e-8.
@@ -49,7 +49,7 @@ proptest! {
     }
 }
 
-/// A wrong share of the area before compression is an error of points, as the paper finds (7-15 points at 0.2).
+/// A wrong area share before compression causes an error of points, as in the paper (7-15 points at 0.2).
 #[test]
 fn a_wrong_area_split_costs_points() {
     let transient = Transient { alpha_area_ratio: 0.2, ..Transient::default() };
@@ -62,11 +62,11 @@ fn the_first_step_has_no_transient() {
     let points = identify(&Transient::default().recording(), &config(0.0)).unwrap();
     assert_eq!((points[0].verdict, points[0].eta, points[0].eta_low), (Verdict::Unusable, None, None));
     assert_eq!(points[0].warnings[0].code, code::NO_TRANSIENT);
-    // Its place on the map is known all the same.
+    // Its position on the map is still known.
     assert!((points[0].pressure_ratio - 1.7).abs() < 1e-12);
 }
 
-/// Without heat transfer the apparent efficiency is the efficiency: one less source of temperature rise.
+/// Without heat transfer the apparent efficiency is the efficiency.
 #[test]
 fn the_steady_method_is_right_where_no_heat_flows() {
     let transient = Transient { h_w_m2k: 0.0, ..Transient::default() };
@@ -80,7 +80,7 @@ fn the_steady_method_is_right_where_no_heat_flows() {
     assert_eq!(points[0].warnings[0].code, code::APPARENT);
 }
 
-/// Static taps: a recording of static pressures gives what one of total pressures gives.
+/// Static taps: a recording of static pressures gives the same result as one of total pressures.
 #[test]
 fn static_taps_are_converted() {
     let transient = Transient::default();
@@ -106,13 +106,13 @@ fn static_taps_are_converted() {
     assert!((taken_for_total.eta.unwrap() - transient.eta).abs() > 1e-3);
 }
 
-/// The bias part of the standard error is what the sensor's offset really does: each sensor shifted by its sigma.
+/// The bias part of the standard error equals the actual effect of a sensor's offset: each sensor is shifted by its sigma.
 #[test]
 fn declared_offsets_move_the_result_as_declared() {
     let transient = Transient { alpha_area_ratio: 0.1, ..Transient::default() };
     let (offset, gain) = ([0.25, 0.25, 0.3, 50.0, 100.0, 2e-4], 0.005);
     let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
-    // What the assumption of a constant h is said to cost stands beside the sensors' share, in quadrature.
+    // The error of assuming a constant h adds to the sensors' share in quadrature.
     let bias = |u: Option<EstimateUncertainty>, base: f64| {
         (u.unwrap().bias_standard_error.powi(2) - base * base).max(0.0).sqrt()
     };
@@ -138,8 +138,8 @@ fn declared_offsets_move_the_result_as_declared() {
             let said = [bias(said.eta_uncertainty, base[0]), bias(said.h_uncertainty, base[1])];
             for (i, size) in [(0, 1.0), (1, 1e3)] {
                 let moved = 0.5 * (up[i] - down[i]).abs();
-                // Second order in the offset is left: a few percent for 2 K of gain error. Where the flow is constant
-                // its gain goes into h alone.
+                // Second-order effects of the offset remain: a few percent for 2 K of gain error. If the flow is constant its gain goes into h
+                // alone.
                 let tolerance = 0.05 * said[i] + 1e-9 * size;
                 assert!(
                     (moved - said[i]).abs() < tolerance,
@@ -174,7 +174,7 @@ fn missing_channels_are_all_named() {
     assert_eq!(identify(&recording, &steady), Err(IdentifyError::NoSteps));
 }
 
-/// The window is found where the signals come to rest: here after 20 s, when the speed stops moving.
+/// The window starts when the signals have settled: here after 20 s, when the speed stops changing.
 #[test]
 fn the_window_starts_where_the_operating_point_has_stabilised() {
     let mut recording = Transient::default().recording();
@@ -205,7 +205,7 @@ fn an_operating_point_that_never_rests_is_doubtful() {
     assert!(point.warnings.iter().any(|warning| warning.code == code::NOT_STABILISED));
 }
 
-/// What was told to change last settles last: the window starts after it.
+/// The quantity with the last command change settles last: the window starts after it.
 #[test]
 fn a_command_that_ramps_moves_the_window() {
     let mut recording = Transient::default().recording();
@@ -218,7 +218,7 @@ fn a_command_that_ramps_moves_the_window() {
     assert!((point.window.unwrap().start_s - 50.0).abs() < 1e-9);
 }
 
-/// A loop that holds the speed moves P3 by some permille as the housings warm: the jump was over long before.
+/// A loop that holds the speed moves P3 by a few permille as the housings warm: the jump was over long before.
 #[test]
 fn a_command_that_is_trimmed_leaves_the_window_alone() {
     let mut recording = Transient::default().recording();
@@ -236,7 +236,7 @@ fn a_command_that_is_trimmed_leaves_the_window_alone() {
     assert_eq!(point.window.unwrap(), untrimmed);
 }
 
-/// A speed that was not reached is told with both speeds, and costs the point nothing: it lies elsewhere on the map.
+/// A remark gives both speeds if a speed was not reached; the point keeps its verdict, since it is only elsewhere on the map.
 #[test]
 fn a_speed_that_was_not_reached_is_a_remark() {
     let mut recording = Transient::default().recording();

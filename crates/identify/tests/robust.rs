@@ -1,4 +1,4 @@
-//! Whatever a recording holds: no panic, no NaN, no silent number.
+//! No recording causes a panic, a NaN or a number without interval and verdict.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -60,7 +60,7 @@ const CHANNELS: [Channel; 9] = [
     Channel::ValveCommand,
 ];
 
-/// Any values at rising times, each channel with its own.
+/// Any values at rising times, separately for each channel.
 fn series() -> impl Strategy<Value = Series> {
     prop::collection::vec((1e-3..5.0f64, values()), 0..60).prop_map(|pairs| {
         let mut t_s = 0.0;
@@ -106,7 +106,7 @@ fn any_config() -> impl Strategy<Value = IdentifyConfig> {
 }
 
 proptest! {
-    // No files beside the sources.
+    // No files next to the sources.
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
@@ -128,7 +128,7 @@ proptest! {
         }
     }
 
-    /// A good recording with values lost or spoilt here and there.
+    /// A good recording with some values lost or corrupted.
     #[test]
     fn spoilt_samples_do_no_harm(
         spoilt in prop::collection::vec((0usize..7, 0usize..1500, values()), 0..40),
@@ -142,7 +142,7 @@ proptest! {
     }
 }
 
-/// Lost samples are left out and counted; a spike is left out and said; the result stays.
+/// Lost samples are left out and counted; a spike is left out and reported; the result stays the same.
 #[test]
 fn lost_samples_and_spikes_are_left_out() {
     let transient = Transient::default();
@@ -160,7 +160,7 @@ fn lost_samples_and_spikes_are_left_out() {
     assert_eq!(point.verdict, Verdict::Good);
 }
 
-/// A step without its flow has no place on the map: it is left out, and the reason is there to be asked for.
+/// A step without its flow has no position on the map: it is left out, and the reason is available.
 #[test]
 fn a_step_without_a_place_says_so() {
     let mut recording = Transient::default().recording();

@@ -1,4 +1,4 @@
-//! What points have in common: their errors, a region that disagrees, the map they are held against.
+//! Common properties of points: their errors, a region that disagrees, the map they are compared with.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -29,7 +29,7 @@ fn found_beside(
     identify_beside(&recording, &config, nominal).unwrap().points.into_iter().map(Result::unwrap).collect()
 }
 
-/// The dynamic method's common errors are what it makes of the readings when all of them are off: T2 by its declared offset.
+/// The dynamic method's common errors equal its response to a common offset of all readings: T2 by its declared offset.
 #[test]
 fn a_common_error_is_what_the_offset_does() {
     let clean = campaign(&eighteen()[..6], 120.0, Machine::default());
@@ -57,8 +57,8 @@ fn a_common_error_is_what_the_offset_does() {
     assert!(compared >= 4, "{compared} points");
 }
 
-/// Errors over many seeds have the covariance that the points say: whitened by it, their mean square is 1. The same errors
-/// taken for independent ones (each divided by its own part alone) would come out tens of times too large.
+/// Errors over many seeds have the reported covariance: whitened by it, their mean square is 1. Treated as independent (each divided by its
+/// own part alone) it would be tens of times larger.
 #[test]
 fn errors_have_the_covariance_that_is_said() {
     let clean = campaign(&eighteen(), 120.0, Machine::default());
@@ -69,7 +69,7 @@ fn errors_have_the_covariance_that_is_said() {
         let own: Vec<f64> = points.iter().map(|point| point.eta_own_standard_error().unwrap()).collect();
         let covariance = DMatrix::from_fn(n, n, |i, j| {
             let common = points[i].common.eta_covariance(&points[j].common);
-            // What the fit's own faults are: a few hundredths of a point.
+            // Allows for model errors: a few hundredths of a point.
             common + if i == j { own[i] * own[i] + 4e-4f64.powi(2) } else { 0.0 }
         });
         let errors = DVector::from_iterator(
@@ -80,13 +80,13 @@ fn errors_have_the_covariance_that_is_said() {
         alone += errors.iter().zip(&own).map(|(error, own)| (error / own).powi(2)).sum::<f64>();
         count += n as f64;
     }
-    // 12 draws of what is common and 216 own ones; smoothness makes the common part 1.2 times too wide.
+    // 12 draws of the common part and 216 individual ones; smoothness makes the common part 1.2 times too wide.
     assert!((0.3..2.0).contains(&(square / count)), "{}", square / count);
     assert!(alone / count > 5.0, "{}", alone / count);
 }
 
-/// At the largest opening T2 answers 1.6 times as much as anywhere else, as if convection were another there. Those steps
-/// are named and left out, with neighbours near choke at most; the others keep their verdicts and their truth.
+/// At the largest opening the T2 sensitivity is 1.6 times that elsewhere, as if convection were different. Those steps, and at most neighbours
+/// near choke, are named and left out; the others keep their verdicts and their truth.
 #[test]
 fn one_bad_region_does_not_condemn_the_rest() {
     let speeds = [90e3, 150e3, 50e3, 130e3, 70e3, 110e3];
@@ -118,13 +118,13 @@ fn one_bad_region_does_not_condemn_the_rest() {
             assert_ne!(point.verdict, Verdict::Unusable);
         }
     }
-    // A region is a sixth or a third of the steps, whichever holds all of them.
+    // A region is a sixth or a third of the steps, the smallest that contains all of them.
     let good = found.iter().filter(|point| point.verdict == Verdict::Good).count();
     assert!(good >= 20, "{good} good");
 }
 
-/// T2 eleven declared offsets off, which the points alone cannot tell from a map that bends: the nominal map can, where the heat balance of
-/// the housing has not told it before. On sound recordings both are silent.
+/// T2 with eleven times its declared offset, which the points alone cannot distinguish from a curved map. The nominal map can, if the
+/// housing's heat balance has not found it before. On fault-free recordings neither gives a warning.
 #[test]
 fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
     let clean = campaign(&eighteen(), 120.0, Machine::default());
@@ -133,8 +133,8 @@ fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
     let doubted = |recording: &Campaign, seed: u64| {
         let points = found_beside(recording, seed, Method::Joint, Some(nominal));
         let named = |point: &IdentifiedPoint| {
-            let told = [code::OFF_THE_NOMINAL_MAP, code::CONTRADICTED_CHANNEL];
-            point.warnings.iter().any(|warning| told.contains(&warning.code.as_str()))
+            let codes = [code::OFF_THE_NOMINAL_MAP, code::CONTRADICTED_CHANNEL];
+            point.warnings.iter().any(|warning| codes.contains(&warning.code.as_str()))
         };
         points.iter().filter(|point| named(point) && point.verdict != Verdict::Good).count()
     };
@@ -148,8 +148,8 @@ fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
     }
 }
 
-/// Ten long steps at two places, among short ones, close a heat balance of five unknowns by chance alone: on a sound machine it must not
-/// speak of an offset.
+/// Ten long steps at two positions, among short ones, close a heat balance of five unknowns by chance: on a fault-free machine it must not
+/// report an offset.
 #[test]
 fn repeats_alone_tell_no_heat_balance() {
     let repeated = [(1.4, 50e3), (1.4, 155e3)];

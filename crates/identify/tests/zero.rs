@@ -1,4 +1,4 @@
-//! The isothermal zero: offsets from a soak, and what is left of them in the points.
+//! The isothermal zero: offsets from a soak, and their remaining effect on the points.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
@@ -64,14 +64,14 @@ fn a_soak_brings_low_speed_within_reach() {
             count += 1.0;
         }
     }
-    // 24 points, three of one campaign alike: 95 % of eight campaigns allow for one that is off.
+    // 24 points, three of one campaign alike: 95 % of eight campaigns allows for one outside.
     assert!(
         within / count >= 0.85 && held / count >= 0.85,
         "within {}, held {}",
         within / count,
         held / count
     );
-    // Without the zero they are off by what offsets of 0.25 K cost: 7.2, 5.7 and 3.2 points for each kelvin.
+    // Without the zero they have the error of 0.25 K offsets: 7.2, 5.7 and 3.2 points for each kelvin.
     assert!((without / count).sqrt() > 0.012);
 }
 
@@ -91,8 +91,8 @@ fn what_is_no_soak_is_refused() {
     assert!(matches!(zero(&broken), Err(NoZero::Uneven { .. })));
 }
 
-/// For a diagnosis one sensor may be off by more than anybody declared: three that read 25 degC tell by how much. Of two that
-/// are off, one each way, nobody can tell.
+/// For a diagnosis one sensor may exceed its declared offset: three that read 25 degC determine its size. If two have opposite offsets,
+/// neither can be identified.
 #[test]
 fn a_broken_sensor_is_held_against_the_others() {
     let clean = campaign(&eighteen()[..2], 120.0, Machine::default());
@@ -113,7 +113,7 @@ fn a_broken_sensor_is_held_against_the_others() {
     assert!(matches!(shift(Channel::Tc, -4.0), Err(NoZero::Uneven { .. })));
 }
 
-/// Sensors that are compared with each other leave what they have in common: over draws of their offsets its spread is what the zero says.
+/// Sensors compared with each other keep their common error: over draws of their offsets its spread equals the reported one.
 #[test]
 fn what_all_sensors_have_in_common_stays_as_uncertain_as_stated() {
     let clean = campaign(&eighteen()[..2], 120.0, Machine::default());
@@ -138,7 +138,7 @@ fn what_all_sensors_have_in_common_stays_as_uncertain_as_stated() {
         }
         let zero = isothermal_zero(&recording, &config, &ZeroSettings::default()).unwrap();
         let common = zero.common.iter().find(|common| common.channels.contains(&Channel::T1)).unwrap();
-        // Every sensor is left with the same error.
+        // Every sensor keeps the same error.
         let left: Vec<f64> = offsets.iter().map(|(channel, off)| off - zero.offsets[channel]).collect();
         assert!(left.iter().all(|other| (other - left[0]).abs() < 1e-9), "{left:?}");
         squares += (left[0] / common.sigma).powi(2);

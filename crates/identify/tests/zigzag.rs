@@ -1,4 +1,4 @@
-//! The two-parameter method on a noise-free continuous campaign, against what an independent implementation makes of it
+//! The two-parameter method on a noise-free continuous campaign, compared with an independent implementation
 //! (`crates/physics/tests/reference/zigzag.csv`).
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
@@ -57,7 +57,7 @@ fn campaign(rows: &[Row]) -> Recording {
     let mut recording = Recording::default();
     for (index, row) in rows.iter().enumerate() {
         let start_s = index as f64 * STEP_S;
-        // The settled start holds the P3 of the speed to all digits, the table gives one decimal.
+        // The settled start has the P3 of the speed to all digits, the table only one decimal.
         let p3_pa = if index == 0 { start.boundary.p3_pa } else { row.p3_pa };
         let boundary = BoundaryConditions { p3_pa, ..boundary };
         simulator.restart();
@@ -143,8 +143,8 @@ fn figures_of(mut errors: Vec<f64>, worst_good: f64) -> Figures {
     }
 }
 
-/// The figures that the independent implementation reached, and its numbers: five digits of eta and h to 0.01 are
-/// printed; near surge the flow amplifies what two integrators differ by, up to 300 times.
+/// The results of the independent implementation: five digits of eta and h to 0.01 are printed. Near surge the flow amplifies the difference
+/// between two integrators up to 300 times.
 #[test]
 fn a_fixed_window_agrees_with_the_independent_implementation() {
     let points = identified(WindowRule::Fixed { start_s: 10.0, end_s: 110.0 });
@@ -170,11 +170,11 @@ fn a_fixed_window_agrees_with_the_independent_implementation() {
     // Five digits are printed.
     assert!(figures.median <= reference.median + 2e-5 && figures.worst <= reference.worst + 2e-5);
     assert!(figures.within_one_point >= reference.within_one_point);
-    // Whatever is off by more than a point is not called good.
+    // A point with an error of more than a point must not be good.
     assert!(figures.worst_good < 0.01);
 }
 
-/// A window found from stabilisation is no worse than the fixed one.
+/// A window from stabilisation is as good as the fixed one.
 #[test]
 fn a_window_found_from_stabilisation_serves_as_well() {
     let points = identified(WindowRule::default());
@@ -189,7 +189,7 @@ fn a_window_found_from_stabilisation_serves_as_well() {
     assert!(figures.worst_good < 0.01);
 }
 
-/// The campaign as a rig would record it: noise on every sample, and if wanted a fixed offset for each sensor.
+/// The campaign as a rig would record it: noise on every sample, and optionally a fixed offset for each sensor.
 fn measured(clean: &Recording, rng: &mut Pcg64, with_offsets: bool) -> Recording {
     let mut recording = clean.clone();
     for (channel, noise, offset) in RIG {
@@ -203,8 +203,8 @@ fn measured(clean: &Recording, rng: &mut Pcg64, with_offsets: bool) -> Recording
     recording
 }
 
-/// With noise, and with noise and offsets, on a window found from stabilisation: intervals hold the efficiency at the
-/// step's end, verdicts are seldom alarmed by noise alone, nothing called good is far off.
+/// With noise, and with noise and offsets, on a window from stabilisation: intervals cover the efficiency at the step's end, noise alone
+/// seldom causes a warning, no good point has a large error.
 #[test]
 fn noise_and_offsets_are_within_what_the_points_say() {
     let rows = rows();
@@ -250,12 +250,12 @@ fn noise_and_offsets_are_within_what_the_points_say() {
             unstable / n
         );
         assert!(held / n > 0.9 && poor / n < 0.02 && unstable / n < 0.05 && good / n > 0.5);
-        // Four of the two points (one sigma) up to which a point may be called good.
+        // Four of the two points (one sigma) up to which a point may be good.
         assert!(figures.worst_good < 0.08);
     }
 }
 
-/// All openings one after the other, 10 s apart: each begins settled, as the file has it.
+/// All openings in sequence, 10 s apart: each begins settled, as in the file.
 fn together(rows: &[Row]) -> Recording {
     let mut all = Recording::default();
     for (opening, rows) in rows.chunk_by(|a, b| a.valve == b.valve).enumerate() {
@@ -277,8 +277,8 @@ fn together(rows: &[Row]) -> Recording {
     all
 }
 
-/// The joint method finds the file's efficiencies within 0.2 points at every point, also at those without a transient,
-/// where the two-parameter method is up to 4.2 points off; h within 1.5 %.
+/// The joint method finds the file's efficiencies within 0.2 points at every point, and h within 1.5 %. This includes points without a
+/// transient, at which the two-parameter method has errors up to 4.2 points.
 #[test]
 fn the_joint_method_finds_every_efficiency_of_the_file() {
     let rows = rows();

@@ -51,6 +51,8 @@ pub struct End<Point> {
     pub point: Point,
     /// The normal equations there.
     pub normal: Normal,
+    /// What one more iteration would promise in the cost: more than was asked for where no step along the slopes led down.
+    pub promised: f64,
 }
 
 /// Tries along a step, and the factor by which each is shorter than the one before.
@@ -67,8 +69,10 @@ pub fn descend<M: Model>(
     model.accept(&point);
     let mut reach = Reach::Fine;
     let mut normal = model.normal(&unknowns, &point, reach);
+    let mut left = 0.0;
     for _ in 1..until.iterations {
         let Some((step, promised)) = normal.step(&model.room(&unknowns)) else { break };
+        left = promised;
         if promised < until.enough {
             break;
         }
@@ -88,7 +92,7 @@ pub fn descend<M: Model>(
         }
         normal = model.normal(&unknowns, &point, reach);
     }
-    End { unknowns, point, normal }
+    End { unknowns, point, normal, promised: left }
 }
 
 /// The normal equations of an iteration: half the cost's second derivatives, and half its slope downwards.

@@ -1,21 +1,21 @@
-//! Who may look, and who may press buttons.
+//! Access control for the page and its buttons.
 
 use crate::request::Request;
 use std::net::SocketAddr;
 
-/// What a request has to show.
+/// Requirements for a request.
 #[derive(Debug, Clone)]
 pub(crate) struct Access {
-    /// Needed on every address but this machine's own.
+    /// The token, required on every address except the loopback address.
     token: Option<String>,
-    /// Names by which a browser may call the server; `None`: any, which the token makes up for.
+    /// Accepted host names; `None`: any, because the token is required.
     hosts: Option<Vec<String>>,
-    /// `http` or `https`, of the server's own page.
+    /// `http` or `https`, as used by the server's own page.
     scheme: &'static str,
 }
 
 impl Access {
-    /// Of a server at this address.
+    /// Rules for a server at this address.
     pub(crate) fn new(address: SocketAddr, token: Option<String>, encrypted: bool) -> Self {
         let port = address.port();
         let here = ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}"));
@@ -26,24 +26,24 @@ impl Access {
         Access { token, hosts, scheme: if encrypted { "https" } else { "http" } }
     }
 
-    /// Whether the request calls the server by its own name: a page of another name that was bent to this address does not.
+    /// Whether the request uses the server's own host name. This rejects pages that reach the address by DNS rebinding.
     pub(crate) fn calls_by_name(&self, request: &Request) -> bool {
         let Some(host) = &request.host else { return false };
         self.hosts.as_ref().is_none_or(|hosts| hosts.iter().any(|own| own.eq_ignore_ascii_case(host)))
     }
 
-    /// Whether the request comes from the server's own page. Browsers say where a page is from with whatever changes something.
+    /// Whether the request comes from the server's own page. Browsers report the origin with every request that changes something.
     pub(crate) fn is_of_own_page(&self, request: &Request) -> bool {
         let own = request.host.as_ref().map(|host| format!("{}://{host}", self.scheme));
         request.origin.is_some() && request.origin == own
     }
 
-    /// Whether a page of another origin reads: its browser says so.
+    /// Whether the browser reports that a page of another origin sent the request.
     pub(crate) fn is_of_another_page(&self, request: &Request) -> bool {
         request.origin.is_some() && !self.is_of_own_page(request)
     }
 
-    /// Whether the request has the token, where one is needed. Takes as long for a wrong one as for the right one.
+    /// Whether the request has the token, if required. The comparison takes the same time for any token of the right length.
     pub(crate) fn has_token(&self, request: &Request) -> bool {
         let Some(token) = &self.token else { return true };
         let given =

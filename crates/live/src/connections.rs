@@ -1,13 +1,13 @@
-//! Who is connected, and who has to go for another.
+//! Open connections and their limits.
 
 use std::net::{IpAddr, Shutdown, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-/// Connections whose request has not been heard yet, or that read the page; a further one takes the place of the oldest of them. A
-/// browser sends a request within milliseconds of connecting, so that a button gets through whoever else holds lines open.
+/// Maximum number of connections that have not sent a request yet or read the page. A new one replaces the oldest. Browsers send a request
+/// within milliseconds of connecting, so a button works even if other clients keep connections open.
 const BRIEF_MAX: usize = 32;
 
-/// The connections that are open.
+/// All open connections.
 #[derive(Debug, Default)]
 pub(crate) struct Connections {
     open: Mutex<Vec<Open>>,
@@ -17,11 +17,11 @@ pub(crate) struct Connections {
 struct Open {
     number: u64,
     address: IpAddr,
-    /// To end it from outside; `None` once it is a stream, which the hub counts.
+    /// Handle to end it from another thread; `None` for a stream, which the hub counts.
     brief: Option<TcpStream>,
 }
 
-/// A connection as long as it is there.
+/// A connection, removed from the list when dropped.
 #[derive(Debug)]
 pub(crate) struct Connection {
     all: Arc<Connections>,
@@ -29,8 +29,8 @@ pub(crate) struct Connection {
 }
 
 impl Connections {
-    /// One more. Where there are too many that have not shown what they want, the oldest of the address with most of them is ended.
-    /// `None` where the connection is gone already.
+    /// Adds a connection. If too many have no known purpose yet, the oldest one of the address with the most is closed. `None` if the connection
+    /// has already gone.
     pub(crate) fn admit(self: &Arc<Connections>, stream: &TcpStream) -> Option<Connection> {
         let (address, own) = (stream.peer_addr().ok()?.ip(), stream.try_clone().ok()?);
         let mut open = self.lock();
@@ -39,12 +39,12 @@ impl Connections {
             open.iter().filter(counts).count()
         };
         if brief(&open, None) >= BRIEF_MAX {
-            // The first of equals is the oldest: they stand in the order in which they came.
+            // The first of equals is the oldest, because the list is in order of arrival.
             let most = open.iter().map(|one| brief(&open, Some(one.address))).max();
             let leaves = |one: &Open| one.brief.is_some() && Some(brief(&open, Some(one.address))) == most;
             let position = open.iter().position(leaves)?;
             if let Some(stream) = open.remove(position).brief {
-                // Its thread finds it closed and ends.
+                // Its thread notices the closed socket and ends.
                 let _ = stream.shutdown(Shutdown::Both);
             }
         }
@@ -58,14 +58,14 @@ impl Connections {
         !self.lock().is_empty()
     }
 
-    /// A thread that panicked while it held the list left it whole.
+    /// A thread that panicked while it held the lock left the list valid.
     fn lock(&self) -> MutexGuard<'_, Vec<Open>> {
         self.open.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 }
 
 impl Connection {
-    /// It has asked for a stream and was let in: no other takes its place.
+    /// Marks an accepted stream, which is never replaced.
     pub(crate) fn stays(&self) {
         if let Some(own) = self.all.lock().iter_mut().find(|one| one.number == self.number) {
             own.brief = None;
@@ -99,7 +99,7 @@ mod tests {
         let held: Vec<_> = (0..BRIEF_MAX).map(|_| come()).collect();
         held[0].0.stays();
         let more: Vec<_> = (0..3).map(|_| come()).collect();
-        // The stream does not count; of the brief ones the two oldest have gone.
+        // The stream does not count; the two oldest brief connections have been closed.
         let ended = |client: &mut TcpStream| {
             client.set_read_timeout(Some(std::time::Duration::from_millis(1))).unwrap();
             matches!(client.read(&mut [0]), Ok(0))

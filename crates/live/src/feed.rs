@@ -1,4 +1,4 @@
-//! From what the session tells to what browsers are shown.
+//! Converts session events into messages for browsers.
 
 use crate::live_run::LiveRun;
 use crate::operator_commands::Pressed;
@@ -15,20 +15,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Browsers are told what changes every second at most this often.
+/// Minimum interval of updates for values that change all the time.
 const TICK: Duration = Duration::from_millis(200);
-/// Channels whose last minutes are drawn.
+/// Channels with a chart of the last minutes.
 const TRACED: [Channel; 6] =
     [Channel::T2, Channel::Tc, Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P2, Channel::P3];
 
-/// Keeps the state, and says what of it is new.
+/// Keeps the state and returns its changes.
 pub(crate) struct Feed {
     kept: Mutex<Kept>,
     display: Display,
     guards: Vec<SignalGuard>,
     plan: Vec<PlanStep>,
     campaign: Campaign,
-    /// Points so far; apart from what is shown, so that drawing the map keeps nobody waiting.
+    /// Points so far. They have a separate lock, so that drawing the map blocks no other thread.
     estimated: Mutex<Vec<IdentifiedPoint>>,
     operator: Arc<Operator>,
     after_step: Arc<AtomicBool>,
@@ -36,17 +36,17 @@ pub(crate) struct Feed {
 
 struct Kept {
     state: State,
-    /// Rows that browsers have not been told.
+    /// Rows not yet sent to browsers.
     unsent: VecDeque<Vec<Option<f64>>>,
     ticked: Option<Instant>,
-    /// How much longer each step took than planned, s.
+    /// Excess of each step's actual duration over the planned one, s.
     longer_s: Vec<f64>,
-    /// Whether the operator held the step that is under way: how long that lasts says nothing of the others.
+    /// Whether the operator held the current step: its duration must not influence the forecast.
     held: bool,
-    /// Steps that have begun.
+    /// Number of started steps.
     begun: usize,
     soak_s: f64,
-    /// Rig time that is planned after the step that is under way, s.
+    /// Planned rig time after the current step, s.
     after_s: f64,
 }
 
@@ -108,16 +108,16 @@ impl Feed {
         }
     }
 
-    /// The whole state.
+    /// The complete state.
     pub(crate) fn snapshot(&self) -> Arc<str> {
         let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
         self.say_what_is_asked(&mut kept.state);
         message("snapshot", json!(kept.state))
     }
 
-    /// Takes an event in; messages for those who look on.
+    /// Processes an event and returns messages for the observers.
     pub(crate) fn take(&self, event: &SessionEvent) -> Vec<Arc<str>> {
-        // Comes from the thread that identifies: the rig does not wait for the map.
+        // Called on the identification thread, so that the rig does not wait for the map.
         let map = match event {
             SessionEvent::PointEstimated(point) => self.map_with(point),
             _ => None,
@@ -171,9 +171,9 @@ impl Feed {
                 Vec::new()
             }
             SessionEvent::Told(event) => {
-                let told = Told { t_s: event.t_s, message: event.message.clone() };
-                let new = message("told", json!(told));
-                kept.state.events.push_back(told);
+                let entry = Told { t_s: event.t_s, message: event.message.clone() };
+                let new = message("told", json!(entry));
+                kept.state.events.push_back(entry);
                 while kept.state.events.len() > EVENTS_MAX {
                     kept.state.events.pop_front();
                 }
@@ -202,7 +202,7 @@ impl Feed {
         }
     }
 
-    /// The map with one point more.
+    /// The map with one additional point.
     fn map_with(&self, point: &IdentifiedPoint) -> Option<LiveMap> {
         let mut estimated = self.estimated.lock().ok()?;
         if estimated.len() < POINTS_MAX {
@@ -211,7 +211,7 @@ impl Feed {
         Some(live_map(&estimated, &self.campaign, &self.display))
     }
 
-    /// A button was pressed: what is shown of it before the run has seen it.
+    /// Shows a pressed button before the run has processed it.
     pub(crate) fn asked(&self, asked: Pressed) {
         if let Ok(mut kept) = self.kept.lock() {
             kept.held |= asked == Pressed::Hold;
@@ -224,13 +224,13 @@ impl Feed {
         }
     }
 
-    /// The run is over.
+    /// Shows the end of the run.
     pub(crate) fn ended(&self, outcome: &str, page: Option<&Path>) -> Arc<str> {
         let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
         kept.state.outcome = Some(outcome.to_owned());
         kept.state.page = page.map(|page| page.display().to_string());
-        let said = json!({ "outcome": kept.state.outcome, "page": kept.state.page });
-        message("end", said)
+        let end = json!({ "outcome": kept.state.outcome, "page": kept.state.page });
+        message("end", end)
     }
 
     fn step(&self, kept: &mut Kept, marker: &StepMarker) {
@@ -289,15 +289,14 @@ impl Feed {
 }
 
 impl Kept {
-    /// Rig time to the end, s, and half the width of its 95 % interval: steps still to come last as much longer than planned as
-    /// those before did.
+    /// Remaining rig time, s, and half-width of its 95 % interval. Future steps are assumed to exceed their plan as the past ones did.
     fn left_s(&self) -> (f64, f64) {
         let (state, count) = (&self.state, self.longer_s.len() as f64);
         let to_come = state.steps.saturating_sub(self.begun) as f64;
         let mean_s = if count > 0.0 { self.longer_s.iter().sum::<f64>() / count } else { 0.0 };
         let variance =
             self.longer_s.iter().map(|s| (s - mean_s).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        // Every step to come has its own scatter, and all of them share the error of the mean.
+        // Each future step has its own scatter; all share the error of the mean.
         let sigma_s = (variance * to_come * (1.0 + to_come / count.max(1.0))).sqrt();
         let planned_s = match &state.now.step {
             Some(step) => (step.end_s - state.now.t_s).max(0.0) + self.after_s,
@@ -309,6 +308,6 @@ impl Kept {
 
 fn message(kind: &str, mut data: Value) -> Arc<str> {
     data["type"] = kind.into();
-    // Written on one line: a line end would end the event.
+    // JSON on one line, because a line break would end the server-sent event.
     Arc::from(data.to_string())
 }

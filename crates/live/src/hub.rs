@@ -1,21 +1,21 @@
-//! Whoever looks on, each with a short queue.
+//! The connected browsers, each with a short queue.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 
-/// Messages that wait for one browser; one that lags further behind is left, and begins again with the whole state.
+/// Queue length of a browser. A browser that falls further behind is disconnected and restarts with the complete state.
 const WAITING_MAX: usize = 64;
-/// Browsers that may look on at once.
+/// Maximum number of connected browsers.
 const CLIENTS_MAX: usize = 16;
 
-/// Passes messages on to all who look on, and never waits for any of them.
+/// Sends messages to all browsers and never waits for any of them.
 #[derive(Debug, Default)]
 pub(crate) struct Hub {
     clients: Mutex<Vec<SyncSender<Arc<str>>>>,
 }
 
 impl Hub {
-    /// One more, who begins with `first`; `None` where there are too many already.
+    /// Adds a browser that starts with `first`; `None` if there are too many already.
     pub(crate) fn join(&self, first: Arc<str>) -> Option<Receiver<Arc<str>>> {
         let mut clients = self.clients.lock().ok()?;
         if clients.len() >= CLIENTS_MAX {
@@ -27,14 +27,14 @@ impl Hub {
         Some(receive)
     }
 
-    /// Passes a message on; who has gone or lags behind is left.
+    /// Sends a message; browsers that have gone or fall behind are removed.
     pub(crate) fn publish(&self, message: &Arc<str>) {
         if let Ok(mut clients) = self.clients.lock() {
             clients.retain(|client| client.try_send(message.clone()).is_ok());
         }
     }
 
-    /// Leaves everybody once they have had what waits for them.
+    /// Disconnects all browsers after their queued messages.
     pub(crate) fn close(&self) {
         if let Ok(mut clients) = self.clients.lock() {
             clients.clear();
@@ -55,7 +55,7 @@ mod tests {
             let expected = if number == 0 { "first".to_owned() } else { (number - 1).to_string() };
             assert_eq!(&*quick.recv().unwrap(), expected);
         }
-        // The slow one has what fitted into its queue, and then the end.
+        // The slow browser gets the messages in its queue and then the end.
         assert_eq!(slow.iter().count(), WAITING_MAX);
     }
 

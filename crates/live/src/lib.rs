@@ -1,8 +1,8 @@
-//! The page of a run while it goes on.
+//! The live page of a run.
 //!
-//! [`Observers`] are told what the session tells, and the page keeps a bounded state of it, which it serves to browsers: the page itself,
-//! a stream of server-sent events, and four requests for the operator's buttons. A browser that is slow, gone or hostile costs
-//! its own connection and never the run. `docs/decisions/0032-live-page.md` says why the server is what it is.
+//! [`Observers`] receive the session's events. The page keeps a bounded state and serves browsers: the page itself, a stream of server-sent
+//! events, and four requests for the operator's buttons. A browser that is slow, gone or hostile affects only its own connection, never the run.
+//! `docs/decisions/0032-live-page.md` gives the reasons for the server's design.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,4 +1,4 @@
-//! The page of a run: opened before it, told while it goes on, closed after it.
+//! The live page of a run: opened before the run, updated during it, closed after it.
 
 use crate::access::Access;
 use crate::feed::Feed;
@@ -15,10 +15,10 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
-/// Browsers get so long for the last message.
+/// Time for browsers to receive the last message.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// The page of a run that goes on.
+/// The live page of a run.
 pub struct Live {
     listener: Mutex<Option<TcpListener>>,
     address: SocketAddr,
@@ -28,10 +28,10 @@ pub struct Live {
 }
 
 impl Live {
-    /// Takes an address, e.g. `127.0.0.1:7373`. Another machine's browsers need the token that this makes.
+    /// Binds an address, e.g. `127.0.0.1:7373`. Browsers on other machines need the token that this creates.
     ///
     /// # Errors
-    /// [`LiveError`] where the address is none, or is taken, or the files are of no use.
+    /// [`LiveError`] if the address is invalid or in use, or the TLS files are unusable.
     pub fn open(text: &str, tls: Option<&TlsFiles>) -> Result<Live, LiveError> {
         let tls = tls.map(read).transpose()?;
         let address: SocketAddr = text.parse().map_err(|_| LiveError::Address { text: text.to_owned() })?;
@@ -42,7 +42,7 @@ impl Live {
         Ok(Live { listener: Mutex::new(Some(listener)), address, token, tls, begun: OnceLock::new() })
     }
 
-    /// Where the page is, with the token behind `#`, which a browser keeps for itself.
+    /// URL of the page. The token follows `#`, so that browsers never send it with the address.
     pub fn url(&self) -> String {
         let scheme = if self.tls.is_some() { "https" } else { "http" };
         match &self.token {
@@ -51,7 +51,7 @@ impl Live {
         }
     }
 
-    /// What whoever starts the run has to know about its net: other machines get there, and all that goes there is in clear.
+    /// Network warning for the operator: other machines can connect, and all traffic is unencrypted.
     pub fn warning(&self) -> Option<&'static str> {
         (self.token.is_some() && self.tls.is_none()).then_some(
             "the live page is open to other machines WITHOUT encryption: whoever listens on that net can read the readings and the token, \
@@ -59,7 +59,7 @@ impl Live {
         )
     }
 
-    /// Begins to serve.
+    /// Starts to serve.
     ///
     /// # Errors
     /// [`LiveError::Page`]: none in practice.
@@ -107,12 +107,12 @@ impl Live {
             .name("live".to_owned())
             .spawn(move || serve(&listener, &for_thread))
             .map_err(|source| LiveError::Listen { address: self.address, source })?;
-        // It is begun once: the listener has just been taken.
+        // This is the only start, because the listener was just taken.
         let _ = self.begun.set((feed, served));
         Ok(())
     }
 
-    /// Passes on what the session tells. Never waits for a browser.
+    /// Forwards a session event. Never waits for a browser.
     pub fn show(&self, event: &SessionEvent) {
         let Some((feed, served)) = self.begun.get() else { return };
         for message in feed.take(event) {
@@ -120,7 +120,7 @@ impl Live {
         }
     }
 
-    /// Says how it ended and where the page of the run is, and gives browsers a moment to hear it.
+    /// Reports the outcome and the run's page, and gives browsers a moment to receive them.
     pub fn end(&self, outcome: &str, page: Option<&std::path::Path>) {
         let Some((feed, served)) = self.begun.get() else { return };
         served.hub.publish(&feed.ended(outcome, page));
@@ -132,7 +132,7 @@ impl Live {
     }
 }
 
-/// 128 bits that nobody guesses.
+/// A random token of 128 bits.
 fn token() -> Result<String, LiveError> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(LiveError::Token)?;

@@ -1,35 +1,35 @@
-//! Why there is no live page.
+//! Errors of the live page.
 
 use crate::tls::TlsError;
 use std::net::SocketAddr;
 
-/// Why there is no live page.
+/// Why the live page cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// It is not an address.
+    /// The address is invalid.
     #[error("`{text}` is not an address; write e.g. 127.0.0.1:7373, or 0.0.0.0:7373 for other machines too")]
     Address {
-        /// What was given.
+        /// The given text.
         text: String,
     },
-    /// The address is not to be had.
+    /// The address is not available.
     #[error("the live page cannot be served at {address}: {source}; choose another with `--live=ADDRESS`")]
     Listen {
         /// The address.
         address: SocketAddr,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// There is nothing to make a token from.
+    /// The system has no random numbers for a token.
     #[error("the system gives no random numbers for a token: {0}")]
     Token(getrandom::Error),
-    /// The page could not be made: a fault of the program.
+    /// The page could not be created: a defect of the program.
     #[error("failed to write the live page: {0}")]
     Page(#[from] serde_json::Error),
-    /// Certificate or key are of no use.
+    /// Certificate or key are unusable.
     #[error(transparent)]
     Tls(#[from] TlsError),
-    /// There is no stream for viewers.
+    /// The stream for viewers cannot be served.
     #[cfg(feature = "foxglove")]
     #[error(transparent)]
     Viewers(#[from] crate::viewers::ViewersError),

@@ -1,4 +1,4 @@
-//! The run that is looked at.
+//! The run shown on the live page.
 
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, Plan};
@@ -6,19 +6,19 @@ use mapper_session::Operator;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// What is run, and how it is stopped.
+/// The run and its stop flags.
 pub struct LiveRun<'a> {
     /// The campaign.
     pub campaign: &'a Campaign,
     /// The plan.
     pub plan: &'a Plan,
-    /// The rig's time over time on the wall; `None`: as fast as it goes.
+    /// Ratio of rig time to wall-clock time; `None`: as fast as possible.
     pub pace: Option<f64>,
-    /// What the rig reads and is told.
+    /// Measured channels and setpoints of the rig.
     pub channels: &'a [Channel],
     /// Epoch time of run time 0, ns, as in the recording.
     pub start_time_ns: u64,
-    /// What the runner looks at.
+    /// Operator requests read by the runner.
     pub operator: Arc<Operator>,
     /// Stops at the end of the step.
     pub after_step: Arc<AtomicBool>,

@@ -1,4 +1,4 @@
-//! All who look on at a run: browsers on its page, and viewers of its readings.
+//! All observers of a run: browsers on its live page, and viewers of its readings.
 
 use crate::live::Live;
 use crate::live_error::LiveError;
@@ -11,33 +11,33 @@ use std::path::Path;
 #[cfg(feature = "foxglove")]
 use std::sync::OnceLock;
 
-/// What was asked for.
+/// Requested outputs.
 #[derive(Debug, Clone, Default)]
 pub struct Asked<'a> {
     /// Address of the page.
     pub page: Option<&'a str>,
-    /// What it is served with over TLS.
+    /// Certificate and key for TLS.
     pub tls: Option<TlsFiles>,
     /// Address of the stream for Foxglove and Lichtblick.
     #[cfg(feature = "foxglove")]
     pub viewers: Option<&'a str>,
 }
 
-/// Nobody, or some.
+/// The observers, possibly none.
 pub struct Observers<'a> {
     page: Option<Live>,
     #[cfg(feature = "foxglove")]
     viewers: OnceLock<Viewers>,
-    // Without the feature nothing but the page is left of it.
+    // Without the feature only the page uses it.
     #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "viewers look at it"))]
     asked: Asked<'a>,
 }
 
 impl<'a> Observers<'a> {
-    /// Takes the page's address; nothing is served yet.
+    /// Binds the page's address; serving starts later.
     ///
     /// # Errors
-    /// [`LiveError`] where it is none, or is taken, or certificate and key are of no use.
+    /// [`LiveError`] if the address is invalid or in use, or certificate and key are unusable.
     pub fn open(asked: Asked<'a>) -> Result<Self, LiveError> {
         let page = asked.page.map(|address| Live::open(address, asked.tls.as_ref())).transpose()?;
         Ok(Observers {
@@ -48,12 +48,12 @@ impl<'a> Observers<'a> {
         })
     }
 
-    /// Whether somebody may press buttons.
+    /// Whether the operator has buttons.
     pub fn have_buttons(&self) -> bool {
         self.page.is_some()
     }
 
-    /// Whether anybody is shown points as they are identified.
+    /// Whether any observer shows points as they are identified.
     pub fn are_there(&self) -> bool {
         #[cfg(feature = "foxglove")]
         if self.asked.viewers.is_some() {
@@ -62,10 +62,10 @@ impl<'a> Observers<'a> {
         self.page.is_some()
     }
 
-    /// Begins to serve; what whoever starts the run is to be told, a line each.
+    /// Starts to serve. Returns lines of information for the operator.
     ///
     /// # Errors
-    /// [`LiveError`] where the stream's address is none of this machine's, or is taken.
+    /// [`LiveError`] if the stream's address is not local or is in use.
     pub fn begin(&self, run: &LiveRun<'_>) -> Result<Vec<String>, LiveError> {
         let mut lines = Vec::new();
         if let Some(page) = &self.page {
@@ -77,13 +77,13 @@ impl<'a> Observers<'a> {
         if let Some(address) = self.asked.viewers {
             let viewers = Viewers::open(address, run.start_time_ns, run.channels)?;
             lines.push(format!("for Foxglove and Lichtblick: {}", viewers.url()));
-            // It is begun once.
+            // This is the only start.
             let _ = self.viewers.set(viewers);
         }
         Ok(lines)
     }
 
-    /// Passes on what the session tells. Never waits for anybody.
+    /// Forwards a session event. Never waits for an observer.
     pub fn show(&self, event: &SessionEvent) {
         if let Some(page) = &self.page {
             page.show(event);
@@ -94,7 +94,7 @@ impl<'a> Observers<'a> {
         }
     }
 
-    /// Says how it ended and where the page of the run is.
+    /// Reports the outcome and the run's page.
     pub fn end(&self, outcome: &str, page: Option<&Path>) {
         if let Some(live) = &self.page {
             live.end(outcome, page);

@@ -1,14 +1,14 @@
 //! The operator's buttons.
 
-/// What a button asks for.
+/// Command of a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Pressed {
-    /// Stay at this step.
+    /// Hold the current step.
     Hold,
-    /// Let it end.
+    /// Continue after a hold.
     GoOn,
     /// Stop the run at the end of the step.
     StopAfterStep,
-    /// Into the safe state, now.
+    /// Go to the safe state now.
     SafeNow,
 }

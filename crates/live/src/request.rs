@@ -1,16 +1,16 @@
-//! One request, read with care: whoever sends it may be anybody.
+//! Reads one request from an untrusted client.
 
 use std::io::Read;
 use std::time::{Duration, Instant};
 
-/// Longest head of a request, bytes.
+/// Maximum size of a request head, bytes.
 const HEAD_MAX: usize = 8192;
-/// Most headers of a request.
+/// Maximum number of headers.
 const HEADERS_MAX: usize = 64;
-/// Longest time that a request may take to arrive.
+/// Maximum time for a request to arrive.
 pub(crate) const ARRIVES_WITHIN: Duration = Duration::from_secs(10);
 
-/// What is looked at of a request.
+/// The fields of a request that are used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Request {
     pub(crate) method: String,
@@ -20,7 +20,7 @@ pub(crate) struct Request {
     pub(crate) authorization: Option<String>,
 }
 
-/// Reads the head of a request; a body is never looked at. `None` where it is not one, is too long, or takes too long.
+/// Reads the head of a request; the body is ignored. `None` if it is invalid, too long, or too slow.
 pub(crate) fn read_request(stream: &mut impl Read) -> Option<Request> {
     let until = Instant::now() + ARRIVES_WITHIN;
     let (mut head, mut piece) = (Vec::new(), [0; 1024]);
@@ -39,7 +39,7 @@ pub(crate) fn read_request(stream: &mut impl Read) -> Option<Request> {
 }
 
 fn request_of(parsed: &httparse::Request<'_, '_>) -> Option<Request> {
-    // A header that is there twice says two things: neither is taken.
+    // A duplicate header is ambiguous, so neither is used.
     let header = |name: &str| {
         let mut values = parsed.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
         let (first, second) = (values.next(), values.next());

@@ -1,4 +1,4 @@
-//! The server: a thread for each of few connections, one request each.
+//! The server: one thread per connection, one request per connection.
 
 use crate::access::Access;
 use crate::connections::{Connection, Connections};
@@ -12,38 +12,38 @@ use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
-/// Longest time that a browser may keep one read or write waiting.
+/// Maximum time that a browser may block one read or write.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Bytes of a page that are written at once.
+/// Bytes of a page per write.
 const PIECE: usize = 1 << 14;
-/// A stream that has nothing to say says so this often: a browser that hears nothing for longer connects again.
+/// Interval of heartbeats on an idle stream. Browsers reconnect after a longer silence.
 const HEARTBEAT: Duration = Duration::from_secs(2);
 const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
                        X-Frame-Options: DENY\r\nConnection: close\r\n";
 
-/// What is served.
+/// The served content.
 pub(crate) struct Served {
     pub(crate) page: String,
     pub(crate) access: Access,
     pub(crate) hub: Hub,
-    /// Where the page is served over TLS.
+    /// TLS settings, if the page uses TLS.
     pub(crate) tls: Option<Tls>,
-    /// The whole state as a message.
+    /// The complete state as a message.
     pub(crate) snapshot: Box<dyn Fn() -> Arc<str> + Send + Sync>,
-    /// Does what a button asks for.
+    /// Executes a button command.
     pub(crate) ask: Box<dyn Fn(Pressed) + Send + Sync>,
-    /// Who is connected.
+    /// The open connections.
     pub(crate) connections: Arc<Connections>,
 }
 
-/// Answers until the process ends.
+/// Serves until the process ends.
 pub(crate) fn serve(listener: &TcpListener, served: &Arc<Served>) {
     for stream in listener.incoming().filter_map(Result::ok) {
         let Some(connection) = served.connections.admit(&stream) else { continue };
         let served = served.clone();
-        // Where no thread can be started the connection is dropped with what it should have run.
+        // If no thread can be started, the connection is dropped with its closure.
         let _ = std::thread::Builder::new().name("live".to_owned()).spawn(move || {
-            // A browser that goes away ends its own connection.
+            // A browser that goes away ends only its own connection.
             let _ = connected(stream, &served, &connection);
         });
     }
@@ -67,7 +67,7 @@ fn answer(stream: &mut (impl Read + Write), served: &Served, connection: &Connec
         return plain(stream, "403 Forbidden");
     }
     match (request.method.as_str(), request.path.as_str()) {
-        // Without data of the run: it is read before anybody can show a token.
+        // The page contains no run data, because it is read before a token can be checked.
         ("GET", "/") => page(stream, &served.page),
         ("GET", "/events") if !access.has_token(&request) => plain(stream, "401 Unauthorized"),
         ("GET", "/events") => events(stream, served, connection),
@@ -109,7 +109,7 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
         "HTTP/1.1 200 OK\r\n{HEADERS}Content-Security-Policy: frame-ancestors 'none'\r\n\
          Content-Type: text/html; charset=utf-8\r\nContent-Length: {length}\r\n\r\n"
     )?;
-    // A reader of a byte at a time keeps its slot no longer than this.
+    // Limits a client that reads one byte at a time.
     let until = Instant::now() + PATIENCE;
     for piece in page.as_bytes().chunks(PIECE) {
         if Instant::now() > until {
@@ -120,7 +120,7 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
     Ok(())
 }
 
-/// The whole state, then every message, until one side goes away.
+/// Sends the complete state, then every message, until one side disconnects.
 fn events(stream: &mut impl Write, served: &Served, connection: &Connection) -> std::io::Result<()> {
     let Some(messages) = served.hub.join((served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");
@@ -142,8 +142,8 @@ mod tests {
     use std::io::{BufRead, BufReader};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// From one address, as through a tunnel: all streams that there are, and more silent lines than there is room for, some of them in the
-    /// middle of a request or of the page. The button is answered and the page is read.
+    /// All from one address, as through a tunnel: the maximum number of streams, and more silent connections than allowed. Some are in the
+    /// middle of a request or of the page. The button still works and the page can be read.
     #[test]
     fn a_button_gets_through_whoever_holds_lines_open() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();

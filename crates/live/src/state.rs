@@ -1,14 +1,14 @@
-//! What a browser is shown, bounded whatever the run does.
+//! The state shown by a browser, with a size limit for any run.
 
 use mapper_page::{LiveMap, LivePoint, Planned};
 use serde::Serialize;
 use std::collections::VecDeque;
 
-/// Seconds of the rig's time whose readings are kept.
+/// Number of stored rows of readings, one per second of rig time.
 pub(crate) const TRACE_ROWS: usize = 300;
-/// Events that are kept, the latest.
+/// Maximum number of stored events; the latest are kept.
 pub(crate) const EVENTS_MAX: usize = 200;
-/// Points that are kept: more than a night has.
+/// Maximum number of stored points, more than a night produces.
 pub(crate) const POINTS_MAX: usize = 2000;
 
 #[derive(Debug, Clone, Serialize)]
@@ -16,12 +16,12 @@ pub(crate) struct State {
     pub(crate) machine: String,
     pub(crate) campaign: String,
     pub(crate) units: Units,
-    /// Names of the speed lines, slow to fast.
+    /// Names of the speed lines, from slow to fast.
     pub(crate) lines: Vec<String>,
-    /// Where points are expected on the map.
+    /// Expected points on the map.
     pub(crate) planned: Vec<Planned>,
     pub(crate) steps: usize,
-    /// Rig time planned, s.
+    /// Planned rig time, s.
     pub(crate) duration_s: f64,
     pub(crate) pace: Option<f64>,
     /// Names and units of the columns of `rows`.
@@ -56,14 +56,14 @@ pub(crate) struct Told {
     pub(crate) message: String,
 }
 
-/// What changes every second.
+/// Values that change every second.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct Now {
     pub(crate) t_s: f64,
-    /// What is done, in words.
+    /// Current activity, in words.
     pub(crate) phase: String,
     pub(crate) step: Option<Step>,
-    /// Rig time to the end and half the width of its 95 % interval, s.
+    /// Remaining rig time and half-width of its 95 % interval, s.
     pub(crate) left_s: f64,
     pub(crate) left_half_s: f64,
     pub(crate) holds: bool,
@@ -71,26 +71,26 @@ pub(crate) struct Now {
     pub(crate) readings: Vec<Reading>,
 }
 
-/// The step that is under way.
+/// The current step.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Step {
-    /// Its number, from 1; `None` for one that a resumed run makes once more.
+    /// Its number, from 1; `None` for one that a resumed run repeats.
     pub(crate) step: Option<usize>,
     pub(crate) place: String,
     pub(crate) start_s: f64,
     pub(crate) end_s: f64,
-    /// When it is expected to have settled, s after its start.
+    /// Expected settling time, s after its start.
     pub(crate) settle_s: Option<f64>,
 }
 
-/// A channel, as it reads and as it may.
+/// A channel with its reading and its limits.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Reading {
     pub(crate) symbol: &'static str,
     pub(crate) what: &'static str,
     pub(crate) unit: String,
     pub(crate) value: f64,
-    /// The value as reports write it.
+    /// The value formatted as in reports.
     pub(crate) shown: String,
     pub(crate) low: Option<f64>,
     pub(crate) high: Option<f64>,

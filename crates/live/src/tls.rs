@@ -1,46 +1,46 @@
-//! The page over TLS, with a certificate that the operator has.
+//! TLS for the page, with a certificate from the operator.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Files of a server, PEM.
+/// PEM files of the server.
 #[derive(Debug, Clone)]
 pub struct TlsFiles {
-    /// The certificate, and those between it and one that browsers know.
+    /// The certificate, followed by intermediate certificates up to one that browsers trust.
     pub certificate: PathBuf,
     /// Its private key.
     pub key: PathBuf,
 }
 
-/// Why a page cannot be served over TLS.
+/// Why the page cannot be served over TLS.
 #[derive(Debug, thiserror::Error)]
 pub enum TlsError {
-    /// A file cannot be read, or is none.
+    /// A file cannot be read or has the wrong content.
     #[error("{}: {why}; it has to be a {what} in PEM", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What it has to hold.
+        /// The required content.
         what: &'static str,
-        /// What is wrong.
+        /// The problem.
         why: String,
     },
-    /// Certificate and key do not fit.
+    /// Certificate and key do not match.
     #[error("{} and {} cannot be used together: {why}", files.certificate.display(), files.key.display())]
     Pair {
         /// The files.
         files: TlsFiles,
-        /// What is wrong.
+        /// The problem.
         why: String,
     },
-    /// The program was built without.
+    /// The program was built without TLS.
     #[error("this program was built without TLS; build it with `--features tls`, or use a tunnel (ssh -L)")]
     NotBuilt,
 }
 
-/// A connection whose requests have to arrive by a certain time: one that drips keeps its slot no longer.
+/// A connection with a deadline for its request, so that a slow sender does not keep its slot.
 pub(crate) struct Punctual {
     pub(crate) stream: TcpStream,
     pub(crate) until: Instant,
@@ -80,11 +80,11 @@ mod with {
     use std::io::Write;
     use std::sync::Arc;
 
-    /// What a server says who it is with.
+    /// TLS configuration of the server.
     #[derive(Clone)]
     pub(crate) struct Tls(Arc<ServerConfig>);
 
-    /// Reads both files and holds them against each other.
+    /// Reads both files and checks that they match.
     pub(crate) fn read(files: &TlsFiles) -> Result<Tls, TlsError> {
         let file =
             |path: &std::path::Path, what, why: String| TlsError::File { path: path.to_owned(), what, why };
@@ -108,7 +108,7 @@ mod with {
     }
 
     impl Tls {
-        /// Does what is to be done on a connection over TLS, and ends it so that the other side knows that nothing was cut off.
+        /// Runs `answer` on a connection over TLS and closes it properly, so that the client knows that no data were cut off.
         pub(crate) fn over(
             &self,
             stream: Punctual,
@@ -128,7 +128,7 @@ mod with {
 mod without {
     use super::{Punctual, TlsError, TlsFiles};
 
-    /// There is none.
+    /// Placeholder for builds without TLS.
     #[derive(Clone)]
     pub(crate) enum Tls {}
 

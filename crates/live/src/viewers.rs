@@ -1,7 +1,7 @@
-//! The same topics that the recording has, while it is made, for viewers that speak Foxglove's WebSocket protocol.
+//! Publishes the topics of the recording during the run, to viewers with Foxglove's WebSocket protocol.
 //!
-//! Each viewer has a queue of its own in the library, which drops the oldest message where the viewer is slow: telling waits
-//! for nobody. Nothing can be written: the server offers no service, no parameter and no topic of the viewer's own.
+//! The library keeps a queue for each viewer and drops the oldest message if the viewer is slow, so publishing never waits. Viewers have no
+//! write access: the server offers no services, parameters or client topics.
 
 use foxglove::{
     ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
@@ -14,13 +14,13 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
-/// Messages that wait for one viewer: three minutes of the rig's time.
+/// Queue length of one viewer, messages: three minutes of rig time.
 const WAITING_MAX: usize = 1024;
 
-/// Topic of points as they are identified, each by itself.
+/// Topic of points identified separately during the run.
 const POINT_TOPIC: &str = "/point";
 
-/// Fields of a point with their units and what they are.
+/// Fields of a point with units and descriptions.
 const POINT_FIELDS: [(&str, &str, &str); 9] = [
     ("step", "1", "number of the step, from 1"),
     ("speed_corrected_rpm", "rpm", "corrected shaft speed"),
@@ -33,16 +33,16 @@ const POINT_FIELDS: [(&str, &str, &str); 9] = [
     ("residual_rms_k", "K", "what the fit leaves of T2"),
 ];
 
-/// Why there is no stream for viewers.
+/// Why the stream for viewers cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewersError {
-    /// It is not an address of this machine.
+    /// The address is not a local one.
     #[error(
         "`{text}` is not an address of this machine, such as 127.0.0.1:8765: viewers know no token, so that others get there by a \
          tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
     )]
     Address {
-        /// What was given.
+        /// The given text.
         text: String,
     },
     /// The library cannot serve.
@@ -52,26 +52,26 @@ pub enum ViewersError {
     Serve {
         /// The address.
         address: SocketAddr,
-        /// Why.
+        /// The reason.
         source: FoxgloveError,
     },
 }
 
-/// A stream of what is read, for viewers.
+/// A stream of readings for viewers.
 pub struct Viewers {
     address: SocketAddr,
     start_time_ns: u64,
     topics: BTreeMap<&'static str, Arc<RawChannel>>,
-    /// Topics are closed with it.
+    /// Its topics are closed when this is dropped.
     _context: Arc<Context>,
 }
 
 impl Viewers {
-    /// Begins to serve at an address of this machine, e.g. `127.0.0.1:8765`, readings of these channels. `start_time_ns`: epoch
-    /// time of run time 0, as in the recording.
+    /// Serves readings of these channels at a local address, e.g. `127.0.0.1:8765`. `start_time_ns`: epoch time of run time 0, as in the
+    /// recording.
     ///
     /// # Errors
-    /// [`ViewersError`] where the address is none of this machine's, or is taken.
+    /// [`ViewersError`] if the address is not local or is in use.
     pub fn open(text: &str, start_time_ns: u64, channels: &[Channel]) -> Result<Viewers, ViewersError> {
         let bad = || ViewersError::Address { text: text.to_owned() };
         let mut address: SocketAddr = text.parse().map_err(|_| bad())?;
@@ -79,8 +79,8 @@ impl Viewers {
             return Err(bad());
         }
         let context = Context::new();
-        // All topics are there before anybody looks: the library tells a viewer of a new one a moment before it takes
-        // a subscription to it, and one that is quicker goes without.
+        // All topics must exist before a viewer connects. The library announces a new topic slightly before it accepts subscriptions, and a fast
+        // viewer would miss it.
         let measured = |group: &Group| channels.iter().any(|channel| channel.info().group == *group);
         let groups = Group::ALL.into_iter().filter(measured);
         let topics = groups
@@ -95,17 +95,17 @@ impl Viewers {
             .context(&context)
             .start_blocking()
             .map_err(|source| ViewersError::Serve { address, source })?;
-        // The server lives as long as the process.
+        // The server lives until the process ends.
         address.set_port(server.port());
         Ok(Viewers { address, start_time_ns, topics, _context: context })
     }
 
-    /// What a viewer is told to open.
+    /// URL for a viewer.
     pub fn url(&self) -> String {
         format!("ws://{}", self.address)
     }
 
-    /// Passes on what the session tells. Never waits for a viewer.
+    /// Forwards a session event. Never waits for a viewer.
     pub fn show(&self, event: &SessionEvent) {
         match event {
             SessionEvent::Readings { t_s, values } => {
@@ -139,13 +139,13 @@ impl Viewers {
 
     fn say(&self, topic: &str, t_s: f64, message: &Value) {
         let Some(channel) = self.topics.get(topic) else { return };
-        // A run lasts for days at most: its nanoseconds fit.
+        // A run lasts days at most, so its nanoseconds fit.
         let log_time = self.start_time_ns.saturating_add((t_s.max(0.0) * 1e9).round() as u64);
         channel.log_with_meta(message.to_string().as_bytes(), PartialMetadata::with_log_time(log_time));
     }
 }
 
-/// A topic as viewers know it; `None` where the library refuses it.
+/// Defines a topic for viewers; `None` if the library refuses it.
 fn defined(context: &Arc<Context>, topic: Topic) -> Option<Arc<RawChannel>> {
     let name = topic.name.trim_start_matches('/').replace('/', ".");
     ChannelBuilder::new(topic.name)

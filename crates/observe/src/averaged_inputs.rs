@@ -1,7 +1,7 @@
-//! Boundary conditions as recorded, for the model to be driven by: averaged where they are quiet, as they are after jumps.
+//! Recorded boundary conditions as model inputs: averaged in quiet segments, unaveraged after jumps.
 //!
-//! Unlike [`smoothed_inputs`](crate::smoothed_inputs) these keep the noise of means, which is independent from one
-//! stretch to the next, and follow an input sensor that steps: what the search for drift needs.
+//! Unlike [`smoothed_inputs`](crate::smoothed_inputs) these keep the noise of means, which is independent between segments, and follow a step
+//! of an input sensor. The search for drift needs both.
 
 use crate::channels::{DRIVERS, boundary_condition};
 use crate::lagged_command::{LaggedCommand, Level, Response, measured_valve_response};
@@ -12,24 +12,24 @@ use mapper_core::{Channel, Recording};
 use mapper_physics::inputs::{Inputs, InputsError, InterpolatedInputs};
 use mapper_physics::params::BoundaryConditions;
 
-/// After a jump readings are taken as they are for this long, s: actuators need some tenths.
+/// Time after a jump for which readings are not averaged, s: actuators need some tenths.
 const RAW_S: f64 = 3.0;
-/// Lag beyond which it is not the valve that is slow, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to
-/// several seconds. Judgement.
+/// Largest lag that is attributed to the valve, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to several
+/// seconds. Judgement.
 const SLOWEST_VALVE_S: f64 = 1.5;
-/// Then means over some seconds. A loop that holds the speed trims P3 by a per cent within ten seconds of the jump, behind which a mean
-/// must not lag; it is not shorter than the steps in which the model is driven, which would see single ones of them.
+/// Averaging times after that. A loop that holds the speed trims P3 by a per cent within ten seconds of the jump, and a mean must not lag
+/// behind that. It is at least the time step of the model, which would otherwise see single means.
 const AFTER_JUMP: Schedule = Schedule {
     first_s: RAW_S,
     lengths_s: &[(8.0, 0.5), (20.0, 1.0), (50.0, 5.0), (f64::INFINITY, 10.0)],
     shortest_s: 0.1,
     shortest_ratio: 0.5,
 };
-/// Means where no jump came before.
+/// Averaging times without a previous jump.
 const AT_REST: Schedule =
     Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.1, shortest_ratio: 0.5 };
 
-/// Boundary conditions from jump to jump: never interpolated across one, however close to it.
+/// Boundary conditions between jumps, never interpolated across a jump.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AveragedInputs {
     starts_s: Vec<f64>,
@@ -55,12 +55,11 @@ impl Inputs for AveragedInputs {
 }
 
 impl AveragedInputs {
-    /// The inputs of a recording until `end_s`. `jumps` are the times at which commands change, rising, s, with the valve
-    /// from then on: the recorded command itself may show a change one sample late. `nominal` stands for what is not
-    /// recorded.
+    /// The inputs of a recording until `end_s`. `jumps` are the times of command changes, rising, s, with the valve opening after each; the
+    /// recorded command may show a change one sample late. `nominal` replaces channels that are not recorded.
     ///
     /// # Errors
-    /// [`InputsError`] where jumps do not rise.
+    /// [`InputsError`] if jumps do not rise.
     pub fn read(
         recording: &Recording,
         nominal: &BoundaryConditions,
@@ -91,7 +90,7 @@ impl AveragedInputs {
     }
 }
 
-/// How the valve follows, as the recording tells; at once where it does not tell, or is slower than a valve: that is the flow meter.
+/// Response of the valve, from the recording; immediate if unknown, or if it is the flow meter that lags (slower than any valve).
 fn valve_response(recording: &Recording, nominal: &BoundaryConditions) -> Response {
     let measured =
         Table::new(recording).and_then(|table| measured_valve_response(&table, recording, nominal.p1_pa));
@@ -117,11 +116,11 @@ impl Nodes<'_> {
                 .get(&Channel::P3)
                 .map(|series| series.slice(start_s, raw_end_s - BEFORE_S).0.to_vec())
                 .unwrap_or_default();
-            // The first node lies at the jump itself, from which on the valve moves.
+            // The first node is at the jump itself, where the valve starts to move.
             let mut times = vec![start_s];
             times.extend(t_s.into_iter().filter(|t| *t > start_s));
             for t_s in times {
-                // Quantities that do not jump keep the mean of the whole stretch.
+                // Quantities that do not jump keep the mean of the whole segment.
                 let mut row = self.means(start_s, raw_end_s);
                 row.valve_opening_ratio = self.command.valve_opening_ratio(t_s);
                 for channel in [Channel::P3, Channel::P4] {
@@ -180,8 +179,8 @@ mod tests {
     use mapper_core::{Series, StepKind, StepMarker};
     use mapper_physics::orifice;
 
-    /// A loop that holds the speed trims P3 by 2 kPa within some seconds of the jump: the inputs follow to a hundredth of that, what
-    /// the line between two means of half a second allows (curvature 2 kPa / (2 s)^2, over 8 x 0.5^2 s^2, is 16 Pa).
+    /// A loop that holds the speed trims P3 by 2 kPa within some seconds of the jump. The inputs follow to a hundredth of that: the
+    /// interpolation error between two half-second means is 16 Pa (curvature 2 kPa / (2 s)^2, over 8 x 0.5^2 s^2).
     #[test]
     fn the_trim_of_a_speed_loop_is_followed() {
         let jump_s = 20.0;
@@ -201,7 +200,7 @@ mod tests {
         }
     }
 
-    /// The flow through a valve that turns by 0.5 1/s, as the orifice equation has it: the inputs have its opening, not the command.
+    /// The orifice flow through a valve that moves at 0.5 1/s: the inputs have its opening, not the command.
     #[test]
     fn a_valve_that_takes_its_time_is_followed() {
         let opening =
@@ -248,7 +247,7 @@ mod tests {
         let inputs = AveragedInputs::read(&recording, &BoundaryConditions::default(), &jumps, 160.0).unwrap();
         for since_s in [0.5, 1.0, 1.5, 2.5, 10.0] {
             let off = inputs.at(40.0 + since_s).valve_opening_ratio - truth(40.0 + since_s);
-            // A twentieth of the jump: the flow through the orifice tells the opening no better while it moves.
+            // A twentieth of the jump: the orifice flow resolves the opening no better while it moves.
             assert!(off.abs() < 0.05, "{off} off {since_s} s after the jump");
         }
     }

@@ -11,18 +11,18 @@ pub struct Block {
     pub samples: std::ops::Range<usize>,
     /// Mean of their times, s.
     pub mean_s: f64,
-    /// Standard deviation of their times, s: the model's mean is taken from the two points at this distance, which
-    /// is exact for cubics in the first two moments.
+    /// Standard deviation of their times, s: the model's mean is taken from the two points at this distance, which is exact for cubics in the
+    /// first two moments.
     pub spread_s: f64,
     /// Mean time since the jump, s.
     pub since_jump_s: f64,
 }
 
-/// Blocks from `start_s` to `end_s` as the schedule has them; those without samples are left out.
+/// Blocks from `start_s` to `end_s` according to the schedule; empty ones are omitted.
 pub fn blocks(table: &Table, start_s: f64, end_s: f64, schedule: &Schedule) -> Vec<Block> {
     let stretches = schedule.stretches(start_s, end_s, table.interval_s);
     let block = |(from_s, to_s): (f64, f64)| {
-        // Half a sample late, so that a sample on an edge falls on the same side whatever its last digit.
+        // Half a sample late, so that rounding does not move a sample across an edge.
         let samples = table.range(from_s + 0.5 * table.interval_s, to_s + 0.5 * table.interval_s);
         let times = &table.t_s[samples.clone()];
         let mean_s = mean_reading(times)?;
@@ -33,7 +33,7 @@ pub fn blocks(table: &Table, start_s: f64, end_s: f64, schedule: &Schedule) -> V
     stretches.into_iter().filter_map(block).collect()
 }
 
-/// Mean of a channel in a block; `None` where samples are missing.
+/// Mean of a channel in a block; `None` if samples are missing.
 pub fn block_mean(values: &[f64], block: &Block) -> Option<f64> {
     mean_reading(&values[block.samples.clone()])
 }

@@ -1,9 +1,9 @@
-//! Which channels drive the model, and which are compared with it.
+//! Channels that drive the model, and channels that are compared with it.
 
 use mapper_core::Channel;
 use mapper_physics::params::BoundaryConditions;
 
-/// What the model predicts and a sensor reads. P3 is a boundary condition and is compared only where its lag matters.
+/// Outputs of the model that a sensor measures. P3 is a boundary condition and is compared only if its lag matters.
 pub const OUTPUTS: [Channel; 8] = [
     Channel::ShaftSpeed,
     Channel::P2,
@@ -19,7 +19,7 @@ pub const OUTPUTS: [Channel; 8] = [
 pub const DRIVERS: [Channel; 6] =
     [Channel::T1, Channel::P1, Channel::P3, Channel::T3, Channel::P4, Channel::TOil];
 
-/// The boundary condition that a channel reads; `None` for channels that drive nothing.
+/// The boundary condition that a channel measures; `None` for channels that are not inputs.
 pub fn boundary_condition(boundary: &mut BoundaryConditions, channel: Channel) -> Option<&mut f64> {
     match channel {
         Channel::T1 => Some(&mut boundary.t1_k),

@@ -1,16 +1,15 @@
-//! What is declared of rig and model: noise, offsets, gains, tolerances. Anything inside them is no news.
+//! Declared uncertainty of rig and model: noise, offsets, gains, tolerances. A deviation within it is not a finding.
 
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour};
 use mapper_physics::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Declared uncertainty of every sensor of a recording, by the one rule that holds everywhere.
+/// Declared uncertainty of every sensor of a recording, by a rule common to all programs.
 ///
-/// The most specific word counts. `channel_map` speaks of the sensors of this very recording: where it declares a channel,
-/// its noise and offset replace those of the campaign's `sensors`. A gain of 0 is one that was not declared: the
-/// campaign's then stands for the channel map's, and for a flow meter for which neither gives one, the tolerances'
-/// `flow_meter_gain_ratio`.
+/// The most specific declaration applies. `channel_map` describes the sensors of this recording: for a channel declared there, its noise and
+/// offset replace those of the campaign's `sensors`. A gain of 0 means that none was declared. The campaign's gain then replaces the channel
+/// map's; for a flow meter without either, the tolerances' `flow_meter_gain_ratio` applies.
 pub fn declared_uncertainties(
     sensors: &BTreeMap<Channel, DeclaredUncertainty>,
     tolerances: &ModelTolerances,
@@ -30,26 +29,26 @@ pub fn declared_uncertainties(
     declared
 }
 
-fn or(said: f64, otherwise: f64) -> f64 {
-    if said > 0.0 { said } else { otherwise }
+fn or(declared_value: f64, otherwise: f64) -> f64 {
+    if declared_value > 0.0 { declared_value } else { otherwise }
 }
 
-/// Everything that is declared.
+/// All declarations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Declared {
     /// Noise, offset and gain of each sensor, as [`declared_uncertainties`] merges them.
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
-    /// The noise over time.
+    /// Time correlation of the noise.
     pub noise_colour: NoiseColour,
     /// Tolerances of the model.
     pub tolerances: ModelTolerances,
-    /// Nominal boundary conditions, for what is not recorded.
+    /// Nominal boundary conditions for channels that are not recorded.
     pub nominal: BoundaryConditions,
-    /// Offsets that several sensors have in common, beside their own.
+    /// Offsets common to several sensors, in addition to their own.
     pub common_offsets: Vec<CommonOffset>,
 }
 
-/// An offset that several sensors of one dimension have in common: what an isothermal zero, which compares them with each other, leaves.
+/// A common offset of several sensors of one dimension: it remains after an isothermal zero, which only compares them with each other.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct CommonOffset {
     /// The sensors.
@@ -59,17 +58,17 @@ pub struct CommonOffset {
 }
 
 impl Declared {
-    /// What is declared of a channel; nothing where nobody says anything.
+    /// The declaration of a channel; zero if there is none.
     pub fn of(&self, channel: Channel) -> DeclaredUncertainty {
         self.sensors.get(&channel).copied().unwrap_or_default()
     }
 
-    /// Noise of one sample, in the channel's unit: as declared, or that of a usual sensor where none is.
+    /// Noise of one sample, in the channel's unit: as declared, otherwise that of a usual sensor.
     pub fn noise_sigma(&self, channel: Channel) -> f64 {
         or(self.of(channel).noise_sigma, usual_noise_sigma(channel))
     }
 
-    /// Fixed offset left after calibration, in the channel's unit.
+    /// Remaining fixed offset after calibration, in the channel's unit.
     pub fn offset_sigma(&self, channel: Channel) -> f64 {
         self.of(channel).offset_sigma
     }
@@ -103,7 +102,7 @@ mod tests {
             declared_uncertainties(&campaign, &tolerances, &map)[&flow]
         };
         assert_eq!(merged(0.0, None), sensor(1.0, 2.0, 0.005));
-        // A meter calibrated better than the tolerance is as good as it is declared.
+        // For a meter calibrated better than the tolerance, the declaration applies.
         assert_eq!(merged(0.002, None), sensor(1.0, 2.0, 0.002));
         assert_eq!(merged(0.002, Some(0.0)), sensor(3.0, 0.0, 0.002));
         assert_eq!(merged(0.002, Some(0.01)), sensor(3.0, 0.0, 0.01));

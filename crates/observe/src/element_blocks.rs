@@ -1,14 +1,14 @@
-//! The readings of several sensors as means over common short stretches, however each of them was sampled.
+//! The readings of several sensors as means over common short segments, independent of their sampling.
 
 use crate::plausible::is_reading;
 use mapper_core::{Channel, Series};
 
-/// Length of a block, s: longer than the memory of usual noise matters, shorter than the lag of a probe that is too large.
+/// Length of a block, s: longer than the correlation time of usual noise, shorter than the lag of a probe that is too large.
 const BLOCK_S: f64 = 2.0;
-/// Most blocks of a recording; a longer one has longer blocks.
+/// Maximum number of blocks of a recording; a longer one has longer blocks.
 const MAX_BLOCKS: f64 = 100_000.0;
 
-/// Means of each sensor, block by block; NaN where it gives none.
+/// Means of each sensor, block by block; NaN without a reading.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     pub(crate) start_s: f64,
@@ -20,7 +20,7 @@ pub(crate) struct Blocks {
 }
 
 impl Blocks {
-    /// The blocks of these sensors of a channel; `None` where none of them has a reading.
+    /// The blocks of these sensors of a channel; `None` if none of them has a reading.
     pub(crate) fn new(channel: Channel, sensors: &[Option<&Series>]) -> Option<Blocks> {
         let all = || sensors.iter().flatten();
         let start_s = all().filter_map(|series| series.t_s.first().copied()).reduce(f64::min)?;
@@ -53,7 +53,7 @@ impl Blocks {
         self.means.first().map_or(0, Vec::len)
     }
 
-    /// The mean of these sensors with these weights, block by block; NaN where one of them is missing.
+    /// The weighted mean of these sensors, block by block; NaN if one of them is missing.
     pub(crate) fn weighted(&self, weights: &[f64]) -> Vec<f64> {
         let at = |block: usize| {
             let used = weights.iter().zip(&self.means).filter(|(weight, _)| **weight > 0.0);
@@ -62,7 +62,7 @@ impl Blocks {
         (0..self.count()).map(at).collect()
     }
 
-    /// How fast a sensor's reading changes at each block, in its unit per second; NaN at both ends and beside gaps.
+    /// Rate of change of a sensor's reading at each block, in its unit per second; NaN at both ends and next to gaps.
     pub(crate) fn slope_s(&self, sensor: usize) -> Vec<f64> {
         let means = &self.means[sensor];
         let at = |block: usize| match (block.checked_sub(1), means.get(block + 1)) {

@@ -1,30 +1,30 @@
-//! What was made of the several sensors of a channel: which are left out and why, in values and in words.
+//! Results for the several sensors of a channel: which are left out and why, as values and as text.
 
 use mapper_core::{Channel, DeclaredUncertainty, Element};
 use serde::Serialize;
 use std::fmt;
 
-/// Why one of several sensors is left out.
+/// Reason for leaving out one of several sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fault {
-    /// It reads something else than the others.
+    /// Its reading differs from the others.
     Off {
         /// Its reading minus theirs, in the channel's unit.
         by: f64,
         /// The same in declared standard deviations of that difference.
         sigmas: f64,
     },
-    /// It follows changes later than the others, or earlier.
+    /// It follows changes later or earlier than the others.
     Slow {
         /// Its lag minus theirs, s.
         lag_s: f64,
     },
-    /// It stands still while the others do not.
+    /// It is stuck while the others change.
     Stuck {
-        /// Run time from which on it does, s.
+        /// Run time from which it is stuck, s.
         from_s: f64,
-        /// What it reads, in the channel's unit.
+        /// Its constant reading, in the channel's unit.
         reading: f64,
     },
     /// It gives no reading for much of the time.
@@ -34,16 +34,16 @@ pub enum Fault {
     },
 }
 
-/// One of several sensors that is left out.
+/// A sensor that is left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FaultyElement {
-    /// Which.
+    /// Its number.
     pub element: Element,
-    /// What people call it.
+    /// Its display name.
     pub name: String,
-    /// With how many it was compared.
+    /// Number of sensors it was compared with.
     pub others: usize,
-    /// Why.
+    /// The reason.
     pub fault: Fault,
 }
 
@@ -90,31 +90,31 @@ impl fmt::Display for Short {
     }
 }
 
-/// Sensors that contradict each other without it being known which is wrong.
+/// Sensors that contradict each other, without a way to identify the wrong one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contradiction {
     /// The one that differs most from the others in use.
     pub name: String,
-    /// How it differs.
+    /// The difference.
     pub fault: Fault,
     /// Largest distance of a sensor in use from the fused reading, in the channel's unit: it widens the declared offset.
     pub widened_by: f64,
 }
 
-/// What the several sensors of a channel became.
+/// Result of fusing the several sensors of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FusedChannel {
     /// The channel.
     pub channel: Channel,
-    /// How many sensors it has.
+    /// Number of its sensors.
     pub sensors: usize,
-    /// Those left out.
+    /// The sensors left out.
     pub left_out: Vec<FaultyElement>,
-    /// That those left contradict each other.
+    /// Contradiction between the remaining ones.
     pub contradiction: Option<Contradiction>,
     /// Uncertainty of the fused reading.
     pub declared: DeclaredUncertainty,
-    /// Diameter of the one probe, m, that lags as the sensors in use do together.
+    /// Diameter of a single probe, m, with the same lag as the sensors in use together.
     pub probe_diameter_m: f64,
 }
 

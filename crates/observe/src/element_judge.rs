@@ -1,8 +1,8 @@
-//! Which of several sensors of a channel is off, slow, stuck or silent, judged over a whole recording.
+//! Judges which of several sensors of a channel has an offset or a lag, is stuck or gives no data, over a whole recording.
 //!
-//! Each is held against the weighted mean of the others in use; the worst one that is beyond its limit is left out, and the
-//! rest judged anew, as long as more than half remain. Two that differ cannot say which of them is wrong. A sensor that
-//! stands still or gives nothing says it by itself.
+//! Each sensor is compared with the weighted mean of the others in use. The worst one beyond its limit is left out, and the remaining ones are
+//! judged again, as long as more than half remain. With two, the wrong one cannot be identified. A stuck or silent sensor is identified by its
+//! own readings.
 
 use crate::element_blocks::Blocks;
 use crate::element_fault::Fault;
@@ -11,47 +11,46 @@ use mapper_numerics::coloured_noise::ColouredNoise;
 use mapper_numerics::statistics::mean;
 use mapper_physics::thermocouple;
 
-/// Share of sound recordings in which some sensor is left out for its offset; half of what may be said wrongly at all.
+/// Share of fault-free recordings in which a sensor is left out for its offset; half of the permitted false alarms.
 pub(crate) const FALSE_ALARMS_RATIO: f64 = 0.005;
-/// Parts of the recording whose mean differences are judged each: a sensor that goes off in the middle is off in the last of
-/// them in full.
+/// Number of parts of the recording, each judged by its mean difference: an offset that starts in the middle shows in full in the last part.
 const PARTS: usize = 4;
-/// Fewest blocks that say anything.
+/// Minimum number of blocks for a decision.
 const MIN_BLOCKS: usize = 10;
-/// Share of the recording without a reading from which on a sensor is silent, where another one has readings.
+/// Share of the recording without a reading above which a sensor is silent, if another one has readings.
 const SILENT_RATIO: f64 = 0.5;
-/// Time and samples over which a reading that repeats to the last digit is one that stands still, s.
+/// Time and number of samples for which a reading repeats to the last digit before it counts as stuck, s.
 const FROZEN_S: f64 = 20.0;
 const FROZEN_SAMPLES: usize = 20;
-/// Share of samples that must differ from the one before them for a sensor to be alive: a coarse digit repeats often.
+/// Share of samples that must differ from the one before for a live sensor: a coarse digit repeats often.
 const ALIVE_RATIO: f64 = 0.2;
-/// Noise of a block within which a reading stands still, standard deviations; that is passed by chance in 1e-8 of them.
+/// Band of block noise within which a reading counts as constant, standard deviations; chance exceeds it in 1e-8 of blocks.
 const STILL_SIGMAS: f64 = 6.0;
-/// How far the others must have moved meanwhile, in widths of that band, and for how many blocks (20 s): a slow probe has come
-/// half of the way by then.
+/// Minimum movement of the others meanwhile, in widths of that band, and its duration in blocks (20 s): a slow probe has completed half of the
+/// change by then.
 const MOVED_BANDS: f64 = 4.0;
 const MOVED_BLOCKS: usize = 10;
-/// Difference of lags that is never too large, s: over the slopes of a usual window it is worth less than a sensor's offset.
+/// Difference of lags that is always acceptable, s: at the slopes of a usual window it is smaller than a sensor's offset.
 const LAG_S: f64 = 0.5;
-/// How well a lag follows from the diameter of a tip, ratio: tips are no spheres, and flows are not known here.
+/// Accuracy of a lag computed from the tip diameter, ratio: tips are not spheres, and the flow is unknown here.
 const LAG_RATIO: f64 = 0.5;
-/// Standard errors by which a lag must show.
+/// Standard errors above which a lag is significant.
 const LAG_SIGMAS: f64 = 6.0;
-/// Standard errors of a regression are those of independent residuals; block after block they are not quite.
+/// Factor on the regression's standard errors, which assume independent residuals; those of blocks are slightly correlated.
 const DEPENDENT_RESIDUALS: f64 = 2.0;
-/// How far slopes must lie beyond their noise for a lag to be seen.
+/// Ratio of slopes to their noise above which a lag can be seen.
 const MOVING_SIGMAS: f64 = 5.0;
-/// Usual outlet pipe, flow and temperature: lags of declared diameters are compared, not used.
+/// Typical outlet pipe, flow and temperature: lags of declared diameters are only compared with each other.
 const USUAL_PIPE_M: f64 = 0.035;
 const USUAL_FLOW_KG_S: f64 = 0.05;
 const USUAL_T2_K: f64 = 350.0;
 
-/// What was found of the sensors of one channel, by their positions from 0.
+/// Result for the sensors of one channel, by their positions from 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Judgement {
-    /// Those to be left out, why, and with how many they were compared.
+    /// Those to be left out, with the reason and the number of sensors compared.
     pub(crate) left_out: Vec<(usize, Fault, usize)>,
-    /// The worst difference among those left, where nobody knows which is wrong.
+    /// The worst difference among the remaining ones, if the wrong one cannot be identified.
     pub(crate) contradiction: Option<(usize, Fault)>,
 }
 
@@ -65,12 +64,12 @@ impl Judgement {
     }
 }
 
-/// Differences that are judged for their offset in a channel of `sensors` sensors: of two there is one.
+/// Number of offset differences judged in a channel of `sensors` sensors: two sensors have one.
 pub(crate) fn comparisons(sensors: usize) -> usize {
     if sensors > 2 { sensors } else { 1 }
 }
 
-/// Judges the sensors of a channel. `limit_sigmas`: how far one may be off.
+/// Judges the sensors of a channel. `limit_sigmas`: maximum offset of one.
 pub(crate) fn judge(
     channel: Channel,
     sensors: &[Option<&Series>],
@@ -108,7 +107,7 @@ struct Judge<'a> {
     limit_sigmas: f64,
 }
 
-/// How a sensor differs from the others; a severity above 1 is too much.
+/// Difference of a sensor from the others; a severity above 1 is too much.
 struct Difference {
     index: usize,
     severity: f64,
@@ -145,13 +144,13 @@ impl Judge<'_> {
             let still = self.frozen(*index, &others).or_else(|| self.unmoved(*index, &others));
             found.extend(still.map(|fault| (*index, fault, others.len())));
         }
-        // Where all stand still nothing moved them.
+        // If all are constant, nothing changed.
         if found.len() < in_use.len() {
             judgement.left_out.extend(found);
         }
     }
 
-    /// A reading that repeats to the last digit while all others are alive.
+    /// A reading that repeats to the last digit while all others change.
     fn frozen(&self, index: usize, others: &[usize]) -> Option<Fault> {
         let series = self.sensors[index]?;
         let (mut start, mut longest) = (0, (0, 0));
@@ -174,7 +173,7 @@ impl Judge<'_> {
         (long && others.iter().all(alive)).then_some(Fault::Stuck { from_s, reading })
     }
 
-    /// A reading that stays within its noise while the others move far and stay away.
+    /// A reading that stays within its noise while the others move far and stay there.
     fn unmoved(&self, index: usize, others: &[usize]) -> Option<Fault> {
         let band = STILL_SIGMAS * self.block_sigma(index).max(f64::MIN_POSITIVE);
         let own = &self.blocks.means[index];
@@ -205,7 +204,7 @@ impl Judge<'_> {
         self.declared.elements[index].declared.noise_sigma * variance.sqrt()
     }
 
-    /// How a sensor differs from the others in use.
+    /// Difference of a sensor from the others in use.
     fn difference(&self, index: usize, in_use: &[usize]) -> Option<Difference> {
         let weights = self.declared.weights(|other| other != index && in_use.contains(&other));
         let reference = self.blocks.weighted(&weights);
@@ -227,7 +226,7 @@ impl Judge<'_> {
         Some(slow.filter(|slow| slow.severity > off.severity).unwrap_or(off))
     }
 
-    /// Lag of a sensor behind the others: of first-order lags `x - r = -tau x'`, whatever the gas does.
+    /// Lag of a sensor relative to the others: first-order lags give `x - r = -tau x'` for any gas temperature.
     fn lag(&self, index: usize, weights: &[f64], rows: &[(f64, f64, f64)]) -> Option<Lag> {
         let count = rows.len() as f64;
         let mean_difference = mean(rows.iter().map(|row| row.0))?;
@@ -270,7 +269,7 @@ impl Judge<'_> {
             let variance = |other: usize| {
                 let declared = &self.declared.elements[other].declared;
                 let fixed = declared.offset_sigma.hypot(declared.gain_sigma_ratio * level);
-                // Of a sensor whose offset nobody declares, the noise of a sample says how good it is.
+                // For a sensor without a declared offset, use the noise of a sample as its scale.
                 let fixed = if fixed > 0.0 { fixed } else { declared.noise_sigma };
                 let samples = part.len() * self.blocks.samples[other];
                 fixed.powi(2) + declared.noise_sigma.powi(2) * self.colour.variance_of_mean(samples, length_s)
@@ -278,7 +277,7 @@ impl Judge<'_> {
             let others = weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0);
             let sigma =
                 (variance(index) + others.map(|(other, w)| w * w * variance(other)).sum::<f64>()).sqrt();
-            // Nothing is declared: nothing can be said.
+            // Without any declaration there is no decision.
             let sigmas = if sigma > 0.0 { by.abs() / sigma } else { 0.0 };
             if sigmas > worst.1 {
                 worst = (by, sigmas);

@@ -1,8 +1,8 @@
-//! Several sensors of a channel become one reading, by one rule for all who read recordings.
+//! Combines several sensors of a channel into one reading, by a rule common to all users of recordings.
 //!
-//! What is fused is a weighted mean: subtracting each sensor's isothermal zero before it, or that of the mean after it, is
-//! the same. Probes of several diameters are fused as they read: a mean of lagged readings lags by the mean of the lags to
-//! first order, which is all that the slow changes of a window ask for, and correcting each to the gas would multiply its noise.
+//! The fused reading is a weighted mean, so each sensor's isothermal zero can be subtracted before it, or that of the mean after it. Probes of
+//! several diameters are fused without correction: to first order their mean lags by the mean of the lags, which is sufficient for slow
+//! changes. Correcting each to the gas would multiply its noise.
 
 use crate::element_fault::{Contradiction, Fault, FaultyElement, FusedChannel};
 use crate::element_judge::{FALSE_ALARMS_RATIO, Judgement, comparisons, judge};
@@ -12,11 +12,11 @@ use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, Recording,
 use mapper_numerics::statistics::{mean, median, normal_quantile};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Declared errors by which an aligned reading may lie off the middle one of three or more before it is passed over.
+/// Maximum deviation of an aligned reading from the median of three or more, in declared errors, before it is skipped.
 const SPIKE_SIGMAS: f64 = 8.0;
 
-/// Judges the several sensors of all channels of a recording: what is left out of each. Channels of which `declared` has
-/// another number of sensors than the recording, or nothing, are left as they were recorded.
+/// Judges the several sensors of all channels of a recording, and lists those left out. Channels without a declaration, or with another number
+/// of declared sensors, are left as recorded.
 pub fn judge_elements(
     recording: &Recording,
     declared: &BTreeMap<Channel, RedundantSensors>,
@@ -42,14 +42,14 @@ pub fn judge_elements(
         .collect()
 }
 
-/// The number of sensors of a channel in a recording: that of the last one; 0 where it has but one reading.
+/// The number of sensors of a channel in a recording: that of the last one; 0 if it has only one reading.
 pub fn element_count(recording: &Recording, channel: Channel) -> usize {
     let of = recording.elements.keys().filter(|element| element.channel == channel);
     of.map(|element| element.number).max().unwrap_or(0)
 }
 
-/// The recording with each of these channels read by its sensors in use. Lost readings of one of them leave no step: the
-/// usual distance of each from the mean of all is known.
+/// The recording with each of these channels fused from its sensors in use. Lost readings of one sensor cause no step, because the typical
+/// difference of each from the mean of all is known.
 pub fn fuse(
     mut recording: Recording,
     declared: &BTreeMap<Channel, RedundantSensors>,
@@ -83,7 +83,7 @@ fn fused_channel(
     let name = |index: usize| declared.elements[index].name.clone();
     let mut together = declared.fused(uses);
     let contradiction = judgement.contradiction.map(|(index, fault)| {
-        // One of them may be right: one standard deviation reaches the farthest.
+        // Either may be right: the standard deviation includes the farthest one.
         let widened_by = if matches!(fault, Fault::Off { .. }) {
             farthest(channel, sensors, declared, &uses)
         } else {
@@ -108,7 +108,7 @@ fn fused_channel(
     }
 }
 
-/// Largest distance of the mean of a sensor in use from the fused mean.
+/// Maximum difference between the mean of a sensor in use and the fused mean.
 fn farthest(
     channel: Channel,
     sensors: &[Option<&Series>],
@@ -126,7 +126,7 @@ fn farthest(
     used().filter_map(|(_, mean)| Some(((*mean)? - fused).abs())).fold(0.0, f64::max)
 }
 
-/// The fused reading at each time; `None` where no sensor is in use.
+/// The fused reading at each time; `None` if no sensor is in use.
 fn fused_values(
     channel: Channel,
     sensors: &[Option<&Series>],
@@ -151,7 +151,7 @@ fn fused_values(
         };
         members.iter().map(read).sum::<Option<f64>>()
     };
-    // Distance of each sensor from the mean of all, over the rows in which all read.
+    // Difference of each sensor from the mean of all, over the rows with all readings.
     let mut distances = vec![0.0; members.len()];
     let mut rows = 0.0;
     let together: Vec<Option<f64>> = (0..t_s.len()).map(complete).collect();
@@ -183,8 +183,8 @@ fn fused_values(
     Some(values.collect())
 }
 
-/// What is said of recordings that are compared with each other: a sensor left out of one is left out of all, as the step
-/// between two sets of sensors would look like drift.
+/// Combines the results for recordings that are compared with each other: a sensor left out of one is left out of all, because a change of the
+/// set of sensors would look like drift.
 pub fn alike(
     judged: Vec<Vec<FusedChannel>>,
     declared: &BTreeMap<Channel, RedundantSensors>,

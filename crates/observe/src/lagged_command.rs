@@ -1,4 +1,4 @@
-//! P3 and the valve behind their commands: a first-order lag and a limited rate, and both as recorded.
+//! Response of P3 and the valve to their commands: a first-order lag and a rate limit. Also the recorded response.
 
 use crate::table::Table;
 use mapper_core::{Channel, Recording, StepMarker};
@@ -6,10 +6,10 @@ use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::median;
 use mapper_physics::orifice;
 
-/// Change of a command below which it counts as held.
+/// Change of a command below which it counts as constant.
 const HELD_RATIO: f64 = 1e-6;
 
-/// A commanded level from a time on.
+/// A commanded level from a given time on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
     /// Time of the change, s.
@@ -20,22 +20,22 @@ pub struct Level {
     pub valve_opening_ratio: f64,
 }
 
-/// How an actuator follows its command.
+/// Response of an actuator to its command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
-    /// Time constant of its first-order lag, s, >= 0; 0 follows at once.
+    /// Time constant of its first-order lag, s, >= 0; 0 follows immediately.
     pub lag_s: f64,
-    /// Largest rate, unit of the actuator per second, > 0; infinity for none.
+    /// Maximum rate, unit of the actuator per second, > 0; infinity for none.
     pub slew_per_s: f64,
 }
 
 impl Response {
-    /// A lag without a limit of the rate.
+    /// A lag without a rate limit.
     pub fn lag(lag_s: f64) -> Response {
         Response { lag_s, slew_per_s: f64::INFINITY }
     }
 
-    /// Where it stands `elapsed_s` after it began to go from `from` to `to`.
+    /// Position `elapsed_s` after it began to move from `from` to `to`.
     fn approach(self, from: f64, to: f64, elapsed_s: f64) -> f64 {
         let (jump, elapsed_s) = (to - from, elapsed_s.max(0.0));
         let limited = self.slew_per_s.is_finite();
@@ -51,7 +51,7 @@ impl Response {
     }
 }
 
-/// P3 and the valve behind their commands.
+/// Response of P3 and the valve to their commands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaggedCommand {
     levels: Vec<Level>,
@@ -59,14 +59,14 @@ pub struct LaggedCommand {
     at_start_pa: Vec<f64>,
     /// Opening at the start of each level.
     opening_at_start: Vec<f64>,
-    /// How P3 follows; Pa/s.
+    /// Response of P3; Pa/s.
     pub p3: Response,
-    /// How the valve follows; 1/s.
+    /// Response of the valve; 1/s.
     pub valve: Response,
 }
 
 impl LaggedCommand {
-    /// The response to `levels` (rising in time, at least one) from rest.
+    /// The response to `levels` (rising in time, at least one) from steady state.
     pub fn new(levels: Vec<Level>, p3: Response, valve: Response) -> Self {
         let at_start = |of: fn(&Level) -> f64, response: Response| {
             let mut at_start: Vec<f64> = Vec::with_capacity(levels.len());
@@ -87,14 +87,14 @@ impl LaggedCommand {
         LaggedCommand { levels, at_start_pa, opening_at_start, p3, valve }
     }
 
-    /// The response to the commands of a recording, which has at least one step: a level for each step, and within it
-    /// one for each further command of P3, as a loop that holds the speed gives them.
+    /// The response to the commands of a recording with at least one step: a level for each step, and one for each further P3 command within
+    /// it, as from a loop that holds the speed.
     pub fn of_recording(recording: &Recording, p3: Response, valve: Response) -> Self {
         let levels = recording.steps.iter().flat_map(|step| levels_of_step(recording, step));
         LaggedCommand::new(levels.collect(), p3, valve)
     }
 
-    /// The level that holds at `t_s`.
+    /// The level commanded at `t_s`.
     pub fn level(&self, t_s: f64) -> usize {
         self.levels.partition_point(|level| level.start_s <= t_s).saturating_sub(1)
     }
@@ -113,7 +113,7 @@ impl LaggedCommand {
         self.valve.approach(self.opening_at_start[index], level.valve_opening_ratio, t_s - level.start_s)
     }
 
-    /// Time after which a jump of P3 has all but arrived, s.
+    /// Time after which a jump of P3 is almost complete, s.
     pub fn p3_settles_s(&self, from_pa: f64, to_pa: f64) -> f64 {
         (to_pa - from_pa).abs() / self.p3.slew_per_s + 6.0 * self.p3.lag_s
     }
@@ -124,16 +124,16 @@ impl LaggedCommand {
     }
 }
 
-/// The level that a step begins with, and those to which a loop that holds the speed moves it.
+/// The first level of a step, and the later levels of a loop that holds the speed.
 pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
     let (mut start_s, mut p3_pa) = (step.start_s, step.p3_pa);
     let level = |start_s, p3_pa| Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio };
     let mut levels = vec![level(start_s, p3_pa)];
     let Some(command) = recording.series.get(&Channel::P3Command) else { return levels };
     let (t_s, values) = command.slice(step.start_s, step.end_s);
-    // The first sample may have been taken before the change, and a change lies behind the sample before it.
+    // The first sample may precede the change, and a change is later than the sample before it.
     for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
-        // The read-back of a command that is held moves in its last digits.
+        // The read-back of a constant command varies in its last digits.
         let moved = p3_pa.is_nan() || !alike(*value, p3_pa);
         if moved && value.is_finite() && pair_s[0] > start_s {
             (start_s, p3_pa) = (pair_s[0], *value);
@@ -148,16 +148,15 @@ pub(crate) fn alike(value: f64, other: f64) -> bool {
     (value / other - 1.0).abs() <= HELD_RATIO
 }
 
-/// Responses that are tried before the closer search: lags, and rates in jumps of the median size per second.
+/// Responses tried before the fine search: lags, and rates in jumps of the median size per second.
 const LOOKS: usize = 24;
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
-/// A limit of the rate is believed where it takes this share off the squared residuals of a lag alone.
+/// Minimum reduction of the squared residuals, relative to a lag alone, for accepting a rate limit.
 const LIMITED_RATIO: f64 = 0.5;
 
-/// Time constant of the measured P3 behind its command, s, and its standard error; `None` without jumps or P3.
+/// Time constant of the measured P3 relative to its command, s, and its standard error; `None` without jumps or P3.
 ///
-/// The minimum squared residual of the first seconds after each jump; the level after it is free, so that
-/// no offset enters.
+/// Minimises the squared residual of the first seconds after each jump; the level after it is free, so that no offset enters.
 pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<(f64, f64)> {
     let values = table.column(Channel::P3)?;
     let jumps = p3_jumps(recording, noise_sigma);
@@ -177,7 +176,7 @@ pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) ->
     Some((lag_s, error_s))
 }
 
-/// How the measured P3 follows its command, its rate limited where the recording says so; `None` without jumps or P3.
+/// Response of the measured P3 to its command, with a rate limit if the recording supports one; `None` without jumps or P3.
 pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<Response> {
     let values = table.column(Channel::P3)?;
     let jumps = p3_jumps(recording, noise_sigma);
@@ -188,9 +187,8 @@ pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f
     })
 }
 
-/// How the valve follows its command, as flow and pressures tell: what passes an orifice is in proportion to its area, and the
-/// volume before it fills in milliseconds. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as
-/// one of the valve.
+/// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area, and the volume before it fills in
+/// milliseconds. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as one of the valve.
 pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_pa: f64) -> Option<Response> {
     let flow = table.column(Channel::CompressorFlow)?;
     let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
@@ -204,7 +202,7 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     let moved = |pair: &[StepMarker]| (pair[1].valve_opening_ratio - pair[0].valve_opening_ratio).abs();
     let jumps: Vec<f64> =
         recording.steps.windows(2).filter(|pair| moved(pair) > 0.02).map(|pair| pair[1].start_s).collect();
-    // In openings, by their mean over all settled ends.
+    // Converted to openings, using their mean over all settled ends.
     let mut areas: Vec<f64> = recording
         .steps
         .iter()
@@ -224,28 +222,28 @@ pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_
     })
 }
 
-/// Starts of the steps to which P3 jumps.
+/// Starts of the steps with a jump of P3.
 fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
     let jumped = |pair: &&[StepMarker]| (pair[1].p3_pa - pair[0].p3_pa).abs() > 10.0 * noise_sigma.max(1.0);
     recording.steps.windows(2).filter(jumped).map(|pair| pair[1].start_s).collect()
 }
 
-/// Squared residuals of the seconds around each jump, the level free.
-fn cost_of(table: &Table, values: &[f64], jumps: &[f64], told: impl Fn(f64) -> f64) -> f64 {
+/// Squared residuals of the seconds around each jump, with a free level.
+fn cost_of(table: &Table, values: &[f64], jumps: &[f64], predicted: impl Fn(f64) -> f64) -> f64 {
     let mut total = 0.0;
     for jump_s in jumps {
         let range = table.range(jump_s - 3.0, jump_s + 12.0);
         let rest: Vec<f64> =
-            range.filter(|i| values[*i].is_finite()).map(|i| values[i] - told(table.t_s[i])).collect();
+            range.filter(|i| values[*i].is_finite()).map(|i| values[i] - predicted(table.t_s[i])).collect();
         let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
         total += rest.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
     }
     total
 }
 
-/// The lag of least cost and that cost.
+/// The lag with minimum cost, and that cost.
 fn best_lag(cost: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
-    // In the logarithm, from 1 ms to 60 s. A coarse look first: the cost has one valley for first-order responses only.
+    // Logarithmic, from 1 ms to 60 s. Coarse search first: the cost has a single minimum only for first-order responses.
     let (shortest, longest) = (1e-3f64.ln(), 60f64.ln());
     let place = |i: usize| shortest + (longest - shortest) * i as f64 / LOOKS as f64;
     let costs: Vec<f64> = (0..=LOOKS).map(|i| cost(place(i).exp())).collect();
@@ -255,12 +253,12 @@ fn best_lag(cost: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
     Some((lag_s, cost(lag_s)))
 }
 
-fn measured_response<Told: Fn(f64) -> f64>(
+fn measured_response<Prediction: Fn(f64) -> f64>(
     table: &Table,
     values: &[f64],
     jumps: &[f64],
     sizes: Vec<f64>,
-    follow: impl Fn(Response) -> Told,
+    follow: impl Fn(Response) -> Prediction,
 ) -> Option<Response> {
     let size = median(&sizes).filter(|size| *size > 0.0)?;
     if jumps.is_empty() {
@@ -289,7 +287,7 @@ mod tests {
         StepMarker { index, kind, start_s, end_s, from: None, to: None, p3_pa, valve_opening_ratio: 0.7 }
     }
 
-    /// Samples every half second; the loop speaks at 12 s, seen at 12.5 s.
+    /// Samples every half second; the loop commands at 12 s, seen at 12.5 s.
     fn recording() -> Recording {
         let t_s: Vec<f64> = (0..=40).map(|i| f64::from(i) * 0.5).collect();
         let command = |t: &f64| match *t {
@@ -312,7 +310,7 @@ mod tests {
         assert_eq!(levels, [(0.0, 150e3), (10.0, 200e3), (12.0, 201e3)]);
     }
 
-    /// Jumps of 100 kPa at 80 kPa/s and a lag of 0.2 s; the valve turns by 0.5 at 0.4 1/s: what was put in is read off again.
+    /// Jumps of 100 kPa at 80 kPa/s and a lag of 0.2 s; the valve moves by 0.5 at 0.4 1/s: the fit recovers these values.
     #[test]
     fn a_limited_rate_is_read_off_the_recording_and_a_plain_lag_is_none() {
         let steps: Vec<StepMarker> = (0..6)

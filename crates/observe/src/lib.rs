@@ -1,8 +1,7 @@
-//! A recording beside the model: what is read, on which times, with what noise, what drives the model, and what may
-//! differ between the two without being news.
+//! Compares a recording with the model: channels, time base, noise, model inputs, and permitted differences.
 //!
-//! The diagnosis of the gap and the search for drift both drive the nominal model by a recording and explain what is
-//! left. They share this crate; each keeps its own statistics. Identification takes the plausible readings from here.
+//! The diagnosis of the gap and the search for drift both drive the nominal model by a recording and explain the residual. They share this
+//! crate; each keeps its own statistics. Identification takes the plausible readings from here.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -3,16 +3,16 @@
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::mean;
 
-/// A sample at a jump belongs to what comes after it, s.
+/// A sample at a jump belongs to the segment after it, s.
 pub const BEFORE_S: f64 = 1e-6;
 
-/// Mean of readings, in their unit; `None` without any, or where one of them is not a number.
+/// Mean of readings, in their unit; `None` without any, or if one of them is not a number.
 pub fn mean_reading(values: &[f64]) -> Option<f64> {
     mean(values).filter(|mean| mean.is_finite())
 }
 
-/// Mean of a channel from `start_s` until just before `end_s`; `None` where it has fewer samples there than `least`, or
-/// one of them is not a number.
+/// Mean of a channel from `start_s` until just before `end_s`; `None` if it has fewer samples there than `least`, or one of them is not a
+/// number.
 pub fn mean_between(
     recording: &Recording,
     channel: Channel,

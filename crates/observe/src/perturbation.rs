@@ -1,4 +1,4 @@
-//! What may differ between a recording and the model: one quantity of machine, inputs or start, and what turns it.
+//! Possible differences between a recording and the model: one quantity of machine, inputs or initial state, and its adjustment.
 
 use crate::channels::boundary_condition;
 use mapper_core::{Channel, ModelTolerances};
@@ -9,7 +9,7 @@ use mapper_physics::params::{BoundaryConditions, Params};
 /// One quantity of model, inputs or initial state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Perturbation {
-    /// A boundary condition, by the channel that reads it; in its unit.
+    /// A boundary condition, by the channel that measures it; in its unit.
     Input(Channel),
     /// Ambient temperature, K.
     Ambient,
@@ -39,16 +39,16 @@ pub enum Perturbation {
     StartTt,
 }
 
-/// Ambient temperature is measured somewhere in the cell, not at each wall, K.
+/// Ambient temperature is measured at one place in the cell, not at each wall, K.
 const AMBIENT_SIGMA_K: f64 = 1.0;
-/// The rig may not have rested before the recording, K.
+/// The rig may not have been at steady state before the recording, K.
 const START_SIGMA_K: f64 = 5.0;
 
 impl Perturbation {
-    /// One standard deviation of what it may be off by, in its unit, as the campaign declares it. 0 for what has no
-    /// tolerance: inputs, whose sensors are declared, and friction, which the nominal model has none of.
+    /// One standard deviation of its error, in its unit, as the campaign declares it. 0 for quantities without a tolerance: inputs, whose
+    /// sensors are declared, and friction, which the nominal model does not have.
     ///
-    /// A campaign declares no tolerance of the turbine's flow and of its convection: those of the compressor stand for them.
+    /// A campaign declares no tolerance of the turbine's flow and convection: those of the compressor apply.
     pub fn tolerance(self, declared: &ModelTolerances) -> f64 {
         match self {
             Perturbation::Input(_) | Perturbation::Friction => 0.0,
@@ -64,7 +64,7 @@ impl Perturbation {
         }
     }
 
-    /// Turns the machine.
+    /// Adjusts the machine.
     pub fn turn(self, params: &mut Params, by: f64) {
         match self {
             Perturbation::Efficiency => params.compressor.efficiency_scale_ratio *= 1.0 + by,
@@ -84,7 +84,7 @@ impl Perturbation {
         }
     }
 
-    /// Turns the boundary conditions.
+    /// Adjusts the boundary conditions.
     pub fn shift(self, boundary: &mut BoundaryConditions, by: f64) {
         let channel = match self {
             Perturbation::Input(channel) => channel,
@@ -96,7 +96,7 @@ impl Perturbation {
         }
     }
 
-    /// Turns the state at the start.
+    /// Adjusts the initial state.
     pub fn start(self, state: &mut State, by_k: f64) {
         match self {
             Perturbation::StartTc => {
@@ -109,12 +109,12 @@ impl Perturbation {
     }
 }
 
-/// Inputs with some of them shifted.
+/// Inputs with shifts on some of them.
 #[derive(Debug, Clone, Copy)]
 pub struct Shifted<'a, I> {
     /// As recorded.
     pub inputs: &'a I,
-    /// What is added to each, in its unit.
+    /// Shift of each, in its unit.
     pub shifts: &'a [(Perturbation, f64)],
 }
 
@@ -157,7 +157,7 @@ mod tests {
         Perturbation::Friction,
     ];
 
-    /// A knob that turned nothing would fit nothing, and nobody would see it.
+    /// A perturbation without an effect would go unnoticed and fit nothing.
     #[test]
     fn each_knob_turns_one_thing_of_its_own() {
         let mut seen = Vec::new();

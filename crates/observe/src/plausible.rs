@@ -1,13 +1,13 @@
-//! Judges readings by what a turbocharger on a gas stand can read.
+//! Checks readings against the possible range of a turbocharger on a gas stand.
 
 use mapper_core::{Channel, Dimension, plausible};
 
-/// Whether a single value is finite and within what any rig could show; the others are lost.
+/// Whether a single value is finite and possible on any rig; other values count as lost.
 pub fn is_reading(channel: Channel, value: f64) -> bool {
     value.is_finite() && plausible(channel).any.contains(&value)
 }
 
-/// The middle reading of a channel is not one of a running machine.
+/// The median reading of a channel is impossible for a running machine.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "{channel} reads {value:.4} {unit} at the median, which no running machine has ({low} to {high} {unit}). {remedy}",
@@ -23,10 +23,10 @@ pub struct Implausible {
     pub value: f64,
 }
 
-/// Judges the middle reading of a channel, SI.
+/// Checks the median reading of a channel, SI.
 ///
 /// # Errors
-/// [`Implausible`] with what the reading looks like, and what to do.
+/// [`Implausible`] with the likely cause and the remedy.
 pub fn check_running(channel: Channel, median: f64) -> Result<(), Implausible> {
     if plausible(channel).running.contains(&median) {
         return Ok(());
@@ -34,7 +34,7 @@ pub fn check_running(channel: Channel, median: f64) -> Result<(), Implausible> {
     Err(Implausible { channel, value: median })
 }
 
-/// What an implausible reading looks like, and what to do.
+/// Likely cause of an implausible reading, and the remedy.
 fn remedy(channel: Channel, value: f64) -> &'static str {
     match channel.info().dimension {
         Dimension::Pressure if (30.0..2_000.0).contains(&value) => {

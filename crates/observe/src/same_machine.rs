@@ -1,27 +1,26 @@
-//! Whether a recording was made on the machine that a campaign names.
+//! Checks whether a recording was made on the machine of the campaign.
 
 use std::collections::BTreeMap;
 
-/// A recording of another machine than the campaign's.
+/// A recording of a different machine from the campaign's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the recording was made on another machine: {what} `{recorded}`, the campaign names `{expected}`")]
 pub struct OtherMachine {
-    /// What differs: `machine` or `serial number`.
+    /// The difference: `machine` or `serial number`.
     pub what: &'static str,
-    /// As the recording has it.
+    /// Value in the recording.
     pub recorded: String,
-    /// As the campaign has it.
+    /// Value in the campaign.
     pub expected: String,
 }
 
-/// Compares what a recording says of its machine (keys `machine` and `serial_number`) with the campaign's.
+/// Compares the machine of a recording (keys `machine` and `serial_number`) with the campaign's.
 ///
-/// An absent or empty entry says nothing, on either side, so it contradicts nothing: recordings made by other programs
-/// seldom name their machine, and a campaign without a serial number is for every machine of its name. Whether two
-/// recordings are of one machine is another question, which their fingerprints answer.
+/// An absent or empty entry on either side contradicts nothing: recordings by other programs seldom name their machine, and a campaign without
+/// a serial number applies to every machine of its name. Whether two recordings are of one machine follows from their fingerprints instead.
 ///
 /// # Errors
-/// [`OtherMachine`] where both sides name a machine or a serial number and the two differ.
+/// [`OtherMachine`] if both sides name a machine or a serial number and the two differ.
 pub fn same_machine(
     recorded: &BTreeMap<String, String>,
     machine_name: &str,
@@ -30,9 +29,9 @@ pub fn same_machine(
     let pairs =
         [("machine", "machine", Some(machine_name)), ("serial_number", "serial number", serial_number)];
     for (key, what, expected) in pairs {
-        let said = |text: &&str| !text.is_empty();
-        let recorded = recorded.get(key).map(String::as_str).filter(said);
-        if let (Some(recorded), Some(expected)) = (recorded, expected.filter(said))
+        let named = |text: &&str| !text.is_empty();
+        let recorded = recorded.get(key).map(String::as_str).filter(named);
+        if let (Some(recorded), Some(expected)) = (recorded, expected.filter(named))
             && recorded != expected
         {
             let (recorded, expected) = (recorded.to_owned(), expected.to_owned());

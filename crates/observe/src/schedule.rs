@@ -1,21 +1,21 @@
-//! Stretches of a step over which readings are averaged: short where the machine still moves, long where only metal does.
+//! Segments of a step over which readings are averaged: short while the machine still moves, long when only the metal does.
 
-/// How a step is cut into stretches.
+/// Rule for cutting a step into segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
-    /// Begin of the first stretch after that of the step, s.
+    /// Start of the first segment after that of the step, s.
     pub first_s: f64,
-    /// Until so many seconds after the step's begin, stretches of so many seconds; the last row holds for ever.
+    /// Pairs of time since the step's start until which a segment length applies, and that length, s; the last one applies without limit.
     pub lengths_s: &'static [(f64, f64)],
-    /// Shorter stretches go to the one before them, s ...
+    /// Segments shorter than this are merged with the previous one, s ...
     pub shortest_s: f64,
-    /// ... and so do those shorter than this share of what their length should be.
+    /// ... and so are those shorter than this share of their nominal length.
     pub shortest_ratio: f64,
 }
 
 impl Schedule {
-    /// Begins and ends of the stretches from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples)
-    /// long. No holes; none at all where the step is shorter than the shortest stretch.
+    /// Starts and ends of the segments from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples) long. There are no
+    /// gaps; the list is empty if the step is shorter than the shortest segment.
     pub fn stretches(&self, start_s: f64, end_s: f64, interval_s: f64) -> Vec<(f64, f64)> {
         let whole_s = end_s - start_s;
         let mut found = Vec::new();
@@ -54,7 +54,7 @@ mod tests {
         let edges = [(105.0, 115.0), (115.0, 135.0), (135.0, 165.0), (165.0, 195.0), (195.0, 220.0)];
         assert_eq!(SLOW.stretches(100.0, 220.0, 0.1), edges);
         assert!(SLOW.stretches(100.0, 104.0, 0.1).is_empty());
-        // Three seconds more than a whole stretch belong to it.
+        // Three seconds more than a whole segment belong to it.
         assert_eq!(SLOW.stretches(0.0, 38.0, 0.1), [(5.0, 15.0), (15.0, 38.0)]);
     }
 

@@ -1,17 +1,17 @@
-//! What sensors are known to do wrong: one catalogue of faults, each with the error that it puts into a reading.
+//! The catalogue of known sensor faults, each with the error that it causes in a reading.
 //!
 //! A fault may be common to several channels: thermocouples share a reference junction, pressure transducers a barometer or a supply.
 
 use mapper_core::Channel;
 
-/// How the error of a reading comes about.
+/// Form of the error of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FaultKind {
     /// The same error in every reading, in the channel's unit (K, Pa, kg/s, rpm).
     Offset,
-    /// An error in proportion to the reading; temperatures from [`CALIBRATED_AT_K`] on. Ratio.
+    /// An error proportional to the reading; for temperatures, to the difference from [`CALIBRATED_AT_K`]. Ratio.
     Gain,
-    /// Nothing at the start of the run and the size at its end, in between in proportion to the time: unit of the channel, but a ratio to the
+    /// Zero at the start of the run, the full size at its end, and proportional to the time between: unit of the channel, but a ratio to the
     /// reading for flow and speed.
     Drift,
 }
@@ -19,13 +19,12 @@ pub enum FaultKind {
 /// A fault of one or several sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorFault {
-    /// The channels that err alike.
+    /// The channels with the same error.
     pub channels: &'static [Channel],
-    /// How they err.
+    /// Form of the error.
     pub kind: FaultKind,
-    /// How large such faults are, one standard deviation, in the unit of `kind`. What a reader takes for a fault and not for
-    /// an ordinary error: some ten times what calibrated sensors are declared to have. The odds of a fault change by the
-    /// logarithm of it alone.
+    /// Prior size of such faults, one standard deviation, in the unit of `kind`. It is some ten times the declared error of calibrated
+    /// sensors, so that an ordinary error does not count as a fault. The odds of a fault depend on it only logarithmically.
     pub sigma: f64,
 }
 
@@ -40,7 +39,7 @@ const fn fault(channels: &'static [Channel], kind: FaultKind, sigma: f64) -> Sen
     SensorFault { channels, kind, sigma }
 }
 
-/// All faults that are looked for.
+/// All faults considered.
 pub const CATALOGUE: [SensorFault; 25] = {
     use Channel::{CompressorFlow, P1, P2, ShaftSpeed, T1, T2, Tc};
     use FaultKind::{Drift, Gain, Offset};
@@ -73,7 +72,7 @@ pub const CATALOGUE: [SensorFault; 25] = {
     ]
 };
 
-/// The turbine side, which identification does not need: what of it drifts.
+/// Drifts of the turbine side, which identification does not need.
 const TURBINE_DRIFTS: [SensorFault; 6] = {
     use Channel::{P3, P4, T3, T4, Tt, TurbineFlow};
     use FaultKind::Drift;
@@ -87,7 +86,7 @@ const TURBINE_DRIFTS: [SensorFault; 6] = {
     ]
 };
 
-/// Everything of which drift is known, both sides.
+/// All known drifts, both sides.
 pub fn drifts() -> impl Iterator<Item = SensorFault> {
     CATALOGUE.into_iter().chain(TURBINE_DRIFTS).filter(|fault| fault.kind == FaultKind::Drift)
 }

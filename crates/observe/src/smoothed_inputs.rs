@@ -1,8 +1,7 @@
-//! What drives the model: the boundary conditions as recorded, without their noise.
+//! The recorded boundary conditions as model inputs, without their noise.
 //!
-//! P3 is its command behind a first-order lag, whose time constant is read off the measured P3, plus the smooth rest.
-//! Other quantities may jump along with P3 (P4 does, by the flow): that share is found by regression, and the rest is
-//! smooth. A jump is never smoothed over.
+//! P3 is its command with a first-order lag, whose time constant is fitted to the measured P3, plus a smooth remainder. Other quantities may
+//! jump with P3 (P4 does, because of the flow): regression gives that share, and the remainder is smooth. A jump is never smoothed over.
 
 use crate::channels::{DRIVERS, boundary_condition};
 use crate::declared::Declared;
@@ -13,7 +12,7 @@ use mapper_core::{Channel, Recording};
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
 
-/// A recorded quantity without its noise: smooth, plus a share of P3's own course.
+/// A recorded quantity without its noise: a smooth part, plus a share of P3's own time history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driver {
     /// The smooth part.
@@ -25,9 +24,9 @@ pub struct Driver {
 /// Recorded boundary conditions over time, without their noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmoothedInputs {
-    /// P3 by its command.
+    /// P3 according to its command.
     pub command: LaggedCommand,
-    /// Starts of the steps, s: what a loop does within a step is too small to stop an integration for.
+    /// Starts of the steps, s: changes by a loop within a step are too small to interrupt an integration.
     jumps_s: Vec<f64>,
     p3_rest: Course,
     /// Every other boundary condition by its channel.
@@ -35,18 +34,18 @@ pub struct SmoothedInputs {
     nominal: BoundaryConditions,
 }
 
-/// What the recording alone says of one of its inputs.
+/// Uncertainty of an input from the recording alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputNoise {
-    /// Standard deviation of its course, in its unit.
+    /// Standard deviation of its time history, in its unit.
     pub sigma: f64,
-    /// Time over which the error stays alike, s.
+    /// Correlation time of the error, s.
     pub correlation_s: f64,
 }
 
 impl SmoothedInputs {
-    /// Reads the inputs off a recording, P3 and the valve behind their commands as said. The campaign's values stand for what is
-    /// not recorded.
+    /// Takes the inputs from a recording, with the given responses of P3 and the valve. The campaign's values replace channels that are not
+    /// recorded.
     pub fn read(
         table: &Table,
         recording: &Recording,
@@ -78,7 +77,7 @@ impl SmoothedInputs {
         }
     }
 
-    /// How well each of [`DRIVERS`] is known, beyond its fixed offset; `None` for those that are not recorded.
+    /// Uncertainty of each of [`DRIVERS`] in addition to its fixed offset; `None` for those that are not recorded.
     pub fn noise(&self) -> [Option<InputNoise>; DRIVERS.len()] {
         DRIVERS.map(|channel| {
             let course = match channel {
@@ -116,11 +115,10 @@ impl Inputs for SmoothedInputs {
     }
 }
 
-/// Length of the stretches beside a jump from which its height is taken, s.
+/// Length of the segments before and after a jump that give its height, s.
 const BESIDE_S: f64 = 8.0;
 
-/// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 where they do not follow it. `along` is P3 by its
-/// command.
+/// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 if they do not follow it. `along` is P3 according to its command.
 fn share_along(
     table: &Table,
     values: &[f64],
@@ -131,7 +129,7 @@ fn share_along(
     for pair in command.levels().windows(2) {
         let jump_s = pair[1].start_s;
         let settled_s = jump_s + command.p3_settles_s(pair[0].p3_pa, pair[1].p3_pa);
-        // What a loop that holds the speed does right behind a jump is no jump of its own.
+        // Changes by a speed-holding loop right after a jump are not separate jumps.
         if pair[0].start_s > jump_s - BESIDE_S {
             continue;
         }
@@ -149,12 +147,12 @@ fn share_along(
     }
     let share = sum_xy / sum_xx;
     let scatter = pairs.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
-    // Never better than the noise allows.
+    // The noise is the lower limit.
     let error = (scatter.max(noise_sigma * noise_sigma * 0.1) / sum_xx).sqrt();
     if share.abs() > 6.0 * error { share } else { 0.0 }
 }
 
-/// A line through the values between two times, read at `at_s`.
+/// A line through the values between two times, evaluated at `at_s`.
 fn line_at(table: &Table, values: &[f64], start_s: f64, end_s: f64, at_s: f64) -> Option<f64> {
     let range = table.range(start_s, end_s);
     let (mut n, mut st, mut sv, mut stt, mut stv) = (0.0, 0.0, 0.0, 0.0, 0.0);

@@ -1,8 +1,8 @@
-//! The smooth course of a wandering quantity under noise of known size.
+//! Smooths a wandering quantity under noise of known size.
 //!
-//! An integrated random walk seen through white and first-order noise: its intensity is chosen by likelihood, the
-//! course is the Kalman smoother's (Rauch, Tung and Striebel 1965). Where nothing wanders it becomes a straight line
-//! over the whole recording, and averages all of it.
+//! The model is an integrated random walk with white and first-order noise. Its intensity is chosen by likelihood, and the smoothed time
+//! history comes from the Kalman smoother (Rauch, Tung and Striebel 1965). If nothing wanders, the result is a straight line over the whole
+//! recording, which averages all of it.
 
 use mapper_core::NoiseColour;
 use mapper_numerics::coloured_noise::{memory, variance_of_mean};
@@ -12,20 +12,20 @@ use nalgebra::{Matrix3, RowVector3, Vector3};
 /// Length of the bins that are filtered, s.
 const BIN_S: f64 = 1.0;
 
-/// A smooth course with its uncertainty.
+/// A smooth time history with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     start_s: f64,
     value: Vec<f64>,
     slope_s: Vec<f64>,
-    /// Usual standard deviation of the course, in the quantity's unit.
+    /// Typical standard deviation of the time history, in the quantity's unit.
     pub sigma: f64,
-    /// Time over which its error stays alike, s.
+    /// Correlation time of its error, s.
     pub correlation_s: f64,
 }
 
 impl Course {
-    /// A value that holds.
+    /// A constant value.
     pub fn constant(value: f64) -> Course {
         Course { start_s: 0.0, value: vec![value], slope_s: vec![0.0], sigma: 0.0, correlation_s: 1.0 }
     }
@@ -42,7 +42,7 @@ impl Course {
         }
         let i = place as usize;
         let x = place - i as f64;
-        // Cubic with the smoother's own slopes.
+        // Cubic with the slopes of the smoother.
         let (a, b) = (self.value[i], self.value[i + 1]);
         let (da, db) = (BIN_S * self.slope_s[i], BIN_S * self.slope_s[i + 1]);
         let rise = b - a;
@@ -51,13 +51,13 @@ impl Course {
 }
 
 struct Bin {
-    /// Mean of the samples, `None` where there are none.
+    /// Mean of the samples, `None` without any.
     mean: Option<f64>,
     samples: f64,
 }
 
-/// The course through `values` at `t_s` (rising; NaN counts as missing) under noise of one sample `noise_sigma`.
-/// `None` where there is no value at all.
+/// The time history through `values` at `t_s` (rising; NaN counts as missing) with the noise `noise_sigma` of one sample. `None` without any
+/// value.
 pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour) -> Option<Course> {
     let bins = bins(t_s, values);
     let first = bins.iter().find_map(|bin| bin.mean)?;
@@ -73,7 +73,7 @@ pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour
         coloured_variance: variance_of_mean(c2 * noise_sigma * noise_sigma, BIN_S, tau_s),
         coloured_decay: memory(BIN_S, tau_s),
     };
-    // Intensity over variance, 1/s^3: from a straight line over hours to a course that follows each bin.
+    // Ratio of intensity to variance, 1/s^3: from a straight line over hours to a time history that follows each bin.
     let mut best = (f64::NEG_INFINITY, 0.0);
     for exponent in -26..=4 {
         let intensity = noise_sigma * noise_sigma * 10f64.powf(0.5 * f64::from(exponent));
@@ -85,7 +85,7 @@ pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour
     let mut tracks = Vec::with_capacity(bins.len());
     filter.run(best.1, Some(&mut tracks));
     let (value, slope_s, variance) = filter.back(&tracks);
-    // Density of the noise at low frequency; the smoother's window goes with its fourth root over the intensity's.
+    // Density of the noise at low frequency; the smoother's window is the fourth root of its ratio to the intensity.
     let density = filter.white_variance * 0.1 + 2.0 * tau_s * c2 * noise_sigma * noise_sigma;
     let correlation_s = (density / best.1).powf(0.25).clamp(2.0, 1e4) * std::f64::consts::SQRT_2;
     let sigma = median(&variance).unwrap_or(0.0).max(0.0).sqrt();
@@ -94,7 +94,7 @@ pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour
 
 fn bins(t_s: &[f64], values: &[f64]) -> Vec<Bin> {
     let (Some(first_s), Some(last_s)) = (t_s.first(), t_s.last()) else { return Vec::new() };
-    // A day at most: beyond it a file is not a campaign.
+    // A day at most: a longer file is not a campaign.
     let count = (((last_s - first_s) / BIN_S).floor() as usize + 1).min(200_000);
     let mut sums = vec![(0.0, 0usize); count];
     for (t, value) in t_s.iter().zip(values) {
@@ -117,7 +117,7 @@ struct Filter<'a> {
     coloured_decay: f64,
 }
 
-/// What the filter knew: before and after each bin.
+/// State of the filter before and after each bin.
 type Track = (Vector3<f64>, Matrix3<f64>, Vector3<f64>, Matrix3<f64>);
 
 impl Filter<'_> {
@@ -125,7 +125,7 @@ impl Filter<'_> {
         Matrix3::new(1.0, BIN_S, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, self.coloured_decay)
     }
 
-    /// Log likelihood, up to what does not depend on the intensity.
+    /// Log likelihood, up to a constant independent of the intensity.
     fn run(&self, intensity: f64, mut tracks: Option<&mut Vec<Track>>) -> f64 {
         let transition = self.transition();
         let (d, q) = (BIN_S, intensity);
@@ -168,7 +168,7 @@ impl Filter<'_> {
         likelihood
     }
 
-    /// Smoothed values, slopes and variances of the course.
+    /// Smoothed values, slopes and variances of the time history.
     fn back(&self, tracks: &[Track]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let transition = self.transition();
         let n = tracks.len();
@@ -233,7 +233,7 @@ mod tests {
         let mean_square =
             (0..n).map(|i| (course.at(20.0 + f64::from(i)) - wave(20.0 + f64::from(i))).powi(2)).sum::<f64>()
                 / f64::from(n);
-        // A wave is not a random walk, so its statement is not exact: within a factor of two either way.
+        // A wave is not a random walk, so its error estimate is only good to a factor of two either way.
         let ratio = mean_square.sqrt() / course.sigma;
         assert!((0.5..2.0).contains(&ratio), "{ratio}");
     }
@@ -245,7 +245,7 @@ mod tests {
             *value = f64::NAN;
         }
         let course = smooth(&t_s, &values, 0.1, NoiseColour::default()).unwrap();
-        // Ten times the error of a line through all of it.
+        // Ten times the error of a straight line through all of it.
         assert!((course.at(450.0) - 4.5).abs() < 0.1, "{}", course.at(450.0));
         assert!(smooth(&t_s, &vec![f64::NAN; t_s.len()], 0.1, NoiseColour::default()).is_none());
         assert!(smooth(&[], &[], 0.1, NoiseColour::default()).is_none());

@@ -1,11 +1,11 @@
-//! The state of the model as a recording shows it.
+//! The initial state of the model from a recording.
 
 use mapper_core::Channel;
 use mapper_physics::model::{State, rad_s_of_rpm};
 use mapper_physics::params::BoundaryConditions;
 
-/// The state that readings show, where `read` gives the mean of a channel. What is not read is taken from what a
-/// turbocharger usually does under the boundary conditions: good enough for settling, which forgets it.
+/// The state given by readings; `read` returns the mean of a channel. Missing readings are replaced by typical values of a turbocharger under
+/// the boundary conditions: good enough for settling, which forgets them.
 pub fn state_as_read(boundary: &BoundaryConditions, read: impl Fn(Channel) -> Option<f64>) -> State {
     let or = |channel: Channel, usual: f64| read(channel).unwrap_or(usual);
     State::new(

@@ -1,8 +1,8 @@
-//! When a rig was told what each step begins with, and how far the times of its samples scatter: a run in real time is late where a
-//! disk or a busy computer kept it, and a controller answers when it comes to it.
+//! Estimates when each step's command reached the rig, and the scatter of the sample times. A run in real time can be late because of a disk,
+//! a busy computer or a slow controller.
 //!
-//! The recorded command says it to a sample. What is left of one shows in the measured P3, which runs by tens of kPa a second after a
-//! jump. Where all jumps are late alike that is the actuator's, and stays with its response; where they differ, it is the run's.
+//! The recorded command gives the time to within one sample. The remaining error shows in the measured P3, which changes by tens of kPa a
+//! second after a jump. An equal delay of all jumps belongs to the actuator and stays in its response; different delays belong to the run.
 
 use crate::lagged_command::{LaggedCommand, Level, Response, alike, levels_of_step};
 use crate::table::Table;
@@ -11,33 +11,33 @@ use mapper_numerics::minimise::minimise;
 use mapper_numerics::statistics::{median, robust_sigma};
 use std::ops::Range;
 
-/// A step's command that comes later than this behind its begin is not taken for it, s.
+/// Maximum delay of a command behind its step's start, s; a later one belongs to another change.
 const LATE_MAX_S: f64 = 2.0;
-/// Samples of a command further apart than this say nothing of when it changed, s.
+/// Maximum sample spacing of a command that still dates its change, s.
 const SEEN_LATE_MAX_S: f64 = 1.0;
-/// What P3 does before a jump is looked at for so long, s.
+/// Time before a jump over which the level of P3 is taken, s.
 const STILL_S: f64 = 3.0;
-/// P3 has moved where it is off its level by so many of its scatter's standard deviations, and by this share of the jump.
+/// Thresholds for a moved P3: standard deviations of its scatter, and share of the jump.
 const MOVED_SIGMAS: f64 = 6.0;
 const MOVED_RATIO: f64 = 0.02;
-/// Around a jump of P3 its time shows from so long before to so long after, s.
+/// Time before and after a jump of P3 that is used to date it, s.
 const AROUND_S: (f64, f64) = (1.0, 3.0);
-/// Jumps are timed where they are apart by so many of their errors, and by so much, s.
+/// The jumps are dated separately if they differ by more than these, in errors and in s.
 const APART_ERRORS: f64 = 3.0;
 const APART_S: f64 = 3e-3;
-/// Scatter of the samples' times below this counts as none, s.
+/// Scatter of the sample times below which it is neglected, s.
 const SCATTER_MIN_S: f64 = 1e-3;
-/// Samples tell a time where P3 runs by so many of its noise's sigmas a second.
+/// Minimum rate of P3 for dating samples, in noise sigmas a second.
 const RUNS_PER_S: f64 = 50.0;
 
-/// The recording with each step from the last sample before its command was changed, so that a step holds what belongs to it.
+/// The recording with each step starting at the last sample before its command changed, so that it includes its whole transient.
 pub fn as_told(recording: &Recording) -> Recording {
     let mut told = recording.clone();
     for index in 0..told.steps.len() {
         let (before_s, start_s) =
-            (recording.steps[index].start_s, told_s(recording, &recording.steps[index]));
+            (recording.steps[index].start_s, command_s(recording, &recording.steps[index]));
         told.steps[index].start_s = start_s;
-        // Where steps follow each other they still do.
+        // Keep adjacent steps adjacent.
         if let Some(last) = index.checked_sub(1).map(|last| &mut told.steps[last])
             && last.end_s >= before_s - 1e-9
         {
@@ -47,7 +47,7 @@ pub fn as_told(recording: &Recording) -> Recording {
     told
 }
 
-fn told_s(recording: &Recording, step: &StepMarker) -> f64 {
+fn command_s(recording: &Recording, step: &StepMarker) -> f64 {
     let commands = [(Channel::P3Command, step.p3_pa), (Channel::ValveCommand, step.valve_opening_ratio)];
     let late = |(channel, told): (Channel, f64)| {
         let command = recording.series.get(&channel)?;
@@ -61,8 +61,8 @@ fn told_s(recording: &Recording, step: &StepMarker) -> f64 {
     late_s.or_else(|| seen_late_s(recording, step)).unwrap_or(step.start_s)
 }
 
-/// Where a log has the command only as its samples saw it, a step begins with the first sample that has the new one, and the rig
-/// may have been told at any time since the sample before: then measured P3 has moved by that first sample.
+/// If a log has the command only at its samples, a step begins with the first sample of the new command. The rig may have received it at any
+/// time since the sample before. Measured P3 has then moved by that first sample.
 fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     let (command, p3) = (recording.series.get(&Channel::P3Command)?, recording.series.get(&Channel::P3)?);
     let first = command.t_s.partition_point(|t_s| *t_s < step.start_s);
@@ -73,7 +73,7 @@ fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     if alike(before_pa, after_pa) || step.start_s - before_s > SEEN_LATE_MAX_S {
         return None;
     }
-    // By so much P3 moves while nobody commands it, noise included.
+    // Movement of P3 at a constant command, noise included.
     let still = p3.slice(step.start_s - STILL_S, before_s + 1e-9).1;
     let level_pa = median(still.iter().filter(|value| value.is_finite()))?;
     let scatter_pa = robust_sigma(still.iter().map(|value| value - level_pa))?;
@@ -84,7 +84,7 @@ fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
     (moved_pa > MOVED_SIGMAS * scatter_pa && moved_pa > MOVED_RATIO * jump_pa.abs()).then_some(before_s)
 }
 
-/// What the measured P3 says of times.
+/// Times found from the measured P3.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Times {
     /// When each step's command reached the rig, s.
@@ -94,7 +94,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Of a recording [as it was told](as_told), whose P3 follows its command so.
+    /// Estimates the times of a recording [with command-based step starts](as_told) whose P3 follows its command with this response.
     pub fn read(table: &Table, recording: &Recording, p3: Response, noise_sigma: f64) -> Times {
         let steps = &recording.steps;
         let mut times = Times { starts_s: steps.iter().map(|step| step.start_s).collect(), scatter_s: 0.0 };
@@ -115,7 +115,7 @@ impl Times {
         times
     }
 
-    /// The recording with its steps from when their commands reached the rig.
+    /// The recording with its steps starting when their commands reached the rig.
     pub fn timed(&self, recording: &Recording) -> Recording {
         let mut timed = recording.clone();
         for (step, start_s) in timed.steps.iter_mut().zip(&self.starts_s) {
@@ -125,11 +125,11 @@ impl Times {
     }
 }
 
-/// A jump of P3 at the begin of a step.
+/// A jump of P3 at the start of a step.
 struct Jump {
     step: usize,
     levels: Vec<Level>,
-    /// Place of the level that the step begins with.
+    /// Position of the step's first level.
     at: usize,
     p3: Response,
     noise_sigma: f64,
@@ -160,14 +160,14 @@ impl Jump {
         (1..steps.len()).filter_map(jump).collect()
     }
 
-    /// P3 by its command, told later by so much.
+    /// P3 according to its command, delayed by this time.
     fn command(&self, shift_s: f64) -> LaggedCommand {
         let mut levels = self.levels.clone();
         levels[self.at].start_s += shift_s;
         LaggedCommand::new(levels, self.p3, Response::lag(0.0))
     }
 
-    /// What is left of the measured P3, about its mean: no offset enters.
+    /// Residual of the measured P3, minus its mean, so that no offset enters.
     fn rest(&self, table: &Table, values: &[f64], shift_s: f64) -> Vec<f64> {
         let command = self.command(shift_s);
         let rest: Vec<f64> = self.samples.clone().map(|i| values[i] - command.p3_pa(table.t_s[i])).collect();
@@ -176,7 +176,7 @@ impl Jump {
         rest.iter().map(|rest| rest - mean).collect()
     }
 
-    /// How P3 runs at each sample, Pa/s.
+    /// Rate of P3 at each sample, Pa/s.
     fn slopes(&self, table: &Table, shift_s: f64) -> Vec<f64> {
         let (command, by_s) = (self.command(shift_s), 1e-3);
         let start_s = self.levels[self.at].start_s + shift_s;
@@ -184,13 +184,13 @@ impl Jump {
         self.samples.clone().map(|i| if table.t_s[i] > start_s { slope(table.t_s[i]) } else { 0.0 }).collect()
     }
 
-    /// By how much it was told later than the sample says, and the error of that, s.
+    /// Delay of the command relative to its sample, and its error, s.
     fn shift_s(&self, table: &Table, values: &[f64]) -> (f64, f64) {
         let cost = |shift_s: f64| {
             let rest = self.rest(table, values, shift_s);
             rest.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).sum::<f64>()
         };
-        // Told between two samples, and at work within a sample of that.
+        // The command came between two samples, and acts within a sample of that.
         let (low_s, high_s) = (-0.5 * self.interval_s, 2.0 * self.interval_s);
         let shift_s = minimise(low_s, high_s, 1e-5, cost).at;
         let information: f64 = self.slopes(table, shift_s).iter().map(|slope| slope * slope).sum();
@@ -198,8 +198,8 @@ impl Jump {
     }
 }
 
-/// Scatter of the samples' times, from how unevenly P3 runs after its jumps: each sample beside its two neighbours, so that whatever is
-/// smooth (another response than the one assumed) does not count.
+/// Scatter of the sample times, from irregular P3 after jumps: each sample compared with its two neighbours, so that smooth differences (such
+/// as another response than the assumed one) cancel.
 fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], found: &[(f64, f64)]) -> f64 {
     let (mut sum, mut weights, mut chi, mut count) = (0.0, 0.0, 0.0, 0.0);
     for (jump, (shift_s, _)) in jumps.iter().zip(found) {
@@ -239,7 +239,7 @@ mod tests {
     const NOISE_PA: f64 = 80.0;
     const LAG: Response = Response { lag_s: 0.3, slew_per_s: f64::INFINITY };
 
-    /// Twelve steps of 20 s between 150 and 200 kPa at 10 Hz, each told so much late, each sample taken off its time by so much.
+    /// Twelve steps of 20 s between 150 and 200 kPa at 10 Hz, with the given delay of each command and time error of each sample.
     fn recorded(late_s: &[f64; 12], scatter_s: f64) -> Recording {
         let mut random = Pcg64::seed_from_u64(4);
         let steps: Vec<StepMarker> = (0..12)
@@ -267,7 +267,7 @@ mod tests {
             .collect();
         let truth = LaggedCommand::new(levels, LAG, Response::lag(0.0));
         let t_s: Vec<f64> = (0..2400).map(|i| f64::from(i) / 10.0).collect();
-        // What a driver says that it was told: known to it at once, seen with its next sample.
+        // A driver reports the command at once; the next sample shows it.
         let told = t_s.iter().map(|t| truth.levels()[truth.level(t - 1e-9)].p3_pa).collect();
         let read = t_s
             .iter()
@@ -299,7 +299,7 @@ mod tests {
         assert_eq!(times.timed(&told), recording);
     }
 
-    /// As a table of a logger has it: no step marks, the new command in the first row behind the jump.
+    /// A logger's table: no step marks, the new command in the first row after the jump.
     #[test]
     fn a_command_that_was_seen_a_sample_late_is_put_before_it() {
         let recording = recorded(&[0.0; 12], 0.0);
@@ -310,7 +310,7 @@ mod tests {
         }
         let (told, times) = read(&seen);
         assert_eq!(times.timed(&told).steps, recording.steps);
-        // Where P3 has not moved by that sample, the command came with it.
+        // If P3 has not moved by that sample, the command came with it.
         let mut with_it = seen.clone();
         let p3 = with_it.series.get_mut(&Channel::P3).unwrap();
         p3.t_s.iter_mut().for_each(|t_s| *t_s = (*t_s * 10.0).round() / 10.0 + 0.1);
@@ -328,7 +328,7 @@ mod tests {
             let (told, times) = read(&recording);
             assert_eq!(told.steps[1].start_s, 20.4, "the last sample before the change");
             assert_eq!(told.steps[0].end_s, 20.4);
-            // A dozen samples of each jump tell its time.
+            // A dozen samples of each jump determine its time.
             let error_s = (2.0 * scatter_s).max(3e-3);
             for (index, late_s) in late_s.iter().enumerate().skip(1) {
                 let off_s = times.starts_s[index] - (recording.steps[index].start_s + late_s);

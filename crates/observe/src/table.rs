@@ -4,18 +4,18 @@ use mapper_core::{Channel, Recording, Series};
 use mapper_numerics::statistics::median;
 use std::collections::BTreeMap;
 
-/// All channels at the same times; NaN where a channel has nothing.
+/// All channels at the same times; NaN without a value.
 #[derive(Debug, Clone)]
 pub struct Table {
     /// Times, s, rising.
     pub t_s: Vec<f64>,
-    /// Usual distance of two samples, s.
+    /// Typical sample interval, s.
     pub interval_s: f64,
     /// SI values of each channel, as long as `t_s`.
     pub columns: BTreeMap<Channel, Vec<f64>>,
 }
 
-/// A distance of samples beyond this many usual ones is a gap.
+/// A sample interval above this many typical ones is a gap.
 const GAP_INTERVALS: f64 = 2.5;
 
 impl Table {
@@ -37,7 +37,7 @@ impl Table {
         Some(Table { t_s, interval_s, columns })
     }
 
-    /// Values of a channel, if it is there.
+    /// Values of a channel, if present.
     pub fn column(&self, channel: Channel) -> Option<&[f64]> {
         self.columns.get(&channel).map(Vec::as_slice)
     }
@@ -53,12 +53,12 @@ fn median_interval_s(t_s: &[f64]) -> Option<f64> {
     median(t_s.windows(2).map(|pair| pair[1] - pair[0]))
 }
 
-/// The values of a series at other times; NaN in its gaps. `interval_s` is the usual distance of those times.
+/// The values of a series at other times; NaN in its gaps. `interval_s` is the typical interval of those times.
 pub(crate) fn on_base(series: &Series, t_s: &[f64], interval_s: f64) -> Vec<f64> {
     if series.t_s == t_s {
         return series.values.clone();
     }
-    // A slower channel has its own distance of samples; what is a gap follows from it.
+    // A slower channel has its own sample interval, which determines its gaps.
     let gap_s = GAP_INTERVALS * median_interval_s(&series.t_s).unwrap_or(interval_s).max(interval_s);
     t_s.iter()
         .map(|t| {

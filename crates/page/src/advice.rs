@@ -1,11 +1,11 @@
-//! The verdict of a run in a sentence, and what to do first.
+//! The verdict of a run in a sentence, and the most important actions.
 
 use crate::run_page::RunPage;
 use mapper_core::Verdict;
 use mapper_identify::ZeroOutcome;
 use mapper_report::{RunReport, disagreement_text, doubts, zero_words};
 
-/// Whether the map can be handed on as it is.
+/// Whether the map can be used as it is.
 pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
     let report = page.report;
     !report.points.is_empty()
@@ -13,7 +13,7 @@ pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
         && page.report.map.is_some()
 }
 
-/// What to do first, in order of weight, each a sentence.
+/// Recommended actions in order of importance, each a sentence.
 pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
     let mut things: Vec<String> = Vec::new();
     if !report.outcome.starts_with("Completed") && !report.outcome.starts_with("Identified") {
@@ -33,7 +33,7 @@ pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
         report.points.iter().map(|scored| &scored.point).filter(move |point| point.verdict == verdict)
     };
     for verdict in [Verdict::Unusable, Verdict::Doubtful] {
-        // What is said of most steps comes first; three sentences are enough to begin with, the rest stands with the points.
+        // Findings about the most steps come first. Three sentences are enough here; the rest is listed with the points.
         let mut said = doubts(of(verdict));
         said.sort_by_key(|doubt| std::cmp::Reverse(doubt.count()));
         things.extend(said.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message)));

@@ -1,4 +1,4 @@
-//! Lines, contours and ends of the map as the script draws them.
+//! Lines, contours and ends of the map in the form that the script draws.
 
 use mapper_campaign::units::Kind;
 use mapper_chart::{StructuredGrid, contour_lines};
@@ -7,7 +7,7 @@ use mapper_mesh::{contour_levels, efficiency_surface, fitted_surface, speed_curv
 use mapper_report::Display;
 use serde::Serialize;
 
-/// The map under its points.
+/// The map without its points.
 #[derive(Debug, Clone, Serialize, Default)]
 pub(crate) struct DrawnMap {
     lines: Vec<DrawnLine>,
@@ -42,7 +42,7 @@ struct DrawnContour {
     paths: Vec<Vec<[f64; 2]>>,
 }
 
-/// A surge-side end that was sought, with half widths of its 95 % intervals.
+/// A measured surge-side end, with half widths of its 95 % intervals.
 #[derive(Debug, Clone, Serialize)]
 struct DrawnMark {
     flow: f64,
@@ -51,7 +51,7 @@ struct DrawnMark {
     pr_half: f64,
 }
 
-/// Everything but the points.
+/// Everything except the points.
 pub(crate) fn drawn_map(map: &CompressorMap, display: &Display) -> DrawnMap {
     let flow = |kg_s: f64| rounded(display.number(Kind::MassFlow, kg_s));
     let place = |node: &FittedNode| [flow(node.flow_corrected_kg_s), rounded(node.pressure_ratio)];
@@ -125,7 +125,7 @@ fn contours(grid: Option<StructuredGrid>, flow: impl Fn(f64) -> f64) -> Vec<Draw
         .collect()
 }
 
-/// Six figures after the point are more than a screen shows, and a third of the bytes.
+/// Rounds to four decimals: more are not visible on a screen, and took a third of the bytes.
 pub(crate) fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

@@ -1,4 +1,4 @@
-//! Points as the script draws them, in the units that are shown.
+//! Points in the form that the script draws, in display units.
 
 use crate::run_page::RunPage;
 use mapper_campaign::units::Kind;
@@ -7,7 +7,7 @@ use mapper_identify::TwoParameter;
 use mapper_report::{Display, at_end, step_name, verdict_word};
 use serde::Serialize;
 
-/// Channels whose readings stand beside a point.
+/// Channels whose readings are shown with a point.
 const RAW: [Channel; 9] = [
     Channel::ShaftSpeed,
     Channel::CompressorFlow,
@@ -31,25 +31,25 @@ pub(crate) struct DrawnPoint {
     speed: f64,
     flow: f64,
     pr: f64,
-    /// Half widths of 95 % intervals; `None` where nobody declared the sensors.
+    /// Half widths of 95 % intervals; `None` if no sensors are declared.
     flow_half: Option<f64>,
     pr_half: Option<f64>,
     eta: Option<f64>,
     eta_low: Option<f64>,
     eta_high: Option<f64>,
-    /// The part of the half width that all points share, and the point's own.
+    /// Contributions to the half width: common to all points, and of this point alone.
     eta_common: Option<f64>,
     eta_own: Option<f64>,
     h: Option<f64>,
     h_low: Option<f64>,
     h_high: Option<f64>,
-    /// By the two-parameter method alone.
+    /// Result of the two-parameter method.
     dynamic: Option<[f64; 3]>,
     valve: Option<f64>,
     verdict: &'static str,
     repeat: bool,
     said: Vec<String>,
-    /// What was read at the end of the step, as it is shown.
+    /// Readings at the end of the step, as displayed.
     raw: Vec<String>,
 }
 
@@ -71,7 +71,7 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
         .collect()
 }
 
-/// A point on a line; `two`: what the two-parameter method makes of it.
+/// A point on a line; `two`: its result by the two-parameter method.
 pub(crate) fn drawn_point(
     point: &IdentifiedPoint,
     line: String,
@@ -109,12 +109,12 @@ pub(crate) fn drawn_point(
     }
 }
 
-/// A half width of 0 says that nobody declared the sensor, not that it is perfect.
+/// A half width of 0 means that no sensor is declared, not that it is perfect.
 fn declared(half: f64) -> Option<f64> {
     (half > 0.0).then_some(half)
 }
 
-/// Readings at the end of a step, symbol, value and unit.
+/// Readings at the end of a step: symbol, value and unit.
 fn raw(page: &RunPage<'_>, step: usize, display: &Display) -> Vec<String> {
     let marker = page.report.recording.steps.iter().find(|marker| marker.index == step);
     let read = |channel| marker.and_then(|marker| at_end(page.report.recording, marker, channel));

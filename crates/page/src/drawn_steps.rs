@@ -1,4 +1,4 @@
-//! What was read in each step, thinned for the eye.
+//! Readings of each step, thinned for drawing.
 
 use crate::drawn_map::rounded;
 use crate::run_page::RunPage;
@@ -9,10 +9,10 @@ use mapper_numerics::statistics::{mean, rms};
 use mapper_report::Display;
 use serde::Serialize;
 
-/// Rows that are drawn of a step: as many as a small plot has pixels for.
+/// Rows drawn per step: as many as a small plot has pixels.
 const ROWS: usize = 120;
 
-/// The channels that are drawn, in this order, and their names on the page.
+/// The drawn channels, in this order, and their names on the page.
 const CHANNELS: [(Channel, &str); 8] = [
     (Channel::T2, "T2"),
     (Channel::Tc, "Tc"),
@@ -24,7 +24,7 @@ const CHANNELS: [(Channel, &str); 8] = [
     (Channel::P1, "P1"),
 ];
 
-/// One step; times are seconds after its change of set-points.
+/// One step; times are seconds after its change of setpoints.
 #[derive(Serialize)]
 pub(crate) struct DrawnStep {
     #[serde(serialize_with = "mapper_core::step_number::serialize")]
@@ -42,7 +42,7 @@ struct DrawnChannel {
     values: Vec<Option<f64>>,
 }
 
-/// T2 by the point's numbers, and what it leaves of the readings, in the unit of temperatures and in K.
+/// T2 by the point's numbers and its residual, in the unit of temperatures and in K.
 #[derive(Serialize)]
 struct DrawnModel {
     t: Vec<f64>,
@@ -52,7 +52,7 @@ struct DrawnModel {
     shift_k: f64,
 }
 
-/// All steps that a point comes from.
+/// All steps that a point was identified from.
 pub(crate) fn drawn_steps(page: &RunPage<'_>, display: &Display) -> Vec<DrawnStep> {
     let markers = page.report.recording.steps.iter();
     markers

@@ -1,8 +1,8 @@
 //! The page of a run: one self-contained HTML file for a browser, a phone and print.
 //!
-//! Everything that can be read stands in the page itself, as headings and tables; the drawings are made by its script from
-//! the data beside them. No request leaves the page: its content policy allows none. `docs/report.md` says where each number
-//! comes from.
+//! All text is in the page itself, as headings and tables. Its script makes the drawings from the data in the page.
+//! No request leaves the page: its content policy allows none. `docs/report.md` describes the source of each
+//! number.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,4 +1,4 @@
-//! The page of a run that goes on: the same map, fed by the program while it runs.
+//! The page of a run in progress: the same map, updated by the program during the run.
 
 use crate::drawn_map::{DrawnMap, drawn_map};
 use crate::drawn_points::{DrawnPoint, drawn_point};
@@ -11,7 +11,7 @@ use mapper_core::{IdentifiedPoint, Plan};
 use mapper_report::Display;
 use serde::Serialize;
 
-/// What the script begins with, before it has heard anything.
+/// Initial data of the script.
 #[derive(Serialize)]
 struct Empty {
     units: EmptyUnits,
@@ -28,24 +28,24 @@ struct EmptyUnits {
     speed: &'static str,
 }
 
-/// A point as the page's script takes it.
+/// A point in the form of the page's script.
 #[derive(Debug, Clone, Serialize)]
 #[serde(transparent)]
 pub struct LivePoint(DrawnPoint);
 
-/// The map so far as the page's script takes it: speed lines and contours.
+/// The map so far in the form of the page's script: speed lines and contours.
 #[derive(Debug, Clone, Default, Serialize)]
 #[serde(transparent)]
 pub struct LiveMap(DrawnMap);
 
-/// Where a point is expected on the map, in the units that are shown.
+/// Expected position of a point on the map, in display units.
 #[derive(Debug, Clone, Serialize)]
 pub struct Planned {
     flow: f64,
     pr: f64,
 }
 
-/// The page, without any data of a run: those come later, to whoever may have them.
+/// The page, without any data of a run: authorised clients receive those later.
 ///
 /// # Errors
 /// None in practice: JSON of numbers and strings can always be written.
@@ -61,14 +61,14 @@ pub fn live_page() -> Result<String, serde_json::Error> {
     shell("A run of mapper, live", "A run of mapper, live", Purpose::Live, &empty, &live::live())
 }
 
-/// A point that was identified by itself, on the line of its target.
+/// A single identified point, on the line of its target.
 pub fn live_point(point: &IdentifiedPoint, display: &Display) -> LivePoint {
     let speed_rpm = point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
     LivePoint(drawn_point(point, display.speed(speed_rpm), None, display))
 }
 
 /// The map of the points so far: contours between lines that have two points each, by the mesh of the finished map. Empty
-/// where there is none yet.
+/// if there is none yet.
 pub fn live_map(points: &[IdentifiedPoint], campaign: &Campaign, display: &Display) -> LiveMap {
     let Some(first) = points.first() else { return LiveMap::default() };
     let (machine, reference) = (&campaign.machine.name, campaign.reference);
@@ -76,7 +76,7 @@ pub fn live_map(points: &[IdentifiedPoint], campaign: &Campaign, display: &Displ
     LiveMap(map.map(|map| drawn_map(&map, display)).unwrap_or_default())
 }
 
-/// Where the plan expects its points.
+/// Expected positions of the plan's points.
 pub fn planned(campaign: &Campaign, plan: &Plan, display: &Display) -> Vec<Planned> {
     let (t1_k, p1_pa) = (campaign.boundary.t1_k, campaign.boundary.p1_pa);
     let steps = plan.steps.iter().filter(|step| step.kind.measures());

@@ -10,7 +10,7 @@ use mapper_report::Display;
 use maud::html;
 use serde::Serialize;
 
-/// What the script draws.
+/// Data of the script.
 #[derive(Serialize)]
 struct Drawn {
     units: Units,

@@ -1,11 +1,11 @@
-//! Sentences that name commands and keys between backticks, as Markdown does.
+//! Sentences with commands and keys between backticks, as in Markdown.
 
 use maud::{Markup, html};
 
-/// The sentence, what stands between backticks as code.
+/// The sentence as HTML; text between backticks becomes code.
 pub(crate) fn prose(sentence: &str) -> Markup {
     let parts: Vec<&str> = sentence.split('`').collect();
-    // An odd backtick is one.
+    // An unmatched backtick stays a backtick.
     let is_paired = parts.len() % 2 == 1;
     html! {
         @if is_paired {
@@ -16,12 +16,12 @@ pub(crate) fn prose(sentence: &str) -> Markup {
     }
 }
 
-/// The same with a capital at its start and a full stop at its end.
+/// The same with a capital first letter and a final full stop.
 pub(crate) fn sentence(text: &str) -> Markup {
     let text = text.trim();
     let mut letters = text.chars();
     let first = letters.next();
-    // Symbols (T2, alpha_A) keep their letters.
+    // Symbols (T2, alpha_A) keep their case.
     let is_word = letters.clone().next().is_some_and(char::is_alphabetic)
         && !text.split_whitespace().next().is_some_and(|word| word.contains('_'));
     let capital: String = match first {

@@ -1,25 +1,25 @@
-//! What the page of a run or of identified recordings is made from.
+//! Input of the page of a run or of identified recordings.
 
 use mapper_core::CompressorMap;
 use mapper_identify::T2Course;
 use mapper_report::RunReport;
 use maud::Markup;
 
-/// Everything that the page shows.
+/// The content of the page.
 pub struct RunPage<'a> {
-    /// What the report in Markdown says too.
+    /// The content that it shares with the Markdown report.
     pub report: &'a RunReport<'a>,
-    /// T2 by the numbers of each point.
+    /// T2 computed from the numbers of each point.
     pub courses: &'a [T2Course],
-    /// The diagnosis of the gap to the nominal model, where one was made.
+    /// The diagnosis of the gap to the nominal model, if there is one.
     pub gap: Option<Markup>,
-    /// Maps to hold this one against.
+    /// Maps for comparison.
     pub others: &'a [OtherRun<'a>],
 }
 
 /// Another run's map.
 pub struct OtherRun<'a> {
-    /// How it is called on the page.
+    /// Its name on the page.
     pub name: String,
     /// Its map.
     pub map: &'a CompressorMap,

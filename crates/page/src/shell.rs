@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde::Serialize;
 
 const STYLE: &str = include_str!("../assets/page.css");
-/// d3 7.9.2 and Observable Plot 0.6.17 (ISC), as their npm packages have them: `assets/SHA256SUMS`.
+/// d3 7.9.2 and Observable Plot 0.6.17 (ISC), unchanged from their npm packages: `assets/SHA256SUMS`.
 const D3: &str = include_str!("../assets/d3.min.js");
 const PLOT: &str = include_str!("../assets/plot.umd.min.js");
 const COMMON: &str = include_str!("../assets/common.js");
@@ -13,17 +13,17 @@ const STEPS: &str = include_str!("../assets/steps.js");
 const TABLES: &str = include_str!("../assets/tables.js");
 const LIVE: &str = include_str!("../assets/live.js");
 
-/// What a page is for.
+/// Purpose of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// To be kept: it works from disk and asks nobody.
+    /// To keep: it works from disk and makes no requests.
     Kept,
-    /// To be looked at while a run goes on: it asks the program that it comes from, and nobody else.
+    /// To watch a run: it makes requests only to the program that served it.
     Live,
 }
 
 impl Purpose {
-    /// What the page's own script is made of, in this order.
+    /// Parts of the page's own script, in order.
     fn scripts(self) -> &'static [&'static str] {
         match self {
             Purpose::Kept => &[COMMON, MAP, STEPS, TABLES],
@@ -39,11 +39,11 @@ impl Purpose {
     }
 }
 
-/// Nothing from outside, nothing to outside.
+/// No requests in or out.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; \
                       base-uri 'none'; form-action 'none'";
 
-/// The whole page; `footer` stands on each sheet of its print, `data` is what its script draws.
+/// The complete page; `footer` is printed on each sheet, `data` is the input of its script.
 pub(crate) fn shell(
     title: &str,
     footer: &str,
@@ -74,9 +74,9 @@ pub(crate) fn shell(
     Ok(page.into_string())
 }
 
-/// What stands at the foot of each sheet, and which sheet of how many it is.
+/// The footer of each printed sheet, with the sheet's number and the total.
 fn footer_style(footer: &str) -> String {
-    // Whatever a name holds: by its number no letter ends a string or an element.
+    // Escaped as numbers, so that no letter of a name can end a string or an element.
     let text: String = footer
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("\\{:x} ", u32::from(c)) })
@@ -87,7 +87,7 @@ fn footer_style(footer: &str) -> String {
     )
 }
 
-/// JSON that ends no element, whatever its strings hold.
+/// JSON in which no string can end the element.
 fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
     Ok(serde_json::to_string(data)?
         .replace('<', "\\u003c")
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use sha2::{Digest, Sha256};
 
-    /// The libraries are byte for byte those whose hashes stand beside them.
+    /// The libraries match their recorded hashes byte for byte.
     #[test]
     fn libraries_are_as_their_sums_say() {
         let sums = include_str!("../assets/SHA256SUMS");
@@ -108,7 +108,7 @@ mod tests {
             let sum: String =
                 Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect();
             assert!(sums.contains(&format!("{sum}  {name}")), "{name}: {sum}");
-            // Nothing in them may end the element they stand in.
+            // They must not contain the end of their element.
             assert!(!text.contains("</script"), "{name}");
         }
     }

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-/// A cell: what stands there, and what it is sorted by where that is a number.
+/// A cell: its text, and its sort key if that is a number.
 pub(crate) struct Cell {
     pub(crate) text: String,
     pub(crate) sorted_by: Option<f64>,
@@ -10,12 +10,12 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// Text, sorted as such.
+    /// Text, sorted as text.
     pub(crate) fn text(text: impl Into<String>) -> Self {
         Cell { text: text.into(), sorted_by: None, class: None }
     }
 
-    /// A number as it is shown, sorted by itself.
+    /// A number as displayed, sorted by value.
     pub(crate) fn number(text: impl Into<String>, value: f64) -> Self {
         Cell { text: text.into(), sorted_by: value.is_finite().then_some(value), class: None }
     }
@@ -26,13 +26,13 @@ impl Cell {
     }
 }
 
-/// Rows of cells, each row with the step that a click on it shows.
+/// Rows of cells; a click on a row shows its step.
 pub(crate) struct Row {
     pub(crate) step: Option<usize>,
     pub(crate) cells: Vec<Cell>,
 }
 
-/// A table of data with a caption, which the page's script makes sortable and gives a button that copies it.
+/// A table of data with a caption. The page's script makes it sortable and adds a copy button.
 pub(crate) fn data_table(caption: &str, heads: &[String], rows: &[Row]) -> Markup {
     html! {
         div.scroll tabindex="0" role="region" aria-label=(caption) {
@@ -53,7 +53,7 @@ pub(crate) fn data_table(caption: &str, heads: &[String], rows: &[Row]) -> Marku
     }
 }
 
-/// A table whose first two columns are words, made sortable as all are.
+/// A table whose first two columns are text; sortable like the others.
 pub(crate) fn words_table<const COLUMNS: usize>(
     caption: &str,
     heads: &[&str; COLUMNS],
@@ -70,7 +70,7 @@ pub(crate) fn words_table<const COLUMNS: usize>(
     }
 }
 
-/// What and its value, a row each.
+/// A table of names and values, one row each.
 pub(crate) fn facts(caption: &str, rows: &[(&str, String)]) -> Markup {
     html! {
         table.facts {

@@ -1,8 +1,8 @@
 //! Air, dry and moist: gas constant, heat capacity, viscosity, conductivity.
 //!
-//! Closed forms of the virtual laboratory, standing for the tables of the paper's reference 12. Domain: 250 to 800 K, at
-//! pressures of a few bar, where air is a perfect gas. Against tabulated dry air the heat capacity is within 1 %, the
-//! viscosity within 2 %, the conductivity within 5 % up to 700 K and 7 % at 800 K. Nothing is cut at the ends.
+//! Closed forms of the virtual laboratory, in place of the tables of the paper's reference 12. Domain: 250 to 800 K, at
+//! pressures of a few bar, where air is a perfect gas. Relative to tabulated dry air the heat capacity is within 1 %, the
+//! viscosity within 2 %, the conductivity within 5 % up to 700 K and 7 % at 800 K. Values outside are not clipped.
 
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +46,7 @@ pub fn isentropic_exponent(temperature_k: f64) -> f64 {
     GAS_CONSTANT_J_KGK / heat_capacity_j_kgk(temperature_k)
 }
 
-/// Air as it is in a cell, a perfect gas: viscosity and conductivity are those of dry air (40 g/kg change them by 1 %).
+/// Air in the cell, a perfect gas: viscosity and conductivity are those of dry air (40 g/kg change them by 1 %).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Air {
     /// Water per dry air, kg/kg, 0 to about 0.06.
@@ -54,10 +54,10 @@ pub struct Air {
 }
 
 impl Air {
-    /// Without water.
+    /// Dry air.
     pub const DRY: Air = Air { humidity_kg_kg: 0.0 };
 
-    /// Of this relative humidity (0..1) at a temperature (-20 to 50 degC) and a pressure, Pa. The pressure of saturated vapour is that of Buck
+    /// From relative humidity (0..1), temperature (-20 to 50 degC) and pressure, Pa. The pressure of saturated vapour is that of Buck
     /// (Buck Research CR-1A manual, 1996), enhanced by 0.4 % in air.
     ///
     /// ```
@@ -92,7 +92,7 @@ impl Air {
         self.gas_constant_j_kgk() / self.heat_capacity_j_kgk(temperature_k)
     }
 
-    /// Flow that dry air would have at the same Mach numbers over this one's: `sqrt(R/R_dry)`. Corrected flows are those of dry air.
+    /// Flow of dry air at the same Mach numbers over the flow of this air: `sqrt(R/R_dry)`. Corrected flows are those of dry air.
     #[inline]
     pub fn dry_flow_ratio(self) -> f64 {
         (self.gas_constant_j_kgk() / GAS_CONSTANT_J_KGK).sqrt()
@@ -138,7 +138,7 @@ mod tests {
         assert!((conductivity_w_mk(800.0) / 57.3e-3 - 1.0).abs() < 0.07);
     }
 
-    /// Humidity ratios of CoolProp 6 (`HAPropsSI('W', ...)`), which has real vapour: within 0.5 %.
+    /// Humidity ratios of CoolProp 6 (`HAPropsSI('W', ...)`), which models real vapour: within 0.5 %.
     #[test]
     fn relative_humidity_is_that_of_coolprop() {
         for (t_k, p_pa, relative, expected) in [

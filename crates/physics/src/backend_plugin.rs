@@ -1,30 +1,30 @@
-//! What a backend says of itself before any rig is there: its name, a sentence, and how it is made.
+//! A backend's registration, before any rig exists: its name, a description, and its constructor.
 
 use crate::nominal_rig::NominalRig;
 use mapper_core::{Backend, BackendError};
 
 /// Makes a backend from the declared rig and from its own settings, the value below `backend: {NAME: ...}` of a
-/// campaign; `null` where the campaign writes none.
+/// campaign; `null` if the campaign gives none.
 ///
 /// A mistake in the settings is [`BackendError::Settings`].
 pub type MakeBackend = fn(&NominalRig, &serde_json::Value) -> Result<Box<dyn Backend>, BackendError>;
 
-/// One backend that campaigns can ask for. Each backend has one, `PLUGIN`; the program lists them.
+/// A backend that campaigns can name. Each backend has one, `PLUGIN`; the program lists them.
 #[derive(Debug, Clone, Copy)]
 pub struct BackendPlugin {
     /// Name in campaigns: lower case, digits and `_`.
     pub name: &'static str,
-    /// What it is, one line for people.
+    /// A one-line description.
     pub summary: &'static str,
-    /// Makes it.
+    /// Its constructor.
     pub make: MakeBackend,
 }
 
 impl BackendPlugin {
-    /// The backend called `name` of a list, made from its settings.
+    /// Makes the backend called `name` of a list from its settings.
     ///
     /// # Errors
-    /// [`BackendError::Settings`] where the list has no such backend, and what the backend itself finds wrong.
+    /// [`BackendError::Settings`] if the list has no such backend, or the backend rejects its settings.
     pub fn make_by_name(
         plugins: &[BackendPlugin],
         name: &str,
@@ -42,10 +42,10 @@ impl BackendPlugin {
     }
 }
 
-/// A campaign asks for a backend that nobody has listed.
+/// A campaign names an unknown backend.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no such backend; the backends are {known}")]
 pub struct UnknownBackend {
-    /// Names of the backends there are.
+    /// Names of the known backends.
     pub known: String,
 }

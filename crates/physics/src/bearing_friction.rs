@@ -7,7 +7,7 @@ pub fn friction_power_w(bearing_friction_w_s2: f64, shaft_speed_rad_s: f64) -> f
     bearing_friction_w_s2 * shaft_speed_rad_s * shaft_speed_rad_s
 }
 
-/// A friction in W s^2/rad^2 as engineers judge it: its power at 150 krpm to two figures, e.g. "370 W at 150 krpm".
+/// A friction in W s^2/rad^2 in a familiar form: its power at 150 krpm to two figures, e.g. "370 W at 150 krpm".
 pub fn at_150_krpm(bearing_friction_w_s2: f64) -> String {
     let power_w = friction_power_w(bearing_friction_w_s2, rad_s_of_rpm(150e3));
     if power_w == 0.0 || !power_w.is_finite() {
@@ -27,7 +27,7 @@ mod tests {
     #[test]
     fn power_by_hand() {
         let power_w = friction_power_w(1.49e-6, rad_s_of_rpm(150e3));
-        // The hand's four figures.
+        // Four figures by hand.
         assert!((power_w - 367.6).abs() < 0.1, "{power_w}");
     }
 

@@ -1,9 +1,9 @@
-//! What surrounds the machine, and where the running model has no meaning.
+//! Boundary conditions of the machine, and the range in which the running model is valid.
 
 use mapper_core::with_unit;
 use serde::{Deserialize, Serialize};
 
-/// What surrounds the machine and is set by rig or cell.
+/// Conditions around the machine that rig or cell set.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoundaryConditions {
@@ -41,7 +41,7 @@ impl Default for BoundaryConditions {
     }
 }
 
-/// Boundary conditions under which the model has no meaning.
+/// Boundary conditions under which the model is not valid.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BoundaryError {
     /// No gas goes through the turbine.
@@ -54,7 +54,7 @@ pub enum BoundaryError {
         /// Turbine outlet pressure, Pa.
         p4_pa: f64,
     },
-    /// A value that no rig has.
+    /// A value outside any rig's range.
     #[error(
         "{name} = {} has no physical meaning here; it must be finite and above {}",
         with_unit(value, unit),
@@ -71,7 +71,7 @@ pub enum BoundaryError {
 }
 
 impl BoundaryConditions {
-    /// Checks that the running model has a meaning here.
+    /// Checks that the running model is valid here.
     ///
     /// # Errors
     /// A pressure, temperature or opening that is not positive and finite, or P3 not above P4.

@@ -1,11 +1,11 @@
-//! The seam between the model and a compressor map: flow and efficiency at a corrected speed and pressure ratio.
+//! The interface between the model and a compressor map: flow and efficiency at a corrected speed and pressure ratio.
 //!
-//! It holds no formula: those stand in [`closed_form_map`](crate::closed_form_map) and
+//! It contains no formula: those are in [`closed_form_map`](crate::closed_form_map) and
 //! [`tabulated_map`](crate::tabulated_map), with their known answers.
 
 use mapper_core::ReferenceState;
 
-/// What a map says at one corrected speed and pressure ratio.
+/// Value of a map at one corrected speed and pressure ratio.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CharacteristicPoint {
     /// Corrected mass flow, kg/s. Negative where the closed form continues far beyond the surge line.
@@ -17,7 +17,7 @@ pub struct CharacteristicPoint {
 }
 
 /// A compressor map in corrected quantities. Defined for every positive speed and every pressure ratio, so that an
-/// integration never leaves it; `surge_position_ratio` tells where it left the measured part.
+/// integration never leaves it; `surge_position_ratio` shows where it left the measured part.
 pub trait CompressorCharacteristic: Send + Sync + std::fmt::Debug {
     /// Reference state of the map's corrected quantities.
     fn reference(&self) -> ReferenceState;
@@ -25,9 +25,9 @@ pub trait CompressorCharacteristic: Send + Sync + std::fmt::Debug {
     /// Flow, efficiency and place on the speed line. `speed_corrected_rpm` > 0.
     fn evaluate(&self, speed_corrected_rpm: f64, pressure_ratio: f64) -> CharacteristicPoint;
 
-    /// The same of a compressor that delivers `flow_scale_ratio` times the flow: `m_corr = s m(N, PR)`, and its efficiency is
-    /// the map's at the flow that it has, `eta(N, m_corr)`; the place on the speed line stays. For maps that know efficiency
-    /// over pressure ratio only, the efficiency moves along the speed line's own slope, to first order.
+    /// The same of a compressor with `flow_scale_ratio` times the flow: `m_corr = s m(N, PR)`, and its efficiency is
+    /// the map's at that flow, `eta(N, m_corr)`; the place on the speed line stays. If a map has efficiency only
+    /// over pressure ratio, the efficiency moves along the speed line's own slope, to first order.
     fn evaluate_scaled(
         &self,
         speed_corrected_rpm: f64,
@@ -39,7 +39,7 @@ pub trait CompressorCharacteristic: Send + Sync + std::fmt::Debug {
             return here;
         }
         let flow_corrected_kg_s = flow_scale_ratio * here.flow_corrected_kg_s;
-        // A hundredth of the pressure rise to each side.
+        // One hundredth of the pressure rise to each side.
         let beside = 0.01 * (pressure_ratio - 1.0).abs().max(0.01);
         let [low, high] = [-beside, beside].map(|by| self.evaluate(speed_corrected_rpm, pressure_ratio + by));
         let between_kg_s = high.flow_corrected_kg_s - low.flow_corrected_kg_s;
@@ -50,12 +50,12 @@ pub trait CompressorCharacteristic: Send + Sync + std::fmt::Debug {
         CharacteristicPoint { flow_corrected_kg_s, efficiency, ..here }
     }
 
-    /// Where the speed line ends on the surge side: corrected flow in kg/s and pressure ratio.
+    /// End of the speed line on the surge side: corrected flow in kg/s and pressure ratio.
     fn surge_point(&self, speed_corrected_rpm: f64) -> (f64, f64);
 
     /// Largest corrected flow of the speed line, kg/s.
     fn choke_flow_corrected_kg_s(&self, speed_corrected_rpm: f64) -> f64;
 
-    /// Text from which the map can be told apart from any other; goes into the hash of a plan.
+    /// Text that distinguishes the map from any other; part of the hash of a plan.
     fn fingerprint(&self) -> String;
 }

@@ -1,8 +1,8 @@
 //! The virtual laboratory's own compressor, "turbo_a", in closed form.
 //!
-//! The paper does not print its map tables; these forms stand for them (flow as a function of speed and pressure
+//! The paper does not print its map tables; these forms replace them (flow as a function of speed and pressure
 //! ratio, an ellipse-like line between a zero-slope and a choke point; efficiency a parabola over flow). Fitted by eye to the
-//! ranges that the paper plots: 50 to 170 krpm, corrected to SAE's reference state. Beyond, the forms go on smoothly.
+//! ranges plotted in the paper: 50 to 170 krpm, corrected to SAE's reference state. Outside, the forms continue smoothly.
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use crate::power::power;

@@ -4,13 +4,13 @@
 //! inlet temperature T1, eq. 3 the outlet temperature T2.
 //!
 //! Domain: flow, efficiency, temperatures and areas above 0 (efficiency may be negative where the machine brakes the gas);
-//! pressure ratios up to about 6, beyond which cp at the inlet no longer stands for the whole compression. Eq. 3 is the
+//! pressure ratios up to about 6, beyond which cp at the inlet no longer represents the whole compression. Eq. 3 is the
 //! one-node form of a heat exchanger: the gas never passes the metal's temperature.
 
 use crate::air::Air;
 use crate::power::power;
 
-/// What the gas meets on its way through the compressor.
+/// Conditions along the gas path of the compressor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompressionInputs {
     /// Inlet total temperature (station 1), K.
@@ -25,7 +25,7 @@ pub struct CompressionInputs {
     pub efficiency: f64,
     /// Heat-transfer coefficient after the wheel, W/(m2 K).
     pub h_w_m2k: f64,
-    /// Heat-transfer coefficient before the wheel over that after it; eqs. 1 and 3 have 1.
+    /// Heat-transfer coefficient before the wheel over that after it; 1 in eqs. 1 and 3.
     pub inlet_h_ratio: f64,
     /// Share of the internal area before compression, alpha_A.
     pub alpha_area_ratio: f64,
@@ -62,7 +62,7 @@ pub fn compressed_k(inlet_k: f64, isentropic_rise_ratio: f64, efficiency: f64) -
     inlet_k * (1.0 + isentropic_rise_ratio / efficiency)
 }
 
-/// Eq. 1 for a conductance in front of the wheel: heat from gas to metal in W, and the gas behind it in K.
+/// Eq. 1 for a conductance before the wheel: heat from gas to metal in W, and the gas after it in K.
 #[inline]
 pub fn before_wheel(
     conductance_w_k: f64,
@@ -75,8 +75,8 @@ pub fn before_wheel(
     (heat_w, t1_k - heat_w / (flow_kg_s * cp_j_kgk))
 }
 
-/// Gas after a wheel that pumps part of its flow in a circle, K: `r` m of the (1 + r) m it pumps come back, hot, to its
-/// inlet, so that T2' = T1'(1 + X)/(1 - r X) with X = rise/efficiency. Eq. 2 where `recirculation_ratio` is 0.
+/// Gas after a wheel that recirculates part of its flow, K: `r` m of the (1 + r) m it pumps come back, hot, to its
+/// inlet, so that T2' = T1'(1 + X)/(1 - r X) with X = rise/efficiency. Eq. 2 if `recirculation_ratio` is 0.
 #[inline]
 pub fn behind_wheel_k(
     t1_prime_k: f64,
@@ -84,12 +84,12 @@ pub fn behind_wheel_k(
     efficiency: f64,
     recirculation_ratio: f64,
 ) -> f64 {
-    // Beyond a tenth the circle would heat itself without bound; no compressor comes near it.
+    // Beyond a tenth the recirculation would heat itself without bound; no compressor comes near it.
     let circle = (1.0 - recirculation_ratio * isentropic_rise_ratio / efficiency).max(0.1);
     compressed_k(t1_prime_k, isentropic_rise_ratio, efficiency) / circle
 }
 
-/// Eq. 3 for a conductance behind the wheel: heat from gas to metal in W, and the gas at the outlet in K.
+/// Eq. 3 for a conductance after the wheel: heat from gas to metal in W, and the gas at the outlet in K.
 #[inline]
 pub fn after_wheel(
     conductance_w_k: f64,
@@ -152,9 +152,9 @@ mod tests {
             )
     }
 
-    /// Air tables (Moran and Shapiro, table A-22): from 300 K (pr = 1.3860) at pressure ratio 4 the isentropic end lies at
+    /// Air tables (Moran and Shapiro, table A-22): from 300 K (pr = 1.3860) at pressure ratio 4 the isentropic end is at
     /// pr = 5.5440, h = 446.5 kJ/kg, which is 444.8 K; at efficiency 0.8 h is 300.2 + (446.5 - 300.2)/0.8 = 483.1 kJ/kg,
-    /// 480.6 K. cp held at the inlet's costs 0.2 % and 0.3 %.
+    /// 480.6 K. The constant cp of the inlet costs 0.2 % and 0.3 %.
     #[test]
     fn a_text_book_compression() {
         let rise = isentropic_rise_ratio(4.0, 300.0, Air::DRY);
@@ -171,7 +171,7 @@ mod tests {
                 isentropic_rise_ratio: isentropic_rise_ratio(pr, t1_k, Air::DRY), internal_area_m2: 29e-3, air: Air::DRY,
             };
             let isentropic_k = t1_k * pr.powf(287.05 / (1002.5 + 275e-6 * (t1_k - 200.0).powi(2)));
-            // Two roundings apart.
+            // Two rounding errors.
             prop_assert!((compress(&ideal, None).t2_k / isentropic_k - 1.0).abs() < 1e-14);
         }
 
@@ -183,7 +183,7 @@ mod tests {
             prop_assert!((gas.t2_prime_k / gas.t1_prime_k).ln() >= ln_pr_kappa - 1e-14);
         }
 
-        /// What the gas loses after the wheel is what the metal gains.
+        /// The gas loses after the wheel what the metal gains.
         #[test]
         fn heat_is_conserved(inputs in inputs()) {
             let gas = compress(&inputs, None);

@@ -1,8 +1,8 @@
 //! The model driven by recorded inputs on a frozen grid of steps.
 //!
 //! Runs with slightly different parameters share every step, so that their difference is as smooth as the model
-//! itself: what a fit needs and what adaptive steps spoil. The grid is fine after each jump and coarse where only metal
-//! moves; each step is one of [Rodas5P](crate::rosenbrock), which is L-stable, so that the outlet volume (milliseconds)
+//! itself, which a fit needs and adaptive steps would destroy. The grid is fine after each jump and coarse while only the metal
+//! changes; each step is one of [Rodas5P](crate::rosenbrock), which is L-stable, so that the outlet volume (milliseconds)
 //! does not limit it.
 
 use crate::characteristic::CharacteristicPoint;
@@ -14,16 +14,16 @@ use crate::simulate::tolerances;
 use crate::state::MAX_STATES;
 use nalgebra::{Const, DimMin};
 
-/// Longest steps after a jump: up to so many seconds, steps of at most so many seconds.
-/// The first are of the outlet volume's own time: where the valve closes, P2 rises along a line that bends too much for one
+/// Longest steps after a jump: up to a time in seconds, steps of at most a length in seconds.
+/// The first are as short as the outlet volume's own time: when the valve closes, P2 rises along a line that is too curved for one
 /// step without error control.
 const STEPS_S: [(f64, f64); 7] =
     [(0.004, 0.001), (0.02, 0.004), (0.2, 0.02), (3.0, 0.1), (8.0, 0.8), (20.0, 2.0), (f64::INFINITY, 6.0)];
 
-/// Within this of the surge line, in places on the speed line, the error of a step is controlled.
+/// Within this distance of the surge line, in places on the speed line, the error of a step is controlled.
 const SURGE_CORNER: f64 = 0.01;
-/// Relative tolerance with which the model is integrated through what the grid's own steps do not follow: the virtual lab's. Steps that this
-/// takes at most: surge cycles last a second, and a hundred steps each.
+/// Relative tolerance of the integration where the grid's own steps are too coarse: that of the virtual lab. Maximum number of
+/// its steps: surge cycles last a second, and a hundred steps each.
 const RESCUE_TOLERANCE: f64 = 1e-5;
 const MAX_RESCUE_STEPS: usize = 10_000;
 
@@ -35,7 +35,7 @@ pub struct FrozenGrid {
 
 impl FrozenGrid {
     /// A grid from `start_s` to `end_s` with nodes at each jump and each of `times_s` within (rising both), and between
-    /// them as fine as the time since the last jump asks for. What is read at nodes is read where the method is
+    /// them as fine as the time since the last jump requires. Results are read only at nodes, where the method is
     /// stiffly accurate.
     pub fn new(start_s: f64, end_s: f64, jumps_s: &[f64], times_s: &[f64]) -> Self {
         let mut wanted: Vec<f64> = jumps_s.iter().chain(times_s).copied().collect();
@@ -64,7 +64,7 @@ impl FrozenGrid {
         FrozenGrid { nodes_s }
     }
 
-    /// The steps between two of its nodes; beyond its ends nothing.
+    /// The steps between two of its nodes; none outside its ends.
     pub fn part(&self, from_s: f64, to_s: f64) -> FrozenGrid {
         let inside = |t_s: &&f64| (from_s..=to_s).contains(*t_s);
         FrozenGrid { nodes_s: self.nodes_s.iter().filter(inside).copied().collect() }
@@ -76,7 +76,7 @@ impl FrozenGrid {
     }
 }
 
-/// A drive that left what the model can do.
+/// A drive that left the valid range of the model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("the driven model cannot continue at {t_s:.2} s; the inputs or parameters there are beyond it")]
 pub struct DriveError {
@@ -84,11 +84,11 @@ pub struct DriveError {
     pub t_s: f64,
 }
 
-/// Drives `model` from `start` over the grid. `on_sample` gets the index of each of `times_s` (rising, within the grid)
+/// Drives `model` from `start` over the grid. `on_sample` receives the index of each of `times_s` (rising, within the grid)
 /// with the model there.
 ///
 /// # Errors
-/// [`DriveError`] where the boundary conditions have no meaning or a step gives no number.
+/// [`DriveError`] if the boundary conditions are not valid or a step gives no number.
 pub fn drive(
     model: &Model,
     inputs: &impl Inputs,
@@ -106,13 +106,13 @@ pub fn drive(
     }
 }
 
-/// The state in which `model` rests under constant boundary conditions, from a first guess: driven for ten hours.
+/// The steady state of `model` under constant boundary conditions, from a first guess: driven for ten hours.
 ///
 /// # Errors
-/// [`DriveError`] where it does not rest.
+/// [`DriveError`] if it does not reach a steady state.
 pub fn settle(model: &Model, boundary: &BoundaryConditions, guess: State) -> Result<State, DriveError> {
-    // Steps that grow: one far longer than every time constant of an L-stable method lands at rest. Where the guess lies
-    // beyond the surge line the first step is too long for the outlet volume: again, from its own milliseconds.
+    // Growing steps: one far longer than every time constant of an L-stable method ends at the steady state. If the guess is
+    // beyond the surge line, the first step is too long for the outlet volume: start again from its own milliseconds.
     let gently = |first_s: f64, growth: f64| {
         let mut nodes_s = vec![0.0];
         let mut step_s = first_s;
@@ -163,7 +163,7 @@ where
         let step = match integrator.step_on_grid(&mut system, end_s).ok().filter(|step| is_physical(&step.y1))
         {
             Some(step) if !system.near_corner(surge_before, &step.y1) => step,
-            // A step across the corner, and one that leads nowhere, deep beyond the surge line.
+            // A step across the corner, and one that fails, deep beyond the surge line.
             _ => {
                 integrator = kept;
                 with_error_control(&mut integrator, &mut system, end_s).ok_or(failed)?
@@ -179,7 +179,7 @@ where
     Ok(State::from_array(&integrator.y))
 }
 
-/// Steps on to `end_s`, as long as the error control lets them be; `None` where no state that a machine can have leads there.
+/// Integrates to `end_s` with error control; `None` if no physically possible state leads there.
 fn with_error_control<const N: usize>(
     integrator: &mut Integrator<N>,
     system: &mut DrivenSystem<'_, impl Inputs>,
@@ -215,8 +215,8 @@ struct DrivenSystem<'a, I: Inputs> {
     /// Time for which the model is prepared.
     boundary_s: f64,
     prepared: PreparedModel<'a>,
-    /// First state asked for at that time, and what the map says there: most slopes are taken over states that move neither
-    /// speed nor pressure.
+    /// First state requested at that time, and the map's value there: most slopes are taken over states with the same
+    /// speed and pressure.
     on_map: Option<(State, CharacteristicPoint)>,
 }
 
@@ -349,7 +349,7 @@ mod tests {
         let mut there = driven;
         let keep = |_: f64, state: &State, _: &Outputs| there = *state;
         simulator.run_to(30.0, &target, times_s.iter().copied(), keep, |_| {}).unwrap();
-        // When a surge cycle ends is chaotic; half a minute later a twentieth of the offsets of a rig is left: 0.5 krpm, 0.5 K.
+        // When a surge cycle ends is chaotic; half a minute later a twentieth of a rig's offsets remains: 0.5 krpm, 0.5 K.
         assert!((driven.shaft_speed_rpm() - there.shaft_speed_rpm()).abs() < 500.0, "{driven:?} {there:?}");
         assert!((driven.tc_k - there.tc_k).abs() < 0.5, "{driven:?} {there:?}");
     }
@@ -369,7 +369,7 @@ mod tests {
         assert!((settled.tt_k - steady.state.tt_k).abs() < 1e-3, "{} K", settled.tt_k);
     }
 
-    /// A machine told 20 K too much at its inlet, from the state at the right temperature, which then lies beyond the surge
+    /// A machine with an inlet temperature that is 20 K too high, from the state at the right temperature, which is then beyond the surge
     /// line.
     #[test]
     fn settling_starts_beyond_the_surge_line_too() {

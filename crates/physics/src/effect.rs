@@ -1,4 +1,4 @@
-//! The seam between the model and effects: what a rig may have and the nominal model has not.
+//! The interface between the model and effects: properties of a rig that the nominal model does not have.
 
 use crate::hooks::{Hooks, TooManyExtraStates};
 use crate::instruments::Instruments;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// A machine behind its instruments: everything an effect can change.
+/// A machine with its instruments: everything an effect can change.
 #[derive(Debug, Clone)]
 pub struct Rig {
     /// The machine.
@@ -32,11 +32,11 @@ impl Rig {
     }
 }
 
-/// The parts of a rig in which a gap can lie.
+/// The parts of a rig in which a gap can originate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Submodel {
-    /// P3 behind its command.
+    /// Response of P3 to its command.
     Actuator,
     /// Flow that the turbine swallows.
     TurbineFlow,
@@ -102,41 +102,41 @@ impl Submodel {
     }
 }
 
-/// A number that says how strong an effect is.
+/// A parameter that sets the strength of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectParameter {
-    /// Name within the effect; the effect's own id where it has one parameter only.
+    /// Name within the effect; the effect's own id if it has only one parameter.
     pub name: Cow<'static, str>,
     /// Unit, `1` for ratios.
     pub unit: Cow<'static, str>,
-    /// Smallest value with a meaning.
+    /// Smallest valid value.
     pub low: f64,
-    /// Largest value with a meaning.
+    /// Largest valid value.
     pub high: f64,
-    /// Value at which the effect is not there.
+    /// Value without effect.
     pub neutral: f64,
-    /// How far from neutral the effect is where it is plainly there: a step to start a search from.
+    /// Distance from neutral at which the effect is clearly visible: the first step of a search.
     pub typical_step: f64,
 }
 
-/// What stands in a table of effects.
+/// A row of a table of effects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectInfo {
     /// Its name: lower case, digits and `_`.
     pub id: Cow<'static, str>,
-    /// Its name for people.
+    /// Its display name.
     pub name: Cow<'static, str>,
-    /// What happens, one line for people.
+    /// A one-line description.
     pub description: Cow<'static, str>,
     /// The equation, in the symbols of `docs/physics.md`.
     pub equation: Cow<'static, str>,
-    /// Where the equation comes from.
+    /// Source of the equation.
     pub source: Cow<'static, str>,
-    /// Where it sits.
+    /// Its submodel.
     pub submodel: Submodel,
-    /// Where its gap may show as well: neighbours that share a balance with it.
+    /// Submodels in which its gap may also appear: neighbours that share a balance with it.
     pub also_shows_in: Vec<Submodel>,
-    /// Its numbers, at least one.
+    /// Its parameters, at least one.
     pub parameters: Vec<EffectParameter>,
 }
 
@@ -147,13 +147,13 @@ impl EffectInfo {
         names.join(", ")
     }
 
-    /// Whether its gap may show in the submodel of this name.
+    /// Whether its gap may appear in the submodel of this name.
     pub fn shows_in(&self, submodel_name: &str) -> bool {
         std::iter::once(&self.submodel).chain(&self.also_shows_in).any(|place| place.name() == submodel_name)
     }
 }
 
-/// The values of an effect's parameters, one for each and within its range, asked for by name.
+/// The values of an effect's parameters, one for each and within its range, accessed by name.
 #[derive(Debug, Clone, Copy)]
 pub struct NamedValues<'a> {
     info: &'a EffectInfo,
@@ -161,10 +161,10 @@ pub struct NamedValues<'a> {
 }
 
 impl<'a> NamedValues<'a> {
-    /// `values` stand in the order of the effect's parameters.
+    /// `values` are in the order of the effect's parameters.
     ///
     /// # Errors
-    /// [`EffectError`] where a value is missing, out of range or not finite.
+    /// [`EffectError`] if a value is missing, out of range or not finite.
     pub fn new(info: &'a EffectInfo, values: &'a [f64]) -> Result<Self, EffectError> {
         let id = || info.id.clone().into_owned();
         if values.len() != info.parameters.len() {
@@ -199,29 +199,29 @@ impl<'a> NamedValues<'a> {
         self.info.parameters.iter().zip(self.values.iter().copied())
     }
 
-    /// Whether every value is the one at which the effect is not there.
+    /// Whether every value is neutral.
     pub fn is_neutral(&self) -> bool {
         self.iter().all(|(parameter, value)| parameter.neutral == value)
     }
 }
 
-/// Something a rig may have.
+/// A property that a rig may have.
 ///
-/// What it changes of the model's parameters and of the instruments it changes once, before a run; what is neither it
+/// It changes parameters of the model and of the instruments once, before a run; anything else it
 /// adds as [`Hooks`]. At neutral values it changes nothing.
 pub trait Effect: std::fmt::Debug + Send + Sync {
-    /// What it is.
+    /// Its description.
     fn info(&self) -> &EffectInfo;
 
-    /// Puts it into a rig.
+    /// Adds it to a rig.
     ///
     /// # Errors
-    /// [`EffectError::Room`] where it brings hidden temperatures for which there is no room;
-    /// [`EffectError::NoParameter`] where it asks for a parameter that it does not declare.
+    /// [`EffectError::Room`] if there is no room for its hidden temperatures;
+    /// [`EffectError::NoParameter`] if it uses a parameter that it does not declare.
     fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
 }
 
-/// Why an effect cannot be put into a rig.
+/// Why an effect cannot be added to a rig.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EffectError {
     /// Too few or too many values.
@@ -234,7 +234,7 @@ pub enum EffectError {
         /// Number of values.
         given: usize,
     },
-    /// A value without meaning.
+    /// An invalid value.
     #[error(
         "{name} = {} of effect `{id}` is not between {low} and {}",
         with_unit(value, unit),
@@ -254,12 +254,12 @@ pub enum EffectError {
         /// Largest value.
         high: f64,
     },
-    /// A parameter that the effect does not have: a fault of the effect.
+    /// A parameter that the effect does not have: a bug in the effect.
     #[error("effect `{id}` has no parameter `{name}`; it has {names}")]
     NoParameter {
         /// The effect.
         id: String,
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// Names of its parameters.
         names: String,
@@ -269,11 +269,11 @@ pub enum EffectError {
     Room(#[from] TooManyExtraStates),
 }
 
-/// Puts `effect` into `rig`, after what is already there; effects compose in any number and order.
+/// Adds `effect` to `rig`, after the effects already there; effects compose in any number and order.
 ///
 /// # Errors
-/// [`EffectError`] where a value is missing, out of range or not finite, or hidden temperatures are too many. The rig
-/// is then as before.
+/// [`EffectError`] if a value is missing, out of range or not finite, or there are too many hidden temperatures. The rig
+/// is then unchanged.
 pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), EffectError> {
     effect.prepare(&NamedValues::new(effect.info(), values)?, rig)
 }

@@ -1,4 +1,4 @@
-//! An effect as a struct of its own numbers: one struct, what is said of it, and what it does to a rig.
+//! An effect as a struct of its own parameters, with its description and its change to a rig.
 
 use crate::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, Submodel};
 use crate::hooks::TooManyExtraStates;
@@ -6,50 +6,50 @@ use std::borrow::Cow;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-/// What stands in a table of effects, but for the numbers.
+/// A row of a table of effects, without the parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct About {
     /// Name: lower case, digits and `_`.
     pub id: &'static str,
-    /// Its name for people, a noun that can be the subject of a sentence.
+    /// Its display name, a noun that can be the subject of a sentence.
     pub name: &'static str,
-    /// What happens, one line for people.
+    /// A one-line description.
     pub description: &'static str,
     /// The equation, in the symbols of `docs/physics.md`.
     pub equation: &'static str,
-    /// Where the equation comes from.
+    /// Source of the equation.
     pub source: &'static str,
-    /// Where it sits.
+    /// Its submodel.
     pub submodel: Submodel,
-    /// Where its gap may show as well: neighbours that share a balance with it.
+    /// Submodels in which its gap may also appear: neighbours that share a balance with it.
     pub also_shows_in: &'static [Submodel],
 }
 
-/// The numbers of an effect, by their names. [`effect_parameters!`](crate::effect_parameters) writes it.
+/// The parameters of an effect, by their names. [`effect_parameters!`](crate::effect_parameters) implements it.
 pub trait EffectNumbers: Sized {
-    /// Every number with its range.
+    /// Every parameter with its range.
     fn parameters() -> Vec<EffectParameter>;
 
-    /// Takes each number by its name.
+    /// Takes each parameter by its name.
     ///
     /// # Errors
-    /// [`EffectError::NoParameter`] where a name is missing.
+    /// [`EffectError::NoParameter`] if a name is missing.
     fn from_values(values: &NamedValues<'_>) -> Result<Self, EffectError>;
 }
 
-/// An effect whose numbers are the fields of `Self`.
+/// An effect whose parameters are the fields of `Self`.
 pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
-    /// What it is.
+    /// Its description.
     const ABOUT: About;
 
-    /// Puts it into a rig. At neutral numbers nothing changes.
+    /// Adds it to a rig. At neutral values nothing changes.
     ///
     /// # Errors
-    /// [`TooManyExtraStates`] where it brings hidden temperatures for which there is no room.
+    /// [`TooManyExtraStates`] if there is no room for its hidden temperatures.
     fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates>;
 }
 
-/// The effect of a kind, as catalogues list it.
+/// The effect of a kind, for effect libraries.
 pub fn effect_of<K: EffectKind>() -> Arc<dyn Effect> {
     let About { id, name, description, equation, source, submodel, also_shows_in } = K::ABOUT;
     let info = EffectInfo {
@@ -82,7 +82,7 @@ impl<K: EffectKind> Effect for OfKind<K> {
     }
 }
 
-/// Declares the struct of an effect's numbers, in the form that scripts use: a field, its name in files and reports,
+/// Declares the struct of an effect's parameters, in the form that scripts use: a field, its name in files and reports,
 /// `[unit] low .. high, neutral value, step value`.
 ///
 /// ```

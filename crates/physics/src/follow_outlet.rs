@@ -1,6 +1,6 @@
 //! Steady states in which hot side and oil follow the compressor's outlet temperature: adiabatic mapping.
 //!
-//! Where gas, oil and both housings have the same temperature, no heat flows to or from the compressor's gas but what the
+//! If gas, oil and both housings have the same temperature, the compressor's gas exchanges no heat except what the
 //! gas itself brings, and the efficiency from the temperature rise is the adiabatic one.
 
 use crate::model::Model;
@@ -8,7 +8,7 @@ use crate::params::BoundaryConditions;
 use crate::steady::{self, SteadyError, SteadyState};
 use serde::{Deserialize, Serialize};
 
-/// Which temperatures are held at the compressor's outlet temperature.
+/// Temperatures that are held at the compressor's outlet temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct FollowOutlet {
     /// Turbine inlet total temperature, T3.
@@ -24,16 +24,16 @@ impl FollowOutlet {
     }
 }
 
-/// Rounds until the temperatures agree; each leaves a few per cent of what was off before.
+/// Maximum number of rounds until the temperatures agree; each reduces the difference to a few per cent.
 const ROUNDS: usize = 40;
 /// Temperatures agree when they differ by less, K.
 const AGREED_K: f64 = 1e-6;
 
-/// As [`steady::hold_speed`], with what `follow` names at the outlet temperature of that steady state; the others stay as
-/// `boundary` has them.
+/// Like [`steady::hold_speed`], with the temperatures in `follow` at the outlet temperature of that steady state; the others are as
+/// in `boundary`.
 ///
 /// # Errors
-/// [`SteadyError`] of the last round; [`SteadyError::NoHeatBalance`] where the temperatures do not converge.
+/// [`SteadyError`] of the last round; [`SteadyError::NoHeatBalance`] if the temperatures do not converge.
 pub fn hold_speed(
     model: &Model,
     speed_rpm: f64,
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
     use crate::air::Air;
 
-    /// With T3 and oil at T2 the temperature rise gives the map's own efficiency, but for what is lost to the cell.
+    /// With T3 and oil at T2 the temperature rise gives the map's own efficiency, except for losses to the cell.
     #[test]
     fn nothing_heats_the_gas_when_all_is_at_its_temperature() {
         let model = Model::nominal();
@@ -84,7 +84,7 @@ mod tests {
             let held = hold_speed(&model, speed_rpm, &boundary, follow).unwrap();
             assert!((held.boundary.t3_k - held.outputs.t2_k).abs() < 1e-5);
             assert!((held.boundary.oil_temperature_k - held.outputs.t2_k).abs() < 1e-5);
-            // What is left is what the housings lose to the cell, some watts.
+            // The remaining difference is the housings' loss to the cell, some watts.
             assert!(error(&held) < 0.01, "{}", error(&held));
         }
         // At low speed the hot turbine heats the compressor most: several points of efficiency.

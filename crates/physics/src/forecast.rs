@@ -1,4 +1,4 @@
-//! One step on the nominal machine, with its thermal memory: what plan and sequence expect of it.
+//! Forecast of one step on the nominal machine, with its thermal memory, for plan and sequence.
 
 use crate::model::{Model, State};
 use crate::params::BoundaryConditions;
@@ -36,31 +36,31 @@ pub struct ForecastRow {
     pub h_w_m2k: f64,
 }
 
-/// A step as the nominal machine takes it.
+/// A step of the nominal machine.
 #[derive(Debug, Clone)]
 pub struct StepForecast {
-    /// Its rows from the jump to the end, which always is the last one.
+    /// Its rows from the jump to the end; the last one is always the end.
     pub rows: Vec<ForecastRow>,
     /// Interval of the rows, s.
     pub interval_s: f64,
     /// The machine at the end.
     pub end: State,
-    /// Highest shaft speed on the way, rpm.
+    /// Highest shaft speed during the step, rpm.
     pub highest_speed_rpm: f64,
-    /// Highest reading of the outlet probe on the way, K. Before the first row the probe still shows the point before.
+    /// Highest reading of the outlet probe during the step, K. Before the first row the probe still shows the previous point.
     pub highest_t2_k: f64,
-    /// Longest stretch beyond the surge line, s.
+    /// Longest time beyond the surge line, s.
     pub longest_surge_s: f64,
     /// The machine at each row.
     states: Vec<State>,
-    /// When it was beyond the surge line, s.
+    /// Intervals beyond the surge line, s.
     surges_s: Vec<(f64, f64)>,
 }
 
 /// The machine after `duration_s` at `boundary`.
 ///
 /// # Errors
-/// [`SimulationError`] where the simulation fails.
+/// [`SimulationError`] if the simulation fails.
 pub fn hold(
     model: &Model,
     state: State,
@@ -72,11 +72,11 @@ pub fn hold(
     Ok(simulator.state())
 }
 
-/// The machine at its first point after `warm_up_s` there, from housings at ambient temperature; `first` is what the
-/// point's steady state is.
+/// The machine at its first point after `warm_up_s` there, from housings at ambient temperature; `first` is the
+/// point's steady state.
 ///
 /// # Errors
-/// [`SimulationError`] where the simulation fails.
+/// [`SimulationError`] if the simulation fails.
 pub fn warmed_up(
     model: &Model,
     first: State,
@@ -90,7 +90,7 @@ pub fn warmed_up(
 /// The step of `dwell_s` from `state` at `boundary`.
 ///
 /// # Errors
-/// [`SimulationError`] where the simulation fails.
+/// [`SimulationError`] if the simulation fails.
 pub fn forecast_step(
     model: &Model,
     state: State,
@@ -157,7 +157,7 @@ impl StepForecast {
         }
     }
 
-    /// The same step, ended at one of its rows; `None` where no row lies at `dwell_s`.
+    /// The same step, ended at one of its rows; `None` if there is no row at `dwell_s`.
     pub fn ended_at(&self, dwell_s: f64) -> Option<StepForecast> {
         let last = self.rows.partition_point(|row| row.t_s < dwell_s - 1e-9);
         let end = self.rows.get(last).filter(|row| row.t_s <= dwell_s + 1e-9)?;
@@ -168,8 +168,8 @@ impl StepForecast {
         Some(StepForecast::of(rows, states, surges_s, self.interval_s, end))
     }
 
-    /// From when on the operating point has settled, s after the jump; `None` where it never has for longer than the
-    /// last interval. [`crate::settled`] says what that means.
+    /// Time at which the operating point has settled, s after the jump; `None` if it has not settled before the
+    /// last interval. [`crate::settled`] defines settling.
     pub fn settle_s(&self, bands: &SettleBands) -> Option<f64> {
         type Signal = fn(&ForecastRow) -> f64;
         let signals = with_bands::<Signal>(
@@ -196,10 +196,10 @@ impl StepForecast {
         self.rows.get(first..behind).unwrap_or_default()
     }
 
-    /// What the step is expected to give, without the errors of an identification. Without a jump (the first step of a
+    /// The expected results of the step, without the errors of an identification. Without a jump (the first step of a
     /// campaign) there are no gradients.
     pub fn predicted(&self, rule: &WindowRule, bands: &SettleBands, has_jump: bool) -> Predicted {
-        // An empty step has nothing to tell.
+        // An empty step has no results.
         let (end, dwell_s) = (self.rows.last(), self.rows.last().map_or(0.0, |row| row.t_s));
         let settle_s = self.settle_s(bands);
         let window = if has_jump { self.window(rule.of_step_s(settle_s, dwell_s)) } else { &[] };
@@ -233,7 +233,7 @@ mod tests {
         let forecast = forecast_step(&model, rest.state, &rest.boundary, 120.0).unwrap();
         let predicted = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), true);
         assert_eq!(predicted.settle_s, Some(0.0));
-        // What the integration's tolerance of 1e-6 leaves of 400 K.
+        // The integration's tolerance of 1e-6 at 400 K.
         assert!(predicted.dtc_k.unwrap().abs() < 1e-2 && predicted.dt2_k.unwrap().abs() < 1e-2);
         let first = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), false);
         assert_eq!((first.dt2_k, first.dtc_k), (None, None), "no jump, no gradient");

@@ -1,23 +1,23 @@
-//! Where something that the model does not have can take part: named places in the gas path and the metal.
+//! Extension points of the model: named places in the gas path and the metal.
 //!
-//! What is a number of the model is one of its [parameters](crate::params::Params); hooks are for the rest. Each gets
-//! the value the model would use and gives the one it shall use. A model without hooks never looks for them.
+//! Numbers of the model are its [parameters](crate::params::Params); hooks are for everything else. Each receives
+//! the model's value and returns the value to use. A model without hooks never looks for them.
 
 use crate::params::BoundaryConditions;
 use crate::state::{MAX_EXTRA, State};
 use mapper_core::Channel;
 use std::sync::Arc;
 
-/// What is known where a hook is asked; values that come later in the gas path are NaN.
+/// Data known when a hook is called; values that come later in the gas path are NaN.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
-    /// Time, s; NaN in a steady state and while everything holds still.
+    /// Time, s; NaN in a steady state and while all inputs are constant.
     pub t_s: f64,
     /// Boundary conditions.
     pub boundary: &'a BoundaryConditions,
     /// States.
     pub state: &'a State,
-    /// Hidden temperatures of the hook that is asked, K.
+    /// Hidden temperatures of the called hook, K.
     pub extra_k: &'a [f64],
     /// Temperature of the metal that touches the compressor's gas, K.
     pub wall_k: f64,
@@ -40,7 +40,7 @@ pub struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    /// A site of whose gas path nothing is known yet.
+    /// A site before the gas path is evaluated.
     #[inline]
     pub(crate) fn before_the_gas(
         t_s: f64,
@@ -68,8 +68,8 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Something that takes part in the model. Every method does nothing unless it is written; all must be smooth in what
-/// they are given, or the integration takes small steps.
+/// An extension of the model. Every method does nothing by default; all must be smooth in their
+/// arguments, or the integration takes small steps.
 pub trait Hooks: std::fmt::Debug + Send + Sync {
     /// Compressor mass flow, kg/s.
     fn flow_kg_s(&self, _site: &Site<'_>, flow_kg_s: f64) -> f64 {
@@ -96,7 +96,7 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
         t2_prime_k
     }
 
-    /// Gas at the outlet (station 2), which probe and valve meet, K.
+    /// Gas at the outlet (station 2), at probe and valve, K.
     fn gas_outlet_k(&self, _site: &Site<'_>, t2_k: f64) -> f64 {
         t2_k
     }
@@ -106,7 +106,7 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
         0.0
     }
 
-    /// Heat added to the inner wall of the compressor housing, W; to the housing where it is one node.
+    /// Heat added to the inner wall of the compressor housing, W; to the housing if it is one node.
     fn heat_to_inner_w(&self, _site: &Site<'_>) -> f64 {
         0.0
     }
@@ -126,7 +126,7 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
         0.0
     }
 
-    /// What the sensor of `channel` sees, in the channel's unit.
+    /// The input of the sensor of `channel`, in the channel's unit.
     fn reading(&self, _site: &Site<'_>, _channel: Channel, value: f64) -> f64 {
         value
     }
@@ -139,13 +139,13 @@ pub trait Hooks: std::fmt::Debug + Send + Sync {
     /// Rates of its hidden temperatures, K/s; `rates` has [`extra_states`](Hooks::extra_states) elements.
     fn extra_rates_k_s(&self, _site: &Site<'_>, _rates: &mut [f64]) {}
 
-    /// What went wrong so far, if anything did: hooks cannot fail, they give NaN and keep the reason.
+    /// The first fault so far, if any: hooks cannot fail, so they return NaN and keep the reason.
     fn fault(&self) -> Option<String> {
         None
     }
 }
 
-/// The hooks of a model, each with its place among the hidden temperatures.
+/// The hooks of a model, each with its index among the hidden temperatures.
 #[derive(Debug, Clone, Default)]
 pub struct HookList {
     placed: Vec<Placed>,
@@ -159,21 +159,21 @@ struct Placed {
     extra_states: usize,
 }
 
-/// The hooks of a model want more hidden temperatures than it has room for.
+/// The hooks of a model need more hidden temperatures than it has room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the effects need {wanted} hidden temperatures together; a model has room for {MAX_EXTRA}: try fewer effects at once"
 )]
 pub struct TooManyExtraStates {
-    /// How many they want.
+    /// The number they need.
     pub wanted: usize,
 }
 
 impl HookList {
-    /// Adds hooks behind those that are there: they see what those made.
+    /// Adds hooks after the existing ones, and passes them the values that those returned.
     ///
     /// # Errors
-    /// [`TooManyExtraStates`]; the list is then as before.
+    /// [`TooManyExtraStates`]; the list is then unchanged.
     pub fn push(&mut self, hooks: Arc<dyn Hooks>) -> Result<(), TooManyExtraStates> {
         let extra_states = hooks.extra_states();
         let wanted = self.extra_states.saturating_add(extra_states);
@@ -196,12 +196,12 @@ impl HookList {
         self.extra_states
     }
 
-    /// The first fault that any of them kept.
+    /// The first fault of any of them.
     pub fn fault(&self) -> Option<String> {
         self.placed.iter().find_map(|placed| placed.hooks.fault())
     }
 
-    /// Each hook's opinion of `value` after the one before it.
+    /// Passes `value` through each hook in order.
     pub(crate) fn fold(
         &self,
         site: &Site<'_>,
@@ -211,7 +211,7 @@ impl HookList {
         self.placed.iter().fold(value, |value, placed| ask(placed.hooks.as_ref(), &placed.site(site), value))
     }
 
-    /// What the sensor of `channel` sees of `value`.
+    /// The input of the sensor of `channel`, given `value`.
     pub fn reading(&self, site: &Site<'_>, channel: Channel, value: f64) -> f64 {
         self.fold(site, value, |hooks, site, value| hooks.reading(site, channel, value))
     }

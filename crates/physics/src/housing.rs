@@ -2,7 +2,7 @@
 //!
 //! Each housing is one temperature: its Biot number is below 0.1 with the coefficients of the paper. Free convection is
 //! Appendix A's, turbulent over a body of some 0.1 m: walls 10 K and more above the cell. Heat capacities are straight lines
-//! over the ranges that Appendix A gives and go on beyond them.
+//! over the ranges of Appendix A and are extrapolated beyond them.
 
 use crate::params::{BearingParams, Params};
 
@@ -41,7 +41,7 @@ pub fn external_heat_w(
     ambient_k: f64,
 ) -> f64 {
     let over_k = wall_k - ambient_k;
-    // The library's cube root takes three times as long as this; 0 gives exp(-inf) = 0, as it must.
+    // The library's cube root takes three times as long as this; 0 gives exp(-inf) = 0, as required.
     let third_root = (over_k.abs().ln() / 3.0).exp();
     let (wall2, ambient2) = (wall_k * wall_k, ambient_k * ambient_k);
     area_m2

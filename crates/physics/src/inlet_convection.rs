@@ -1,13 +1,13 @@
 //! Convection before the compressor's wheel: the Nusselt law of the outlet at the inlet's own diameter and gas.
 //!
-//! Eqs. 1 and 3 of Burke et al. have one h; their section 5.2 says that this "is not correct", and Appendix A gives the
-//! inlet a diameter of its own. Coefficient and exponent of the law are those of the outlet: nobody has measured others.
+//! Eqs. 1 and 3 of Burke et al. have one h; their section 5.2 states that this "is not correct", and Appendix A gives the
+//! inlet a diameter of its own. Coefficient and exponent of the law are those of the outlet: no others have been measured.
 
 use crate::nusselt::coefficient_w_m2k;
 use crate::params::CompressorParams;
 use mapper_core::InletConvection;
 
-/// What the ratio of both coefficients needs of the machine.
+/// Machine data for the ratio of both coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InletLaw {
     /// Exponent b of the Reynolds number.
@@ -31,7 +31,7 @@ impl InletLaw {
     }
 }
 
-/// h before the wheel over h after it as the machine has it: 1 where both share one.
+/// h before the wheel over h after it for this machine: 1 if both are shared.
 #[inline]
 pub(crate) fn h_ratio(compressor: &CompressorParams, t1_k: f64, bulk_k: f64) -> f64 {
     compressor.inlet_h_ratio
@@ -54,7 +54,7 @@ mod tests {
     /// Air by a table (Incropera, table A.4: at 300 K mu = 184.6e-7 Pa s, k = 26.3e-3 W/(m K), Pr = 0.707; at 400 K
     /// 230.1e-7, 33.8e-3, 0.690), 0.05 kg/s, the housing at 350 K (208.2e-7). Before the wheel in 40 mm Re = 86 216 and Nu =
     /// 0.004 Re^1.13 Pr^(1/3) (184.6/208.2)^0.14 = 1324, so h = 870.3 W/(m2 K); behind it in 35 mm Re = 79 049, Nu = 1228 and
-    /// h = 1185.5. The closed forms of air leave 1 % of the ratio.
+    /// h = 1185.5. The closed forms of air contribute 1 % of the ratio.
     #[test]
     fn before_the_wheel_the_law_has_the_inlet_s_diameter_and_gas() {
         let law = InletLaw { exponent: 1.13, inlet_diameter_m: 0.040, outlet_diameter_m: 0.035 };
@@ -63,7 +63,7 @@ mod tests {
         assert!((before / 870.3 - 1.0).abs() < 0.02, "{before} W/(m2 K)");
     }
 
-    /// In the same pipe with the same gas there is one coefficient; without heat in the gas diameters count alone.
+    /// In the same pipe with the same gas there is one coefficient; without heat in the gas only the diameters matter.
     #[test]
     fn equal_pipes_share_their_coefficient() {
         let law = |inlet_diameter_m| InletLaw { exponent: 0.8, inlet_diameter_m, outlet_diameter_m: 0.035 };

@@ -1,6 +1,6 @@
-//! What no compressor passes: a bound that tells a wrong unit from a machine.
+//! Upper bound on the flow of any compressor, to detect wrong units.
 //!
-//! An inlet passes at most the flow of a choked pipe of the wheel's diameter, and a wheel stands at most so much at its tip.
+//! An inlet passes at most the flow of a choked pipe of the wheel's diameter, and the tip speed of a wheel is limited.
 //! Both together bound the flow by the speed alone: 13 kg/s at 50 krpm, 1.5 kg/s at 150 krpm. Real machines pass a tenth of
 //! it and more.
 
@@ -11,9 +11,9 @@ const TIP_M_S: f64 = 700.0;
 /// State at which the pipe chokes: a reference state's temperature and pressure (SAE).
 const T_K: f64 = 298.0;
 const P_PA: f64 = 100e3;
-/// Slowest top speed of a turbocharger's map, rpm: the largest, on ships' engines, turn at some 9000.
+/// Lowest top speed of a turbocharger's map, rpm: the largest, on ships' engines, turn at some 9000.
 pub const SLOWEST_TOP_SPEED_RPM: f64 = 1000.0;
-/// No turbocharger turns faster, rpm: the smallest ones end at some 400 000.
+/// Highest speed of any turbocharger, rpm: the smallest ones reach some 400 000.
 pub const FASTEST_SPEED_RPM: f64 = 2e6;
 
 /// Largest corrected flow that any compressor passes at a corrected speed (rpm, > 0), kg/s.

@@ -1,4 +1,4 @@
-//! Boundary conditions over time: constant between kinks, interpolated, or anything a rig's actuators do.
+//! Boundary conditions over time: constant between kinks, interpolated, or the response of a rig's actuators.
 
 use crate::params::BoundaryConditions;
 
@@ -7,15 +7,15 @@ pub trait Inputs {
     /// Boundary conditions at `t_s`.
     fn at(&self, t_s: f64) -> BoundaryConditions;
 
-    /// Time that hooks are told at `t_s`, s; NaN where nothing has a time, as in a steady state.
+    /// Time passed to hooks at `t_s`, s; NaN if there is no time, as in a steady state.
     fn time_s(&self, t_s: f64) -> f64 {
         t_s
     }
 
-    /// The next time after `t_s` at which a value or a slope jumps; infinity where none does.
+    /// The next time after `t_s` at which a value or a slope jumps; infinity if there is none.
     fn next_kink_s(&self, t_s: f64) -> f64;
 
-    /// Whether everything holds still from `t_s` to the next kink: the model is then prepared once.
+    /// Whether all inputs are constant from `t_s` to the next kink: the model is then prepared once.
     fn is_constant_after(&self, t_s: f64) -> bool;
 }
 
@@ -71,7 +71,7 @@ impl InterpolatedInputs {
     /// Takes strictly rising times, s, and as many rows.
     ///
     /// # Errors
-    /// [`InputsError`] where the table is empty, uneven or out of order.
+    /// [`InputsError`] if the table is empty, uneven or out of order.
     pub fn new(t_s: Vec<f64>, rows: Vec<BoundaryConditions>) -> Result<Self, InputsError> {
         if t_s.is_empty() || t_s.len() != rows.len() {
             return Err(InputsError::Lengths { times: t_s.len(), rows: rows.len() });

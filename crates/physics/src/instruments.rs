@@ -1,9 +1,9 @@
-//! Between the machine and what is recorded: what a sensor sees, and how it follows; how P3 follows its command.
+//! Instruments between the machine and the recording: response of each sensor, and response of P3 to its command.
 
 use crate::model::{Outputs, PreparedModel, State};
 use mapper_core::{CHANNELS, Channel};
 
-/// How one channel reads: `y' = (gain x - y)/lag`, plus an offset.
+/// Response of one channel: `y' = (gain x - y)/lag`, plus an offset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelPath {
     /// Gain; 1.
@@ -33,18 +33,18 @@ impl Default for Instruments {
 }
 
 impl Instruments {
-    /// How `channel` reads.
+    /// The response of `channel`.
     pub fn path(&self, channel: Channel) -> &ChannelPath {
         &self.paths[channel as usize]
     }
 
-    /// How `channel` reads, to be changed.
+    /// The response of `channel`, to be changed.
     pub fn path_mut(&mut self, channel: Channel) -> &mut ChannelPath {
         &mut self.paths[channel as usize]
     }
 }
 
-/// What the sensor of `channel` sees of a running machine, before its own lag, gain and offset, in the channel's unit;
+/// The input of the sensor of `channel` on a running machine, before its own lag, gain and offset, in the channel's unit;
 /// `None` for commands, which no sensor measures.
 pub fn true_value(
     channel: Channel,
@@ -86,12 +86,12 @@ pub struct ChannelFollower {
 }
 
 impl ChannelFollower {
-    /// A follower that has not seen anything yet.
+    /// A follower without any sample.
     pub fn new(path: ChannelPath) -> Self {
         ChannelFollower { path, last: None }
     }
 
-    /// Goes on as a sensor that follows along another path from here on.
+    /// Continues as a sensor on another path from here on.
     pub fn turn_to(&mut self, path: ChannelPath) {
         self.path = path;
     }

@@ -1,6 +1,6 @@
-//! The lumped turbocharger model of Burke et al., and the laws it is made of.
+//! The lumped turbocharger model of Burke et al., and the laws it consists of.
 //!
-//! One file per law; [`model`] puts them together, [`simulate`] integrates them, [`steady`] finds where they rest.
+//! One file per law; [`model`] combines them, [`simulate`] integrates them, [`steady`] finds steady states.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,14 +1,14 @@
-//! The points of one corrected speed on the nominal machine, from choke to surge: where on the line they lie, and which
-//! opening of the back-pressure valve leads there.
+//! The points of one corrected speed on the nominal machine, from choke to surge: their places on the line, and the
+//! opening of the back-pressure valve for each.
 //!
-//! **The ends.** On the choke side the widest opening that is asked for; on the surge side the flow at which the surge
-//! margin ([`SteadyState::surge_margin_ratio`]) is the one asked for. Between them points are evenly spaced in corrected
+//! **The ends.** On the choke side the widest requested opening; on the surge side the flow at the requested surge
+//! margin ([`SteadyState::surge_margin_ratio`]). Between them points are evenly spaced in corrected
 //! flow.
 //!
 //! **The opening.** At a given speed and flow the map gives P2. The valve is the orifice of
 //! [`orifice`](crate::orifice), whose flow is in proportion to its opening, so that `opening = m_c / m_orifice(P2, T2, 1)`.
-//! T2 depends on the housings, which depend on the flow: opening and [steady state](crate::steady) are found in turn, each
-//! round leaving some per cent of what was off before.
+//! T2 depends on the housings, which depend on the flow: opening and [steady state](crate::steady) are found alternately; each
+//! round reduces the difference to some per cent.
 
 use crate::follow_outlet::{FollowOutlet, hold_speed};
 use crate::model::{Model, State};
@@ -20,32 +20,32 @@ use serde::Serialize;
 
 /// Maximum number of points of a line.
 pub const POINT_LIMIT: usize = 100;
-/// Rounds until opening and steady state agree.
+/// Maximum number of rounds until opening and steady state agree.
 const ROUNDS: usize = 40;
-/// Flow and what was asked for agree within this share: far below any flow meter, well above rounding.
+/// Relative tolerance of the flow: far below any flow meter, well above rounding.
 const AGREED_RATIO: f64 = 1e-10;
-/// Smallest opening that is tried for the surge side, relative to the nominal area.
+/// Smallest opening tried for the surge side, relative to the nominal area.
 const NARROWEST_RATIO: f64 = 1e-3;
 
-/// How the points of a line are spread between its ends, both included.
+/// Distribution of a line's points between its ends, both included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spread {
-    /// So many points, evenly spaced in corrected flow, 2 to [`POINT_LIMIT`].
+    /// This number of points, evenly spaced in corrected flow, 2 to [`POINT_LIMIT`].
     Points(usize),
-    /// From the choke end at this distance in corrected flow, kg/s, > 0; then the surge end. What would be left of less
-    /// than half a distance before it is joined to the distance before.
+    /// From the choke end at this distance in corrected flow, kg/s, > 0; then the surge end. A remainder of less
+    /// than half a distance is added to the distance before it.
     SpacingKgS(f64),
 }
 
-/// A line as asked for. Corrected quantities refer to `reference`.
+/// A requested line. Corrected quantities refer to `reference`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LineRequest {
     /// Corrected shaft speed, rpm.
     pub speed_corrected_rpm: f64,
     /// Reference state of speed and spacing.
     pub reference: ReferenceState,
-    /// Where its points lie.
+    /// Places of its points.
     pub spread: Spread,
     /// Surge margin of the last point, ratio, > -1.
     pub surge_margin_ratio: f64,
@@ -56,19 +56,19 @@ pub struct LineRequest {
 /// Why a line has no points.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum LineError {
-    /// The machine does not rest on the line.
+    /// The machine has no steady state on the line.
     #[error("the nominal machine cannot be held there: {0}")]
     NoSteadyState(#[from] SteadyError),
-    /// The valve, opened as far as asked for, passes less than the surge end.
+    /// The valve, at its widest requested opening, passes less flow than the surge end.
     #[error(
         "the line has no room: its choke end at opening {widest_opening_ratio} has {:.2} g/s corrected, its surge end with a margin of {:.1} % would have {:.2} g/s", 1e3 * .choke_end_kg_s, 100.0 * .surge_margin_ratio, 1e3 * .surge_end_kg_s
     )]
     NoRoom {
-        /// Widest opening asked for.
+        /// Widest requested opening.
         widest_opening_ratio: f64,
         /// Corrected flow there, kg/s.
         choke_end_kg_s: f64,
-        /// Surge margin asked for.
+        /// Requested surge margin.
         surge_margin_ratio: f64,
         /// Corrected flow there, kg/s.
         surge_end_kg_s: f64,
@@ -78,7 +78,7 @@ pub enum LineError {
         "a spacing of {:.2} g/s leaves one point: from choke ({:.2} g/s corrected) to surge end ({:.2} g/s) there are {:.2} g/s", 1e3 * .spacing_kg_s, 1e3 * .choke_end_kg_s, 1e3 * .surge_end_kg_s, 1e3 * (.choke_end_kg_s - .surge_end_kg_s)
     )]
     SpacingTooWide {
-        /// Spacing asked for, kg/s.
+        /// Requested spacing, kg/s.
         spacing_kg_s: f64,
         /// Corrected flow at the choke end, kg/s.
         choke_end_kg_s: f64,
@@ -90,17 +90,17 @@ pub enum LineError {
         "a spacing of {:.4} g/s gives {count:.0} points over {:.2} g/s; a line may have at most {POINT_LIMIT}", 1e3 * .spacing_kg_s, 1e3 * .range_kg_s
     )]
     TooManyPoints {
-        /// Spacing asked for, kg/s.
+        /// Requested spacing, kg/s.
         spacing_kg_s: f64,
         /// Points it would give.
         count: f64,
-        /// From end to end, kg/s.
+        /// Flow from end to end, kg/s.
         range_kg_s: f64,
     },
 }
 
 impl LineError {
-    /// What to do.
+    /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             LineError::NoSteadyState(_) => "leave the line out, or change its speed",
@@ -111,11 +111,11 @@ impl LineError {
     }
 }
 
-/// The points of a line from choke to surge. `boundary` has T1 and P1, and what the machine rests under; its P3 and
-/// valve do not matter.
+/// The points of a line from choke to surge. `boundary` has T1 and P1 and the other boundary conditions; its P3 and
+/// valve are not used.
 ///
 /// # Errors
-/// [`LineError`] where the line has no such points.
+/// [`LineError`] if the line has no such points.
 pub fn line_points(
     model: &Model,
     boundary: &BoundaryConditions,
@@ -127,11 +127,11 @@ pub fn line_points(
         hold_speed(model, speed_rpm, &BoundaryConditions { valve_opening_ratio, ..*boundary }, follow)
     };
     let choke_end = hold(line.widest_opening_ratio)?;
-    // Flows are compared as the map has them; people see them in their own reference state.
+    // Flows are compared in the map's reference state, and shown in the requested one.
     let shown = model.map.reference().flow_factor_to(line.reference);
     let map_speed_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
     let choke_flow_kg_s = choke_end.outputs.flow_corrected_kg_s;
-    // Rounding never puts the last point on the wrong side of a limit of the same margin.
+    // Rounding must not put the last point on the wrong side of a limit of the same margin.
     let margin_ratio = line.surge_margin_ratio + 10.0 * AGREED_RATIO;
     let surge_flow_kg_s = model.map.surge_point(map_speed_rpm).0 * (1.0 + margin_ratio);
     let range_kg_s = choke_flow_kg_s - surge_flow_kg_s;
@@ -161,10 +161,10 @@ pub fn line_points(
     Ok(points)
 }
 
-/// Places behind the choke end as shares of the line, for a spacing; flows corrected, kg/s.
+/// Places after the choke end as shares of the line, for a spacing; flows corrected, kg/s.
 fn spaced(spacing_kg_s: f64, choke_end_kg_s: f64, surge_end_kg_s: f64) -> Result<Vec<f64>, LineError> {
     let range_kg_s = choke_end_kg_s - surge_end_kg_s;
-    // A range that is a whole number of spacings but for rounding is one.
+    // A range that is a whole number of spacings except for rounding counts as whole.
     let whole = (range_kg_s / spacing_kg_s * (1.0 + 1e-9)).floor();
     if whole < 1.0 {
         return Err(LineError::SpacingTooWide { spacing_kg_s, choke_end_kg_s, surge_end_kg_s });
@@ -203,7 +203,7 @@ fn hold_flow(
     Ok(held)
 }
 
-/// The opening that passes this flow at the speed and with the housings of `held`; `None` where the line has no such flow.
+/// The opening that passes this flow at the speed and with the housings of `held`; `None` if the line has no such flow.
 fn opening_of_flow(model: &Model, held: &SteadyState, flow_corrected_kg_s: f64) -> Option<f64> {
     let (prepared, boundary) = (model.prepare(&held.boundary), &held.boundary);
     let at = |p2_pa: f64| prepared.evaluate(&State { p2_pa, ..held.state });
@@ -244,8 +244,8 @@ mod tests {
         line_points(&Model::nominal(), &boundary(), FollowOutlet::default(), line)
     }
 
-    /// Speed and flow where the machine comes to rest at a point, corrected to Garrett's state, by the integrated
-    /// transient: the P3 that holds the point, an hour from cold housings.
+    /// Speed and flow at the end of the integrated transient to a point, corrected to Garrett's state:
+    /// the P3 that holds the point, an hour from cold housings.
     fn at_rest(point: OperatingPoint) -> (f64, f64) {
         let model = Model::nominal();
         let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..boundary() };

@@ -25,11 +25,11 @@ pub struct Model {
     pub params: Params,
     /// Flow and efficiency.
     pub map: Arc<dyn CompressorCharacteristic>,
-    /// What takes part beyond the parameters; usually nothing.
+    /// Extensions beyond the parameters; usually none.
     pub hooks: HookList,
 }
 
-/// The model under boundary conditions that hold for a while; evaluating it repeats nothing that they fix.
+/// The model under constant boundary conditions; all terms that they determine are computed once.
 #[derive(Debug)]
 pub struct PreparedModel<'a> {
     model: &'a Model,
@@ -49,7 +49,7 @@ pub struct PreparedModel<'a> {
     gas_constant_j_kgk: f64,
     /// Flow of the compressor's air over that of dry air, through map and valve.
     moist_flow_ratio: f64,
-    /// h of the compressor's air over that of dry air: the Prandtl number's root.
+    /// h of the compressor's air over that of dry air: the root of the Prandtl number.
     moist_h_ratio: f64,
 }
 
@@ -79,7 +79,7 @@ impl Model {
         self.prepare_at(f64::NAN, boundary)
     }
 
-    /// The same at a time, s, which hooks are told.
+    /// The same at a time, s, which is passed to hooks.
     #[inline]
     pub fn prepare_at(&self, t_s: f64, boundary: &BoundaryConditions) -> PreparedModel<'_> {
         let reference = self.map.reference();
@@ -109,18 +109,18 @@ impl Model {
 }
 
 impl PreparedModel<'_> {
-    /// The boundary conditions this was prepared for.
+    /// The boundary conditions of this prepared model.
     pub fn boundary(&self) -> &BoundaryConditions {
         &self.boundary
     }
 
-    /// Everything the model knows at `state`.
+    /// All outputs at `state`.
     #[inline]
     pub fn evaluate(&self, state: &State) -> Outputs {
         self.evaluate_on_map(state, self.on_map(state))
     }
 
-    /// What the map says at `state`: of the state it depends on shaft speed and outlet pressure alone.
+    /// The map's value at `state`: it depends only on shaft speed and outlet pressure of the state.
     #[inline]
     pub(crate) fn on_map(&self, state: &State) -> CharacteristicPoint {
         self.model.map.evaluate_scaled(
@@ -130,10 +130,10 @@ impl PreparedModel<'_> {
         )
     }
 
-    /// As [`PreparedModel::evaluate`] where it is known what the map says there.
+    /// Like [`PreparedModel::evaluate`], with a known value of the map.
     #[inline]
     pub(crate) fn evaluate_on_map(&self, state: &State, on_map: CharacteristicPoint) -> Outputs {
-        // Two bodies from one text: a model without hooks must not pay for looking.
+        // Two bodies from one text: a model without hooks must not pay for checking them.
         if self.model.hooks.is_empty() {
             self.evaluate_with::<false>(state, on_map)
         } else {
@@ -298,7 +298,7 @@ impl PreparedModel<'_> {
         }
     }
 
-    /// What hooks add at a site where the gas path is known.
+    /// Additions of hooks at a site where the gas path is known.
     #[cold]
     fn added(&self, site: &Site<'_>) -> Added {
         let hooks = &self.model.hooks;
@@ -315,7 +315,7 @@ impl PreparedModel<'_> {
         }
     }
 
-    /// Where hooks that look at readings are asked: everything is known.
+    /// The site for hooks on readings: everything is known.
     pub fn site<'b>(&'b self, state: &'b State, outputs: &Outputs) -> Site<'b> {
         Site {
             flow_kg_s: outputs.flow_kg_s,
@@ -340,14 +340,14 @@ impl PreparedModel<'_> {
         self.model
     }
 
-    /// Power that is left to accelerate the shaft, W.
+    /// Net power that accelerates the shaft, W.
     #[inline]
     pub fn shaft_balance_w(&self, outputs: &Outputs) -> f64 {
         outputs.turbine.power_w - outputs.compressor_power_w - outputs.friction_power_w
             + outputs.added.shaft_power_w
     }
 
-    /// Heat that stays in the compressor housing, W; in its outer part where the inner wall has its own temperature.
+    /// Net heat to the compressor housing, W; to its outer part if the inner wall has its own temperature.
     #[inline]
     pub fn compressor_housing_balance_w(&self, state: &State, outputs: &Outputs) -> f64 {
         let from_inside_w = if self.model.has_inner_wall() {
@@ -361,7 +361,7 @@ impl PreparedModel<'_> {
             + outputs.added.compressor_heat_w
     }
 
-    /// Heat that stays in the inner wall of the compressor housing, W; 0 where the housing is one node.
+    /// Net heat to the inner wall of the compressor housing, W; 0 if the housing is one node.
     #[inline]
     pub fn inner_wall_balance_w(&self, outputs: &Outputs) -> f64 {
         if self.model.has_inner_wall() {
@@ -371,7 +371,7 @@ impl PreparedModel<'_> {
         }
     }
 
-    /// Heat that stays in the turbine housing, W.
+    /// Net heat to the turbine housing, W.
     #[inline]
     pub fn turbine_housing_balance_w(&self, state: &State, outputs: &Outputs) -> f64 {
         outputs.turbine.heat_w

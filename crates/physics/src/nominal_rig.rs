@@ -1,4 +1,4 @@
-//! What a backend is told of the machine and the rig: all that a campaign declares, and nothing that is true beyond it.
+//! The machine and the rig as declared in a campaign, for a backend; it contains no simulated truth.
 
 use crate::effect::Effect;
 use crate::model::Model;
@@ -7,7 +7,7 @@ use mapper_core::{Channel, DeclaredUncertainty, ModelTolerances, RedundantSensor
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The machine and the rig as declared. A backend may differ from it as its own settings say.
+/// The machine and the rig as declared. A backend may differ from it according to its own settings.
 #[derive(Debug, Clone)]
 pub struct NominalRig {
     /// The machine as declared.
@@ -18,16 +18,16 @@ pub struct NominalRig {
     pub speed_max_rpm: f64,
     /// Declared one-sigma uncertainty of each sensor, in the channel's unit.
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
-    /// Each sensor of the channels that have several; `sensors` has what they are together.
+    /// Each sensor of the channels that have several; `sensors` has the combined values.
     pub redundant: BTreeMap<Channel, RedundantSensors>,
     /// Declared static taps with the inner diameters of their pipes, m.
     pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Declared tolerances of the model.
     pub tolerances: ModelTolerances,
-    /// The rest before the run as declared, where there is one.
+    /// The declared soak before the run, if there is one.
     pub soak: Option<Soak>,
-    /// Effects that a simulated machine may be given by their ids.
+    /// Effects that may be added to a simulated machine by their ids.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// Seed of all noise and of all that is drawn.
+    /// Seed of all noise and of all random draws.
     pub seed: u64,
 }

@@ -1,7 +1,7 @@
 //! Forced convection inside the housings: the Sieder-Tate form of eq. 9 with Appendix A's coefficients.
 //!
 //! The form is that of turbulent flow in a smooth pipe (Sieder and Tate, Ind. Eng. Chem. 28, 1936): a = 0.027, b = 0.8 for
-//! Re > 1e4 and Pr 0.7 to 16 700. Appendix A fits a and b to the compressor and the turbine themselves; such a pair holds
+//! Re > 1e4 and Pr 0.7 to 16 700. Appendix A fits a and b to the compressor and the turbine themselves; such a pair is valid
 //! within the flows of its own measurements, Re of some 1e4 to 3e5 here. Properties of air: see [`air`].
 
 use crate::air;
@@ -25,7 +25,7 @@ pub fn coefficient_w_m2k(
     let mu = air::viscosity_pa_s(bulk_k);
     let ln_k_ratio = air::ln_conductivity_ratio(bulk_k);
     let reynolds = 4.0 * flow_kg_s / (std::f64::consts::PI * diameter_m * mu);
-    // All powers as one exponential of a sum of logarithms: half the time, and this is the model's hottest line.
+    // All powers as one exponential of a sum of logarithms: half the time, in the line where the model spends most of it.
     let ln_prandtl =
         (air::heat_capacity_j_kgk(bulk_k) * mu / air::CONDUCTIVITY_AT_300_K_W_MK).ln() - ln_k_ratio;
     let ln_nusselt =
@@ -39,14 +39,14 @@ mod tests {
 
     /// Sieder and Tate's own coefficients on air at 300 K with the properties of a table (Incropera, table A.4:
     /// mu = 184.6e-7 Pa s, k = 26.3e-3 W/(m K), Pr = 0.707): 0.05 kg/s in 35 mm is Re = 98 530 and Nu = 0.027 Re^0.8 Pr^(1/3)
-    /// = 237.7, so h = 178.6 W/(m2 K). The closed forms of air leave 2 % of it.
+    /// = 237.7, so h = 178.6 W/(m2 K). The closed forms of air contribute 2 % of it.
     #[test]
     fn pipe_flow_has_the_text_book_coefficient() {
         let h_w_m2k = coefficient_w_m2k(0.027, 0.8, 0.035, 0.05, 300.0, 300.0);
         assert!((h_w_m2k / 178.6 - 1.0).abs() < 0.02, "{h_w_m2k} W/(m2 K)");
     }
 
-    /// A wall of 400 K makes the gas beside it more viscous: (184.6/230.1)^0.14 = 0.9696 by the same table.
+    /// A wall of 400 K makes the gas next to it more viscous: (184.6/230.1)^0.14 = 0.9696 by the same table.
     #[test]
     fn a_hot_wall_lowers_the_coefficient_as_the_viscosities_say() {
         let at_wall = |wall_k: f64| coefficient_w_m2k(0.027, 0.8, 0.035, 0.05, 300.0, wall_k);

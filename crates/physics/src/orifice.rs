@@ -1,12 +1,12 @@
 //! The back-pressure valve as an isentropic orifice (St. Venant and Wantzel).
 //!
-//! Domain: a perfect gas with gamma = 1.4 held constant, as the paper's model has it; hot air at 450 K has 1.39, which moves
-//! the flow by 0.3 %. Both pressures are total before and static behind the throat; backflow is not modelled.
+//! Domain: a perfect gas with constant gamma = 1.4, as in the paper's model; hot air at 450 K has 1.39, which moves
+//! the flow by 0.3 %. The pressure is total before the throat and static after it; backflow is not modelled.
 
 use crate::air::{GAS_CONSTANT_J_KGK, HEAT_CAPACITY_RATIO as G};
 
 /// Mass flow of an isentropic orifice from (`p_up_pa`, `t_up_k`) to `p_down_pa`, choked below the critical pressure
-/// ratio, kg/s; 0 where there is no forward pressure difference.
+/// ratio, kg/s; 0 if there is no forward pressure difference.
 ///
 /// `effective_area_m2` is area times discharge coefficient.
 #[inline]

@@ -1,9 +1,9 @@
-//! What the model knows at one instant.
+//! Outputs of the model at one instant.
 
 use crate::state::MAX_EXTRA;
 use crate::turbine::TurbineState;
 
-/// Everything the model knows at one instant.
+/// All outputs of the model at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outputs {
     /// Compressor mass flow, kg/s.
@@ -26,7 +26,7 @@ pub struct Outputs {
     pub t2_k: f64,
     /// Reading of the T2 probe, K.
     pub t2_probe_k: f64,
-    /// What the T2 probe tends to: the gas, but for stem and recovery, K.
+    /// Steady reading of the T2 probe: the gas temperature with stem conduction and recovery, K.
     pub t2_probe_target_k: f64,
     /// Time constant of the T2 probe, s; 0 for an ideal one.
     pub t2_probe_time_constant_s: f64,
@@ -40,9 +40,9 @@ pub struct Outputs {
     pub friction_power_w: f64,
     /// Heat from turbine to compressor housing by radiation, W.
     pub radiation_w: f64,
-    /// Heat from the inner wall to the rest of the compressor housing, W; 0 where the housing is one node.
+    /// Heat from the inner wall to the rest of the compressor housing, W; 0 if the housing is one node.
     pub inner_heat_w: f64,
-    /// What hooks add.
+    /// Additions of hooks.
     pub added: Added,
     /// Heat from the compressor housing to the cell, W.
     pub compressor_external_heat_w: f64,

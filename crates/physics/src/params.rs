@@ -5,7 +5,7 @@ pub use crate::boundary::BoundaryConditions;
 use mapper_core::{InletConvection, ReferenceState};
 use serde::{Deserialize, Serialize};
 
-/// The machine: geometry, masses, conductances, probe. Effects and fits change these numbers, never the equations.
+/// The machine: geometry, masses, conductances, probe. Effects and fits change these parameters, never the equations.
 ///
 /// Defaults are those of Burke et al., Appendix A, as completed in the model's description (`docs/physics.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,10 +43,10 @@ pub struct CompressorParams {
     pub internal_area_m2: f64,
     /// Share of `internal_area_m2` before compression, alpha_A, 0..1 (eqs. 1 and 3).
     pub alpha_area_ratio: f64,
-    /// Inlet pipe diameter, m: characteristic length of the Nusselt correlation before the wheel where `inlet_convection` is
+    /// Inlet pipe diameter, m: characteristic length of the Nusselt correlation before the wheel if `inlet_convection` is
     /// `own`.
     pub inlet_diameter_m: f64,
-    /// What h before the wheel follows; without meaning where `alpha_area_ratio` is 0.
+    /// Model of h before the wheel; not used if `alpha_area_ratio` is 0.
     pub inlet_convection: InletConvection,
     /// Multiplies h before the wheel, > 0; 1.
     pub inlet_h_ratio: f64,
@@ -64,22 +64,22 @@ pub struct CompressorParams {
     pub external_area_m2: f64,
     /// External emissivity, 0..1, ratio to a black body.
     pub emissivity_ratio: f64,
-    /// Multiplies h where the metal is hotter than the gas it touches (T1 before, T2' after compression), > 0; 1.
+    /// Multiplies h if the metal is hotter than the gas it touches (T1 before, T2' after compression), > 0; 1.
     pub hot_metal_h_ratio: f64,
-    /// Conductance from the housing to the gas between the T1 probe and the wheel, besides `alpha_area_ratio`, W/K; 0.
+    /// Conductance from the housing to the gas between the T1 probe and the wheel, in addition to `alpha_area_ratio`, W/K; 0.
     pub inlet_conductance_w_k: f64,
     /// Multiplies the map's efficiency, > 0; 1.
     pub efficiency_scale_ratio: f64,
     /// Multiplies the map's flow, > 0; 1. The efficiency is the map's at the multiplied flow.
     pub flow_scale_ratio: f64,
-    /// Part r of the flow that comes back, hot, from the wheel's exit to its inlet: the wheel, and with it the map, has
+    /// Part r of the flow that recirculates, hot, from the wheel's exit to its inlet: the wheel, and with it the map, has
     /// (1 + r) times the flow that leaves the compressor; 0.
     pub recirculation_ratio: f64,
     /// Water in the air of the compressor side, kg per kg of dry air, >= 0; 0.
     pub humidity_kg_kg: f64,
     /// Fraction phi of the housing's heat capacity that touches the gas and has its own temperature, 0..1; 0 is one node.
     pub inner_capacity_ratio: f64,
-    /// Conductance G between that inner wall and the rest, W/K, > 0; without meaning where the housing is one node.
+    /// Conductance G between that inner wall and the rest, W/K, > 0; not used if the housing is one node.
     pub inner_conductance_w_k: f64,
 }
 

@@ -1,6 +1,6 @@
-//! Powers of positive numbers, where they are taken a hundred thousand times a second.
+//! Fast powers of positive numbers, for code that runs a hundred thousand times a second.
 
-/// `base^exponent` for `base` > 0. The library's rounds correctly to the last bit and takes twice as long; this one is within
+/// `base^exponent` for `base` > 0. The library's is correct to the last bit and takes twice as long; this one is accurate to
 /// a few bits for the exponents of correlations.
 #[inline]
 pub(crate) fn power(base: f64, exponent: f64) -> f64 {
@@ -15,7 +15,7 @@ mod tests {
     proptest! {
         #[test]
         fn it_is_the_librarys(base in 1e-6..10.0f64, exponent in -3.0..3.0f64) {
-            // The logarithm's rounding, times an exponent of 40 at most, is in the result as it is.
+            // The logarithm's rounding error, times an exponent of 40 at most, appears in the result.
             prop_assert!((power(base, exponent) / base.powf(exponent) - 1.0).abs() < 1e-14);
         }
     }

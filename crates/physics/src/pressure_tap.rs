@@ -15,9 +15,9 @@ fn heat_capacity_ratio(temperature_k: f64) -> f64 {
 /// Total pressure, Pa, of `flow_kg_s` at total temperature `total_temperature_k` in a pipe of `pipe_diameter_m`
 /// whose wall has `static_pa`.
 ///
-/// Continuity gives `m sqrt(R T0)/(p A) = sqrt(gamma) M sqrt(1 + (gamma-1)/2 M^2)`, a quadratic in M^2 where the
-/// pressure is static and the temperature total; then `p0/p = (1 + (gamma-1)/2 M^2)^(gamma/(gamma-1))`. Valid up to
-/// Mach 1 and somewhat beyond; all arguments positive. The sign of the flow does not matter.
+/// Continuity gives `m sqrt(R T0)/(p A) = sqrt(gamma) M sqrt(1 + (gamma-1)/2 M^2)`, a quadratic in M^2 for static
+/// pressure and total temperature; then `p0/p = (1 + (gamma-1)/2 M^2)^(gamma/(gamma-1))`. Valid up to
+/// Mach 1 and slightly beyond; all arguments positive. The sign of the flow does not matter.
 pub fn static_to_total_pa(
     static_pa: f64,
     flow_kg_s: f64,
@@ -29,14 +29,14 @@ pub fn static_to_total_pa(
     let area_m2 = 0.25 * std::f64::consts::PI * pipe_diameter_m * pipe_diameter_m;
     let flow_number_squared =
         air::GAS_CONSTANT_J_KGK * total_temperature_k / gamma * (flow_kg_s / (static_pa * area_m2)).powi(2);
-    // M^2 (1 + half M^2) = K; written so that no digits are lost at small Mach numbers.
+    // M^2 (1 + half M^2) = K; in a form that keeps all digits at small Mach numbers.
     let mach_squared = 2.0 * flow_number_squared / (1.0 + (1.0 + 4.0 * half * flow_number_squared).sqrt());
     static_pa * (1.0 + half * mach_squared).powf(gamma / (gamma - 1.0))
 }
 
 /// Static pressure, Pa, at the wall: the inverse of [`static_to_total_pa`] on its subsonic branch.
 ///
-/// `None` where the pipe would have to pass more than sonic flow.
+/// `None` if the pipe would have to pass more than sonic flow.
 pub fn total_to_static_pa(
     total_pa: f64,
     flow_kg_s: f64,
@@ -63,7 +63,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// Isentropic flow tables for gamma = 1.4 (NACA report 1135): p/p0 = 0.8430 at M = 0.5, 0.9725 at M = 0.2. Air
-    /// at 250 K has gamma = 1.4009 in the closed form used here; four printed digits leave 2e-4.
+    /// at 250 K has gamma = 1.4009 in the closed form used here; four printed digits allow 2e-4.
     #[test]
     fn pressure_ratios_follow_the_isentropic_tables() {
         let (total_temperature_k, diameter_m, static_pa) = (250.0, 0.04, 9.0e4);

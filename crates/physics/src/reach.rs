@@ -1,8 +1,8 @@
-//! Which operating points can be measured at all: the one definition that campaign, plan and sequence share.
+//! Which operating points can be measured: the definition that campaign, plan and sequence share.
 //!
-//! **Definition.** A point can be reached when the nominal machine has a steady state there in which no limit of the
-//! campaign is broken. Its surge margin is [`SteadyState::surge_margin_ratio`]; where no smallest one is declared, the
-//! nominal map's surge line is it.
+//! **Definition.** A point can be reached if the nominal machine has a steady state there that violates no limit of the
+//! campaign. Its surge margin is [`SteadyState::surge_margin_ratio`]; if no minimum is declared, the limit is the
+//! nominal map's surge line.
 
 use crate::follow_outlet::{FollowOutlet, hold_speed};
 use crate::model::Model;
@@ -10,16 +10,16 @@ use crate::params::BoundaryConditions;
 use crate::steady::{SteadyError, SteadyState};
 use mapper_core::{Limits, OperatingPoint, temperature};
 
-/// What is in the way of a point, in words that follow its name.
+/// A reason why a point cannot be reached, in words that follow its name.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Obstacle {
-    /// The valve cannot be set so.
+    /// The valve cannot be set to this opening.
     #[error("is outside the valve's range, above 0 to {highest_ratio}")]
     Opening {
         /// Largest opening, relative to the nominal area.
         highest_ratio: f64,
     },
-    /// The machine does not rest there.
+    /// The machine has no steady state there.
     #[error("cannot be held: {0}")]
     NoSteadyState(#[source] SteadyError),
     /// The shaft turns too fast.
@@ -43,7 +43,7 @@ pub enum Obstacle {
     SurgeMargin {
         /// Surge margin.
         margin_ratio: f64,
-        /// Smallest that is allowed.
+        /// Smallest allowed margin.
         limit_ratio: f64,
     },
     /// The turbine would need more pressure than the rig has.
@@ -90,7 +90,7 @@ pub enum Obstacle {
 }
 
 impl Obstacle {
-    /// What to do.
+    /// The remedy.
     pub fn remedy(&self) -> &'static str {
         match self {
             Obstacle::Opening { .. } => "choose an opening within the range",
@@ -113,10 +113,10 @@ impl Obstacle {
     }
 }
 
-/// The steady state of the nominal machine at `point`, whose valve opening stands for that of `boundary`.
+/// The steady state of the nominal machine at `point`, whose valve opening replaces that of `boundary`.
 ///
 /// # Errors
-/// Everything that is in the way of the point, at least one entry.
+/// All reasons why the point cannot be reached, at least one.
 pub fn reach(
     model: &Model,
     point: OperatingPoint,
@@ -171,7 +171,7 @@ fn broken_limits(model: &Model, steady: &SteadyState, limits: &Limits) -> Vec<Ob
     broken
 }
 
-/// All that is in the way of a point, as one clause that follows its name.
+/// All reasons why a point cannot be reached, as one clause that follows its name.
 pub fn clause(obstacles: &[Obstacle]) -> String {
     obstacles.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ")
 }

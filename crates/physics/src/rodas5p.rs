@@ -1,14 +1,14 @@
 //! The coefficients of Rodas5P, in the form whose stages need no product with the Jacobian.
 //!
 //! Source: G. Steinebach, "Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the Julia Differential
-//! Equations package", BIT Numerical Mathematics 63:27 (2023). Public, since what is exported integrates by them too.
+//! Equations package", BIT Numerical Mathematics 63:27 (2023). Public, since exported models integrate by them too.
 
 /// Stages of a step.
 pub const STAGES: usize = 8;
 /// Diagonal of the stages' matrix.
 pub const GAMMA: f64 = 0.211_937_563_194_290_14;
 
-/// Weights of the stages before in a stage's state.
+/// Weights of the previous stages in a stage's state.
 #[rustfmt::skip]
 pub const A: [[f64; 7]; STAGES] = [
     [0.0; 7],
@@ -21,7 +21,7 @@ pub const A: [[f64; 7]; STAGES] = [
     [-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1.0, 1.0],
 ];
 
-/// Weights of the stages before in a stage's right-hand side.
+/// Weights of the previous stages in a stage's right-hand side.
 #[rustfmt::skip]
 pub const C: [[f64; 7]; STAGES] = [
     [0.0; 7],

@@ -2,17 +2,17 @@
 //!
 //! Source: G. Steinebach, "Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the
 //! Julia Differential Equations package", BIT Numerical Mathematics 63:27 (2023). A one-step method, because a rig's
-//! inputs have kinks and a multistep method restarts at each; see docs/decisions for the libraries it was held against.
+//! inputs have kinks and a multistep method restarts at each; docs/decisions compares it with libraries.
 
 use crate::rodas5p::{A, C, DENSE, GAMMA, STAGE_TIME, STAGES, TIME_DERIVATIVE};
 use nalgebra::{Const, DimMin, SMatrix, SVector};
 
 /// A system of `N` ordinary differential equations.
 pub trait OdeSystem<const N: usize> {
-    /// Rates at `t_s`. Non-finite rates make the step be tried again with a smaller one.
+    /// Rates at `t_s`. Non-finite rates make the integrator retry the step with a smaller one.
     fn rates(&mut self, t_s: f64, y: &[f64; N]) -> [f64; N];
 
-    /// df/dt at fixed `y`, where the system depends on time between kinks; `None` where it does not.
+    /// df/dt at fixed `y`, if the system depends on time between kinks; `None` if it does not.
     fn time_derivative(&mut self, t_s: f64, y: &[f64; N], rates: &[f64; N]) -> Option<[f64; N]>;
 }
 
@@ -52,10 +52,10 @@ impl<const N: usize> Step<N> {
     }
 }
 
-/// Why an integration could not go on.
+/// Why an integration could not continue.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum IntegrationError {
-    /// The error control asks for ever smaller steps.
+    /// The error control requires ever smaller steps.
     #[error(
         "the integration needs steps below {step_s:.1e} s at {t_s:.6} s; the inputs or parameters there are beyond the model"
     )]
@@ -77,7 +77,7 @@ pub enum IntegrationError {
     },
 }
 
-/// The step-size control and the state that goes from step to step.
+/// The step-size control and the state that is carried from step to step.
 #[derive(Debug, Clone)]
 pub struct Integrator<const N: usize> {
     /// Current time, s.
@@ -89,12 +89,12 @@ pub struct Integrator<const N: usize> {
     steps: usize,
 }
 
-/// Bound on the steps of one integrator; far above what any campaign needs.
+/// Maximum number of steps of one integrator; far above the needs of any campaign.
 const MAX_STEPS: usize = 50_000_000;
 
 impl<const N: usize> Integrator<N>
 where
-    // What nalgebra's LU asks for; true of every N.
+    // Required by nalgebra's LU; true of every N.
     Const<N>: DimMin<Const<N>, Output = Const<N>>,
 {
     /// Starts at `t_s` with `y`.
@@ -102,7 +102,7 @@ where
         Integrator { t_s, y, tolerances, next_step_s: 0.0, steps: 0 }
     }
 
-    /// Forgets the step size: to be called after a jump of the inputs.
+    /// Forgets the step size: call this after a jump of the inputs.
     pub fn restart(&mut self) {
         self.next_step_s = 0.0;
     }
@@ -115,7 +115,7 @@ where
     /// Takes one step, at the longest to `end_s` (> `t_s`).
     ///
     /// # Errors
-    /// [`IntegrationError`] where no step of sensible size meets the tolerance.
+    /// [`IntegrationError`] if no step of sensible size meets the tolerance.
     pub fn step(&mut self, system: &mut impl OdeSystem<N>, end_s: f64) -> Result<Step<N>, IntegrationError> {
         self.steps += 1;
         if self.steps > MAX_STEPS {
@@ -147,7 +147,7 @@ where
                 // The error estimate is of order 4, so the local error goes with the fifth power of the step.
                 let factor = (0.9 * error.max(1e-10).powf(-0.2)).clamp(0.2, 6.0);
                 let proposed_s = tried_s * if rejected { factor.min(1.0) } else { factor };
-                // A step cut short by `end_s` says little about how long it might have been.
+                // A step cut short by `end_s` gives little information on how long it might have been.
                 self.next_step_s = if tried_s < h { proposed_s.max(h) } else { proposed_s };
                 let t1_s = if ends_here { end_s } else { t0_s + tried_s };
                 self.t_s = t1_s;
@@ -166,7 +166,7 @@ where
     /// slightly different parameters differ smoothly, which a step-size control would spoil.
     ///
     /// # Errors
-    /// [`IntegrationError::StepTooSmall`] where the system cannot be stepped at all (rates that are not numbers).
+    /// [`IntegrationError::StepTooSmall`] if the system cannot be stepped at all (rates that are not numbers).
     pub fn step_on_grid(
         &mut self,
         system: &mut impl OdeSystem<N>,

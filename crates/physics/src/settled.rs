@@ -1,25 +1,25 @@
-//! When an operating point has settled: the one definition that plan, sequence and identification share.
+//! When an operating point has settled: the definition that plan, sequence and identification share.
 //!
-//! **Definition.** A quantity has settled at a time when, from that time to the end of the stretch that is looked at,
-//! its largest minus its smallest value, minus the spread that its noise alone would have, is at most its band
+//! **Definition.** A quantity has settled at a time if, from that time to the end of the evaluated segment,
+//! its maximum minus its minimum, minus the spread that its noise alone would have, is at most its band
 //! ([`SettleBands`]) times the mean. An operating point has settled when shaft speed, compressor flow and pressure ratio
 //! all have. Values of a model have no noise; recorded ones are condensed to medians over blocks first.
 //!
-//! Housing and outlet temperature play no part: at a settled operating point they still move, which is what the
-//! identification lives on. Bands: Burke et al., section 3.
+//! Housing and outlet temperature play no part: at a settled operating point they still change, and the
+//! identification needs that change. Bands: Burke et al., section 3.
 
 use mapper_core::SettleBands;
 use mapper_numerics::statistics::robust_sigma;
 
 /// Blocks over which recorded signals are condensed (to their median) before they are compared, s.
 pub const BLOCK_S: f64 = 1.0;
-/// Spread (largest less smallest) of about a hundred normally distributed values, standard deviations.
+/// Spread (maximum minus minimum) of about a hundred normally distributed values, standard deviations.
 const NOISE_SPREAD_SIGMAS: f64 = 5.0;
-/// Distance of the blocks whose second difference measures noise: farther apart than noise remembers.
+/// Distance of the blocks whose second difference measures noise: longer than the correlation of noise.
 const NOISE_LAG_BLOCKS: usize = 4;
 
-/// How many values, from the last one backwards, vary together by at most `allowed_ratio` of their mean, once
-/// `noise_spread` (in the values' own unit, >= 0) is subtracted. NaN counts as settled; nothing but NaN never settles.
+/// Number of values, from the last one backwards, that vary together by at most `allowed_ratio` of their mean, once
+/// `noise_spread` (in the values' own unit, >= 0) is subtracted. NaN counts as settled; a series of only NaN never settles.
 pub fn settled_count(
     backwards: impl IntoIterator<Item = f64>,
     allowed_ratio: f64,
@@ -54,7 +54,7 @@ pub fn with_bands<T>(
 }
 
 /// Spread that the noise of recorded `blocks` (medians, in order) alone would have: from their second differences, whose
-/// median ignores where the signal really moves. 0 where there are too few.
+/// median ignores real changes of the signal. 0 if there are too few.
 pub fn noise_spread(blocks: &[f64]) -> f64 {
     let lag = NOISE_LAG_BLOCKS;
     let differences = (2 * lag..blocks.len())

@@ -1,7 +1,7 @@
-//! Similarity of speed lines: at equal place on the line flow goes with speed, isentropic head with its square.
+//! Similarity of speed lines: at equal place on the line flow is proportional to speed, isentropic head to its square.
 //!
-//! The fan laws (e.g. Dixon and Hall, Fluid Mechanics and Thermodynamics of Turbomachinery, ch. 2). They hold for small
-//! changes of speed: within 2 % here. Over more, compressibility bends the line.
+//! The fan laws (e.g. Dixon and Hall, Fluid Mechanics and Thermodynamics of Turbomachinery, ch. 2). They apply to small
+//! changes of speed: within 2 % here. For larger changes compressibility bends the line.
 
 /// (gamma - 1)/gamma of cold air.
 const KAPPA: f64 = 1.0 - 1.0 / crate::air::HEAT_CAPACITY_RATIO;
@@ -11,7 +11,7 @@ pub fn head_ratio(pressure_ratio: f64) -> f64 {
     pressure_ratio.powf(KAPPA) - 1.0
 }
 
-/// Pressure ratio of a head ([`head_ratio`]); a negative head counts as none.
+/// Pressure ratio of a head ([`head_ratio`]); a negative head counts as 0.
 pub fn pressure_ratio_of_head(head_ratio: f64) -> f64 {
     pressure_ratio_of_signed_head(head_ratio.max(0.0))
 }
@@ -21,7 +21,7 @@ pub fn pressure_ratio_of_signed_head(head_ratio: f64) -> f64 {
     (1.0 + head_ratio.max(-0.9)).powf(1.0 / KAPPA)
 }
 
-/// Flow and pressure ratio of a point brought to `speed_factor` times its corrected speed; the efficiency stays.
+/// Flow and pressure ratio of a point converted to `speed_factor` times its corrected speed; the efficiency stays.
 pub fn at_speed(flow_corrected_kg_s: f64, pressure_ratio: f64, speed_factor: f64) -> (f64, f64) {
     let head = head_ratio(pressure_ratio) * speed_factor * speed_factor;
     (flow_corrected_kg_s * speed_factor, pressure_ratio_of_signed_head(head))

@@ -1,4 +1,4 @@
-//! Integrates the model: samples where asked, events where they happen.
+//! Integrates the model; returns samples at given times and events when they occur.
 
 use crate::inputs::Inputs;
 use crate::model::{BoundaryError, Model, Outputs, PreparedModel, State};
@@ -8,7 +8,7 @@ use crate::state::MAX_STATES;
 use mapper_numerics::root::bisect;
 use nalgebra::{Const, DimMin};
 
-/// What to look out for.
+/// Thresholds of events.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Watch {
     /// Shaft speed of the overspeed event, rpm.
@@ -21,12 +21,12 @@ impl Default for Watch {
     }
 }
 
-/// A line that was crossed.
+/// A threshold that was crossed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Crossing {
-    /// Past the surge line.
+    /// Into surge.
     SurgeEntered,
-    /// Back from beyond the surge line.
+    /// Back from surge.
     SurgeLeft,
     /// Above the overspeed limit.
     OverspeedEntered,
@@ -39,7 +39,7 @@ pub enum Crossing {
 pub struct ModelEvent {
     /// Time, s.
     pub t_s: f64,
-    /// What was crossed.
+    /// The threshold.
     pub crossing: Crossing,
     /// Shaft speed at the crossing, rpm.
     pub speed_rpm: f64,
@@ -47,10 +47,10 @@ pub struct ModelEvent {
     pub pressure_ratio: f64,
 }
 
-/// Why a simulation could not go on.
+/// Why a simulation could not continue.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SimulationError {
-    /// The boundary conditions have no meaning.
+    /// The boundary conditions are not valid.
     #[error("at {t_s:.3} s: {source}")]
     Boundary {
         /// Time, s.
@@ -63,7 +63,7 @@ pub enum SimulationError {
     Integration(#[from] IntegrationError),
 }
 
-/// A machine in motion: advance it as far as wanted, as often as wanted.
+/// A machine in motion: advance it as far and as often as needed.
 #[derive(Debug, Clone)]
 pub struct Simulator {
     model: Model,
@@ -71,7 +71,7 @@ pub struct Simulator {
     crossings: CrossingWatch,
 }
 
-/// An integrator of as many states as the model has: the nominal one does not pay for the others' linear algebra.
+/// An integrator with as many states as the model has: the nominal one does not pay for the others' linear algebra.
 #[derive(Debug, Clone)]
 enum SizedIntegrator {
     /// Without inner wall and hidden temperatures.
@@ -93,7 +93,7 @@ macro_rules! sized {
     };
 }
 
-/// Looks for crossings from step to step.
+/// Detects crossings from step to step.
 #[derive(Debug, Clone)]
 struct CrossingWatch {
     watch: Watch,
@@ -104,7 +104,7 @@ struct CrossingWatch {
 /// Local error allowed by default, relative: three orders below the noise of any sensor.
 pub const DEFAULT_RELATIVE_TOLERANCE: f64 = 1e-6;
 
-/// Usual sizes of the states.
+/// Typical magnitudes of the states.
 const STATE_SIZES: [f64; MAX_STATES] = [1e4, 1e5, 3e2, 5e2, 3e2, 3e2, 3e2, 3e2];
 
 impl SizedIntegrator {
@@ -119,9 +119,9 @@ impl SizedIntegrator {
     }
 }
 
-/// Of the error of a step in all states, by that relative to their sizes.
+/// Tolerances of a step in all states, from the relative tolerance and the states' magnitudes.
 pub(crate) fn tolerances<const N: usize>(relative_ratio: f64) -> Tolerances<N> {
-    // Absolute parts: a thousandth of each state's usual size.
+    // Absolute parts: a thousandth of each state's typical magnitude.
     Tolerances { relative_ratio, absolute: std::array::from_fn(|i| 1e-3 * STATE_SIZES[i] * relative_ratio) }
 }
 
@@ -150,7 +150,7 @@ impl Simulator {
         sized!(&self.integrator, integrator => integrator.steps())
     }
 
-    /// Goes on as a machine of other parameters, e.g. one that fouls. What states the model has does not change: neither may
+    /// Continues as a machine with other parameters, e.g. one that fouls. The states of the model must not change, nor
     /// whether it has an inner wall.
     pub fn change_params(&mut self, params: Params) {
         if params != self.model.params {
@@ -164,11 +164,11 @@ impl Simulator {
         sized!(&mut self.integrator, integrator => integrator.restart());
     }
 
-    /// Runs to `end_s`. `on_sample` is called with time, state and outputs at each of `sample_times_s` (rising, within
-    /// the interval; the interval's start is allowed), `on_event` at each crossing, in order of time.
+    /// Runs to `end_s`. Calls `on_sample` with time, state and outputs at each of `sample_times_s` (rising, within
+    /// the interval; the interval's start is allowed), and `on_event` at each crossing, in order of time.
     ///
     /// # Errors
-    /// [`SimulationError`] where the inputs have no meaning or the tolerance cannot be met.
+    /// [`SimulationError`] if the inputs are not valid or the tolerance cannot be met.
     pub fn run_to(
         &mut self,
         end_s: f64,
@@ -325,7 +325,7 @@ impl<const N: usize, I: Inputs> OdeSystem<N> for ModelSystem<'_, I> {
         if self.constant {
             return None;
         }
-        // One-sided, ahead: behind may lie a kink. Inputs are linear or exponential over far longer times.
+        // One-sided, forwards: there may be a kink behind. Inputs are linear or exponential over far longer times.
         let ahead_s = 1e-6;
         let moved = self.rates(t_s + ahead_s, y);
         Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))

@@ -1,7 +1,7 @@
-//! How the shaft speed answers to P3 around a steady state: what a speed controller is tuned by.
+//! Response of the shaft speed to P3 around a steady state, used to tune a speed controller.
 //!
-//! The shaft is `J w dw/dt = W_t(P3, w) - W_c(w) - W_f(w)` (eq. 12). Linearised around a steady state with the gas path at
-//! rest, its gain is `dN/dP3` from one steady state to the next and its time constant `J w (dw/dP3) / (dW_t/dP3)`.
+//! The shaft is `J w dw/dt = W_t(P3, w) - W_c(w) - W_f(w)` (eq. 12). Linearised around a steady state with the gas path
+//! steady, its gain is `dN/dP3` from one steady state to the next and its time constant `J w (dw/dP3) / (dW_t/dP3)`.
 
 use crate::instruments::NOMINAL_P3_LAG_S;
 use crate::model::{Model, rad_s_of_rpm};
@@ -10,10 +10,10 @@ use crate::steady::{SteadyError, hold_speed};
 use crate::turbine::TurbineInlet;
 use mapper_core::SpeedResponse;
 
-/// Relative step of the differences: far above what steady states are found to, far below any curvature.
+/// Relative step of the differences: far above the tolerance of steady states, far below any curvature.
 const STEP_RATIO: f64 = 1e-3;
 
-/// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored. `None` where the machine has no steady state there,
+/// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored. `None` if the machine has no steady state there,
 /// or one that more pressure slows down.
 pub fn speed_response(model: &Model, speed_rpm: f64, boundary: &BoundaryConditions) -> Option<SpeedResponse> {
     differences(model, speed_rpm, boundary).ok().filter(|response| {
@@ -52,8 +52,8 @@ mod tests {
     use super::*;
     use crate::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
 
-    /// The integrated model after a small step of P3, with housings that cannot change: the speed goes where the gain says, and
-    /// 63 % of the way in the shaft's time constant.
+    /// The integrated model after a small step of P3, with housings of constant temperature: the speed follows the gain, and
+    /// reaches 63 % of the way in the shaft's time constant.
     #[test]
     fn the_integrated_machine_answers_as_said() {
         for (speed_rpm, valve_opening_ratio) in [(50e3, 0.7), (110e3, 1.0), (150e3, 2.0)] {
@@ -81,7 +81,7 @@ mod tests {
                 )
                 .unwrap();
             let (early, late) = (rise_rpm[0], rise_rpm[1]);
-            // The gain takes housings along, which change the turbine's power by some per cent.
+            // The gain includes the housings, which change the turbine's power by some per cent.
             let gain = late / (response.rpm_per_pa * step_pa);
             assert!((0.85..1.1).contains(&gain), "{speed_rpm} {gain}");
             // P2 follows the valve's volume in some tens of milliseconds: not quite first order.

@@ -1,6 +1,6 @@
 //! The machine at rest: no flow, both housings relax to the cell through the bearing housing.
 //!
-//! The running model is singular at speed 0 and flow 0; for soaks and zeros this one stands in for it. Domain: no gas flow
+//! The running model is singular at speed 0 and flow 0; this one replaces it for soaks and zeros. Domain: no gas flow
 //! at all; the heat balances are those of [`housing`] without their gas side.
 
 use crate::housing;
@@ -20,7 +20,7 @@ const LONGEST_STEP_S: f64 = 1.0;
 
 /// Housing temperatures `duration_s` later.
 ///
-/// Classical Runge-Kutta of order 4 with steps of at most 1 s: nothing here is stiff.
+/// Classical Runge-Kutta of order 4 with steps of at most 1 s: the system is not stiff.
 pub fn relax(
     params: &Params,
     state: StandstillState,
@@ -67,7 +67,7 @@ fn rates_k_s(params: &Params, tc_k: f64, tt_k: f64, oil_k: f64, ambient_k: f64) 
 mod tests {
     use super::*;
 
-    /// Lumped capacitance (Incropera, 5.1): without losses to the cell, and with oil that holds the bearing node, a housing falls
+    /// Lumped capacitance (Incropera, 5.1): without losses to the cell, and with oil that fixes the bearing node, a housing falls
     /// to 1/e of its excess in M c/G. The oil's conductance is made large; c at 300 K, and nearly so 1 K above it.
     #[test]
     fn a_housing_cools_as_a_lumped_capacitance() {

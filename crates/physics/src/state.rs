@@ -1,32 +1,32 @@
-//! What moves in the model.
+//! The states of the model.
 
-/// Hidden states that [hooks](crate::hooks::Hooks) may add, of all hooks of a model together.
+/// Maximum number of hidden states that all [hooks](crate::hooks::Hooks) of a model may add together.
 pub const MAX_EXTRA: usize = 2;
 
-/// All states that a model may have.
+/// Maximum number of states of a model.
 pub(crate) const MAX_STATES: usize = 6 + MAX_EXTRA;
 
-/// The states: five always move, the inner wall and the extra ones only where a model has them.
+/// The states: five are always integrated, the inner wall and the extra ones only if a model has them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State {
     /// Shaft speed, rad/s, > 0.
     pub shaft_speed_rad_s: f64,
     /// Compressor outlet total pressure (station 2), Pa.
     pub p2_pa: f64,
-    /// Compressor housing temperature, K; of its outer part where the inner wall has its own.
+    /// Compressor housing temperature, K; of its outer part if the inner wall has its own.
     pub tc_k: f64,
     /// Turbine housing temperature, K.
     pub tt_k: f64,
     /// Temperature of the T2 probe's tip, K; unused with an ideal probe.
     pub t2_tip_k: f64,
-    /// Inner wall of the compressor housing, K; unused where the housing is one node.
+    /// Inner wall of the compressor housing, K; unused if the housing is one node.
     pub inner_k: f64,
     /// Temperatures that hooks add, K; unused without them.
     pub extra_k: [f64; MAX_EXTRA],
 }
 
 impl State {
-    /// A state whose probe and inner wall are at rest with what they touch: the probe at `gas_k`, the wall at `tc_k`.
+    /// A state with probe and inner wall in equilibrium with what they touch: the probe at `gas_k`, the wall at `tc_k`.
     pub fn new(shaft_speed_rad_s: f64, p2_pa: f64, tc_k: f64, tt_k: f64, gas_k: f64) -> Self {
         State {
             shaft_speed_rad_s,
@@ -60,7 +60,7 @@ impl State {
         std::array::from_fn(|i| all[i])
     }
 
-    /// From the first `N` >= 5 states; what is beyond them rests with the housing.
+    /// From the first `N` >= 5 states; further states are in equilibrium with the housing.
     #[inline]
     pub(crate) fn from_array<const N: usize>(y: &[f64; N]) -> Self {
         let at = |i: usize| if i < N { y[i] } else { y[2] };

@@ -1,4 +1,4 @@
-//! Where the machine rests: the steady state at a wanted speed, and the turbine pressure that holds it.
+//! The steady state at a given speed, and the turbine pressure that holds it.
 
 use crate::model::{BoundaryError, Model, Outputs, State, rad_s_of_rpm};
 use crate::params::BoundaryConditions;
@@ -6,11 +6,11 @@ use crate::state::MAX_EXTRA;
 use mapper_numerics::root::root_between;
 use nalgebra::{SMatrix, SVector};
 
-/// Temperatures that come to rest: both housings, the inner wall, hidden ones.
+/// Temperatures in equilibrium: both housings, the inner wall, hidden ones.
 const HEAT_NODES: usize = 3 + MAX_EXTRA;
 type Temperatures = SVector<f64, HEAT_NODES>;
 
-/// A steady state with everything the model knows there.
+/// A steady state with all outputs of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteadyState {
     /// Boundary conditions, with the P3 that holds the speed.
@@ -33,7 +33,7 @@ impl SteadyState {
 /// Why no steady state was found.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SteadyError {
-    /// The boundary conditions have no meaning.
+    /// The boundary conditions are not valid.
     #[error(transparent)]
     Boundary(#[from] BoundaryError),
     /// The valve passes less than the compressor delivers at any pressure, or the other way round.
@@ -74,17 +74,17 @@ pub enum SteadyError {
     },
 }
 
-/// Highest pressure that is tried, over P4.
+/// Highest pressure tried, relative to P4.
 const HIGHEST_EXPANSION_RATIO: f64 = 20.0;
-/// Heat that may be left in a housing, W: far below 1e-6 of any shaft power.
+/// Largest residual heat flow of a housing, W: far below 1e-6 of any shaft power.
 const HEAT_TOLERANCE_W: f64 = 1e-9;
 
-/// The steady state at `speed_rpm` under `boundary`, whose `p3_pa` is ignored and found.
+/// The steady state at `speed_rpm` under `boundary`, whose `p3_pa` is ignored and computed.
 ///
 /// Nested: outlet pressure from flow balance, P3 from power balance, temperatures by Newton's method.
 ///
 /// # Errors
-/// [`SteadyError`] naming the balance that cannot be met.
+/// [`SteadyError`] with the balance that cannot be met.
 pub fn hold_speed(
     model: &Model,
     speed_rpm: f64,
@@ -107,7 +107,7 @@ pub fn hold_speed(
                 prepared.compressor_housing_balance_w(&state, &outputs),
                 prepared.turbine_housing_balance_w(&state, &outputs),
                 prepared.inner_wall_balance_w(&outputs),
-                // Rates of hidden temperatures, as heats of a node of 1 kJ/K.
+                // Rates of hidden temperatures, as heat flows of a node of 1 kJ/K.
                 1e3 * outputs.added.extra_rates_k_s[0],
                 1e3 * outputs.added.extra_rates_k_s[1],
             ]);
@@ -126,7 +126,7 @@ pub fn hold_speed(
             let outputs = model.prepare(&at_rest).evaluate(&state);
             return Ok(SteadyState { boundary: at_rest, state, outputs });
         }
-        // Forward differences of the balances, which are smooth in the temperatures; what does not move stays.
+        // Forward differences of the balances, which are smooth in the temperatures; constant temperatures stay.
         let step_k = 1e-4;
         let mut slopes = SMatrix::<f64, HEAT_NODES, HEAT_NODES>::identity();
         for node in (0..HEAT_NODES).filter(|node| moves[*node]) {
@@ -150,7 +150,7 @@ pub fn hold_speed(
             share *= 0.5;
         }
         if temperatures == before.1 {
-            // The balances cannot be told from rounding any more.
+            // The balances are within rounding.
             if heat_w.amax() < 1e-6 {
                 heat_w = Temperatures::zeros();
                 continue;
@@ -208,7 +208,7 @@ fn gas_path_at_rest(
     Ok((boundary, state))
 }
 
-/// Speeds between which [`settle_under`] looks, rpm.
+/// Range of speeds that [`settle_under`] searches, rpm.
 const SETTLE_SPEEDS_RPM: (f64, f64) = (5_000.0, 400_000.0);
 
 /// The steady state that the machine runs up to from below under `boundary`, its `p3_pa` included.
@@ -216,7 +216,7 @@ const SETTLE_SPEEDS_RPM: (f64, f64) = (5_000.0, 400_000.0);
 /// The lowest speed whose own P3 is the given one, found on a geometric grid of 5 % and refined to rounding.
 ///
 /// # Errors
-/// [`SteadyError`] where the boundary conditions have no meaning or no speed from 5 to 400 krpm balances them.
+/// [`SteadyError`] if the boundary conditions are not valid or no speed from 5 to 400 krpm balances them.
 pub fn settle_under(model: &Model, boundary: &BoundaryConditions) -> Result<SteadyState, SteadyError> {
     boundary.check()?;
     let excess_pa = |speed_rpm: f64| {

@@ -1,9 +1,9 @@
 //! A user's own compressor map: speed lines of corrected speed, flow, pressure ratio and efficiency.
 //!
-//! Each line is described by its two ends and the course between them over the same coordinate x that the closed form
+//! Each line is described by its two ends and its shape between them over the same coordinate x that the closed form
 //! uses (0 at the choke end, 1 at the surge end), so that lines of different speed can be blended at equal x. Beyond
-//! the outermost lines similarity holds: flow in proportion to speed, isentropic head to its square. That is an
-//! extrapolation, good enough to run a machine up, not to be read as a measurement.
+//! the outermost lines similarity applies: flow in proportion to speed, isentropic head to its square. That is an
+//! extrapolation, good enough to run a machine up, but not a measurement.
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use crate::inlet_limit::{FASTEST_SPEED_RPM, SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
@@ -26,7 +26,7 @@ pub struct MapRow {
 /// Why a table is not a map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MapError {
-    /// A value without physical meaning.
+    /// An invalid value.
     #[error(
         "row {row} of the map: {quantity} = {} has no physical meaning (it must be {needed})",
         with_unit(value, unit)
@@ -36,17 +36,17 @@ pub enum MapError {
         row: usize,
         /// Which column.
         quantity: &'static str,
-        /// What stands there.
+        /// Its value.
         value: f64,
         /// Unit of the column.
         unit: &'static str,
-        /// What is allowed.
+        /// The allowed range.
         needed: &'static str,
     },
     /// Too few speed lines to interpolate between.
     #[error("the map has {lines} speed line(s); at least 2 are needed")]
     TooFewLines {
-        /// How many there are.
+        /// Number of lines.
         lines: usize,
     },
     /// A line with too few points.
@@ -56,7 +56,7 @@ pub enum MapError {
     TooFewPoints {
         /// The line's corrected speed, rpm.
         speed_corrected_rpm: f64,
-        /// How many there are.
+        /// Number of points.
         points: usize,
     },
     /// A line below another of lower speed.
@@ -68,7 +68,7 @@ pub enum MapError {
         speed_corrected_rpm: f64,
         /// Its highest pressure ratio.
         pressure_ratio: f64,
-        /// That of the next slower line.
+        /// Highest pressure ratio of the next slower line.
         slower_pressure_ratio: f64,
     },
     /// All lines slower than any turbocharger's.
@@ -91,7 +91,7 @@ pub enum MapError {
         /// Corrected speed, rpm.
         speed_corrected_rpm: f64,
     },
-    /// More flow than an inlet passes.
+    /// More flow than an inlet can pass.
     #[error(
         "row {row} of the map: no compressor passes {} at {} ({} at most); if the table has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)",
         with_unit(flow_corrected_kg_s, "kg/s"),
@@ -105,12 +105,12 @@ pub enum MapError {
         flow_corrected_kg_s: f64,
         /// Corrected speed, rpm.
         speed_corrected_rpm: f64,
-        /// What an inlet passes at most, kg/s.
+        /// Largest flow of an inlet, kg/s.
         most_kg_s: f64,
     },
 }
 
-/// A speed line as it is kept.
+/// A stored speed line.
 #[derive(Debug, Clone)]
 pub struct Line {
     /// Mean corrected speed of its points, rpm.
@@ -134,7 +134,7 @@ pub struct Node {
     pub efficiency: f64,
 }
 
-/// A map made of a table.
+/// A map from a table.
 #[derive(Debug, Clone)]
 pub struct TabulatedMap {
     reference: ReferenceState,
@@ -142,7 +142,7 @@ pub struct TabulatedMap {
     fingerprint: String,
 }
 
-/// Lowest efficiency that a blend may give; the same floor as the closed form's.
+/// Lowest efficiency of a blend; the same floor as the closed form's.
 const LOWEST_EFFICIENCY: f64 = 0.2;
 /// Points whose speeds differ by less than this belong to one line.
 const SAME_LINE_RATIO: f64 = 0.01;
@@ -150,11 +150,11 @@ const SAME_LINE_RATIO: f64 = 0.01;
 impl TabulatedMap {
     /// Builds a map from rows in any order, at `reference`.
     ///
-    /// Points on the surge side of a line's highest pressure ratio are left out: there flow is not a function of
+    /// Points on the surge side of a line's highest pressure ratio are left out: there, flow is not a function of
     /// pressure ratio.
     ///
     /// # Errors
-    /// [`MapError`] naming the row or line that is wrong.
+    /// [`MapError`] with the wrong row or line.
     pub fn new(rows: &[MapRow], reference: ReferenceState) -> Result<Self, MapError> {
         for (index, row) in rows.iter().enumerate() {
             let positive = "finite and above 0";
@@ -284,7 +284,7 @@ impl Line {
     fn new(rows: &[MapRow]) -> Result<Self, MapError> {
         let speed_corrected_rpm =
             rows.iter().map(|row| row.speed_corrected_rpm).sum::<f64>() / rows.len() as f64;
-        // From choke towards surge the pressure ratio must rise; what does not is left out.
+        // From choke towards surge the pressure ratio must rise; points where it does not are left out.
         let mut rising: Vec<&MapRow> = Vec::new();
         for row in rows {
             if rising.last().is_none_or(|last| {
@@ -363,7 +363,7 @@ mod tests {
     use crate::closed_form_map::ClosedFormMap;
     use proptest::prelude::*;
 
-    /// The closed form, sampled as a user's table would be.
+    /// The closed form, sampled like a user's table.
     fn sampled(speeds: &[f64]) -> TabulatedMap {
         let map = ClosedFormMap { wheel_diameter_m: 0.052 };
         let mut rows = Vec::new();
@@ -391,7 +391,7 @@ mod tests {
         for (speed, tolerance) in [(90e3, 1e-9), (95e3, 0.01)] {
             let (_, surge_pr) = exact.surge_point(speed);
             let choke_pr = 1.0 + 0.15 * (surge_pr - 1.0);
-            // Nodes at every twentieth; the last before surge is steep, there a straight line is 1 % off.
+            // Nodes at every twentieth; the last before surge is steep, so a straight line is 1 % off there.
             for i in 1..19 {
                 let pr = choke_pr + (surge_pr - choke_pr) * f64::from(i) / 20.0;
                 let (a, b) = (table.evaluate(speed, pr), exact.evaluate(speed, pr));

@@ -29,7 +29,7 @@ pub fn time_constant_s(tip_diameter_m: f64, pipe_diameter_m: f64, flow_kg_s: f64
     TIP_HEAT_CAPACITY_J_M3K * tip_diameter_m * tip_diameter_m / (6.0 * nusselt * k)
 }
 
-/// `v^2/(2 cp)` in the outlet pipe, K, with `v = m/(rho A)` and `rho = P2/(R T2)`: what a probe without recovery misses.
+/// `v^2/(2 cp)` in the outlet pipe, K, with `v = m/(rho A)` and `rho = P2/(R T2)`: the error of a probe without recovery.
 #[inline]
 pub fn dynamic_temperature_k(
     pipe_diameter_m: f64,

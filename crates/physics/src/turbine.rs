@@ -1,8 +1,8 @@
 //! The turbine (vanes fixed): swallowing, heat to the housing, expansion.
 //!
 //! Closed forms of the virtual laboratory for the paper's turbine. Domain: P3 above P4 (the caller checks), expansion ratios up
-//! to about 4, gas taken for air. The efficiency is total to static and a parabola over the blade-speed ratio (e.g. Watson and
-//! Janota, Turbocharging the Internal Combustion Engine, ch. 5), held at 0.05 far from its best.
+//! to about 4, gas treated as air. The efficiency is total to static and a parabola over the blade-speed ratio (e.g. Watson and
+//! Janota, Turbocharging the Internal Combustion Engine, ch. 5), limited to 0.05 far from its best.
 
 use crate::air::{self, GAS_CONSTANT_J_KGK};
 use crate::nusselt;
@@ -15,7 +15,7 @@ const FLOW_REFERENCE_PA: f64 = 101_325.0;
 /// Exponent of the swallowing curve `1 - (P3/P4)^-1.1`.
 const SWALLOWING_EXPONENT: f64 = -1.1;
 
-/// What depends on the boundary conditions alone; made once for as long as they hold.
+/// Terms that depend only on the boundary conditions; computed once while these are constant.
 #[derive(Debug, Clone, Copy)]
 pub struct TurbineInlet {
     params: TurbineParams,
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
     use crate::params::Params;
 
-    /// A turbine without heat loss whose efficiency is 1 at every blade-speed ratio that a test can reach.
+    /// A turbine without heat loss and with efficiency 1 at every blade-speed ratio that a test can reach.
     fn inlet(expansion_ratio: f64, t3_k: f64) -> TurbineInlet {
         let params =
             TurbineParams { internal_area_m2: 0.0, peak_efficiency: 1.0, ..Params::default().turbine };
@@ -151,7 +151,7 @@ mod tests {
     }
 
     /// Air tables (Moran and Shapiro, table A-22): from 773.15 K (h = 792.5 kJ/kg, pr = 41.95) to a third of the pressure the
-    /// isentropic end is pr = 13.98, h = 581.3 kJ/kg. cp held at the inlet's leaves 1 %.
+    /// isentropic end is at pr = 13.98, h = 581.3 kJ/kg. The constant cp of the inlet costs 1 %.
     #[test]
     fn the_power_of_hot_gas_is_its_drop_of_enthalpy() {
         let hot = inlet(3.0, 773.15);
@@ -160,7 +160,7 @@ mod tests {
         assert!((drop_j_kg / 211.2e3 - 1.0).abs() < 0.01, "{drop_j_kg} J/kg");
     }
 
-    /// Choked, on the ISA day, it swallows what it is declared to; hotter gas in proportion to 1/sqrt(T3).
+    /// Choked, on the ISA day, it swallows its declared flow; hotter gas in proportion to 1/sqrt(T3).
     #[test]
     fn the_swallowing_curve_is_corrected_to_the_isa_day() {
         let choked = inlet(1e6, FLOW_REFERENCE_K);

@@ -1,4 +1,4 @@
-//! Chunks unpacked, and their messages read, several at a time: what a recording costs is the text of its numbers.
+//! Unpacks chunks and reads their messages in parallel: parsing numbers from text dominates the cost of reading a recording.
 
 use crate::chunk::{ChunkError, Unpacker, claimed_bytes};
 use crate::framing::split_record;
@@ -6,18 +6,18 @@ use crate::records::{op, parse_message};
 use crate::sink::Sink;
 use mapper_numerics::parallel;
 
-/// Chunks of a batch are at most so large together, unpacked: enough to be worth sharing out, and little beside a recording.
+/// Maximum total size of a batch, unpacked: enough to share out, and small compared with a recording.
 const BATCH_BYTES: u64 = 4 << 20;
-/// Chunks of a batch: of small ones, more would wait for nothing.
+/// Maximum number of chunks of a batch: with small chunks, more would only add waiting time.
 const BATCH_CHUNKS: usize = 1024;
-/// Parts of a batch: more than there are cores, so that all end together.
+/// Parts of a batch: more than there are cores, to balance the load.
 const PARTS: usize = 16;
 
 /// A record of a chunk.
 pub(crate) enum Item<T> {
-    /// A message on a topic that was known before the batch; `None` where the topic is not wanted.
+    /// A message on a topic that was known before the batch; `None` if the topic is not wanted.
     Message { channel_id: u16, log_time_ns: u64, told: Option<T> },
-    /// Any other record, to be looked at in its turn.
+    /// Any other record, to be read in its turn.
     Record { opcode: u8, body: Vec<u8> },
     /// The chunk ends within a record.
     Cut,
@@ -25,12 +25,12 @@ pub(crate) enum Item<T> {
 
 /// A chunk of a batch.
 pub(crate) struct Opened<T> {
-    /// Where it lies in the file.
+    /// Its offset in the file.
     pub(crate) offset: u64,
     pub(crate) items: Result<Vec<Item<T>>, ChunkError>,
 }
 
-/// Chunks that wait to be unpacked together.
+/// Chunks that are to be unpacked together.
 #[derive(Default)]
 pub(crate) struct Batch {
     chunks: Vec<(u64, Vec<u8>)>,
@@ -38,12 +38,12 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Whether a chunk may be one of several: what is read of a large one at once might take many times its size.
+    /// Whether a chunk may share a batch: reading a large one at once might need many times its size.
     pub(crate) fn takes(body: &[u8]) -> bool {
         claimed_bytes(body).is_none_or(|bytes| bytes <= BATCH_BYTES)
     }
 
-    /// Adds a chunk that lies at `offset`.
+    /// Adds a chunk at `offset` in the file.
     pub(crate) fn push(&mut self, offset: u64, body: &[u8]) {
         self.bytes = self.bytes.saturating_add(claimed_bytes(body).unwrap_or(0));
         self.chunks.push((offset, body.to_owned()));

@@ -1,4 +1,4 @@
-//! Where a recording holds the rig's channels, and what it does not say itself.
+//! Maps a recording's topics and fields onto the rig's channels, and adds data that the recording does not contain.
 
 use crate::format::ELEMENTS_TOPIC;
 use mapper_core::{
@@ -14,12 +14,12 @@ use std::path::PathBuf;
 pub struct ChannelMap {
     /// Topic, field and unit of each channel.
     pub channels: BTreeMap<Channel, ChannelSource>,
-    /// Topic, field and unit of each sensor of the channels that have several; such a channel need not stand among
-    /// `channels`: its reading is then made of theirs.
+    /// Topic, field and unit of each sensor of the channels that have several; such a channel need not be listed in
+    /// `channels`: its reading is then computed from theirs.
     pub elements: BTreeMap<Element, ChannelSource>,
-    /// Channels that the recording does not hold and that stay at a known value; SI, in the channel's unit.
+    /// Channels with a constant known value that the recording does not contain; SI, in the channel's unit.
     pub constants: BTreeMap<Channel, f64>,
-    /// What identification needs of the machine where there is no campaign.
+    /// Machine data for the identification if there is no campaign.
     pub machine: Option<MachineConstants>,
     /// Reference state of corrected quantities.
     pub reference: Option<ReferenceState>,
@@ -27,20 +27,20 @@ pub struct ChannelMap {
     pub window: Option<WindowLimits>,
     /// Declared uncertainty of the sensors.
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
-    /// What is declared of each sensor of the channels that have several; `sensors` then has what they are together.
+    /// Declared uncertainty of each sensor of the channels that have several; `sensors` then has that of the combined reading.
     pub redundant: BTreeMap<Channel, RedundantSensors>,
     /// How the sensors' noise is correlated in time.
     pub noise_colour: Option<NoiseColour>,
-    /// What gauge pressures are added to.
+    /// Reference of gauge pressures.
     pub ambient_pressure: Option<AmbientPressure>,
-    /// How a log of another program is to be read, where looking at it is not enough.
+    /// Settings for reading a log of another program, if they cannot be detected.
     pub log: LogOptions,
-    /// File and text it was read from, so that what is wrong with it for a recording can be shown in it.
+    /// File and text it was read from, so that messages can point into it.
     pub(crate) text: Option<(PathBuf, String)>,
     pub(crate) native: bool,
 }
 
-/// The pressure that gauge pressures are read over.
+/// The reference of gauge pressures.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AmbientPressure {
     /// A known value, Pa.
@@ -58,11 +58,11 @@ pub struct ChannelSource {
     pub field: String,
     /// Unit of the field; `None` to take it from the recording.
     pub unit: Option<String>,
-    /// Whether it is a pressure over the ambient pressure.
+    /// Whether it is a gauge pressure.
     pub gauge: bool,
 }
 
-/// What identification needs of the machine.
+/// Machine data for the identification.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MachineConstants {
     /// Internal area of the compressor that exchanges heat with the gas, m2, > 0.
@@ -116,7 +116,7 @@ impl ChannelMap {
         ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
     }
 
-    /// Whether this is [`ChannelMap::native`]: channels missing from the recording are then no surprise.
+    /// Whether this is [`ChannelMap::native`]: missing channels are then expected.
     pub fn is_native(&self) -> bool {
         self.native
     }

@@ -1,7 +1,7 @@
-//! What a channel map may hold, as a JSON schema. Its descriptions are quoted in messages: they say what to write.
+//! JSON schema of a channel map. Messages quote its descriptions, so they describe what to write.
 //!
 //! Quantities are plain strings or numbers here: recordings of other programs spell units in more ways than campaigns
-//! may, and a ratio may stand bare. [`crate::channel_map_yaml`] reads them.
+//! may, and a ratio may be written without a unit. [`crate::channel_map_yaml`] parses them.
 
 use mapper_core::{CHANNELS, MAX_ELEMENTS, NAMED_REFERENCES};
 use mapper_logs::OPTION_KEYS;
@@ -73,7 +73,7 @@ fn ambient_pressure() -> Value {
     })
 }
 
-/// How a log is to be read: the keys that its formats know.
+/// Settings of a log: the keys that its formats know.
 fn log() -> Value {
     let key = |key: &mapper_logs::OptionKey| (key.name.to_owned(), quantity(key.description, key.example));
     let keys: Map<String, Value> = OPTION_KEYS.iter().map(key).collect();

@@ -1,4 +1,4 @@
-//! Channel maps as people write them: YAML with units.
+//! Channel maps in YAML with units.
 
 use crate::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Largest channel map that is read, bytes.
 const SIZE_LIMIT: usize = 1 << 20;
 
-/// What messages call the file.
+/// Name of the file in messages.
 pub(crate) static DOCUMENT: Document =
     Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
 
@@ -40,7 +40,7 @@ impl ChannelMap {
     /// Reads and checks the file of a channel map.
     ///
     /// # Errors
-    /// [`ChannelMapError::Read`] where the file cannot be read, [`ChannelMapError::Mistakes`] with all its mistakes.
+    /// [`ChannelMapError::Read`] if the file cannot be read, [`ChannelMapError::Mistakes`] with all its mistakes.
     pub fn load(path: &Path) -> Result<ChannelMap, ChannelMapError> {
         let mistakes = |findings| ChannelMapError::Mistakes(Box::new(findings));
         let text = mapper_yaml::open(&DOCUMENT, path, SIZE_LIMIT)
@@ -52,7 +52,7 @@ impl ChannelMap {
     /// Reads a channel map; `origin` names it in messages.
     ///
     /// # Errors
-    /// All mistakes of the text in one go.
+    /// All mistakes of the text together.
     pub fn from_yaml(text: &str, origin: &Path) -> Result<ChannelMap, Findings> {
         let source = Source::new(&DOCUMENT, origin, text);
         let mut notes = Notes::default();
@@ -67,8 +67,8 @@ impl ChannelMap {
     }
 }
 
-/// Turns the tree into values and notes what is wrong with them. What is missing or of another type was noted by the
-/// check against the schema and is passed over here.
+/// Converts the tree to values and collects mistakes. The check against the schema has already reported missing values and wrong
+/// types, so they are skipped here.
 struct Reader<'a> {
     source: &'a Source,
     root: &'a Node,
@@ -168,7 +168,7 @@ impl<'a> Reader<'a> {
             else {
                 continue;
             };
-            // A key that does not exist was noted by the check against the schema.
+            // The check against the schema has already reported an unknown key.
             if let Err(error @ OptionError::Value { .. }) = options.set(&entry.key, &text) {
                 let remedy =
                     OPTION_KEYS.iter().find(|key| key.name == entry.key).map_or("", |key| key.description);
@@ -203,7 +203,7 @@ impl<'a> Reader<'a> {
         (topic, written, gauge)
     }
 
-    /// The field of a channel, or those of its several sensors.
+    /// The field of a channel, or the fields of its several sensors.
     fn fields(&self, channel: Channel) -> Vec<String> {
         let Some(node) = self.root.get(&steps!["channels", channel.symbol(), "field"]) else {
             return Vec::new();
@@ -246,7 +246,7 @@ impl<'a> Reader<'a> {
         WindowLimits { start_s, end_s }
     }
 
-    /// What is declared of each sensor of a channel, and the offset that they share.
+    /// The declared uncertainty of each sensor of a channel, and their common offset.
     fn sensor(&mut self, channel: Channel) -> (DeclaredUncertainty, f64) {
         let of = |key: &str| steps!["sensors", channel.symbol(), key];
         let kind = difference(kind_of(channel));
@@ -283,7 +283,7 @@ impl<'a> Reader<'a> {
         Some(value)
     }
 
-    /// 0 where nothing is written.
+    /// 0 if it is not given.
     fn not_negative(&mut self, steps: &[Step], kind: Kind) -> f64 {
         let value = self.quantity(steps, kind).unwrap_or(0.0);
         if value < 0.0 {

@@ -10,7 +10,7 @@ pub enum ChunkError {
     /// It ends within its header.
     #[error("its header is incomplete")]
     Header,
-    /// It would unpack to more than is read.
+    /// Its unpacked size exceeds the limit.
     #[error("it claims {claimed} bytes, more than the {limit} that are read")]
     TooLarge {
         /// Size it claims, bytes.
@@ -27,23 +27,23 @@ pub enum ChunkError {
     /// The compressed data are damaged.
     #[error("it does not decompress ({reason})")]
     Decompress {
-        /// What zstd said.
+        /// The error of zstd.
         reason: String,
     },
-    /// It unpacks to another size than it claims.
+    /// Its unpacked size differs from the stated one.
     #[error("it holds {found} bytes and claims {claimed}")]
     Length {
-        /// Size it claims, bytes.
+        /// Stated size, bytes.
         claimed: u64,
-        /// Size it has, bytes.
+        /// Actual size, bytes.
         found: u64,
     },
-    /// Its content is not what was written.
+    /// Its content was changed.
     #[error("its checksum is {found:08x} and should be {saved:08x}")]
     Checksum {
-        /// Checksum that stands in it.
+        /// Stored checksum.
         saved: u32,
-        /// Checksum of what is there.
+        /// Checksum of the content.
         found: u32,
     },
     /// Its last record is cut.
@@ -51,7 +51,7 @@ pub enum ChunkError {
     CutRecord,
 }
 
-/// Unpacks chunks; keeps what decompression can use again for the next one.
+/// Unpacks chunks; keeps the decompression state for the next one.
 pub(crate) struct Unpacker {
     context: DCtx<'static>,
     content: Vec<u8>,
@@ -83,7 +83,7 @@ impl Unpacker {
         if found != claimed {
             return Err(ChunkError::Length { claimed, found });
         }
-        // Zero means that the writer made none.
+        // Zero means that the writer computed no checksum.
         let found = if saved == 0 { 0 } else { crc32fast::hash(&self.content) };
         if found != saved {
             return Err(ChunkError::Checksum { saved, found });
@@ -92,18 +92,18 @@ impl Unpacker {
     }
 
     fn decompress(&mut self, data: &[u8], claimed: u64) -> io::Result<()> {
-        // A damaged chunk before may have left the context within a frame.
+        // A damaged earlier chunk may have left the context within a frame.
         self.context
             .reset(ResetDirective::SessionOnly)
             .map_err(|code| io::Error::other(get_error_name(code)))?;
         let decoder = zstd::stream::read::Decoder::with_context(data, &mut self.context);
-        // One byte more than claimed shows a chunk that lies, without unpacking the rest of it.
+        // One byte more than stated reveals a wrong size without unpacking the rest.
         decoder.take(claimed.saturating_add(1)).read_to_end(&mut self.content)?;
         Ok(())
     }
 }
 
-/// What a chunk claims to unpack to, bytes; `None` where its header is incomplete.
+/// The stated unpacked size of a chunk, bytes; `None` if its header is incomplete.
 pub(crate) fn claimed_bytes(body: &[u8]) -> Option<u64> {
     Some(parse_header(body)?.0)
 }

@@ -1,26 +1,26 @@
-//! What is wrong with a channel map for one recording, shown in the map's own text.
+//! Mistakes of a channel map for one recording, shown in the map's own text.
 
 use crate::channel_map_yaml::DOCUMENT;
 use crate::{ChannelMap, RecordError};
 use mapper_yaml::{FindingKind, Findings, Node, Notes, Source, Step, path_text};
 use std::path::Path;
 
-/// Complaints as they are collected: all mistakes come at once.
+/// Collects mistakes, so that all are reported at once.
 #[derive(Debug, Default)]
 pub(crate) struct Complaints {
     list: Vec<(FindingKind, Vec<Step>, String, String)>,
 }
 
 impl Complaints {
-    /// Adds what is wrong at a place of the map, and what would be right.
+    /// Adds a mistake at a place of the map, with its remedy.
     pub(crate) fn add(&mut self, kind: FindingKind, place: &[Step], message: String, remedy: String) {
         self.list.push((kind, place.to_owned(), message, remedy));
     }
 
-    /// All of them as an error; nothing where there are none.
+    /// All mistakes as an error; nothing if there are none.
     ///
     /// # Errors
-    /// [`RecordError::ChannelMap`] where there is any.
+    /// [`RecordError::ChannelMap`] if there is any.
     pub(crate) fn result(self, map: &ChannelMap) -> Result<(), RecordError> {
         if self.list.is_empty() {
             return Ok(());

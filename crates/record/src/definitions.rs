@@ -1,4 +1,4 @@
-//! Which fields of a topic are which channels, and in which unit.
+//! Assigns fields of topics to channels, with their units.
 
 use crate::records::ChannelDefinition;
 use crate::{ChannelMap, ChannelSource, ReadWarning, RecordError};
@@ -8,7 +8,7 @@ use mapper_yaml::units::{Kind, Unit};
 use serde_json::Value;
 use std::path::Path;
 
-/// What a field of a recording reads.
+/// The quantity of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Reads {
     /// A channel.
@@ -25,7 +25,7 @@ impl Reads {
     }
 }
 
-/// Where the map says that a channel or a sensor is read.
+/// Topic and field of a channel or sensor in the map.
 pub(crate) fn source_of(map: &ChannelMap, reads: Reads) -> Option<&ChannelSource> {
     match reads {
         Reads::Channel(channel) => map.channels.get(&channel),
@@ -39,11 +39,11 @@ pub(crate) struct MappedTopic {
     pub(crate) topic: String,
     /// Fields to read, each once.
     pub(crate) fields: Vec<String>,
-    /// Index of the field, what it reads, unit of the field.
+    /// Index of the field, its quantity, unit of the field.
     pub(crate) outputs: Vec<(usize, Reads, &'static Unit)>,
 }
 
-/// The channels that the map finds on a topic; `None` where there is none.
+/// The channels that the map finds on a topic; `None` if there is none.
 pub(crate) fn map_topic(
     path: &Path,
     map: &ChannelMap,
@@ -72,7 +72,7 @@ pub(crate) fn map_topic(
     Ok((!mapped.outputs.is_empty()).then_some(mapped))
 }
 
-/// Where programs leave a unit: the topic's metadata, `unit` in the schema, or the description in the schema.
+/// Places where programs store a unit: the topic's metadata, `unit` in the schema, or the description in the schema.
 fn recorded_unit(
     definition: &ChannelDefinition,
     schema: &Value,
@@ -86,7 +86,7 @@ fn recorded_unit(
         .get(&source.field)
         .map(String::as_str)
         .or_else(|| text("unit"))
-        // A description is prose: it counts only where it is a fitting unit and nothing else.
+        // A description is prose: it counts only if it consists of a fitting unit.
         .or_else(|| text("description").filter(|description| unit(kind, description).is_ok()))
         .map(str::to_owned)
 }

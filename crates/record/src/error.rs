@@ -21,7 +21,7 @@ pub enum RecordError {
     Create {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// Writing failed on the way, for example because the disk is full.
@@ -31,10 +31,10 @@ pub enum RecordError {
         path: PathBuf,
         /// Run time up to which all samples are in the file, s; `None` before the first flush.
         saved_until_s: Option<f64>,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// A batch, event or step that cannot be written: a fault of the program that made it.
+    /// A batch, event or step that cannot be written: a bug in the program that made it.
     #[error("failed to record into `{}`: {source}; a fault of the program that made it", path.display())]
     BadInput {
         /// The file.
@@ -47,10 +47,10 @@ pub enum RecordError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The file is something else.
+    /// The file has another format.
     #[error("failed to read `{}`: it is not an MCAP file (it starts with {found}); give the .mcap file of a run", path.display())]
     NotMcap {
         /// The file.
@@ -66,7 +66,7 @@ pub enum RecordError {
     Neither {
         /// The file.
         path: PathBuf,
-        /// Why it is no log.
+        /// Why it is not a log.
         message: String,
     },
     /// A log of another program without a channel map.
@@ -75,7 +75,7 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// The channel map does not fit the recording: all that is wrong with it, with its places.
+    /// The channel map does not fit the recording: all mistakes, with their places.
     #[error("{0}")]
     ChannelMap(Box<Findings>),
     /// Written by a later version of this program.
@@ -94,7 +94,7 @@ pub enum RecordError {
         /// Topics it has.
         topics: Vec<String>,
     },
-    /// Neither the map nor the recording says in which unit a field is.
+    /// Neither the map nor the recording gives the unit of a field.
     #[error("failed to read `{}`: neither the channel map nor the recording gives the unit of {channel} (`{field}` of {topic}); write it in the channel map, e.g. `unit: {}`", path.display(), channel.unit())]
     MissingUnit {
         /// The file.
@@ -122,7 +122,7 @@ pub enum RecordError {
     },
 }
 
-/// What is wrong with something that was to be recorded.
+/// Why data cannot be recorded.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BadBatch {
     /// A time that is not a number or leaves the clock's range.
@@ -141,7 +141,7 @@ pub enum BadBatch {
         /// The times.
         samples: usize,
     },
-    /// A column that is there twice.
+    /// A duplicate column.
     #[error("`{name}` appears twice in a batch")]
     Twice {
         /// The column.

@@ -2,15 +2,15 @@
 
 /// Version of the recording format.
 ///
-/// Bumped when a reader of the version before would misread a file: a topic, field or unit changes its meaning. New
-/// topics, fields and metadata keys do not bump it, since readers pass over what they do not know.
+/// Increased when a reader of the previous version would misread a file: a topic, field or unit changes its meaning. New
+/// topics, fields and metadata keys do not increase it, since readers skip unknown ones.
 ///
-/// Version 2 numbers the steps on `/step` from 1, as `step`. Version 1 has `index` there, from 0, and still reads.
+/// Version 2 numbers the steps on `/step` from 1, as `step`. Version 1 has `index` there, from 0, and can still be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FormatVersion(pub u32);
 
 impl FormatVersion {
-    /// What this program writes.
+    /// Version written by this program.
     pub const CURRENT: FormatVersion = FormatVersion(2);
 }
 
@@ -26,11 +26,11 @@ pub(crate) const STEP_TOPIC: &str = "/step";
 pub(crate) const EVENT_TOPIC: &str = "/event";
 /// Topic of the single sensors of channels that have several.
 pub(crate) const ELEMENTS_TOPIC: &str = "/rig/elements";
-/// Topic of what is not as usual of where readings come from.
+/// Topic of readings with an unusual quality or source time.
 pub(crate) const PROVENANCE_TOPIC: &str = "/rig/provenance";
-/// Topic of what only a simulator knows.
+/// Topic of the simulator's truth.
 pub(crate) const TRUTH_TOPIC: &str = "/truth/model";
-/// Everything below this belongs to scoring.
+/// Everything below this topic is for scoring only.
 pub(crate) const TRUTH_PREFIX: &str = "/truth";
 /// Name of the metadata record that marks a recording of this program.
 pub(crate) const METADATA_NAME: &str = "mapper.recording";

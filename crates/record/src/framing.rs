@@ -1,14 +1,14 @@
 //! Records of an MCAP file or chunk, one after the other: opcode, length, body.
 //!
 //! The framing is read here rather than by `mcap`'s readers because those stop at the first fault, and because
-//! lengths that lie must neither allocate nor overflow. The bodies are parsed by `mcap`.
+//! wrong lengths must neither allocate nor overflow. `mcap` parses the bodies.
 
 use std::io::{self, Read};
 
 /// Bytes before a record's body: one of opcode, eight of length.
 const FRAME_BYTES: usize = 9;
 
-/// What came next.
+/// Result of a read.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Frame<'a> {
     /// A whole record.
@@ -29,7 +29,7 @@ pub(crate) enum Frame<'a> {
     },
 }
 
-/// Reads records from a stream. Memory grows with what is really there, never with what a length claims.
+/// Reads records from a stream. Memory grows with the actual data, never with a stated length.
 pub(crate) struct FrameReader<R> {
     source: R,
     offset: u64,
@@ -37,7 +37,7 @@ pub(crate) struct FrameReader<R> {
 }
 
 impl<R: Read> FrameReader<R> {
-    /// Starts at the first record, which lies `offset` bytes into the file.
+    /// Starts at the first record, `offset` bytes into the file.
     pub(crate) fn new(source: R, offset: u64) -> Self {
         FrameReader { source, offset, buffer: Vec::new() }
     }
@@ -63,7 +63,7 @@ impl<R: Read> FrameReader<R> {
     }
 }
 
-/// Splits the first record off a chunk: opcode, body, rest. `None` where it is not whole.
+/// Splits the first record off a chunk: opcode, body, rest. `None` if it is incomplete.
 pub(crate) fn split_record(chunk: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let (opcode, length) = parse_frame(chunk)?;
     let rest = &chunk[FRAME_BYTES..];

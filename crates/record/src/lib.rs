@@ -1,11 +1,11 @@
-//! Recordings: MCAP out and in, and the mapping of other programs' recordings onto the rig's channels.
+//! Recordings: reading and writing MCAP, and mapping other programs' recordings onto the rig's channels.
 //!
 //! A recording is one MCAP file: a message in JSON per device group and sample, units in each channel's metadata and
-//! in its schema, step markers on `/step`, events on `/event`, plan and campaign attached. What only a simulator
-//! knows lies under `/truth`; [`read_recording`] never returns it, [`score`] alone reads it.
+//! in its schema, step markers on `/step`, events on `/event`, plan and campaign attached. The simulator's
+//! truth is under `/truth`; [`read_recording`] never returns it, only [`score`] reads it.
 //!
-//! Everything read here is treated as hostile: files may be truncated, damaged, or not MCAP at all. What can be
-//! saved is returned beside a list of [`ReadWarning`]s.
+//! All input is untrusted: files may be truncated, damaged, or not MCAP at all. Recoverable data
+//! are returned together with a list of [`ReadWarning`]s.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod batch;

@@ -1,21 +1,21 @@
-//! Means of a fast log at the rate that identification uses.
+//! Averages a fast log to the rate of the identification.
 
-/// Rate of the means, Hz: that of this program's own recordings. Identification works with transients of seconds.
+/// Rate of the means, Hz: that of this program's own recordings. Identification evaluates transients of seconds.
 const RATE_HZ: f64 = 10.0;
 
-/// A group is left as it is up to this rate, Hz: blocks would hold one sample, or now one and now two.
+/// Up to this rate, Hz, a group is not averaged: blocks would hold one sample, or alternately one and two.
 const LEFT_ALONE_HZ: f64 = 15.0;
 
-/// Rows from which the rate is taken first.
+/// Number of rows that determine the initial rate.
 const LOOKED_AT: usize = 256;
 
-/// Intervals that are looked at later on: a log may be slow at rest and fast from a trigger on.
+/// Number of intervals monitored later: a log may be slow at rest and fast after a trigger.
 const LATER: u32 = u64::BITS;
 
-/// The rows of one group, averaged where they come fast.
+/// The rows of one group, averaged if their rate is high.
 #[derive(Debug, Default)]
 pub(crate) struct Blocks {
-    /// Rows from which the rate is found.
+    /// Rows that determine the rate.
     first: Vec<(f64, Vec<f64>)>,
     state: State,
 }
@@ -56,7 +56,7 @@ struct Block {
     sums: Vec<(f64, f64)>,
 }
 
-/// Takes time and values; NaN where there is none.
+/// Takes time and values; NaN if there is none.
 pub(crate) type TakeRow<'a> = dyn FnMut(f64, &[f64]) + 'a;
 
 impl Blocks {
@@ -79,7 +79,7 @@ impl Blocks {
         }
     }
 
-    /// Gives what is left.
+    /// Returns the remaining rows.
     pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
         if matches!(self.state, State::Looking) {
             self.decide(take);
@@ -110,7 +110,7 @@ impl Blocks {
 
 impl Block {
     fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) {
-        // A sample on a border belongs behind it, whatever the last digit of its time.
+        // A sample on a border belongs to the later block, whatever the last digit of its time.
         let number = (t_s * RATE_HZ + 1e-6).floor() as i64;
         if number != self.number {
             self.flush(take);
@@ -155,7 +155,7 @@ mod tests {
         let out = through(100.0, 1000);
         assert_eq!(out.len(), 100);
         for (index, (t_s, values)) in out.iter().enumerate() {
-            // Ten samples from 0.1 i to 0.1 i + 0.09 s have their mean in the middle; a ramp stays one.
+            // Ten samples from 0.1 i to 0.1 i + 0.09 s have their mean in the middle; a ramp stays a ramp.
             assert!((t_s - (0.1 * index as f64 + 0.045)).abs() < 1e-9, "{t_s}");
             assert!((values[0] - 5.0 * t_s).abs() < 1e-9 && values[1] == 1.0);
         }
@@ -170,7 +170,7 @@ mod tests {
         rest.chain(run).for_each(|t_s| blocks.push(t_s, &[5.0 * t_s], &mut take));
         blocks.finish(&mut take);
         assert!(blocks.averages());
-        // 600 rows of rest as they are, 100 s at 10 Hz, and those few that showed the change.
+        // 600 unchanged rows at rest, 100 s at 10 Hz, and the few rows that showed the change.
         assert!((1600..1640).contains(&out.len()), "{}", out.len());
         assert!(out[..600].iter().enumerate().all(|(row, (t_s, _))| *t_s == row as f64));
         assert!(out.iter().all(|(t_s, value)| (value - 5.0 * t_s).abs() < 1e-9));

@@ -1,18 +1,18 @@
-//! The clock of a group of rows: single times that are wrong are passed over, and one that starts again ends the reading.
+//! The clock of a group of rows: isolated wrong times are skipped, and a restarted clock ends the reading.
 
-/// A row that is further than this from both rows beside it has a wrong time, s.
+/// A row whose time differs by more than this from both neighbours has a wrong time, s.
 pub(crate) const STRAY_S: f64 = 86_400.0;
 
-/// Times beyond this are no times, s: a century, within what the clock of a series holds.
+/// Maximum valid time, s: a century, within the range of a series' clock.
 const LONGEST_S: f64 = 3.2e9;
 
-/// Intervals by which a clock may step back: loggers write a few rows out of order.
+/// Intervals by which a clock may step back: loggers write some rows out of order.
 const BACK_INTERVALS: f64 = 5.0;
 
-/// A clock may step back by this much at any rate, s: it was set by another clock.
+/// A clock may step back by this much in any case, s: it was set by another clock.
 const BACK_S: f64 = 2.0;
 
-/// Intervals that are remembered.
+/// Number of intervals that are kept.
 const REMEMBERED: usize = 15;
 
 /// A clock that goes back.
@@ -24,16 +24,16 @@ pub(crate) struct Restart {
     pub(crate) to_s: f64,
 }
 
-/// Passes rows on, one row late.
+/// Forwards rows with a delay of one row.
 #[derive(Debug, Default)]
 pub(crate) struct LogClock {
     rows: u64,
     held: Option<(f64, Vec<f64>)>,
     last_s: Option<f64>,
     intervals_s: Vec<f64>,
-    /// How many rows were passed over.
+    /// Number of skipped rows.
     pub(crate) strays: u64,
-    /// The first time that was passed over, s.
+    /// The first skipped time, s.
     pub(crate) stray_s: f64,
 }
 
@@ -44,7 +44,7 @@ impl LogClock {
     /// Takes the next row.
     ///
     /// # Errors
-    /// [`Restart`] where the clock starts again.
+    /// [`Restart`] if the clock starts again.
     pub(crate) fn push(&mut self, t_s: f64, values: &[f64], take: &mut TakeRow<'_>) -> Result<(), Restart> {
         self.rows += 1;
         if !t_s.is_finite() || t_s.abs() >= LONGEST_S {
@@ -54,7 +54,7 @@ impl LogClock {
         let mut place = Vec::new();
         if let Some((held_s, held)) = self.held.take() {
             match self.last_s {
-                // The first row of all: what comes behind it tells.
+                // The very first row: the next one shows whether it is valid.
                 None if (t_s - held_s).abs() > STRAY_S => self.stray(held_s),
                 Some(last_s) if self.goes_back(last_s, held_s) => {
                     if self.goes_back(last_s, t_s) {
@@ -79,7 +79,7 @@ impl LogClock {
         Ok(())
     }
 
-    /// Passes the last row on.
+    /// Forwards the last row.
     pub(crate) fn finish(&mut self, take: &mut TakeRow<'_>) {
         let Some((held_s, held)) = self.held.take() else { return };
         match self.last_s {

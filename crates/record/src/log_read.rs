@@ -16,7 +16,7 @@ use std::path::Path;
 /// Time 0 of a log on the clock of [`SeriesBuilder`]: logs may begin before it.
 const ZERO_NS: u64 = 1 << 62;
 
-/// What was read of a log.
+/// Result of reading a log.
 #[derive(Debug, Default)]
 pub(crate) struct ReadLog {
     pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
@@ -25,7 +25,7 @@ pub(crate) struct ReadLog {
     pub(crate) ambient_unit: Option<&'static Unit>,
     pub(crate) units: BTreeMap<Reads, &'static Unit>,
     pub(crate) zero_ns: u64,
-    /// Time 0 in nanoseconds since 1970, where the log says it.
+    /// Time 0 in nanoseconds since 1970, if the log gives it.
     pub(crate) start_time_ns: Option<u64>,
     pub(crate) warnings: Vec<ReadWarning>,
     pub(crate) averaged: bool,
@@ -33,7 +33,7 @@ pub(crate) struct ReadLog {
     kept: u64,
 }
 
-/// What a wanted column is for.
+/// Use of a wanted column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Target {
     Reads(Reads),
@@ -67,7 +67,7 @@ pub(crate) fn read_log(
             .collect()
     };
     let members: Vec<Vec<usize>> = (0..layout.groups.len()).map(of_group).collect();
-    // Place of each wanted column among the values of its group.
+    // Index of each wanted column among the values of its group.
     let places: Vec<Vec<(usize, Target, &'static Unit)>> = members
         .iter()
         .map(|members| {
@@ -131,7 +131,7 @@ impl ReadLog {
     fn take(&mut self, places: &[(usize, Target, &'static Unit)], t_s: f64, values: &[f64]) {
         let time_ns = ZERO_NS.saturating_add_signed((t_s * 1e9).round() as i64);
         for (at, target, unit) in places {
-            // An empty cell is no sample: slow columns share rows with fast ones.
+            // An empty cell is not a sample: slow columns share rows with fast ones.
             let Some(value) = values.get(*at).copied().filter(|value| value.is_finite()) else { continue };
             let builder = match target {
                 Target::Reads(reads) => self.builders.entry(*reads).or_default(),
@@ -143,7 +143,7 @@ impl ReadLog {
     }
 }
 
-/// What to do about a clock that starts again.
+/// The remedy for a clock that starts again.
 fn restart_words(restart: Restart, layout: &Layout, group: usize) -> String {
     let Restart { row, from_s, to_s } = restart;
     let group = layout.groups.get(group).filter(|group| !group.name.is_empty());
@@ -178,7 +178,7 @@ fn wanted(map: &ChannelMap, layout: &Layout) -> Result<Vec<Wanted>, RecordError>
     Ok(list)
 }
 
-/// Where the map and the log disagree about a unit.
+/// Contradictions between the units of the map and the log.
 fn contradictions(map: &ChannelMap, layout: &Layout, wanted: &[Wanted]) -> Vec<ReadWarning> {
     let contradiction = |wanted: &Wanted| {
         let Target::Reads(reads) = wanted.target else { return None };
@@ -259,7 +259,7 @@ fn unit_of(
         complaints.add(FindingKind::Unit, &at("field"), message, remedy);
         return None;
     }
-    // What the map has was checked when it was read.
+    // The values of the map were checked when it was read.
     if let Some(written) = &source.unit {
         return unit(kind, written).ok();
     }
@@ -289,7 +289,7 @@ fn unit_of(
     }
 }
 
-/// Where the log says what a pressure is measured from, and the map something else: a message and what would be right.
+/// If the log and the map give different references of a pressure: a message and the remedy.
 fn wrong_reference(
     name: &str,
     recorded: &str,
@@ -311,12 +311,12 @@ fn wrong_reference(
     Some((format!("the log gives {name} in {recorded}, a pressure {over}"), remedy.to_owned()))
 }
 
-/// Whether a file that starts with these bytes is MCAP, or too short to be anything else; an empty one is nothing.
+/// Whether a file that starts with these bytes is MCAP, or too short to be anything else; an empty file is neither.
 pub(crate) fn is_mcap(head: &[u8]) -> bool {
     head.starts_with(b"\x89MCAP") || !head.is_empty() && head.len() < 5 && b"\x89MCAP".starts_with(head)
 }
 
-/// The file as a log, where it is no MCAP and there are formats to ask.
+/// The file as a log, if it is not MCAP and there are log formats.
 pub(crate) fn log_of_path(path: &Path, options: &ReadOptions) -> Result<Option<LogFile>, RecordError> {
     if options.logs.0.is_empty() {
         return Ok(None);

@@ -1,18 +1,18 @@
-//! A measured position of the valve, mapped as its command: it moves with every sample and marks no step.
+//! A measured valve position that is mapped as the command: it moves with every sample and marks no step.
 
 use mapper_core::{Series, StepMarker};
 use mapper_numerics::statistics::median;
 
-/// Share of the samples in which a position turns back; commands of points that last a minute turn back a tenth as often.
+/// Share of samples in which a position reverses; commands of points that last a minute reverse a tenth as often.
 const TURNS_SHARE: f64 = 0.05;
 
-/// Turns back that are needed before anything is said.
+/// Minimum number of reversals for a decision.
 const MIN_TURNS: usize = 20;
 
-/// Where half of the moves are smaller than this share of the largest opening, they are the resolution of a sensor.
+/// If half of the moves are smaller than this share of the largest opening, they are the resolution of a sensor.
 const SMALL_MOVE_SHARE: f64 = 5e-3;
 
-/// Share of the samples in which a command turns back, where these are so many or so small that it is a measured position.
+/// Share of samples in which a command reverses, if the reversals are so frequent or so small that it is a measured position.
 pub(crate) fn turns_share(command: &Series) -> Option<f64> {
     let values: Vec<f64> = command.values.iter().copied().filter(|value| value.is_finite()).collect();
     let moves: Vec<f64> =
@@ -28,7 +28,7 @@ pub(crate) fn turns_share(command: &Series) -> Option<f64> {
     (share > TURNS_SHARE || small).then_some(share)
 }
 
-/// The position as the command that it was: of each step the opening that was held at its end.
+/// The command reconstructed from the position: for each step, the opening at its end.
 pub(crate) fn hold(position: &mut Series, steps: &[StepMarker]) {
     let mut held = Vec::with_capacity(position.values.len());
     for t_s in &position.t_s {
@@ -53,7 +53,7 @@ mod tests {
     fn noise_and_resolution_make_a_position_and_steps_and_ramps_do_not() {
         let noise = |row: usize| 0.7 * (1.0 + 1e-3 * (row as f64 * 12.9898).sin());
         assert!(turns_share(&series(noise)).is_some_and(|share| share > 0.1));
-        // The last digit, now and then.
+        // The last digit changes occasionally.
         assert!(turns_share(&series(|row| if row % 60 < 30 { 0.7 } else { 0.701 })).is_some());
         assert_eq!(turns_share(&series(|row| if row % 600 < 300 { 0.7 } else { 0.5 })), None);
         let saw = |row: usize| 0.5 + 0.001 * (row % 300) as f64;

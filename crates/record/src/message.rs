@@ -4,10 +4,10 @@ use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
 use std::fmt;
 
-/// What a message holds for a field.
+/// The content of a field in a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum FieldValue {
-    /// The message does not have the field.
+    /// The field is missing.
     Absent,
     /// A number; NaN for null.
     Number(f64),
@@ -15,8 +15,8 @@ pub(crate) enum FieldValue {
     Other,
 }
 
-/// Reads the named fields into `values`, which is resized to the number of names. Returns false where the message is
-/// no JSON object.
+/// Reads the named fields into `values`, which is resized to the number of names. Returns false if the message is
+/// not a JSON object.
 pub(crate) fn read_fields(message: &[u8], names: &[String], values: &mut Vec<FieldValue>) -> bool {
     let read = |message: &[u8], values: &mut Vec<FieldValue>| {
         values.clear();
@@ -63,7 +63,7 @@ fn parse(raw: &str) -> FieldValue {
     }
 }
 
-/// Finds a key among the names; messages mostly keep the order of the names.
+/// Finds a key among the names; messages usually keep the order of the names.
 struct KeySeed<'a> {
     names: &'a [String],
     expected: usize,
@@ -92,7 +92,7 @@ impl Visitor<'_> for KeySeed<'_> {
     }
 }
 
-/// The message with null for NaN, Infinity and -Infinity outside strings; `None` where there is none of them.
+/// The message with null for NaN, Infinity and -Infinity outside strings; `None` if it contains none of them.
 fn null_for_nonfinite(message: &[u8]) -> Option<Vec<u8>> {
     let mut rewritten = Vec::with_capacity(message.len());
     let (mut in_string, mut escaped, mut changed) = (false, false, false);

@@ -1,4 +1,4 @@
-//! Whether what was read can be what the channel map says, before anything is computed from it.
+//! Checks readings against the units of the channel map, before anything is computed from them.
 
 use crate::complaints::Complaints;
 use crate::{AmbientPressure, ChannelSource};
@@ -9,7 +9,7 @@ use mapper_logs::{Kind, Unit};
 use mapper_numerics::statistics::quantile;
 use mapper_yaml::{FindingKind, steps};
 
-/// Share of the readings left out at each end: spikes are no matter of units.
+/// Share of the readings left out at each end: spikes do not indicate a wrong unit.
 const OUTER: f64 = 0.02;
 
 /// The readings of a channel.
@@ -19,19 +19,19 @@ pub(crate) struct Readings<'a> {
     pub(crate) unit: &'static Unit,
     /// SI, gauge pressures made absolute.
     pub(crate) series: &'a Series,
-    /// Typical ambient pressure, Pa; `None` where none is known.
+    /// Typical ambient pressure, Pa; `None` if unknown.
     pub(crate) ambient_pa: Option<f64>,
 }
 
-/// Complains about a channel whose readings are impossible in their unit, where another unit would make them possible. Readings
-/// that no unit makes possible are a matter of the sensor, not of the map.
+/// Reports a channel whose readings are impossible in their unit and possible in another one. Readings
+/// that are impossible in every unit indicate a sensor fault, not a mistake of the map.
 pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
     let Readings { channel, source, unit: unit_used, series, ambient_pa } = *readings;
     let Some((low, high)) = range(series) else { return };
     if fits(channel, low, high) {
         return;
     }
-    // What was added to the readings.
+    // Offset added to the readings.
     let over_pa = if source.gauge { ambient_pa.unwrap_or(f64::NAN) } else { 0.0 };
     let written = |inside: f64| unit_used.from_inside(inside - over_pa);
     let (written_low, written_high) = (written(low), written(high));
@@ -74,7 +74,7 @@ pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
     complaints.add(FindingKind::Implausible, &place, message, remedy);
 }
 
-/// Complains about an ambient pressure that no place on earth has: gauge pressures are added to it.
+/// Reports an ambient pressure that occurs nowhere on earth: gauge pressures are added to it.
 pub(crate) fn check_ambient(
     ambient: &AmbientPressure,
     column: Option<&Series>,
@@ -119,13 +119,13 @@ pub(crate) fn check_ambient(
     }
 }
 
-/// Least and largest reading without the outer ones.
+/// Smallest and largest reading without the outer ones.
 fn range(series: &Series) -> Option<(f64, f64)> {
     let values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
     Some((quantile(&values, OUTER)?, quantile(&values, 1.0 - OUTER)?))
 }
 
-/// A unit in which people know such values.
+/// A common unit for such values.
 fn shown_unit(kind: Kind) -> Option<&'static Unit> {
     let symbol = match kind {
         Kind::Temperature => "degC",

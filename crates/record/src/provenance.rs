@@ -1,4 +1,4 @@
-//! How good a reading is and when its source took it, beside the time at which it arrived: a message where either is not as usual.
+//! Quality and source time of readings: a message if either is unusual. The normal case is a good reading taken when it arrived.
 
 use crate::format::PROVENANCE_TOPIC;
 use crate::recording_file::{McapFile, add_channel};
@@ -8,13 +8,13 @@ use mcap::McapResult;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Times that differ by less are the same, s: what clocks and threads are off.
+/// Times that differ by less are the same, s: the jitter of clocks and threads.
 const SAME_S: f64 = 1e-4;
 
-/// What is not as usual of one reading.
+/// Unusual provenance of one reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Origin {
-    /// Run time at which the source took it, s; none: when it arrived.
+    /// Run time at which the source took it, s; none: on arrival.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     source_t_s: Option<f64>,
     /// None: good.
@@ -22,21 +22,21 @@ struct Origin {
     quality: Option<Quality>,
 }
 
-/// One message: a sample, and the channels of it that have something to say.
+/// One message: a sample, and its channels with unusual provenance.
 pub(crate) type OriginMessage = BTreeMap<Channel, ReadingOrigin>;
 
-/// Writes the messages; the topic is there once it is needed, so that others' recordings stay as they are.
+/// Writes the messages; creates the topic only when needed, so that other recordings stay unchanged.
 #[derive(Default)]
 pub(crate) struct ProvenanceWriter {
     channel: Option<u16>,
 }
 
 impl ProvenanceWriter {
-    /// What there is to be said of a sample of a batch.
+    /// The unusual provenance in a sample of a batch.
     pub(crate) fn message(&self, batch: &SampleBatch, index: usize) -> Option<serde_json::Value> {
         let t_s = *batch.t_s.get(index)?;
         let said = |from: &mapper_core::Provenance| {
-            // A reading that is not there has no source.
+            // A missing reading has no source.
             let read = batch.column(from.channel).and_then(|values| values.get(index));
             let quality = from.quality.get(index).copied().filter(|quality| *quality != Quality::Good);
             if quality.is_none() && read.is_none_or(|value| !value.is_finite()) {
@@ -64,7 +64,7 @@ impl ProvenanceWriter {
     }
 }
 
-/// A message as it was written; what names a channel that nobody knows is passed over.
+/// A parsed message; unknown channels are skipped.
 pub(crate) fn read_origins(data: &[u8]) -> Option<OriginMessage> {
     let message: BTreeMap<String, serde_json::Value> = serde_json::from_slice(data).ok()?;
     let known = message.into_iter().filter_map(|(symbol, said)| {

@@ -1,4 +1,4 @@
-//! Reading a recording, one's own or another program's.
+//! Reads a recording of this or another program.
 
 use crate::complaints::Complaints;
 use crate::definitions::{Reads, source_of};
@@ -25,12 +25,12 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
-/// A recording with all that is known about how it was read.
+/// A recording with information on how it was read.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReadReport {
     /// Samples, steps and events in SI units; no truth.
     pub recording: Recording,
-    /// What was wrong with the file; empty for a sound one.
+    /// Problems of the file; empty for an intact one.
     pub warnings: Vec<ReadWarning>,
     /// The campaign as attached.
     pub campaign_text: Option<String>,
@@ -47,12 +47,12 @@ pub struct ReadReport {
 
 /// Reads a recording; [`ChannelMap::native`] for those of this program.
 ///
-/// Steps come from the recording's own markers; where it has none, from changes of the command channels. A file that
-/// is truncated or damaged gives what can be saved, with warnings.
+/// Steps come from the recording's own markers; if it has none, from changes of the command channels. For a file that
+/// is truncated or damaged, returns the recoverable data with warnings.
 ///
 /// # Errors
-/// [`RecordError`] for a file that cannot be opened, is not MCAP, has a later format, holds none of the mapped
-/// measurements, or holds one whose unit is not known.
+/// [`RecordError`] for a file that cannot be opened, is not MCAP, has a later format, contains none of the mapped
+/// measurements, or contains one whose unit is unknown.
 pub fn read_recording(
     path: &Path,
     map: &ChannelMap,
@@ -64,7 +64,7 @@ pub fn read_recording(
     }
 }
 
-/// Reads the steps of a recording of this program by their marks, and nothing else: one that has no end, and no step after it, ends
+/// Reads only the steps of a recording of this program, from their markers. A step without an end and without a following step ends
 /// where it begins.
 ///
 /// # Errors
@@ -87,7 +87,7 @@ pub fn read_recording_from(
     if !options.logs.0.is_empty() && !is_mcap(bytes) {
         return read_as_log(&LogFile::of_bytes(name, bytes), map, options);
     }
-    // The pass needs a source it may own; a shared copy costs once what the file has.
+    // The pass needs to own its source; a shared copy costs the size of the file once.
     let shared: std::sync::Arc<[u8]> = bytes.into();
     read(name, map, options, &|| Ok(Box::new(io::Cursor::new(shared.clone()))))
 }
@@ -98,7 +98,7 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
 
 fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Result<ReadReport, RecordError> {
     if map.is_native() {
-        // Any file may have been named: what cannot be read as a log is not said to need a channel map.
+        // The file may be anything: do not ask for a channel map if it cannot be read as a log.
         return Err(match options.logs.open(file, &map.log) {
             Ok(_) => RecordError::LogWithoutMap { path: file.path().to_owned() },
             Err(LogError::Content { path, message, .. }) => RecordError::Neither { path, message },
@@ -137,7 +137,7 @@ fn read(
         return Err(error);
     }
     let builders = sink.take_builders();
-    // A command alone is a chance likeness of names: nothing can be made of a recording without measurements.
+    // A command alone may match a name by chance: a recording without measurements is useless.
     let measured = builders.keys().any(|reads| reads.channel().info().group != Group::Command);
     let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own(topic));
     if !measured && sink.format.is_none() && has_rig_topics {
@@ -147,7 +147,7 @@ fn read(
     report(map, sink, builders, scanned)
 }
 
-/// What only logs allow.
+/// Results that only logs can give.
 fn fits_mcap(map: &ChannelMap) -> Result<(), RecordError> {
     let mut complaints = Complaints::default();
     for (reads, source) in sources(map).filter(|(_, source)| source.topic.is_empty()) {
@@ -227,7 +227,7 @@ fn report(
     })
 }
 
-/// What the map names and the recording does not hold.
+/// Names in the map that the recording does not contain.
 fn missing(map: &ChannelMap, builders: &BTreeMap<Reads, SeriesBuilder>) -> Vec<ReadWarning> {
     let absent = sources(map).filter(|(reads, _)| !builders.contains_key(reads));
     let warning = |(reads, source): (Reads, &ChannelSource)| ReadWarning::MissingChannel {
@@ -238,7 +238,7 @@ fn missing(map: &ChannelMap, builders: &BTreeMap<Reads, SeriesBuilder>) -> Vec<R
     absent.map(warning).collect()
 }
 
-/// Every source that the map names.
+/// Every source in the map.
 fn sources(map: &ChannelMap) -> impl Iterator<Item = (Reads, &ChannelSource)> {
     let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
     channels.chain(map.elements.iter().map(|(element, source)| (Reads::Element(*element), source)))
@@ -286,7 +286,7 @@ fn gather(
     gathered
 }
 
-/// Checks what was read against what is possible, and adds what follows from it: channels with several sensors, constants.
+/// Checks the readings against what is possible, and adds derived data: channels with several sensors, constants.
 fn complete(
     map: &ChannelMap,
     gathered: &mut Gathered,
@@ -326,7 +326,7 @@ fn complete(
     Ok(())
 }
 
-/// What is not as usual of readings, by channel.
+/// Unusual provenance of readings, by channel.
 fn origins_of(found: Vec<(u64, OriginMessage)>, zero_ns: u64) -> BTreeMap<Channel, Vec<ReadingOrigin>> {
     let mut origins: BTreeMap<Channel, Vec<ReadingOrigin>> = BTreeMap::new();
     for (log_time_ns, message) in found {
@@ -339,7 +339,7 @@ fn origins_of(found: Vec<(u64, OriginMessage)>, zero_ns: u64) -> BTreeMap<Channe
     origins
 }
 
-/// A bad reading is no reading, whatever number stands there.
+/// A bad reading counts as missing, whatever its value.
 fn without_bad(
     series: &mut BTreeMap<Channel, Series>,
     origins: &BTreeMap<Channel, Vec<ReadingOrigin>>,
@@ -360,7 +360,7 @@ fn without_bad(
     }
 }
 
-/// Steps from commands, or else from jumps of what was measured.
+/// Steps from commands, or else from jumps of measured channels.
 fn steps_without_marks(
     map: &ChannelMap,
     series: &mut BTreeMap<Channel, Series>,
@@ -375,7 +375,7 @@ fn steps_without_marks(
         return without_rest(steps, series);
     }
     let span_s = span_s(series);
-    // A command that stays at a value marks no step.
+    // A constant command marks no step.
     let moves = |channel: &Channel| series.contains_key(channel) && !map.constants.contains_key(channel);
     let commanded = [Channel::P3Command, Channel::ValveCommand].iter().any(moves);
     if commanded || !can_be_searched(series) {
@@ -384,8 +384,8 @@ fn steps_without_marks(
     without_rest(steps_from_jumps(series, false, warnings), series)
 }
 
-/// The readings of channels of which the recording holds single sensors alone, on the times of the first of them: what the
-/// rig would have shown. Identification judges the sensors and fuses them anew.
+/// The readings of channels of which the recording contains only single sensors, at the times of the first of them: the
+/// reading that the rig would have shown. Identification checks the sensors and fuses them from scratch.
 fn read_together(
     map: &ChannelMap,
     series: &mut BTreeMap<Channel, Series>,
@@ -422,7 +422,7 @@ fn span_s(series: &BTreeMap<Channel, Series>) -> Option<(f64, f64)> {
     Some((first, last))
 }
 
-/// A value that holds over the whole recording.
+/// A constant value over the whole recording.
 fn constant(first_s: f64, last_s: f64, value: f64) -> Series {
     if first_s < last_s {
         Series { t_s: vec![first_s, last_s], values: vec![value; 2] }

@@ -1,22 +1,22 @@
-//! Bounds of the reader.
+//! Limits of the reader.
 
 use mapper_logs::LogFormats;
 
-/// Bounds on what a file may make the reader do.
+/// Limits that protect the reader from a file.
 #[derive(Debug, Clone, Copy)]
 pub struct ReadOptions {
-    /// Chunks that claim to be larger unpacked are left out, bytes.
+    /// Chunks with a larger stated size are left out, bytes.
     pub max_chunk_bytes: u64,
     /// Messages and other records beyond these are left out; a log with more rows is refused.
     pub max_messages: u64,
     /// Values beyond these are left out; a log with more in its mapped columns, after averaging, is refused.
     pub max_values: u64,
-    /// Formats of logs that are read beside MCAP.
+    /// Formats of logs that are read in addition to MCAP.
     pub logs: LogFormats,
 }
 
 impl Default for ReadOptions {
-    /// 256 MiB; 100 million, which is a month of four groups at 10 Hz; 64 million of 16 bytes, which is three days of 24 channels
+    /// 256 MiB; 100 million, a month of four groups at 10 Hz; 64 million of 16 bytes, three days of 24 channels
     /// at 10 Hz; MCAP alone.
     fn default() -> Self {
         ReadOptions {

@@ -25,7 +25,7 @@ pub(crate) struct OpenedFile {
     pub(crate) event_channel: u16,
 }
 
-/// What a recording says of itself before its first sample.
+/// Metadata of a recording that precede its first sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RecordingHeader {
     /// Program and version that writes, e.g. `mapper 0.1.0`.
@@ -34,7 +34,7 @@ pub struct RecordingHeader {
     pub profile: String,
     /// Time of run time 0 in nanoseconds since 1970-01-01 UTC. An argument, so that equal runs give equal bytes.
     pub start_time_ns: u64,
-    /// Campaign, seed, program version, reference state and what else is worth keeping, as text.
+    /// Campaign, seed, program version, reference state and further metadata, as text.
     pub metadata: BTreeMap<String, String>,
     /// The plan as JSON, attached as `plan.json`.
     pub plan_json: Option<Vec<u8>>,
@@ -48,11 +48,11 @@ pub(crate) fn open(file: File, header: &RecordingHeader) -> McapResult<OpenedFil
         .profile(&header.profile)
         .library(&header.library)
         .compression(Some(Compression::Zstd))
-        // Digits compress little better at higher levels, at several times the cost.
+        // Higher levels hardly compress digits any better, at several times the cost.
         .compression_level(1)
         // Equal inputs give equal bytes on any number of cores.
         .compression_threads(0)
-        // The clock alone ends chunks, so that their bounds do not depend on what is in them.
+        // Only the clock ends chunks, so that their bounds do not depend on their content.
         .chunk_size(None)
         .disable_seeking(true)
         .create(NoSeek::new(BufWriter::with_capacity(1 << 16, file)))?;
@@ -95,7 +95,7 @@ pub(crate) fn add_channel(
     mcap.add_channel(schema_id, topic, "json", units)
 }
 
-/// What the system said, or what `mcap` says.
+/// The error of the system, or that of `mcap`.
 pub(crate) fn io_error(error: McapError) -> io::Error {
     match error {
         McapError::Io(source) => source,

@@ -1,6 +1,6 @@
-//! The bodies of the records that matter here, parsed without trusting any length.
+//! Parses the bodies of the relevant records without trusting any length.
 //!
-//! `mcap`'s own parser reserves what a length claims (4 GB for a damaged string), and panics on a short attachment.
+//! `mcap`'s own parser allocates a stated length (4 GB for a damaged string), and panics on a short attachment.
 
 use std::collections::BTreeMap;
 
@@ -97,7 +97,7 @@ pub(crate) fn parse_metadata(body: &[u8]) -> Option<(String, BTreeMap<String, St
     Some((body.text()?, body.text_map()?))
 }
 
-/// Name and content of an attachment whose checksum is right.
+/// Name and content of an attachment with a correct checksum.
 pub(crate) fn parse_attachment(record: &[u8]) -> Option<(String, &[u8])> {
     let mut body = Body(record);
     let (_log_time, _create_time) = (body.u64()?, body.u64()?);

@@ -1,4 +1,4 @@
-//! Takes samples, steps and events out of a recording, and leaves truth where it is.
+//! Takes samples, steps and events out of a recording, and ignores truth.
 
 use crate::definitions::{MappedTopic, Reads, map_topic};
 use crate::format::{
@@ -16,9 +16,9 @@ use mapper_logs::Unit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What a topic means to this reader.
+/// The role of a topic for this reader.
 enum Topic {
-    /// With the position of each of its outputs among the series.
+    /// With the index of each of its outputs among the series.
     Mapped(MappedTopic, Vec<usize>),
     Step,
     Event,
@@ -36,15 +36,15 @@ impl Topic {
     }
 }
 
-/// What a message says.
+/// The content of a message.
 pub(crate) enum SinkMessage {
-    /// A value for each output of its topic, in the units used inside.
+    /// A value for each output of its topic, in internal units.
     Samples(Vec<FieldValue>),
     Step(StepMessage),
     /// With the bytes of the message, as below.
     Origins(OriginMessage, usize),
     Event(Event, usize),
-    /// Nothing that can be read.
+    /// Unreadable.
     Damaged,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct RigSink<'a> {
     map: &'a ChannelMap,
     topics: BTreeMap<u16, Topic>,
     pub(crate) topic_names: BTreeSet<String>,
-    /// What is read, in the order in which the file defines it.
+    /// The topics to read, in the order in which the file defines them.
     series: Vec<(Reads, SeriesBuilder)>,
     /// Unit of each field that was mapped.
     pub(crate) units: BTreeMap<Reads, &'static Unit>,
@@ -103,12 +103,12 @@ impl<'a> RigSink<'a> {
             .map(|(topic, count)| ReadWarning::DamagedMessages { topic: topic.clone(), count: *count })
     }
 
-    /// The samples of everything that has some.
+    /// The non-empty series.
     pub(crate) fn take_builders(&mut self) -> BTreeMap<Reads, SeriesBuilder> {
         std::mem::take(&mut self.series).into_iter().filter(|(_, builder)| !builder.is_empty()).collect()
     }
 
-    /// Where the samples of a channel or sensor are collected, which several topics may have.
+    /// The series that collects the samples of a channel or sensor; several topics may have the same one.
     fn builder(&mut self, reads: Reads) -> usize {
         let known = self.series.iter().position(|(known, _)| *known == reads);
         known.unwrap_or_else(|| {
@@ -238,7 +238,7 @@ impl Sink for RigSink<'_> {
     }
 }
 
-/// How many values of a series, with their times, take as much memory.
+/// Number of values of a series, with their times, that take the same memory.
 fn values_of(bytes: usize) -> u64 {
     u64::try_from(bytes / 16 + 1).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,4 @@
-//! One pass over a recording: finds what can be saved, and hands it on.
+//! One pass over a recording: finds the recoverable data and forwards them.
 
 use crate::batch::{Batch, Item, Opened};
 use crate::chunk::{ChunkError, Unpacker};
@@ -13,23 +13,23 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Schemas beyond this are not looked at; it bounds what many of them could hold in memory.
+/// Larger schemas are skipped, which limits the memory that many of them could take.
 const SCHEMA_LIMIT_BYTES: usize = 1 << 20;
 
-/// Definitions of topics and their schemas together; those beyond are not looked at.
+/// Maximum total size of topic definitions and schemas; later ones are skipped.
 const DEFINITIONS_LIMIT_BYTES: usize = 64 << 20;
 
-/// Damaged chunks and records that are listed; more are counted.
+/// Number of damaged chunks and records that are listed; further ones are only counted.
 const LISTED_DAMAGE: u64 = 100;
 
-/// What a pass found apart from what it handed on.
+/// Results of a pass in addition to the forwarded data.
 #[derive(Default)]
 pub(crate) struct Scanned {
     pub(crate) warnings: Vec<ReadWarning>,
     /// Every topic the file defines, the index at its end included.
     definitions: BTreeMap<u16, ChannelDefinition>,
     schemas: BTreeMap<u16, Vec<u8>>,
-    /// Messages that came before any definition of their topic.
+    /// Messages that came before a definition of their topic.
     undefined: BTreeMap<u16, u64>,
     /// Records of any kind, damaged ones included.
     records: u64,
@@ -38,8 +38,8 @@ pub(crate) struct Scanned {
     defined_bytes: usize,
 }
 
-/// Reads a recording into a fresh sink. Where a damaged chunk held the definition of a topic, and the index at the
-/// file's end still has it, a second pass makes use of that.
+/// Reads a recording into a fresh sink. If a damaged chunk contained the definition of a topic, and the index at the
+/// file's end still has it, a second pass uses that one.
 pub(crate) fn scan<S: Sink>(
     path: &Path,
     open: &dyn Fn() -> io::Result<Box<dyn Read>>,
@@ -78,14 +78,14 @@ fn pass<S: Sink>(
     loop {
         let frame = frames.next_frame().map_err(failed)?;
         let joins = matches!(&frame, Frame::Record { opcode: op::CHUNK, body, .. } if Batch::takes(body));
-        // Where the messages of the chunk before lie stands behind it; everything else has its turn after the chunks before it.
+        // A message index follows its chunk; every other record is handled after the chunks before it.
         let index = matches!(&frame, Frame::Record { opcode: op::MESSAGE_INDEX, .. });
         if !(joins || index) || batch.is_full() {
             scanned.batch(&mut batch, options, sink);
         }
         match frame {
             Frame::Record { opcode: op::FOOTER, .. } => break,
-            // No record has opcode 0: the file goes on in zeros, as it may after a loss of power.
+            // No record has opcode 0: the file ends in zeros, as it may after a power failure.
             Frame::Record { offset, opcode: 0, .. } | Frame::Truncated { offset } => {
                 scanned.warnings.push(ReadWarning::Truncated { offset });
                 break;
@@ -134,7 +134,7 @@ impl Scanned {
         }
     }
 
-    /// Whether that many bytes of definitions still find room.
+    /// Whether this many bytes of definitions still fit.
     fn has_room(&mut self, bytes: usize) -> bool {
         let together = self.defined_bytes.saturating_add(bytes);
         let fits = together <= DEFINITIONS_LIMIT_BYTES;
@@ -144,7 +144,7 @@ impl Scanned {
         fits
     }
 
-    /// Chunks that were read several at a time.
+    /// Chunks that are read in parallel.
     fn batch<S: Sink>(&mut self, batch: &mut Batch, options: &ReadOptions, sink: &mut S) {
         let known = |channel_id| self.definitions.contains_key(&channel_id);
         for Opened { offset, items } in batch.open(sink, known, options.max_chunk_bytes) {

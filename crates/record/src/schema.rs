@@ -18,7 +18,7 @@ impl<'a> Field<'a> {
     }
 
     fn schema(&self) -> Value {
-        // The type is plain `number` although a value may be null: viewers refuse a list of types, and pass over
+        // The type is plain `number` although a value may be null: viewers reject a list of types, and skip
         // nulls.
         json!({"type": "number", "title": self.title, "description": self.description, "unit": self.unit})
     }

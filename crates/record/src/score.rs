@@ -1,6 +1,6 @@
-//! How far identified points are from what the simulator knows: the only way to `/truth`.
+//! Errors of identified points relative to the simulator's truth: the only access to `/truth`.
 //!
-//! Whatever identifies, corrects or diagnoses must not see this module; a test of the tree lists who names it.
+//! Code that identifies, corrects or diagnoses must not use this module; a test of the source tree lists its users.
 
 pub use crate::truth::{Truth, read_truth};
 
@@ -20,17 +20,17 @@ pub struct PointTruth {
     pub h_w_m2k: f64,
 }
 
-/// An identified point beside the truth, where there is any.
+/// An identified point with its truth, if there is one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoredPoint {
-    /// What was identified.
+    /// The identified point.
     #[serde(flatten)]
     pub point: IdentifiedPoint,
-    /// What is true; `None` on a real rig.
+    /// The truth; `None` on a real rig.
     pub truth: Option<PointTruth>,
 }
 
-/// Errors of all points that have both a number and a truth. Efficiencies as fractions, h relative.
+/// Errors of all points that have both a result and a truth. Efficiencies as fractions, h relative.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ScoreSummary {
     /// Number of points with both.
@@ -41,17 +41,17 @@ pub struct ScoreSummary {
     pub eta_within_one_point_ratio: f64,
     /// Largest absolute error of the efficiency, fraction.
     pub eta_worst_error: f64,
-    /// Share of the points whose 95 % interval of the efficiency holds the truth, ratio.
+    /// Share of the points whose 95 % interval of the efficiency covers the truth, ratio.
     pub eta_coverage_ratio: f64,
-    /// Share of the points with an h whose 95 % interval of it holds the truth, ratio; `None` where no point has one.
+    /// Share of the points with an h whose 95 % interval of it covers the truth, ratio; `None` if no point has one.
     pub h_coverage_ratio: Option<f64>,
-    /// Median absolute relative error of h; `None` where no point has h.
+    /// Median absolute relative error of h; `None` if no point has h.
     pub h_median_error_ratio: Option<f64>,
-    /// Largest absolute relative error of h; `None` where no point has h.
+    /// Largest absolute relative error of h; `None` if no point has h.
     pub h_worst_error_ratio: Option<f64>,
 }
 
-/// Truths of recordings that are being read on another thread: not there before they are asked for.
+/// Truths of recordings that another thread reads, so that they are unavailable until requested.
 pub struct AwaitedTruths<'scope>(ScopedJoinHandle<'scope, Result<Vec<Truth>, RecordError>>);
 
 impl AwaitedTruths<'_> {
@@ -71,7 +71,7 @@ pub fn beside_truths<T>(paths: &[PathBuf], work: impl FnOnce(AwaitedTruths<'_>) 
     })
 }
 
-/// Puts the truth of a recording beside its identified points; `truth` is `None` everywhere on a real rig.
+/// Pairs identified points with the truth of their recording; `truth` is `None` everywhere on a real rig.
 pub fn score(truth: &Truth, steps: &[StepMarker], points: Vec<IdentifiedPoint>) -> Vec<ScoredPoint> {
     let scored = |point: IdentifiedPoint| {
         let marker = steps.iter().find(|marker| marker.index == point.step);
@@ -88,20 +88,20 @@ fn truth_at(truth: &Truth, t_s: f64) -> Option<PointTruth> {
     Some(PointTruth { eta: value("eta")?, h_w_m2k: value("h_w_m2k")? })
 }
 
-/// A surge mark beside the truth, where there is any.
+/// A surge mark with its truth, if there is one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ScoredMark {
-    /// What was found.
+    /// The mark.
     #[serde(flatten)]
     pub mark: SurgeMark,
-    /// Corrected flow at which the machine truly surges at that speed, kg/s; `None` on a real rig.
+    /// True corrected flow at surge at that speed, kg/s; `None` on a real rig.
     pub truth_flow_corrected_kg_s: Option<f64>,
 }
 
-/// Truth is taken from so much before the end of the measurement nearest surge, s.
+/// Truth is taken this long before the end of the measurement nearest surge, s.
 const MARK_TRUTH_S: f64 = 10.0;
 
-/// Puts the truth of a recording beside its surge marks; `approaches` says the inlet's state, which corrects the true flow.
+/// Pairs surge marks with the truth of their recording; `approaches` give the inlet's state, which corrects the true flow.
 pub fn score_marks(
     truth: &Truth,
     approaches: &Recording,
@@ -125,7 +125,7 @@ pub fn score_marks(
     marks.into_iter().map(scored).collect()
 }
 
-/// The errors of all points in a few numbers; `None` where no point has both a number and a truth.
+/// Summary of the errors of all points; `None` if no point has both a result and a truth.
 pub fn summarise(points: &[ScoredPoint]) -> Option<ScoreSummary> {
     let mut eta_errors = Vec::new();
     let mut h_errors = Vec::new();

@@ -26,7 +26,7 @@ impl SeriesBuilder {
         self.times_ns.iter().copied().min()
     }
 
-    /// Leaves out samples that are further than a day from both samples beside them in time; how many, and the first such time.
+    /// Removes samples that are more than a day from both neighbours in time; returns their number and the first such time.
     pub(crate) fn drop_strays(&mut self) -> Option<(u64, u64)> {
         let mut sorted = self.times_ns.clone();
         sorted.sort_unstable();
@@ -38,11 +38,11 @@ impl SeriesBuilder {
                 let before = at.checked_sub(1).and_then(|before| sorted.get(before));
                 let after = sorted.get(at + 1);
                 sorted.len() > 2
-                    && [before, after].into_iter().flatten().all(|beside| far(*beside, **time_ns))
+                    && [before, after].into_iter().flatten().all(|neighbour| far(*neighbour, **time_ns))
             })
             .map(|(_, time_ns)| *time_ns)
             .collect();
-        // Where most are apart, that is how the channel was sampled.
+        // If most samples are that far apart, this is the channel's sampling interval.
         let first = *strays.first().filter(|_| 2 * strays.len() < sorted.len())?;
         let kept =
             self.times_ns.iter().zip(&self.values).filter(|(time, _)| strays.binary_search(time).is_err());
@@ -50,7 +50,7 @@ impl SeriesBuilder {
         Some((strays.len() as u64, first))
     }
 
-    /// The series over run time, strictly increasing; of samples at the same time the first one stays.
+    /// The series over run time, strictly increasing; of samples at the same time the first one is kept.
     pub(crate) fn build(self, channel: Channel, zero_ns: u64, warnings: &mut Vec<ReadWarning>) -> Series {
         if self.not_numbers > 0 {
             warnings.push(ReadWarning::NotANumber { channel, count: self.not_numbers });

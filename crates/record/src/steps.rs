@@ -10,14 +10,14 @@ use std::collections::BTreeMap;
 /// after the other, and a ramp is a chain of changes.
 const JUMP_GAP_S: f64 = 1.0;
 
-/// Relative change below which a command counts as unchanged: read-back of a held command moves in its last digits.
+/// Relative change below which a command counts as unchanged: the read-back of a constant command varies in its last digits.
 const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
 
-/// P3 that moves by more than this share within [`JUMP_GAP_S`] is a jump: a loop that holds the speed takes longer for less.
+/// P3 that moves by more than this share within [`JUMP_GAP_S`] is a jump: a speed controller takes longer for less.
 const FAST_RATIO: f64 = 0.01;
 
-/// A chain of slow changes of P3 is a jump by a slow rig where it moves P3 by more than this share, and else the work of a
-/// loop that holds the speed.
+/// A chain of slow changes of P3 is a jump by a slow rig if it moves P3 by more than this share. Otherwise a speed
+/// controller made it.
 const SLOW_RATIO: f64 = 0.02;
 
 /// A message on `/step`.
@@ -91,7 +91,7 @@ pub(crate) fn steps_from_markers(
     steps
 }
 
-/// Steps from changes of the commanded pressure and valve: each lasts from one jump to the next. What was held before
+/// Steps from changes of the commanded pressure and valve: each lasts from one jump to the next. The time before
 /// the first jump is the first step, so that a hold at the first point is its beginning.
 pub(crate) fn steps_from_commands(
     series: &BTreeMap<Channel, Series>,
@@ -107,7 +107,7 @@ pub(crate) fn steps_from_commands(
     let missing = commands.iter().filter(|(_, command)| command.is_none());
     warnings.extend(missing.map(|(channel, _)| ReadWarning::MissingCommand { channel: *channel }));
 
-    // Start of each step, and the time its commands have taken their values.
+    // Start of each step, and the time at which its commands have reached their values.
     let mut jumps_s: Vec<(f64, f64)> = vec![(first_s, first_s)];
     jumps_s.extend(jumps(commands[0].1, commands[1].1));
     let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| last_before_s(series, *start_s)).chain([last_s]);
@@ -117,7 +117,7 @@ pub(crate) fn steps_from_commands(
         .enumerate()
         .map(|(index, ((start_s, settled_s), end_s))| {
             let held = |command: Option<&Series>| command.and_then(|c| held_number(c, *settled_s));
-            // Of a rig whose P3 nobody commanded: what it came to.
+            // For a rig without a P3 command: the P3 that it reached.
             let reached = || {
                 let p3 = series.get(&Channel::P3)?;
                 median(p3.slice(0.5 * (start_s + end_s), end_s).1.iter().filter(|pa| pa.is_finite()))
@@ -146,7 +146,7 @@ fn jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
     chains.filter_map(|chain| jump_of_chain(chain, &p3_changes, &valve_changes)).collect()
 }
 
-/// The jump in a chain of changes, which what a loop does before it may have joined.
+/// The jump in a chain of changes, which may begin with changes by a controller.
 fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change]) -> Option<(f64, f64)> {
     let (first_s, last_s) = (*chain.first()?, *chain.last()?);
     let within = |changes: &[Change], from_s: f64, to_s: f64| -> Vec<Change> {
@@ -159,7 +159,7 @@ fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change])
         [only] => (only.after / only.before - 1.0).abs(),
         [] => 0.0,
     };
-    // Already in its first moments, or the trim before a jump would count as its start.
+    // Only its first moments count, or the trim before a jump would become its start.
     let fast_over =
         |from_s: f64, share: f64| moved_ratio(from_s, from_s + share * JUMP_GAP_S) > share * FAST_RATIO;
     let fast = chain.iter().copied().find(|t_s| {
@@ -169,9 +169,9 @@ fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change])
     Some((fast.or(slow)?, last_s))
 }
 
-/// Time of the last measured sample before `change_s`, or `change_s` where nothing was measured before.
+/// Time of the last measured sample before `change_s`, or `change_s` if there is none.
 ///
-/// A command is seen at a sample: whether that sample was taken before or after the change, the recording does not say,
+/// A command is seen at a sample. The recording does not show whether that sample was taken before or after the change,
 /// so it belongs to neither step's end.
 fn last_before_s(series: &BTreeMap<Channel, Series>, change_s: f64) -> f64 {
     let measured = series.iter().filter(|(channel, _)| channel.info().group != Group::Command);
@@ -204,7 +204,7 @@ fn changes(command: &Series) -> Vec<Change> {
     changes
 }
 
-/// The latest number at or before a time, or the first one there is.
+/// The latest number at or before a time, or else the first one.
 fn held_number(command: &Series, t_s: f64) -> Option<f64> {
     let after = command.t_s.partition_point(|t| *t <= t_s);
     let finite = |value: &&f64| value.is_finite();
@@ -275,7 +275,7 @@ mod tests {
         assert!(warnings.is_empty());
     }
 
-    /// The speed's loop trims P3 each second, up to the next jump, which follows within a second.
+    /// The speed controller trims P3 each second, up to the next jump, which follows within a second.
     #[test]
     fn a_loop_that_trims_the_pressure_makes_no_steps() {
         let trims = (3..40).map(|second| (f64::from(second), 1.5e5 * (1.0 + 2e-4 * f64::from(second)), 0.5));
@@ -295,7 +295,7 @@ mod tests {
         rows.push((90.0, 1.8e5, 0.5));
         let steps = steps_from_commands(&commands(&rows), Some((0.0, 90.0)), &mut Vec::new());
         let found: Vec<_> = steps.iter().map(|step| (step.start_s, step.p3_pa)).collect();
-        // The value at 20 s is the one that was held before.
+        // The value at 20 s is the previous one.
         assert_eq!(found, [(0.0, 1.5e5), (20.5, 1.8e5)]);
     }
 

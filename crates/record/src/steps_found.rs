@@ -1,4 +1,4 @@
-//! The steps of a recording that has neither marks nor commands: where speed, flow and pressures jump.
+//! Finds the steps of a recording without markers and commands: at jumps of speed, flow and pressures.
 
 use crate::ReadWarning;
 use mapper_core::{Channel, JUMPS, Series, StepKind, StepMarker, VALVE_JUMP_RATIO};
@@ -10,22 +10,22 @@ const WINDOW_S: f64 = 3.0;
 /// The later mean begins this long after the earlier one ends, s: a jump is over by then, a drift has hardly begun.
 const APART_S: f64 = 2.0;
 
-/// Shortest interval of the grid on which jumps are sought, s.
+/// Shortest interval of the search grid for jumps, s.
 const GRID_S: f64 = 0.2;
 
-/// Most places of that grid: a day at its shortest interval.
+/// Maximum number of points of that grid: a day at its shortest interval.
 const GRID_LIMIT: f64 = 5e5;
 
 /// Multiple of the noise of a mean over the grid's interval that a jump must exceed.
 const NOISE_MULTIPLE: f64 = 6.0;
 
-/// Share of a jump that has happened where it counts as begun.
+/// Share of a jump that marks its start.
 const BEGUN_SHARE: f64 = 0.1;
 
-/// Share of the least jump per window below which a signal counts as calm again.
+/// Share of the smallest jump per window below which a signal counts as settled again.
 const CALM_SHARE: f64 = 0.3;
 
-/// A loop that holds the speed goes on correcting for this long after a jump, s, by less than [`SETTLING_SHARE`] of it.
+/// A speed controller goes on correcting for this long after a jump, s, by less than [`SETTLING_SHARE`] of it.
 const SETTLING_S: f64 = 15.0;
 
 /// See [`SETTLING_S`].
@@ -34,15 +34,15 @@ const SETTLING_SHARE: f64 = 0.2;
 /// Shaft speed below which the machine is at rest, rpm: far below any idle, far above any sensor's noise.
 const AT_REST_RPM: f64 = 1000.0;
 
-/// The opening of the valve, where it was measured.
+/// The valve opening, if it was measured.
 const MEASURED_VALVE: (Channel, f64) = (Channel::ValveCommand, VALVE_JUMP_RATIO);
 
-/// Whether there is anything that jumps.
+/// Whether there is a signal that may jump.
 pub(crate) fn can_be_searched(series: &BTreeMap<Channel, Series>) -> bool {
     JUMPS.iter().any(|(channel, _)| series.get(channel).is_some_and(|series| series.t_s.len() > 30))
 }
 
-/// Steps from jump to jump. What was held before the first jump is the first step. A valve that was measured is looked at too.
+/// Steps from jump to jump. The time before the first jump is the first step. A measured valve is evaluated too.
 pub(crate) fn steps_from_jumps(
     series: &BTreeMap<Channel, Series>,
     measured_valve: bool,
@@ -80,25 +80,25 @@ pub(crate) fn steps_from_jumps(
     steps
 }
 
-/// Leaves out the steps in which the shaft rests: a soak before the first point, the end of a run. They are counted anew.
+/// Removes the steps in which the shaft is at rest: a soak before the first point, the end of a run. Renumbers the others.
 pub(crate) fn without_rest(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Series>) -> Vec<StepMarker> {
     let Some(speed) = series.get(&Channel::ShaftSpeed) else { return steps };
     let rests = |step: &StepMarker| median(speed, step.start_s, step.end_s) < AT_REST_RPM;
     if steps.iter().all(rests) {
-        // A dead sensor, or a file without a run: nothing to judge by.
+        // A dead sensor, or a file without a run: there is no evidence.
         return steps;
     }
     let turning = steps.into_iter().filter(|step| !rests(step));
     turning.enumerate().map(|(index, step)| StepMarker { index, ..step }).collect()
 }
 
-/// NaN where there are no readings.
+/// NaN if there are no readings.
 fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
     let values = series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite());
     mapper_numerics::statistics::median(values).unwrap_or(f64::NAN)
 }
 
-/// Means of the signals over equal intervals; intervals without any are left out, so that a jump in a gap shows behind it.
+/// Means of the signals over equal intervals; empty intervals are left out, so that a jump in a gap appears after it.
 struct Grid {
     interval_s: f64,
     t_s: Vec<f64>,
@@ -108,12 +108,12 @@ struct Grid {
 struct Signal {
     channel: Channel,
     values: Vec<f64>,
-    /// Sums of the values before each place.
+    /// Sums of the values before each grid point.
     sums: Vec<f64>,
     /// Noise of a value.
     sigma: f64,
     least_ratio: f64,
-    /// Level below which a share of it means nothing.
+    /// Level below which a relative change has no meaning.
     floor: f64,
 }
 
@@ -157,7 +157,7 @@ impl Grid {
                 held = if count > 0.0 { sum / count } else { held };
                 values.push(held);
             }
-            // Before its first reading a signal stands where it begins.
+            // Before its first reading a signal has its first value.
             let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
             values.iter_mut().take_while(|value| !value.is_finite()).for_each(|value| *value = first);
             Signal::of(*channel, *ratio, values)
@@ -166,7 +166,7 @@ impl Grid {
         Grid { interval_s, t_s, signals }
     }
 
-    /// Places of a time, at least two.
+    /// Number of grid points in a time, at least two.
     fn places(&self, time_s: f64) -> usize {
         ((time_s / self.interval_s).round() as usize).max(2)
     }
@@ -208,7 +208,7 @@ impl Grid {
                 last = Some((start, sizes));
             }
             at = start + window;
-            // The rest of a slow jump is no other one.
+            // The rest of a slow jump is not another jump.
             while at + window <= self.t_s.len()
                 && !self.signals.iter().all(|signal| signal.is_calm(at - window, at, window))
             {
@@ -229,8 +229,8 @@ impl Signal {
             .collect();
         let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
         let floor = 0.1 * top;
-        // Without rest, where nothing moves, and with steps of 0: of a reading that stands still between its jumps the jumps
-        // alone would be left.
+        // Only where the signal moves, and without steps of 0: for a reading that is constant between its jumps,
+        // only the jumps would remain.
         let running = values.windows(2).filter(|pair| pair[0].abs() > floor && pair[1].abs() > floor);
         let mut steps: Vec<f64> = running.map(|pair| (pair[1] - pair[0]).abs()).collect();
         steps.sort_unstable_by(f64::total_cmp);
@@ -245,12 +245,12 @@ impl Signal {
         (sum(to) - sum(from)) / to.saturating_sub(from).max(1) as f64
     }
 
-    /// The least difference of two means that is a jump.
+    /// The smallest difference of two means that is a jump.
     fn least(&self, before: f64, after: f64) -> f64 {
         (self.least_ratio * before.abs().max(after.abs()).max(self.floor)).max(NOISE_MULTIPLE * self.sigma)
     }
 
-    /// Whether the jump between two means has begun at a place, and goes on at the next one.
+    /// Whether the jump between two means has begun at a grid point, and continues at the next one.
     fn has_begun(&self, place: usize, from: usize, to: usize, after_from: usize, window: usize) -> bool {
         let (before, after) = (self.mean(from, to), self.mean(after_from, after_from + window));
         let jump = after - before;

@@ -1,4 +1,4 @@
-//! Topics of a recording and their messages, for the file and for whoever is sent the same while it is made.
+//! Topics of a recording and their messages, for the file and for clients that receive the same data live.
 
 use crate::format::{EVENT_TOPIC, STEP_TOPIC};
 use crate::schema::{Field, event_schema, numeric_schema, step_schema, unit_metadata};
@@ -6,7 +6,7 @@ use mapper_core::{Channel, Event, Group, StepMarker, step_number};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// Which end of a step a marker stands for.
+/// The end of a step that a marker refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepPhase {
     /// The setpoints change; the marker's `start_s` counts, its `end_s` is not written.
@@ -45,7 +45,7 @@ impl Topic {
         Topic { name: STEP_TOPIC, schema, units }
     }
 
-    /// What the rig and the runner have to tell.
+    /// Messages of the rig and the runner.
     pub fn of_events() -> Topic {
         let (schema, units) = event_schema();
         Topic { name: EVENT_TOPIC, schema, units }
@@ -71,7 +71,7 @@ pub fn event_message(event: &Event) -> Value {
     json!({"t_s": event.t_s, "kind": event.kind, "message": event.message})
 }
 
-/// Message of a device's readings, SI; null where a value is no number.
+/// Message of a device's readings, SI; null if a value is not a number.
 pub fn readings_message(group: Group, values: &[(Channel, f64)]) -> Value {
     let of_group = values.iter().filter(|(channel, _)| channel.info().group == group);
     let fields: Map<String, Value> =

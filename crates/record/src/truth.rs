@@ -1,4 +1,4 @@
-//! What only a simulator knows, for scoring alone.
+//! The simulator's truth, for scoring only.
 
 use crate::format::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
 use crate::log_read::is_mcap;
@@ -19,9 +19,9 @@ use std::path::Path;
 pub struct Truth {
     /// Run times, s, in the order of the file.
     pub t_s: Vec<f64>,
-    /// Quantities in order of their names, each as long as `t_s`; NaN where a message had none.
+    /// Quantities in order of their names, each as long as `t_s`; NaN if a message had none.
     pub columns: Vec<TruthColumn>,
-    /// What was wrong with the file.
+    /// Problems of the file.
     pub warnings: Vec<ReadWarning>,
 }
 
@@ -32,7 +32,7 @@ impl Truth {
     }
 }
 
-/// Reads the truth of a recording; empty where it has none, as the log of another program.
+/// Reads the truth of a recording; empty if it has none, like the log of another program.
 ///
 /// # Errors
 /// As [`read_recording`](crate::read_recording).
@@ -61,7 +61,7 @@ struct TruthSink {
     fields: BTreeMap<u16, Vec<String>>,
     start_time_ns: Option<u64>,
     times_ns: Vec<u64>,
-    /// Unit and values by name; padded where a message had none.
+    /// Unit and values by name; padded if a message had none.
     columns: BTreeMap<String, (String, Vec<f64>)>,
 }
 
@@ -83,11 +83,11 @@ impl Sink for TruthSink {
         read_fields(data, fields, &mut values).then_some(values)
     }
 
-    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: Vec<FieldValue>) {
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, content: Vec<FieldValue>) {
         let Some(fields) = self.fields.get(&channel_id) else { return };
         let row = self.times_ns.len();
         self.times_ns.push(log_time_ns);
-        for (field, value) in fields.iter().zip(&told) {
+        for (field, value) in fields.iter().zip(&content) {
             if let (Some((_, values)), FieldValue::Number(value)) = (self.columns.get_mut(field), value) {
                 values.resize(row, f64::NAN);
                 values.push(*value);
@@ -104,7 +104,7 @@ impl Sink for TruthSink {
     fn attachment(&mut self, _name: String, _data: &[u8]) {}
 
     fn kept(&self) -> u64 {
-        // Columns are as long as the times in the end.
+        // Columns must finally be as long as the times.
         let width = u64::try_from(self.columns.len()).unwrap_or(u64::MAX).saturating_add(1);
         u64::try_from(self.times_ns.len()).unwrap_or(u64::MAX).saturating_mul(width)
     }

@@ -1,18 +1,18 @@
-//! What was wrong with a recording that could be read all the same.
+//! Warnings about a recording that could still be read.
 
 use crate::ChunkError;
 use mapper_core::{Channel, step_number};
 
-/// Something a reader of the recording should know. Each displays as one sentence with values.
+/// A warning for the user of a recording. Each displays as one sentence with values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReadWarning {
-    /// The file ends in the middle: the run was killed, or the file was cut.
+    /// The file ends early: the run was killed, or the file was cut.
     #[error("the file is cut short at byte {offset}: what follows the last flush is lost")]
     Truncated {
-        /// Byte offset of the first record that is not whole.
+        /// Byte offset of the first incomplete record.
         offset: u64,
     },
-    /// A chunk could not be used; the others were.
+    /// A chunk could not be used; the others were used.
     #[error("the chunk at byte {offset} was left out: {source}")]
     DamagedChunk {
         /// Byte offset of the chunk's record.
@@ -25,7 +25,7 @@ pub enum ReadWarning {
     DamagedRecord {
         /// Byte offset of the record, or of the chunk it is in.
         offset: u64,
-        /// What it is, and what is wrong with it.
+        /// Its kind, and what is wrong with it.
         part: DamagedPart,
     },
     /// More damage than is listed.
@@ -42,7 +42,7 @@ pub enum ReadWarning {
         /// How many.
         count: u64,
     },
-    /// Messages whose channel is defined nowhere in the file.
+    /// Messages on a topic that the file does not define.
     #[error("{count} messages were left out: the file does not say what channel they belong to")]
     UndefinedChannel {
         /// How many.
@@ -64,7 +64,7 @@ pub enum ReadWarning {
         /// How many.
         count: u64,
     },
-    /// The rig itself calls readings bad.
+    /// The rig itself reports readings as bad.
     #[error("{count} readings of {channel} are bad by the rig's own word; they count as missing")]
     BadReadings {
         /// Channel.
@@ -72,7 +72,7 @@ pub enum ReadWarning {
         /// How many.
         count: u64,
     },
-    /// The map names a field that the recording does not hold.
+    /// The map names a field that the recording does not contain.
     #[error("the recording has no `{field}` on {topic}, which the channel map gives for {channel}")]
     MissingChannel {
         /// Channel.
@@ -94,7 +94,7 @@ pub enum ReadWarning {
         /// Unit of the recording.
         recorded: String,
     },
-    /// Times went back or stood still.
+    /// Times went back or did not advance.
     #[error(
         "{channel}: {reordered} samples came out of order and {repeated} repeated a time; they were sorted and the repeats left out"
     )]
@@ -118,7 +118,7 @@ pub enum ReadWarning {
         /// The limit.
         limit: u64,
     },
-    /// Rows or samples with times that cannot be.
+    /// Rows or samples with impossible times.
     #[error(
         "{count} rows or samples were left out: their times, the first of them {first_s} s, are none or more than a day from those beside them, or step back"
     )]
@@ -128,7 +128,7 @@ pub enum ReadWarning {
         /// The first of these times, s.
         first_s: f64,
     },
-    /// A fast log was averaged while it was read.
+    /// A fast log was averaged during reading.
     #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
     Averaged,
     /// The opening of the valve is a measured position.
@@ -139,17 +139,17 @@ pub enum ReadWarning {
         /// Samples in which it turns back, %.
         turns_percent: f64,
     },
-    /// Steps were found in what was measured.
+    /// Steps were found from measured channels.
     #[error(
         "the recording has neither step marks nor commands that mark steps: {count} steps were found where {channels} jump"
     )]
     StepsFound {
         /// How many.
         count: usize,
-        /// Channels that were looked at.
+        /// Evaluated channels.
         channels: String,
     },
-    /// What a gauge pressure is added to is not there.
+    /// The reference of a gauge pressure is missing.
     #[error(
         "{channel} is a gauge pressure, and the ambient pressure is not in the recording: it was left out"
     )]
@@ -162,7 +162,7 @@ pub enum ReadWarning {
         "no steps were found: the recording has neither step markers nor a mapped P3_command or valve_command"
     )]
     NoCommands,
-    /// Steps were found, but one command is not there; its value is undefined in the steps.
+    /// Steps were found, but one command is missing; its value is undefined in the steps.
     #[error("steps were found without {channel}: it is not in the recording, and undefined in the steps")]
     MissingCommand {
         /// The command.
@@ -171,14 +171,14 @@ pub enum ReadWarning {
     /// The run ended within a step.
     #[error("step {} has no end: the run was cut short at {end_s} s", step_number(*index))]
     UnfinishedStep {
-        /// Place of the step, from 0.
+        /// Index of the step, from 0.
         index: usize,
-        /// Time taken for its end: that of the last sample, s.
+        /// Time taken as its end: that of the last sample, s.
         end_s: f64,
     },
 }
 
-/// What a damaged record was.
+/// Kinds of damaged records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DamagedPart {
     /// A sample.

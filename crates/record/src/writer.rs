@@ -14,14 +14,14 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A topic of numeric fields as it is being written. Batch after batch has the same ones: making schemas again for
+/// A topic of numeric fields that is being written. Every batch has the same ones, and making schemas again for
 /// each would cost more than writing the samples.
 struct Layout {
     topic: &'static str,
     /// Names and units of the fields.
     fields: Vec<(String, String)>,
     channel_id: u16,
-    /// What stands before each value: `{"speed_rpm":`, then `,"flow_kg_s":` and so on.
+    /// Text before each value: `{"speed_rpm":`, then `,"flow_kg_s":` and so on.
     prefixes: Vec<Vec<u8>>,
 }
 
@@ -36,9 +36,9 @@ struct Table<'a> {
 ///
 /// Samples of a second of the run's clock form a chunk, which goes to the operating system when the clock enters the
 /// next second: a process killed at any moment leaves everything before in a readable file. Times are kept in whole
-/// nanoseconds; values exactly. What is not finite is written as null and read back as NaN.
+/// nanoseconds, values exactly. Non-finite values are written as null and read back as NaN.
 ///
-/// Dropping a writer finishes the file as well as it can; [`finish`](RecordingWriter::finish) also tells.
+/// Dropping a writer finishes the file as well as it can; [`finish`](RecordingWriter::finish) also reports errors.
 pub struct RecordingWriter {
     path: PathBuf,
     mcap: McapFile,
@@ -98,7 +98,7 @@ impl RecordingWriter {
         })
     }
 
-    /// Leaves fields without a reading out, in place of writing null: for channels of several sources, each with its own times.
+    /// Omits fields without a reading instead of writing null: for channels of several sources, each with its own times.
     pub fn leaving_out_absent(self, absent_left_out: bool) -> Self {
         RecordingWriter { absent_left_out, ..self }
     }
@@ -135,7 +135,7 @@ impl RecordingWriter {
                     }
                     let at = self.line.len();
                     self.line.extend_from_slice(prefix);
-                    // What stands before it may have been left out.
+                    // The fields before it may have been omitted.
                     self.line[at] = if at == 0 { b'{' } else { b',' };
                     push_number(&mut self.line, value);
                 }
@@ -187,7 +187,7 @@ impl RecordingWriter {
     /// Writes index and summary, and hands the file to the operating system.
     ///
     /// # Errors
-    /// [`RecordError::Write`] as the system says; what was flushed before stays readable.
+    /// [`RecordError::Write`] as the system reports; flushed data stay readable.
     pub fn finish(mut self) -> Result<(), RecordError> {
         self.refuse_after_failure()?;
         let flushed = self.mcap.flush();
@@ -383,7 +383,7 @@ impl std::fmt::Debug for RecordingWriter {
     }
 }
 
-/// The shortest text that reads back as the same number; null for what JSON has no number for.
+/// The shortest text that reads back as the same number; null for values that JSON cannot represent.
 fn push_number(line: &mut Vec<u8>, value: f64) {
     // Writing a number into memory cannot fail.
     if serde_json::to_writer(&mut *line, &value).is_err() {

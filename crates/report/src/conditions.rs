@@ -1,4 +1,4 @@
-//! What rig and cell were to hold constant, beside what was read.
+//! Declared conditions of rig and cell compared with the readings.
 
 use crate::display::Display;
 use crate::measured::at_end;
@@ -9,14 +9,14 @@ use mapper_numerics::statistics::mean;
 /// Columns of [`condition_rows`].
 pub const CONDITION_HEADS: [&str; 6] = ["condition", "declared", "mean", "lowest", "highest", "unit"];
 
-/// A row for each condition that was read: what, declared, and mean, lowest and highest of its readings at the ends of the steps.
+/// A row for each condition with readings: name, declared value, and mean, minimum and maximum of its readings at the ends of the steps.
 pub fn condition_rows(
     campaign: Option<&Campaign>,
     recording: &Recording,
     display: &Display,
 ) -> Vec<[String; 6]> {
     let boundary = campaign.map(|campaign| &campaign.boundary);
-    // Where it follows the compressor's outlet, there is no one value.
+    // A condition that follows the compressor's outlet has no single value.
     let follows = campaign.map(|campaign| campaign.follow_outlet).unwrap_or_default();
     let conditions = [
         (Channel::T1, "inlet temperature T1, total", boundary.map(|b| b.t1_k)),

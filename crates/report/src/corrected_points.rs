@@ -1,10 +1,10 @@
-//! Points without the drifts, for other programs.
+//! Points corrected for drift, for other programs.
 
 use mapper_core::step_number::step_number;
 use mapper_drift::DriftReport;
 
-/// Corrected points as CSV, one row each under the names of [`CorrectedPoint`](mapper_drift::CorrectedPoint); what was subtracted has a
-/// column for each drift, `correction_` and its cause. A number that is not there is empty.
+/// Corrected points as CSV, one row each under the names of [`CorrectedPoint`](mapper_drift::CorrectedPoint). Each drift has a column
+/// for its correction, `correction_` and its cause. A missing number is empty.
 ///
 /// # Errors
 /// None in practice: the writer's own, which memory never raises.

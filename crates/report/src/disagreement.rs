@@ -1,4 +1,4 @@
-//! Where the joint and the two-parameter method disagree: the first thing a reader has to know.
+//! Disagreement of the joint and the two-parameter method: the most important warning for a reader.
 
 use crate::display::Display;
 use mapper_campaign::campaign::DisplayUnits;
@@ -6,7 +6,7 @@ use mapper_core::{IdentifiedPoint, step_number};
 use mapper_identify::TwoParameter;
 use mapper_record::score::ScoredPoint;
 
-/// One sentence on the points whose 95 % intervals by both methods do not meet; `None` where all do.
+/// One sentence on the points whose 95 % intervals by both methods do not overlap; `None` if all overlap.
 pub fn disagreement_text(
     points: &[ScoredPoint],
     two_parameter: &[TwoParameter],

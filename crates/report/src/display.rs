@@ -1,11 +1,11 @@
-//! Values in the units that a campaign wants shown.
+//! Values in the display units of a campaign.
 
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, OperatingPoint};
 use mapper_logs::units::kind_of;
 
-/// Values as the campaign wants them shown.
+/// Formatter of values in the display units.
 #[derive(Debug, Clone)]
 pub struct Display {
     units: DisplayUnits,
@@ -22,7 +22,7 @@ impl Display {
         &self.units
     }
 
-    /// A value of the unit used inside in the unit that is shown, for drawing.
+    /// A value converted from the internal to the display unit, for drawing.
     pub fn number(&self, kind: Kind, inside: f64) -> f64 {
         let symbol = match kind {
             Kind::Speed => &self.units.speed,
@@ -34,12 +34,12 @@ impl Display {
         Self::in_unit(kind, symbol, inside)
     }
 
-    /// A reading of a channel in the unit that is shown, for drawing.
+    /// A reading of a channel converted to the display unit, for drawing.
     pub fn reading(&self, channel: Channel, inside: f64) -> f64 {
         self.number(kind_of(channel), inside)
     }
 
-    /// The unit in which readings of a channel are shown; empty for a ratio.
+    /// The display unit of a channel's readings; empty for a ratio.
     pub fn unit_of(&self, channel: Channel) -> &str {
         match kind_of(channel) {
             Kind::Speed => &self.units.speed,
@@ -50,7 +50,7 @@ impl Display {
         }
     }
 
-    /// A reading of a channel as it is shown, without its unit.
+    /// A reading of a channel in its display unit, without the unit.
     pub fn shown_reading(&self, channel: Channel, inside: f64) -> String {
         match kind_of(channel) {
             Kind::Speed => self.speed(inside),
@@ -61,7 +61,7 @@ impl Display {
         }
     }
 
-    /// The unit in which differences between readings of a channel are shown: K for temperatures.
+    /// The display unit of differences between readings of a channel: K for temperatures.
     pub fn difference_unit(&self, channel: Channel) -> &str {
         if kind_of(channel) == Kind::Temperature { "K" } else { self.unit_of(channel) }
     }
@@ -76,7 +76,7 @@ impl Display {
     }
 
     fn in_unit(kind: Kind, symbol: &str, inside: f64) -> f64 {
-        // A checked campaign names only units that exist; anything else is shown in SI.
+        // A checked campaign names only existing units; anything else is shown in SI.
         kind.unit(symbol).map_or(inside, |unit| unit.from_inside(inside))
     }
 
@@ -84,7 +84,7 @@ impl Display {
         format!("{:.decimals$}", Self::in_unit(kind, symbol, value))
     }
 
-    /// Column head: what, and the unit of speeds.
+    /// Column head: name, and the unit of speeds.
     pub fn speed_head(&self, what: &str) -> String {
         format!("{what} {}", self.units.speed)
     }
@@ -104,7 +104,7 @@ impl Display {
         format!("{} @ {}", self.speed(point.speed_rpm), point.shown().1)
     }
 
-    /// Column head: what, and the unit of pressures.
+    /// Column head: name, and the unit of pressures.
     pub fn pressure_head(&self, what: &str) -> String {
         format!("{what} {}", self.units.pressure)
     }
@@ -119,7 +119,7 @@ impl Display {
         Self::shown(Kind::Pressure, &self.units.pressure, pressure_pa, decimals)
     }
 
-    /// Column head: what, and the unit of flows.
+    /// Column head: name, and the unit of flows.
     pub fn flow_head(&self, what: &str) -> String {
         format!("{what} {}", self.units.flow)
     }
@@ -134,7 +134,7 @@ impl Display {
         )
     }
 
-    /// Column head: what, and the unit of temperatures.
+    /// Column head: name, and the unit of temperatures.
     pub fn temperature_head(&self, what: &str) -> String {
         format!("{what} {}", self.units.temperature)
     }

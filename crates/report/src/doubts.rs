@@ -1,20 +1,20 @@
-//! Doubts and remarks about points, each sentence once.
+//! Warnings and remarks about points, each sentence once.
 
 use mapper_core::{IdentifiedPoint, step_number};
 
-/// A sentence, and the steps that it is about.
+/// A sentence, and the steps that it applies to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt<'a> {
     /// Steps, from 1, in order.
     steps: Vec<usize>,
-    /// What kind of doubt it is.
+    /// Its kind.
     pub code: &'a str,
-    /// The sentence; a number that is not the same at all steps as its range.
+    /// The sentence; a number that differs between steps is shown as a range.
     pub message: String,
 }
 
-/// What is said of the points, in order of the first step of each. Sentences that differ in their numbers alone are one, with
-/// the range of each number: what a single step says stands with its point.
+/// All remarks on the points, in order of the first step of each. Sentences that differ only in their numbers are merged into one, with
+/// the range of each number. The exact sentence of a step is shown with its point.
 pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
     let mut said: Vec<DoubtText<'a>> = Vec::new();
     for point in points {
@@ -30,7 +30,7 @@ pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doub
     said.into_iter().map(DoubtText::doubt).collect()
 }
 
-/// A sentence in pieces, and the steps that say it.
+/// A sentence in pieces, and the steps that it applies to.
 struct DoubtText<'a> {
     steps: Vec<usize>,
     code: &'a str,
@@ -41,7 +41,7 @@ struct DoubtText<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Piece<'a> {
     Words(&'a str),
-    /// A number as it is written, smallest and largest so far.
+    /// A number as written, smallest and largest so far.
     Number(&'a str, &'a str),
 }
 
@@ -75,7 +75,7 @@ fn value(number: &str) -> f64 {
     number.parse().unwrap_or(f64::NAN)
 }
 
-/// Whether two sentences differ in their numbers alone.
+/// Whether two sentences differ only in their numbers.
 fn are_alike(a: &[Piece<'_>], b: &[Piece<'_>]) -> bool {
     a.len() == b.len()
         && a.iter().zip(b).all(|(a, b)| match (a, b) {
@@ -85,7 +85,7 @@ fn are_alike(a: &[Piece<'_>], b: &[Piece<'_>]) -> bool {
         })
 }
 
-/// Words and numbers by turns. A digit behind a letter belongs to a name (`T2`), and so does what touches a letter (`95krpm`).
+/// Words and numbers in alternation. A digit after a letter belongs to a name (`T2`), and so does a number that touches a letter (`95krpm`).
 fn pieces(sentence: &str) -> Vec<Piece<'_>> {
     let mut pieces = Vec::new();
     let (mut words, mut at) = (0, 0);
@@ -110,7 +110,7 @@ fn pieces(sentence: &str) -> Vec<Piece<'_>> {
     pieces
 }
 
-/// Bytes of the decimal number that a text begins with; 0 where it begins with none.
+/// Length in bytes of the decimal number at the start of a text; 0 if there is none.
 fn number_length(text: &str) -> usize {
     let sign = usize::from(text.starts_with(['+', '-']));
     let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
@@ -127,12 +127,12 @@ fn number_length(text: &str) -> usize {
 }
 
 impl Doubt<'_> {
-    /// How many steps it is about.
+    /// Number of steps that it applies to.
     pub fn count(&self) -> usize {
         self.steps.len()
     }
 
-    /// The steps in words: "step 3", "steps 2, 5 to 9".
+    /// The steps as text: "step 3", "steps 2, 5 to 9".
     pub fn steps(&self) -> String {
         let one = if self.steps.len() == 1 { "step" } else { "steps" };
         let mut ranges: Vec<(usize, usize)> = Vec::new();
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(of(&[2, 5, 6, 7, 9, 10]), "steps 2, 5 to 7, 9, 10");
     }
 
-    /// The sentence of all steps, as it would be said of them one after the other.
+    /// The merged sentence of all steps.
     fn said(sentences: &[&'static str]) -> Vec<String> {
         let mut said: Vec<DoubtText<'_>> = Vec::new();
         for (step, sentence) in sentences.iter().enumerate() {
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(said(&["flow is 1.5.", "flow is 2."]), ["flow is 1.5 to 2."]);
     }
 
-    /// Names are no numbers: T2 is not T1, and 95krpm@1 is one place.
+    /// Names are not numbers: T2 is not T1, and 95krpm@1 is one place.
     #[test]
     fn names_keep_sentences_apart() {
         for pair in [["T1 is off", "T2 is off"], ["at 95krpm@1", "at 50krpm@1"], ["by µ 2K", "by µ 3K"]] {

@@ -1,11 +1,11 @@
-//! What is said of drift, for people.
+//! Drift as text.
 
 use crate::{number, table};
 use mapper_core::half_width_95;
 use mapper_drift::{Alternative, Cause, DriftReport, RateOrStep, RepeatGroup};
 use std::fmt::Write;
 
-/// The answer for people.
+/// The drift diagnosis as text.
 pub fn drift_text(report: &DriftReport) -> String {
     let mut text = format!("{}\n", report.reason);
     for drift in &report.drifts {
@@ -47,15 +47,15 @@ pub fn drift_text(report: &DriftReport) -> String {
     text
 }
 
-/// The most probable causes, and none among the alternatives of one, with their probabilities; `None` where there are none worth a word.
+/// The most probable alternatives, no drift included, with their probabilities; `None` if no alternative is worth mentioning.
 fn likely(alternatives: &[Alternative]) -> Option<String> {
     let named = |other: &Alternative| {
         let cause = other.cause.map_or_else(|| "no drift".to_owned(), Cause::name);
         format!("{cause} {:.0} %", 100.0 * other.probability)
     };
-    // Half a per cent would be rounded to none.
-    let worth = alternatives.iter().filter(|other| (5e-3..0.5).contains(&other.probability));
-    let words: Vec<String> = worth.take(4).map(named).collect();
+    // Half a per cent would be rounded to zero.
+    let likely_alternatives = alternatives.iter().filter(|other| (5e-3..0.5).contains(&other.probability));
+    let words: Vec<String> = likely_alternatives.take(4).map(named).collect();
     (!words.is_empty()).then(|| words.join(", "))
 }
 
@@ -75,7 +75,7 @@ fn group_table(group: &RepeatGroup) -> comfy_table::Table {
             number::number(visit.sigma_h_w_m2k.map(half_width_95), 0),
         ];
         row.extend(symbols.iter().map(|symbol| {
-            // Against the first visit, what the boundary conditions do taken out.
+            // Relative to the first visit, corrected for boundary conditions.
             let first = group.visits.first().and_then(|first| first.channels.get(symbol));
             let change = visit
                 .channels

@@ -1,12 +1,12 @@
-//! Times of a run as people write them.
+//! Times and durations as text.
 
-/// When something is done, after the start of the run: `+h:mm`.
+/// Time after the start of the run: `+h:mm`.
 pub fn eta(after_s: f64) -> String {
     let minutes = (after_s.max(0.0) / 60.0).round() as u64;
     format!("+{}:{:02}", minutes / 60, minutes % 60)
 }
 
-/// A duration as hours and minutes, minutes and seconds, or seconds; rounded, and without what is 0 at its end.
+/// A duration as hours and minutes, minutes and seconds, or seconds; rounded, without trailing zeros.
 pub fn duration(duration_s: f64) -> String {
     let seconds = duration_s.max(0.0).round() as u64;
     let minutes = (seconds + 30) / 60;

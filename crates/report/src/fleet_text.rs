@@ -1,13 +1,13 @@
-//! How far a study is, and what it costs, for people.
+//! Progress and cost of a study, as text.
 
 use mapper_fleet::{Cost, Lacking, Merged, Status, Submission};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Items of a list that are shown; the rest is counted.
+/// Maximum number of listed items; the rest is counted.
 const SHOWN: usize = 20;
 
-/// Done, under way, failed, missing, time to the end.
+/// Done, in progress, failed, missing, remaining time.
 pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, usize>>) -> String {
     let mut text = format!("{name}: {} of {} items done", status.done, status.items);
     let begun = status.begun();
@@ -33,7 +33,7 @@ pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, 
     text + lacking_text(status, |item| item.why.is_some()).as_str()
 }
 
-/// Every item that has no result, and what was left out.
+/// Every item without a result, and the files that were left out.
 fn lacking_text(status: &Status, shown: impl Fn(&Lacking) -> bool) -> String {
     let mut text = String::new();
     for (items, what) in [(&status.failed, "failed"), (&status.refused, "left out, its part")] {
@@ -61,7 +61,7 @@ fn list<T>(text: &mut String, items: &[T], line: impl Fn(&T) -> String) {
     }
 }
 
-/// What was merged, and what is missing.
+/// The merged result and the missing items.
 pub fn merged_text(merged: &Merged) -> String {
     let status = &merged.status;
     let mut text = lacking_text(status, |_| true);

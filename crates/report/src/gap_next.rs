@@ -1,11 +1,11 @@
-//! What to do next, in words.
+//! Recommended next steps, as text.
 
 use mapper_gap::report::{Diagnosis, Kind, Next, Suggestion};
 
 /// 0 degC, K.
 const ZERO_C_K: f64 = 273.15;
 
-/// The chapter; nothing where nothing is left to settle.
+/// The chapter; empty if nothing remains to be decided.
 pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     let Some(next) = &diagnosis.next else { return String::new() };
     let mut text = "\nwhat next\n".to_owned();
@@ -40,7 +40,7 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// What is done, in words.
+/// The action, in words.
 fn named(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     let at = format!("at {:.0} krpm and opening {}", to.speed_rpm / 1e3, to.valve);
@@ -78,7 +78,7 @@ fn named(experiment: &Suggestion) -> String {
     }
 }
 
-/// How it is run.
+/// How to run it.
 fn how(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     match experiment.kind {

@@ -1,4 +1,4 @@
-//! A diagnosis as a page with pictures: one HTML file that needs nothing else.
+//! A diagnosis as a page with pictures: one self-contained HTML file.
 
 use crate::gap_text::{gap_text, headline, named};
 use crate::number::four_figures;
@@ -31,10 +31,10 @@ svg{max-width:100%;height:auto}\
 pre{background:var(--card);padding:1em;overflow:auto;white-space:pre-wrap}\
 @media print{:root{--ink:#000;--soft:#333;--line:#999;--ground:#fff;--card:#fff}.scroll{overflow:visible}table{font-size:7pt}}";
 
-/// Nothing from outside, nothing to outside.
+/// No requests in or out.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
 
-/// A table that may be wider than the screen: it scrolls by itself, by keyboard too.
+/// A table that may be wider than the screen: it scrolls separately, by keyboard too.
 fn wide(name: &str, table: &Markup) -> Markup {
     html! { div.scroll tabindex="0" role="region" aria-label=(name) { (table) } }
 }
@@ -65,7 +65,7 @@ pub fn gap_page(title: &str, done: &Diagnosed) -> String {
     page.into_string()
 }
 
-/// The diagnosis as a part of another page, below a heading of its own: its headline, and everything that its page shows.
+/// The diagnosis as a section of another page, below a heading of its own: its headline and the full content of its page.
 pub fn gap_part(done: &Diagnosed) -> Markup {
     html! {
         p { b { (headline(&done.diagnosis)) } }
@@ -73,11 +73,11 @@ pub fn gap_part(done: &Diagnosed) -> Markup {
     }
 }
 
-/// What is found and what shows it, each below a heading.
+/// The findings and their evidence, each below a heading.
 fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
     let diagnosis = &done.diagnosis;
     html! {
-        // The law that stands in the headline is not said again.
+        // The closure term in the headline is not repeated.
         @for law in diagnosis.laws.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
             p { "A law for what is missing in " (law.submodel) ": " b { (law.sentence) } }
         }
@@ -108,7 +108,7 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
     }
 }
 
-/// The first causes with their probabilities as bars.
+/// The most probable causes with their probabilities as bars.
 fn causes(done: &Diagnosed) -> Markup {
     let diagnosis = &done.diagnosis;
     let candidates = diagnosis.candidates.iter().take(8);
@@ -135,7 +135,7 @@ fn causes(done: &Diagnosed) -> Markup {
     wide("causes and their probabilities", &table)
 }
 
-/// What each balance lacks at the end of each step, if it alone lacks something.
+/// The residual source term of each balance at the end of each step, if that balance alone has one.
 fn forces(done: &Diagnosed) -> Markup {
     let table = html! {
         table {
@@ -178,7 +178,7 @@ fn places(done: &Diagnosed) -> Markup {
     wide("where the gap lies", &table)
 }
 
-/// Classes of residuals in the map of where: up to so many sigma, colour and name.
+/// Classes of residuals in the map: upper bound in sigma, colour and name.
 const CLASSES: [(f64, Colour, &str); 4] = [
     (1.3, palette::GREY, "noise"),
     (3.0, palette::SKY, "up to 3 sigma"),
@@ -186,7 +186,7 @@ const CLASSES: [(f64, Colour, &str); 4] = [
     (f64::INFINITY, palette::VERMILLION, "beyond 10 sigma"),
 ];
 
-/// Where on the compressor map the steps end, coloured by their residual, before and after.
+/// Ends of the steps on the compressor map, coloured by their residual, before and after.
 fn map_of_where(done: &Diagnosed) -> String {
     let mut figure = Figure::new("Where on the map").columns(2).panel_size_px(430.0, 300.0);
     let after = done.with_cause.as_ref().map(|(what, fit)| (format!("with {what}"), &fit.residual));
@@ -257,7 +257,7 @@ fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> 
     let Some(group) = group else { return html! { td { "-" } } };
     let here = &residual[group.rows.clone()];
     let rms = (here.iter().map(|r| r * r).sum::<f64>() / here.len().max(1) as f64).sqrt();
-    // White at 1, red from 30 on, evenly in the logarithm.
+    // White at 1, red from 30 on, logarithmic.
     let heat = (rms.max(1.0).ln() / 30f64.ln()).clamp(0.0, 1.0);
     let fade = (255.0 * (1.0 - heat)) as u8;
     // Both have a contrast above 4.5 there.

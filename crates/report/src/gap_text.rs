@@ -9,9 +9,9 @@ use mapper_gap::report::{
 };
 use std::collections::BTreeMap;
 
-/// Causes shown.
+/// Maximum number of causes shown.
 const CAUSES: usize = 5;
-/// Places shown.
+/// Maximum number of places shown.
 const PLACES: usize = 5;
 
 /// The page.
@@ -74,10 +74,10 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// A law less probable than this closes a gap without being its truth.
+/// Below this probability a closure term closes a gap without being its cause.
 const NOT_THE_TRUTH: f64 = 0.05;
 
-/// What is missing and by which law.
+/// The missing term and the closure term for it.
 fn laws(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
     if let (Some(force), Some(place)) = (diagnosis.forces.first(), diagnosis.r#where.first())
@@ -114,7 +114,7 @@ fn laws(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// What a law does to the gap, in words.
+/// The effect of a closure term on the gap, in words.
 fn removed(law: &Law) -> String {
     match law.worse.as_slice() {
         [] => format!("removes {:.0} % of the gap", 100.0 * law.shrink),
@@ -155,7 +155,7 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// What is in both recordings and not judged, where a healthy one was given.
+/// Effects in both recordings, which are not judged, if a reference recording was given.
 fn not_judged(since: &Since) -> String {
     let lacking = since.lacking.iter().map(|(channel, lacking)| {
         let (scale, unit) = in_people_s_unit(&lacking.unit);
@@ -168,12 +168,12 @@ fn not_judged(since: &Since) -> String {
     )
 }
 
-/// Pascals are many.
+/// Pressures have many pascals.
 fn in_people_s_unit(unit: &str) -> (f64, &str) {
     if unit == "Pa" { (1e-3, "kPa") } else { (1.0, unit) }
 }
 
-/// What of the catalogue comes nearest to a cause that is not in it.
+/// The effect of the library that is closest to an unmodelled cause.
 fn nearest(diagnosis: &Diagnosis) -> Option<String> {
     let first = diagnosis.candidates.first()?;
     match diagnosis.verdict {
@@ -186,7 +186,7 @@ fn nearest(diagnosis: &Diagnosis) -> Option<String> {
     }
 }
 
-/// Effects by their names for people, ids behind them, and when they begin.
+/// Effects by their names, with ids and onset times.
 pub fn named(candidate: &Candidate) -> String {
     let one = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
         Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", step_number(onset.step)),
@@ -209,7 +209,7 @@ fn parameter(name: &str, estimate: &Estimate) -> String {
     format!("{name} = {written} ({low} .. {high}){beside}")
 }
 
-/// How small each effect would have been seen.
+/// The smallest detectable size of each effect.
 fn smallest_seen(effects: &[SmallestSeen]) -> String {
     let mut text =
         "\nan effect would have been named, in 95 of 100 recordings like this one, from\n".to_owned();
@@ -220,10 +220,10 @@ fn smallest_seen(effects: &[SmallestSeen]) -> String {
     text
 }
 
-/// Share of the gap from which on a step is named: as much as five even steps have.
+/// Share of the gap from which a step is named: that of five equal steps.
 const NAMED_SHARE: f64 = 0.2;
 
-/// How many steps bear witness, and the one that carries much of the gap.
+/// Number of steps that support the cause, and the step that dominates the gap.
 fn carried_by(gap: &mapper_gap::report::Gap) -> String {
     let all = gap.held_out_steps.len();
     if all == 0 {
@@ -269,7 +269,7 @@ fn how_far(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// What the cause spares the tolerances, where they can stand in for it: then it leaves no smaller residual.
+/// If tolerances can replace the cause without a larger residual: the tolerance that would have to exceed its prior.
 fn strained(gap: &Gap) -> String {
     let Some(strained) = gap.strained.as_ref().filter(|_| gap.shrink < STANDS_IN) else {
         return String::new();
@@ -280,10 +280,10 @@ fn strained(gap: &Gap) -> String {
     )
 }
 
-/// A cause that removes less than this of what tolerances leave is one that they can stand in for.
+/// A cause that removes less than this share of the residual after tolerances can be replaced by them.
 const STANDS_IN: f64 = 0.5;
 
-/// How far with a law that no effect of the catalogue comes near.
+/// The gap reduction of a closure term that resembles no effect of the library.
 fn how_far_by(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
     let seen = match law.held_out_steps {
         0 => "on the steps that were fitted: too few to hold any out".to_owned(),
@@ -293,7 +293,7 @@ fn how_far_by(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
         + by_channel(diagnosis, &law.channels, "with the law", 3).as_str()
 }
 
-/// What is left of each channel in the first so many columns.
+/// The residual of each channel in the first so many columns.
 fn by_channel(
     diagnosis: &Diagnosis,
     channels: &BTreeMap<String, ChannelGap>,
@@ -317,7 +317,7 @@ fn by_channel(
     text
 }
 
-/// What the cause changes of efficiency and heat transfer at equal speed and pressures.
+/// The effect of the cause on efficiency and heat transfer at equal speed and pressures.
 fn points(points: &[PointGap]) -> String {
     let largest = |of: fn(&PointGap) -> f64| {
         let changes = points.iter().map(of).filter(|d| d.is_finite());

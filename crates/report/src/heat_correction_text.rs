@@ -1,11 +1,11 @@
-//! A map corrected for its heat, in words.
+//! A map corrected for heat transfer, as text.
 
 use mapper_assemble::HeatCorrection;
 
-/// Scatter of the work above which the lines are not one curve: 0.35 % on the lab where they are, 1.7 % where they are not.
+/// Scatter of the work above which the lines do not form one curve. On the lab: 0.35 % if they do, 1.7 % if they do not.
 const ONE_CURVE_RATIO: f64 = 0.01;
 
-/// What was taken off, and what that did line by line.
+/// The correction, and its effect line by line.
 pub fn heat_correction_text(correction: &HeatCorrection) -> String {
     let mut text = match (correction.heat_shown_w, correction.heat_standard_error_w) {
         (Some(shown_w), Some(error_w)) => format!(

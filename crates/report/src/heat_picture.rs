@@ -1,4 +1,4 @@
-//! Pictures of what was identified beside the map: h over flow, and error of efficiency over the change of T2.
+//! Further pictures of the results: h over flow, and error of efficiency over the change of T2.
 
 use mapper_chart::{Axis, Dash, Figure, Line, Marker, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette};
 use mapper_core::{IdentifiedPoint, Verdict};
@@ -42,7 +42,7 @@ pub fn heat_transfer_figure(machine: &str, points: &[IdentifiedPoint], exponent:
         .panel_size_px(640.0, 420.0)
 }
 
-/// A point's error of efficiency against what is known to be right, as figure 12 of the paper has it.
+/// A point's error of efficiency relative to the true value, as in figure 12 of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorAtGradient {
     /// Change of T2 over the window, K.
@@ -55,7 +55,7 @@ pub struct ErrorAtGradient {
     pub verdict: Verdict,
 }
 
-/// Error of efficiency over the change of T2 (figure 12): where the truth is known, that is in a simulated run.
+/// Error of efficiency over the change of T2 (figure 12), for simulated runs, whose truth is known.
 pub fn error_figure(machine: &str, errors: &[ErrorAtGradient]) -> Figure {
     let mut panel =
         Panel::new(Axis::new("change of T2 in the window, K"), Axis::new("error of efficiency, points"))

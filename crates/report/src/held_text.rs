@@ -1,4 +1,4 @@
-//! How a sealed forecast came out, as a page for a terminal.
+//! Evaluation of a pre-registered prediction, as a page for a terminal.
 
 use crate::number::four_figures;
 use mapper_gap::twin::Held;

@@ -1,4 +1,4 @@
-//! Trends of the nights: a panel a figure, a line a campaign and method.
+//! Trends of the nights: a panel per figure, a line per campaign and method.
 
 use mapper_chart::{Axis, Colour, Figure as Picture, Line, Note, Panel, Scatter};
 use mapper_history::{ListedRun, Metric, median};
@@ -17,10 +17,10 @@ const COLOURS: [Colour; 8] = [
 const MOVED: Colour = Colour(0xC6, 0x28, 0x28);
 const MS_PER_DAY: f64 = 86_400_000.0;
 
-/// Dates under an axis: so many at most.
+/// Maximum number of dates under an axis.
 const DATES_MAX: i64 = 6;
 
-/// Midnights from the first night to the last, days after the first night and as people write them, evenly apart.
+/// Equally spaced midnights from the first night to the last: days after the first night, and the formatted date.
 fn dates(first_ms: i64, last_ms: i64) -> Vec<(f64, String)> {
     let day_ms = MS_PER_DAY as i64;
     let (first, last) = (first_ms.div_euclid(day_ms), last_ms.div_euclid(day_ms));
@@ -30,12 +30,12 @@ fn dates(first_ms: i64, last_ms: i64) -> Vec<(f64, String)> {
     days.map(|day| {
         ((day * day_ms - first_ms) as f64 / MS_PER_DAY, crate::history_text::time(day * day_ms, format))
     })
-    // The first night's own midnight lies before the axis.
+    // The first night's own midnight is before the axis.
     .map(|(place, text)| (place.max(0.0), text))
     .collect()
 }
 
-/// All figures as one SVG: the pointer says night, figure and value, and a click opens what `report_of` names for a night that
+/// All figures as one SVG. The tooltip shows night, figure and value. A click opens the page that `report_of` names for a night that
 /// began then, ms since 1970.
 pub fn history_svg(
     runs: &[ListedRun],
@@ -97,7 +97,7 @@ pub fn history_svg(
         if !rings.is_empty() {
             panel.add(Scatter::new(rings, MOVED).hollow().size_px(10.0).label("moved"));
         }
-        // Last: what lies above a point would keep the pointer from it.
+        // Last: an element above a point would keep the pointer from it.
         of_points.into_iter().for_each(|points| panel.add(points));
         picture = picture.panel(panel);
     }

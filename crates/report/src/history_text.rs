@@ -1,10 +1,10 @@
-//! What the nights gave, as tables.
+//! Results of the nights, as tables.
 
 use crate::{number, table};
 use mapper_history::{ListedRun, Metric, median};
 use std::collections::BTreeMap;
 
-/// A time of the history in UTC by a strftime format; a dash where it is not a time.
+/// A time of the history in UTC by a strftime format; a dash if it is not a time.
 pub fn time(ms: i64, format: &str) -> String {
     jiff::Timestamp::from_millisecond(ms)
         .map_or_else(|_| "-".to_owned(), |time| time.strftime(format).to_string())

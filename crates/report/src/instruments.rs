@@ -1,4 +1,4 @@
-//! The instruments: what each is declared to be worth, what a zero has left of it, when it was calibrated.
+//! The instruments: declared uncertainty, uncertainty after a zero, date of calibration.
 
 use crate::display::Display;
 use mapper_campaign::Campaign;
@@ -18,12 +18,12 @@ pub const INSTRUMENT_HEADS: [&str; 9] = [
     "last calibration",
 ];
 
-/// What the columns are.
+/// Meaning of the columns.
 pub const INSTRUMENT_WORDS: &str = "Half widths of 95 % intervals, as declared: noise of one sample, offset left after calibration, gain; \
                                     temperatures in K. As used: the offset that the isothermal zero leaves, where there was one. \
                                     `-`: nobody has declared it.";
 
-/// A row for each sensor of the campaign. `used`: what the points were identified with.
+/// A row for each sensor of the campaign. `used`: the uncertainties of the identification.
 pub fn instrument_rows(
     campaign: &Campaign,
     used: &BTreeMap<Channel, DeclaredUncertainty>,
@@ -64,7 +64,7 @@ fn dash() -> String {
     "-".to_owned()
 }
 
-/// Two significant figures without an exponent: an uncertainty has no more.
+/// Two significant figures without an exponent, enough for an uncertainty.
 fn two_figures(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return dash();

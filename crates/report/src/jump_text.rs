@@ -1,4 +1,4 @@
-//! One edge of the jump graph in words: what a jump gives and what forbids it.
+//! One edge of the jump graph as text: its result and the reasons against it.
 
 use crate::display::Display;
 use crate::number::{number, percent};
@@ -22,7 +22,7 @@ pub fn jump_json(jump: &JumpForecast) -> serde_json::Value {
     })
 }
 
-/// What the jump gives from the steady state of its first point, and each reason against it.
+/// The result of the jump from the steady state of its first point, and each reason against it.
 pub fn jump_text(campaign: &Campaign, jump: &JumpForecast) -> String {
     let display = Display::new(&campaign.display);
     let predicted = &jump.predicted;

@@ -1,4 +1,4 @@
-//! What a map covers and how sure it is, in a few sentences.
+//! Range and uncertainty of a map, in a few sentences.
 
 use crate::duration::duration;
 use mapper_campaign::Campaign;
@@ -6,7 +6,7 @@ use mapper_core::{CompressorMap, IdentifiedPoint, Plan, Verdict};
 use mapper_numerics::statistics::median;
 use mapper_record::score::ScoredPoint;
 
-/// What was measured, how sure it is, how long it was planned to take; `None` where there is no map.
+/// Measured range, uncertainty and planned duration; `None` if there is no map.
 pub fn key_figures(
     map: Option<&CompressorMap>,
     points: &[ScoredPoint],
@@ -50,7 +50,7 @@ pub fn key_figures(
     Some(words)
 }
 
-/// How wide the intervals of usable points are.
+/// Width of the intervals of usable points.
 fn certainty<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<String> {
     let usable = points.filter(|point| point.verdict != Verdict::Unusable);
     let halves: Vec<f64> =

@@ -1,7 +1,7 @@
-//! What people read: tables for a terminal, the report of a run, pages and pictures.
+//! Output for people: tables for a terminal, the report of a run, pages and pictures.
 //!
-//! Every function here turns data into text or a picture, in the units that a campaign wants shown. Nothing is read,
-//! written or decided.
+//! Every function turns data into text or a picture, in the display units of a campaign. This crate reads, writes and
+//! decides nothing.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -85,7 +85,7 @@ pub use log_text::log_text;
 pub use map_comparison_picture::{map_comparison_figure, told_apart};
 pub use map_comparison_text::map_comparison_text;
 pub use map_fit_text::map_fit_text;
-/// A point beside its truth, where that is known.
+/// A point with its truth, if known.
 pub use mapper_record::score::ScoredPoint;
 pub use measured::{END_S, at_end};
 pub use night_text::night_text;

@@ -13,11 +13,11 @@ use mapper_core::{CompressorMap, IdentifiedPoint, SpeedLine, Verdict, step_numbe
 use mapper_numerics::statistics::mean;
 use mapper_record::score::ScoredPoint;
 
-/// Columns of a terminal that nobody has made wider.
+/// Default width of a terminal, columns.
 const COLUMNS: usize = 80;
 
-/// The points of the map by speed line from surge to choke, what is not on it behind them; without repeats, which are there to
-/// compare. With their true efficiency where `truth` is wanted and known.
+/// The points of the map by speed line from surge to choke, followed by the points outside it; without repeats, which serve only
+/// for comparison. With their true efficiency if `truth` is set and it is known.
 pub fn points_by_line_text(
     points: &[ScoredPoint],
     map: Option<&CompressorMap>,
@@ -63,7 +63,7 @@ pub fn points_by_line_text(
             on_a_line.push(scored.point.step);
         }
     }
-    // A point that was visited again stands on the map once, by the surer visit.
+    // A point with a repeat visit is on the map once, by the more certain visit.
     let is_on_a_line = |scored: &ScoredPoint| {
         let visits = points.iter().filter(|other| on_a_line.contains(&other.point.step));
         let same = |other: &ScoredPoint| {
@@ -72,7 +72,7 @@ pub fn points_by_line_text(
         on_a_line.contains(&scored.point.step) || visits.into_iter().any(same)
     };
     let others = points.iter().filter(|scored| scored.point.kind.measures() && !is_on_a_line(scored));
-    // Where there are no lines each has the speed that it was measured at.
+    // Without lines, each point has its measured speed.
     let mut name = (!on_a_line.is_empty()).then(|| "no line".to_owned());
     for scored in others {
         let own = || display.speed(scored.point.speed_corrected_rpm);
@@ -88,7 +88,7 @@ pub fn points_by_line_text(
     for (index, line) in rendered.lines().enumerate() {
         let line = line.strip_prefix(' ').unwrap_or(line).trim_end();
         text.push_str(line);
-        // A good point needs no word.
+        // A good point needs no remark.
         match index.checked_sub(1).and_then(|row| verdicts.get(row)) {
             Some(verdict) if *verdict != Verdict::Good => {
                 text.push_str("  ");
@@ -133,7 +133,7 @@ fn row(display: &Display, point: &IdentifiedPoint) -> Vec<String> {
     ]
 }
 
-/// Why points are not good, a sentence each: the first of what is said of a point. What is said of several is said once.
+/// Why points are not good: the first reason of each point, a sentence each. A reason that several points share is given once.
 pub fn first_doubts_text(points: &[ScoredPoint]) -> String {
     let first_only: Vec<IdentifiedPoint> = points
         .iter()
@@ -144,7 +144,7 @@ pub fn first_doubts_text(points: &[ScoredPoint]) -> String {
             ..point.clone()
         })
         .collect();
-    let said = doubts(first_only.iter());
+    let remarks = doubts(first_only.iter());
     let named = |doubt: &Doubt<'_>| {
         let steps = match doubt.count() == points.len() && points.len() > 1 {
             true => "all steps".to_owned(),
@@ -152,10 +152,10 @@ pub fn first_doubts_text(points: &[ScoredPoint]) -> String {
         };
         wrapped(&format!("{steps}: {}", doubt.message), COLUMNS, 2)
     };
-    said.iter().map(named).collect()
+    remarks.iter().map(named).collect()
 }
 
-/// How many points are worth what, in a sentence.
+/// Number of points with each verdict, in a sentence.
 pub fn verdict_sentence<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> String {
     let verdicts: Vec<Verdict> = points.map(|point| point.verdict).collect();
     let count = |verdict| verdicts.iter().filter(|other| **other == verdict).count();

@@ -1,4 +1,4 @@
-//! The speed lines of a campaign as they were resolved, for people.
+//! The resolved speed lines of a campaign, as text.
 
 use crate::display::Display;
 use crate::number::percent;

@@ -1,4 +1,4 @@
-//! What a log holds, as a table, and the channel map that it suggests.
+//! The content of a log as a table, and a suggested channel map.
 
 use crate::table;
 use comfy_table::CellAlignment;
@@ -9,10 +9,10 @@ use std::fmt::Write;
 /// Width of a trace, characters.
 const TRACE: usize = 20;
 
-/// Most gaps of a group that are listed.
+/// Maximum number of listed gaps of a group.
 const GAPS: usize = 5;
 
-/// Findings, columns, gaps, and the proposal with what is sure of it and what is not.
+/// Findings, columns, gaps, and the suggestion with its certain and uncertain parts.
 pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Proposal) -> String {
     let mut text = format!(
         "{format}, {} columns. Found by looking (in brackets what overrides it, `--with KEY=VALUE`):\n",
@@ -96,7 +96,7 @@ fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> comfy_table
     table
 }
 
-/// The suggestion: channels with a remark, and what the channels say of each other.
+/// The suggestion: channels with a remark, and the relations between channels.
 fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
     let mut text = String::new();
     let by = |certainty: Certainty| -> Vec<&str> {
@@ -142,13 +142,13 @@ fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
     text
 }
 
-/// A name short enough for a table.
+/// A name shortened for a table.
 fn cut(name: &str) -> String {
     let clean: String = name.chars().take(40).map(|c| if c.is_control() { '?' } else { c }).collect();
     if name.chars().count() > 40 { format!("{clean}...") } else { clean }
 }
 
-/// A number with this many digits that count; `-` for none.
+/// A number with this many significant digits; `-` for none.
 fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return "-".to_owned();

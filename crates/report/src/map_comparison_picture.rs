@@ -7,10 +7,10 @@ use mapper_chart::{
 use mapper_core::{CompressorMap, half_width_95};
 use std::path::Path;
 
-/// Every how many places the second panel draws an error bar.
+/// Number of places per error bar in the second panel.
 const BAR_EVERY: usize = 5;
 
-/// Names of two files for a legend: as many of their folders as it takes to tell them apart.
+/// Names of two files for a legend, with as many of their folders as needed to distinguish them.
 pub fn told_apart(files: [&Path; 2]) -> [String; 2] {
     let last = |path: &Path, count: usize| {
         let parts: Vec<String> =
@@ -23,11 +23,11 @@ pub fn told_apart(files: [&Path; 2]) -> [String; 2] {
         .into_iter()
         .find(|[first, second]| first != second)
         .unwrap_or_else(|| files.map(|path| path.display().to_string()));
-    // One file against itself has one name.
+    // A file compared with itself has one name.
     if first == second { [first, format!("{second} again")] } else { [first, second] }
 }
 
-/// Points of both maps with the places compared, and the difference of efficiency with its 95 % interval.
+/// Points of both maps with the compared places, and the difference of efficiency with its 95 % interval.
 pub fn map_comparison_figure(
     first: &CompressorMap,
     second: &CompressorMap,
@@ -64,7 +64,7 @@ fn map_panel(
             line.places.iter().map(|p| (p.flow_corrected_kg_s, p.pressure_ratio)).collect();
         panel.add(Line::new(places, palette::GREY).width_px(1.2).end_label(speed, LineEnd::First));
         let differs = |p: &ComparedPlace| p.line_differs() || p.eta_differs();
-        // A place that does not differ breaks the coloured line.
+        // A place without a difference interrupts the coloured line.
         let coloured: Vec<(f64, f64)> = line
             .places
             .iter()
@@ -105,7 +105,7 @@ fn eta_panel(comparison: &MapComparison) -> Panel {
             .enumerate()
             .map(|(place, p)| {
                 let (y, half) = (100.0 * p.eta_difference, 100.0 * half_width_95(p.eta_standard_error));
-                // Bars vary slowly along a line: a few of them, on another place of each line, stay legible.
+                // Bars vary slowly along a line: a few of them, at different places of each line, stay legible.
                 let y_interval = (place % BAR_EVERY == index % BAR_EVERY).then_some((y - half, y + half));
                 ScatterPoint { x: p.flow_corrected_kg_s, y, x_interval: None, y_interval }
             })

@@ -1,4 +1,4 @@
-//! Where two maps differ, for people.
+//! Differences between two maps, as text.
 
 use crate::number::number;
 use crate::table;

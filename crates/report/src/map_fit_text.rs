@@ -1,4 +1,4 @@
-//! A map fit for people: what each line reaches, and how well lines that were left out are predicted.
+//! A map fit as text: the range of each line, and the prediction error of lines that were left out.
 
 use crate::number::number;
 use crate::table;
@@ -21,7 +21,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
     let mut table = table::with_heads(&heads.map(str::to_owned));
     for line in &fitted.lines {
         let left_out = fitted.left_out.iter().find(|l| l.speed_corrected_rpm == line.speed_corrected_rpm);
-        // Where the line is supported at all, its best efficiency is one that is.
+        // If the line is supported at all, its best efficiency is supported too.
         let supported = line.nodes.iter().any(|n| !n.extrapolated);
         let known = line.nodes.iter().filter(|n| !(supported && n.extrapolated));
         let best = known.max_by(|a, b| a.eta.total_cmp(&b.eta));

@@ -1,6 +1,6 @@
-//! Tables in Markdown: the one writer of them.
+//! Writes all tables in Markdown.
 
-/// Where the cells of a column stand.
+/// Alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Align {
     /// As text.
@@ -9,7 +9,7 @@ pub enum Align {
     Right,
 }
 
-/// A table with these heads, all columns aligned alike; a bar in a cell is written so that it ends no cell.
+/// A table with these heads, all columns aligned alike; a bar in a cell is escaped.
 pub fn table<H: AsRef<str>, R: AsRef<[String]>>(
     heads: &[H],
     align: Align,
@@ -39,7 +39,7 @@ fn row<C: AsRef<str>>(cells: &[C]) -> String {
 mod tests {
     use super::{Align, table};
 
-    /// As CommonMark's table extension asks: a bar inside a cell stands behind a backslash.
+    /// CommonMark's table extension requires a backslash before a bar inside a cell.
     #[test]
     fn a_bar_ends_no_cell() {
         let text = table(&["a", "b"], Align::Left, [["1|2".to_owned(), "3".to_owned()]]);

@@ -1,10 +1,10 @@
-//! A night's runs against the nights before, for people.
+//! A night's runs compared with earlier nights, as text.
 
 use mapper_history::{Comparison, Night};
 use std::fmt::Write;
 use std::path::Path;
 
-/// The night for people.
+/// The night as text.
 pub fn night_text(night: &Night, comparison: &Comparison, path: &Path) -> String {
     let mut text = String::new();
     for (run, failure) in &comparison.failed {

@@ -1,6 +1,6 @@
-//! Numbers as people read them.
+//! Numbers as text.
 
-/// A number, or a dash where there is none: a silent number helps nobody.
+/// A number, or a dash if there is none.
 pub fn number(value: Option<f64>, decimals: usize) -> String {
     value
         .filter(|value| value.is_finite())

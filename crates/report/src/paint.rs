@@ -1,11 +1,11 @@
-//! Colours of a terminal, for verdicts.
+//! Terminal colours for verdicts.
 
 use mapper_core::Verdict;
 
 /// Whether words are coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Paint {
-    /// As they are.
+    /// Uncoloured.
     #[default]
     Plain,
     /// By ANSI escapes, in the terminal's own colours.

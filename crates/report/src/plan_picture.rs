@@ -1,4 +1,4 @@
-//! Figure 13 of the paper, made from a campaign: (a) its points along speed lines, (b) in the planned order.
+//! Figure 13 of the paper for a campaign: (a) its points along speed lines, (b) in the planned order.
 
 use mapper_campaign::Campaign;
 use mapper_chart::{Annotation, Axis, Colour, Figure, Line, Panel, PointLabels, Scatter};
@@ -13,16 +13,16 @@ const SPEED_LINES: Colour = Colour(0xB4, 0x53, 0x09);
 const PLANNED: Colour = Colour(0x1D, 0x4E, 0x89);
 const FIRST: Colour = Colour(0x15, 0x80, 0x3D);
 
-/// Plans of more steps than this have only every fifth number, and those of more than the second every tenth.
+/// Plans with more steps than the first number show only every fifth number, those with more than the second every tenth.
 const ALL_NUMBERED: usize = 60;
 const FIFTH_NUMBERED: usize = 150;
 
-/// Both orders side by side, as SVG; `along_lines` is the plan along speed lines, `None` where the limits allow none.
+/// Both orders next to each other, as SVG; `along_lines` is the plan along speed lines, `None` if the limits allow none.
 pub fn plan_svg(campaign: &Campaign, model: &Model, plan: &Plan, along_lines: Option<&Plan>) -> String {
     let place = |point: OperatingPoint| {
         let boundary =
             BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
-        // The plan has held every point before.
+        // The plan has reached every point already.
         hold_speed(model, point.speed_rpm, &boundary).map_or((f64::NAN, f64::NAN), |steady| {
             (1e3 * steady.outputs.flow_corrected_kg_s, steady.outputs.pressure_ratio)
         })
@@ -100,7 +100,7 @@ fn panel(
     let mut panel = speed_lines(grid);
     let places: Vec<(f64, f64)> = plan.steps.iter().map(|step| place(step.to)).collect();
     let count = places.len();
-    // The more jumps there are, the lighter they have to be for the numbers to stand out.
+    // More jumps need lighter lines, so that the numbers stay legible.
     let tint = (0.6 - 0.002 * count as f64).max(0.25);
     panel.add(Line::new(places.clone(), colour.tint(tint)).width_px(0.8).arrows().label("jumps"));
     panel.add(Scatter::new(places.clone(), colour).size_px(4.0));
@@ -119,7 +119,7 @@ fn panel(
     panel
 }
 
-/// The numbers of the steps at each point, those of several steps together.
+/// The numbers of the steps at each point, combined if there are several.
 fn numbers(plan: &Plan, places: &[(f64, f64)]) -> Vec<(String, (f64, f64))> {
     let count = plan.steps.len();
     let mut labels: Vec<(OperatingPoint, String, (f64, f64))> = Vec::new();

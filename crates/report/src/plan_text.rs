@@ -1,4 +1,4 @@
-//! A plan for people, in 80 columns.
+//! A plan as text, in 80 columns.
 
 use crate::display::Display;
 use crate::duration::{duration, eta};
@@ -30,7 +30,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
     for column in steps.column_iter_mut() {
         column.set_padding((0, 1));
     }
-    // The machine rests before the plan begins.
+    // The machine soaks before the plan begins.
     let soak_s = campaign.zero.map_or(0.0, |zero| zero.duration_s);
     for step in &plan.steps {
         let predicted = &step.predicted;
@@ -51,7 +51,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
     format!("{steps}\n\n{}\n{}", legend(plan), summary(plan, soak_s))
 }
 
-/// What marks a step that is no point of the grid.
+/// The mark of a step that is not a point of the grid.
 fn mark(kind: StepKind) -> &'static str {
     match kind {
         StepKind::Point => "",
@@ -81,7 +81,7 @@ fn legend(plan: &Plan) -> String {
     wrapped(&text, 80, 0)
 }
 
-/// What the plan comes to, a line for each figure.
+/// Totals of the plan, a line for each figure.
 fn summary(plan: &Plan, soak_s: f64) -> String {
     let figures = &plan.figures;
     let steps_s: f64 = plan.steps.iter().map(|step| step.dwell_s).sum();

@@ -1,4 +1,4 @@
-//! The points by speed line, as test reports list them: one table for report and page.
+//! The points by speed line, as in test reports: one table for report and page.
 
 use crate::display::Display;
 use crate::measured::at_end;
@@ -6,12 +6,12 @@ use crate::number::{number, percent};
 use crate::points::{step_name, verdict_word};
 use mapper_core::{Channel, CompressorMap, IdentifiedPoint, Recording, half_width_95};
 
-/// A cell: what stands there, and its value where it is a number.
+/// A cell: its text, and its value if it is a number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointCell {
-    /// As it is shown.
+    /// As displayed.
     pub text: String,
-    /// In the unit used inside.
+    /// In the internal unit.
     pub value: Option<f64>,
 }
 
@@ -28,13 +28,13 @@ impl PointCell {
 /// Points below one caption.
 #[derive(Debug)]
 pub struct PointGroup<'a> {
-    /// What they have in common.
+    /// Their common property.
     pub caption: String,
     /// The points.
     pub points: Vec<&'a IdentifiedPoint>,
 }
 
-/// The points of each speed line from surge to choke, and what is not on the map behind them.
+/// The points of each speed line from surge to choke, followed by the points outside the map.
 pub fn point_groups<'a>(
     map: Option<&'a CompressorMap>,
     points: impl Iterator<Item = &'a IdentifiedPoint>,
@@ -95,7 +95,7 @@ pub fn point_cells(recording: &Recording, point: &IdentifiedPoint, display: &Dis
         |pa: Option<f64>| pa.map_or_else(PointCell::nothing, |pa| PointCell::new(display.pressure(pa), pa));
     let half = |low: Option<f64>, high: Option<f64>| low.zip(high).map(|(low, high)| 0.5 * (high - low));
     let optional = |text: String, value: Option<f64>| PointCell::new(text, value.unwrap_or(f64::NAN));
-    // A half width of 0 says that nobody declared the sensor, not that it is perfect.
+    // A half width of 0 means that no sensor is declared, not that it is perfect.
     let known =
         |half: f64, text: String| if half > 0.0 { PointCell::new(text, half) } else { PointCell::nothing() };
     let flow_half_kg_s =

@@ -1,4 +1,4 @@
-//! Identified points, their doubts, and how far they are from the truth.
+//! Identified points, their warnings, and their deviations from the truth.
 
 use crate::display::Display;
 use crate::doubts::doubts;
@@ -9,8 +9,8 @@ use mapper_core::{IdentifiedPoint, StepKind, Verdict, step_number};
 use mapper_record::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
-/// Identified points as a table, their doubts below, and how far they are from the truth where it is known.
-/// `truth`: whether to say the latter.
+/// Identified points as a table with their warnings below; deviations from the truth if it is known.
+/// `truth`: whether to show the latter.
 pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> String {
     let mut text = format!("{}\n\n", points_table(points, units, truth));
     let doubted = points.iter().map(|scored| &scored.point).filter(|point| point.verdict != Verdict::Good);
@@ -32,12 +32,12 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) ->
     text
 }
 
-/// How far the points are from what the simulator knows; `None` where nobody knows.
+/// Deviations of the points from the simulator's truth; `None` if the truth is unknown.
 pub fn truth_text(points: &[ScoredPoint]) -> Option<String> {
     mapper_record::score::summarise(points).map(|score| score_text(&score))
 }
 
-/// How far the points are from what the simulator knows.
+/// Deviations of the points from the simulator's truth.
 pub fn score_text(score: &ScoreSummary) -> String {
     let mut text = format!(
         "Against the simulator's truth ({} points): median error of efficiency {:.2} points, {:.2} at worst, {:.0} % \
@@ -63,7 +63,7 @@ pub fn score_text(score: &ScoreSummary) -> String {
     text
 }
 
-/// `-` where the recording does not hold it.
+/// `-` if the recording does not contain it.
 pub(crate) fn opening(ratio: f64) -> String {
     if ratio.is_finite() { ratio.to_string() } else { "-".to_owned() }
 }
@@ -123,7 +123,7 @@ pub fn step_name(point: &IdentifiedPoint) -> String {
     }
 }
 
-/// A verdict in a word.
+/// A verdict as one word.
 pub fn verdict_word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Good => "good",

@@ -1,4 +1,4 @@
-//! A production in words: the spread of its machines at every point, the stand, and machines that stand out.
+//! A production as text: the spread of its machines at every point, the stand, and outliers.
 
 use crate::history_text::time;
 use crate::{number, table};

@@ -1,4 +1,4 @@
-//! Several recordings of one rig side by side: what persists, what came, what went.
+//! Several recordings of one rig compared: causes that persist, appear and disappear.
 
 use crate::number::four_figures;
 use mapper_core::with_unit;

@@ -1,4 +1,4 @@
-//! What repeats of one jump say about drift, in sentences.
+//! Evidence of drift from repeats of one jump, in sentences.
 
 use crate::display::Display;
 use crate::number::percent;

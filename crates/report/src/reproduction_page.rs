@@ -3,7 +3,7 @@
 use crate::markdown::{Align, table};
 use mapper_reproduce::{FigureResult, picture_path};
 
-/// The page, Markdown; pictures are linked where [`picture_path`] says, beside it. The same results give the same bytes.
+/// The page, Markdown; it links pictures by [`picture_path`], relative to the page. The same results give the same bytes.
 pub fn reproduction_page(results: &[FigureResult]) -> String {
     let figures = results.iter().map(|result| {
         let statements = result.statements.iter();

@@ -27,29 +27,29 @@ use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Everything a test report needs.
+/// Content of a test report.
 pub struct RunReport<'a> {
     /// Name of the machine.
     pub machine: &'a str,
-    /// Rig, conditions, calibration, display units; `None` for a log of which no campaign is known.
+    /// Rig, conditions, calibration, display units; `None` for a log without a campaign.
     pub campaign: Option<&'a Campaign>,
-    /// What was run; `None` where nobody planned it here.
+    /// The executed plan; `None` if there is none.
     pub plan: Option<&'a Plan>,
-    /// When the test was run, as it is to be shown; `None` where nobody knows.
+    /// Date of the test, as displayed; `None` if unknown.
     pub tested_at: Option<&'a str>,
     /// Program, version and commit.
     pub program: &'a str,
-    /// The map; `None` where there is none.
+    /// The map; `None` if there is none.
     pub map: Option<&'a CompressorMap>,
-    /// What was read, as it was identified.
+    /// The readings, as identified.
     pub recording: &'a Recording,
-    /// Uncertainty of each channel with which the points were identified.
+    /// Uncertainty of each channel used in the identification.
     pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
-    /// What the points were identified from; of a run, whose directory has its recording, nothing.
+    /// The identified recordings; empty for a run, whose directory has its recording.
     pub sources: &'a [ReportSource],
     /// How the run ended, in a sentence.
     pub outcome: &'a str,
-    /// What else is to be known: of the recording, of the method, of the map.
+    /// Further remarks: on the recording, the method and the map.
     pub remarks: &'a [String],
     /// Reference state of corrected quantities.
     pub reference: ReferenceState,
@@ -57,23 +57,23 @@ pub struct RunReport<'a> {
     pub method: Method,
     /// Declared share of the internal area before compression.
     pub alpha_area_ratio: f64,
-    /// What happened on the way.
+    /// Events during the run.
     pub events: &'a [Event],
     /// Identified points, repeats included.
     pub points: &'a [ScoredPoint],
     /// Jumps that were made more than once.
     pub repeats: &'a [RepeatedJump],
-    /// What the two-parameter method makes of the same steps, where another method was used.
+    /// Results of the two-parameter method for the same steps, if another method was used.
     pub two_parameter: &'a [TwoParameter],
-    /// What came of the isothermal zero.
+    /// Result of the isothermal zero.
     pub zero: &'a ZeroOutcome,
-    /// What became of channels with several sensors.
+    /// Result for channels with several sensors.
     pub sensors: &'a [FusedChannel],
-    /// How far the points are from the simulator's truth; `None` on a real rig.
+    /// Deviations of the points from the simulator's truth; `None` on a real rig.
     pub score: Option<&'a ScoreSummary>,
-    /// What came of the search for surge; `None` where there was none.
+    /// Result of the search for surge; `None` if there was none.
     pub surge: Option<SurgeReport<'a>>,
-    /// Whether a picture of the map stands beside the report as `map.svg`.
+    /// Whether a picture of the map is next to the report as `map.svg`.
     pub has_picture: bool,
 }
 
@@ -82,20 +82,20 @@ pub struct RunReport<'a> {
 pub struct ReportSource {
     /// Its file.
     pub file: String,
-    /// Time of its start in nanoseconds since 1970-01-01 UTC; 0 where it does not say.
+    /// Time of its start in nanoseconds since 1970-01-01 UTC; 0 if unknown.
     pub start_time_ns: u64,
-    /// From the first sample to the last, s.
+    /// Duration from the first sample to the last, s.
     pub duration_s: f64,
-    /// Steps that were marked or found in it.
+    /// Steps marked or found in it.
     pub steps: usize,
 }
 
-/// What came of the search for surge.
+/// Result of the search for surge.
 #[derive(Clone, Copy)]
 pub struct SurgeReport<'a> {
     /// Marks in order of speed.
     pub marks: &'a [ScoredMark],
-    /// Lines on which none was found.
+    /// Lines on which no mark was found.
     pub remarks: &'a [String],
     /// How often the compressor went into surge.
     pub surges: usize,
@@ -199,8 +199,8 @@ pub fn run_report(report: &RunReport<'_>) -> String {
     text
 }
 
-/// A time since 1970-01-01 UTC, ns, as people read it; `None` for 0: simulated time starts there, and so does a log that knows
-/// only seconds, which is no date.
+/// A formatted time since 1970-01-01 UTC, ns; `None` for 0: simulated time starts there, and so does a log that knows
+/// only seconds, which is not a date.
 pub fn instant(ns: u64) -> Option<String> {
     let seconds = i64::try_from(ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0)?;
     Some(jiff::Timestamp::from_second(seconds).ok()?.strftime("%Y-%m-%d %H:%M:%S UTC").to_string())
@@ -223,7 +223,7 @@ fn facts(rows: &[(&'static str, String)]) -> String {
     markdown::table(&["", ""], Align::Left, rows)
 }
 
-/// What was tested by whom, where, when, and what rig and cell were to hold: what, and its value in words.
+/// Who tested what, where and when, and the declared conditions of rig and cell: name and value in words.
 pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let mut rows = vec![("tested", report.tested_at.unwrap_or("not stated").to_owned())];
     rows.extend(report.campaign.map(campaign_rows).unwrap_or_default());
@@ -236,7 +236,7 @@ pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// How the numbers were made: what, and its value in words.
+/// Method and settings behind the numbers: name and value in words.
 pub fn provenance_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
     let mut rows = vec![("program", report.program.to_owned())];
     rows.push(("identification", format!("{}, alpha_A = {}", report.method, report.alpha_area_ratio)));
@@ -285,7 +285,7 @@ fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// Rest and steps, as `mapper check` and `mapper plan` count them.
+/// Soak and steps, as counted by `mapper check` and `mapper plan`.
 fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
     match campaign.zero {
         Some(soak) => format!(

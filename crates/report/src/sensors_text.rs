@@ -1,10 +1,10 @@
-//! Several sensors of a channel, for people.
+//! Several sensors of a channel, as text.
 
 use mapper_campaign::Campaign;
 use mapper_observe::FusedChannel;
 
-/// A line for each channel that has several sensors: what they are together, and which are left out and why; empty where no
-/// channel has.
+/// A line for each channel that has several sensors: their combination, and which are left out and why; empty if no
+/// channel has several.
 pub fn sensors_text(channels: &[FusedChannel]) -> String {
     if channels.is_empty() {
         return String::new();

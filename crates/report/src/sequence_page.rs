@@ -1,4 +1,4 @@
-//! The documentation of what a script may call, from the same table that registers it.
+//! The documentation of the functions of a script, from the same table that registers them.
 
 use crate::markdown::{Align, table};
 use mapper_sequence::functions;

@@ -1,11 +1,11 @@
-//! How much of the points' intervals is common to all of them, in a sentence.
+//! The share of the points' intervals that is common to all of them, in a sentence.
 
 use crate::display::Display;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, Verdict, half_width_95};
 use mapper_numerics::statistics::median;
 
-/// Says it for the slowest speed and for the rest, since offsets weigh by one over the square of the speed; `None` where no
+/// One sentence for the slowest speed and the others, since offsets count by one over the square of the speed; `None` if no
 /// point has an interval with a common part.
 pub fn shared_errors_text<'a>(
     points: impl Iterator<Item = &'a IdentifiedPoint>,
@@ -18,7 +18,7 @@ pub fn shared_errors_text<'a>(
         .collect();
     let speed = |point: &IdentifiedPoint| point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
     let slowest_rpm = usable.iter().map(|point| speed(point)).reduce(f64::min)?;
-    // A speed line is held within a few per cent.
+    // The speed along a line varies by a few per cent at most.
     let (slow, fast): (Vec<&IdentifiedPoint>, Vec<&IdentifiedPoint>) =
         usable.iter().copied().partition(|point| speed(point) <= 1.05 * slowest_rpm);
     let of = |points: &[&IdentifiedPoint]| {

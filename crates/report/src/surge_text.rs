@@ -1,4 +1,4 @@
-//! The surge-side ends that were sought, in words and as a table.
+//! Measured surge-side ends, in words and as a table.
 
 use crate::display::Display;
 use crate::markdown::{self, Align};
@@ -9,10 +9,10 @@ use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{SurgeFoundBy, SurgeMark, half_width_95};
 use mapper_record::score::ScoredMark;
 
-/// Columns of a terminal that nobody has made wider.
+/// Default width of a terminal, columns.
 const COLUMNS: usize = 80;
 
-/// Marks of a search for surge, what it did not find, and how often the compressor surged; Markdown.
+/// Marks of a search for surge, lines without a mark, and the number of surge events; Markdown.
 pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units: &DisplayUnits) -> String {
     let display = Display::new(units);
     let table = markdown::table(&surge_heads(marks, &display), Align::Right, surge_rows(marks, &display));
@@ -20,7 +20,7 @@ pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units
     format!("{table}{said}")
 }
 
-/// How often the compressor surged, and where surge was not found, a sentence each.
+/// The number of surge events, and the lines without a mark, a sentence each.
 pub fn surge_remarks(remarks: &[String], surges: usize) -> Vec<String> {
     std::iter::once(times(surges))
         .chain(remarks.iter().map(|remark| format!("Not found at {remark}.")))
@@ -45,7 +45,7 @@ pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
     heads
 }
 
-/// The same for a terminal of 80 columns. `truth`: whether to say how far the marks are from it.
+/// The same for a terminal of 80 columns. `truth`: whether to show the deviations of the marks from it.
 pub fn surge_columns_text(
     marks: &[ScoredMark],
     remarks: &[String],

@@ -7,22 +7,22 @@ use mapper_physics::params::Params;
 use serde_json::json;
 use std::fmt::Write;
 
-/// Temperature at which the housings' heat capacities are told, K.
+/// Temperature at which the housings' heat capacities are given, K.
 const CAPACITY_AT_K: f64 = 350.0;
 
-/// What is told of a machine.
+/// The reported data of a machine.
 #[derive(Debug, Clone, Copy)]
 pub struct ThermalExport<'a> {
     /// Name of the machine.
     pub machine: &'a str,
     /// Declared geometry, masses and conductances.
     pub params: &'a Params,
-    /// What a joint identification found; `None` tells what was declared instead.
+    /// Result of a joint identification; `None` reports the declared values instead.
     pub found: Option<&'a ThermalModel>,
 }
 
 impl ThermalExport<'_> {
-    /// One JSON object; keys carry units, what the recording did not give is marked `declared`.
+    /// One JSON object; keys carry units, and declared values that the recording did not give are marked `declared`.
     ///
     /// # Errors
     /// That of serde_json; numbers and texts never fail.
@@ -59,7 +59,7 @@ impl ThermalExport<'_> {
         Ok(bytes)
     }
 
-    /// The same as lines `name value unit # where from`.
+    /// The same as lines `name value unit # source`.
     pub fn text(&self) -> String {
         let (params, compressor) = (self.params, &self.params.compressor);
         let mut text = format!(

@@ -1,4 +1,4 @@
-//! What the points of a campaign share, for people.
+//! The parameters that the points of a campaign share, as text.
 
 use mapper_core::{FoundInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95};
 use std::fmt::Write;
@@ -40,7 +40,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
             100.0 * law.deviation_ratio
         );
     }
-    // Values that the recording allows at 95 %, by the profile: three and more of them are no answer.
+    // Values within the 95 % profile interval; three or more of them are not an answer.
     let allowed: Vec<f64> = thermal
         .alpha_area_profile
         .iter()
@@ -61,7 +61,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     for pair in &thermal.entangled {
         let _ = writeln!(
             text,
-            "  {} and {} can hardly be told apart (correlation {:+.2})",
+            "  {} and {} can hardly be fitted apart (correlation {:+.2})",
             pair.first, pair.second, pair.correlation
         );
     }
@@ -71,7 +71,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     text
 }
 
-/// What h before the wheel follows, and whether the recording tells, as one line without its end.
+/// The relation for h before the wheel, and whether the recording determines it, as one line without its end.
 pub(crate) fn inlet_text(inlet: &FoundInlet) -> String {
     let named = |convection: InletConvection| match convection {
         InletConvection::Shared => "that behind it".to_owned(),
@@ -113,15 +113,15 @@ mod tests {
         let text = inlet_text(&open);
         assert!(text.contains("inlet's 40.0 mm") && text.contains("0.207"), "{text}");
         assert!(text.contains("the intervals contain both"), "{text}");
-        let told = FoundInlet { convection: InletConvection::Own, origin: Origin::Fitted, ..open };
+        let fitted = FoundInlet { convection: InletConvection::Own, origin: Origin::Fitted, ..open };
         assert!(
-            inlet_text(&told)
+            inlet_text(&fitted)
                 .ends_with("the same law at the inlet's 40.0 mm, says the recording (probability 0.67)")
         );
         assert!(inlet_text(&FoundInlet { origin: Origin::Assumed, ..open }).ends_with("(declared)"));
     }
 
-    /// What the recording cannot tell reaches people and programs.
+    /// Parameters that the recording cannot determine are reported in text and in files.
     #[test]
     fn what_can_not_be_told_apart_is_said() {
         let unknown =
@@ -148,7 +148,7 @@ mod tests {
         assert!(!text.contains("before the wheel"), "nothing is said of what makes no difference: {text}");
         assert!(text.contains("the recording cannot tell"), "{text}");
         assert!(text.contains("flat: 0.0 to 0.2"), "{text}");
-        assert!(text.contains("alpha_A and direction factor can hardly be told apart"), "{text}");
+        assert!(text.contains("alpha_A and direction factor can hardly be fitted apart"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["alpha_area_profile"][3]["value"], 0.3);
         assert_eq!(json["entangled"][0]["correlation"], 0.97);

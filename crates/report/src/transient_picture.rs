@@ -1,9 +1,9 @@
-//! T2 of a log without steps beside its prediction, and the efficiency that stands behind it.
+//! T2 of a log without steps compared with its prediction, and the efficiency behind it.
 
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Polygon, Rule, RuleAt, Scatter, ScatterPoint, palette};
 use mapper_driven::{DrivenOutcome, Trace};
 
-/// Two panels over time: T2 as read and as predicted with its interval, apparent and isentropic efficiency.
+/// Two panels over time: measured T2 and its prediction with interval; apparent and isentropic efficiency.
 pub fn transient_figure(name: &str, outcome: &DrivenOutcome) -> Figure {
     let trace = &outcome.trace;
     let split = outcome.held_out.map(|held_out| held_out.from_s);

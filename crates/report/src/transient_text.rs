@@ -1,4 +1,4 @@
-//! What a log without steps has given, for a terminal and a report.
+//! Results of a log without steps, for a terminal and a report.
 
 use crate::table;
 use mapper_driven::{DrivenOutcome, Judged, Moves};
@@ -7,7 +7,7 @@ use std::fmt::Write;
 /// Bare thermocouples and resistance thermometers of test stands are thinner than this, mm.
 const THICKEST_PROBE_MM: f64 = 6.0;
 
-/// What is left of T2, what moves it, and the parameters.
+/// The T2 residual, the sensitivities of T2, and the parameters.
 pub fn transient_text(outcome: &DrivenOutcome) -> String {
     // Writing to a String cannot fail.
     let mut text = String::from(

@@ -1,9 +1,9 @@
-//! The turbine side that was recorded anyway: flow parameter, and efficiency with mechanical loss.
+//! Turbine results from a compressor test: flow parameter, and efficiency with mechanical loss.
 //!
 //! Limits: one row a step, at its end. Efficiency is the compressor's power over the turbine's isentropic power, total to
-//! static: it holds the bearing's loss, and what the gas loses to the turbine housing before the wheel counts as lost. A
-//! housing that still warms up makes it too low. Shaft acceleration is not corrected for: the speed has settled. The gas
-//! is taken for air. Expansion is from the total inlet pressure to the outlet pressure as tapped.
+//! static. It includes the bearing loss, and the heat that the gas loses to the turbine housing before the wheel counts as loss. A
+//! housing that still warms up lowers it. Shaft acceleration is not corrected for: the speed has settled. The gas
+//! is treated as air. Expansion is from the total inlet pressure to the outlet pressure as tapped.
 
 use mapper_core::{Channel, IdentifiedPoint, Recording, one_line};
 use mapper_physics::air::{self, Air};
@@ -17,7 +17,7 @@ const AVERAGE_S: f64 = 10.0;
 /// The turbine at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TurbinePoint {
-    /// Place of the step, from 0; files have its number, from 1.
+    /// Index of the step, from 0; files have its number, from 1.
     #[serde(serialize_with = "mapper_core::step_number::serialize")]
     pub step: usize,
     /// Speed over the root of the inlet temperature, rpm/K^0.5.
@@ -26,11 +26,11 @@ pub struct TurbinePoint {
     pub flow_parameter_kg_sqrt_k_s_kpa: f64,
     /// Expansion ratio P3/P4.
     pub expansion_ratio: f64,
-    /// Turbine times mechanical efficiency, fraction; `None` where the compressor's efficiency is not known.
+    /// Turbine times mechanical efficiency, fraction; `None` if the compressor's efficiency is unknown.
     pub efficiency: Option<f64>,
 }
 
-/// The turbine's side of every point whose channels are there and make sense.
+/// The turbine results of every point whose channels are present and plausible.
 pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint]) -> Vec<TurbinePoint> {
     points.iter().filter_map(|point| turbine_point(recording, point)).collect()
 }

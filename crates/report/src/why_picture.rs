@@ -1,9 +1,9 @@
-//! What is judged on one side of a machine, beside the model without and with the likeliest cause.
+//! The judged quantity of one side of a machine, compared with the model without and with the most probable cause.
 
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette};
 use mapper_driven::why::{Diagnosis, Word};
 
-/// Two panels over time: the reading with both predictions, and what each leaves of it.
+/// Two panels over time: the reading with both predictions, and both residuals.
 pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
     let course = &found.course;
     let channel = found.judged.first().copied().unwrap_or("");

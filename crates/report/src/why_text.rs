@@ -1,15 +1,15 @@
-//! Which cause explains what is judged on one side of a machine, for a terminal and a report.
+//! The cause of a deviation on one side of a machine, for a terminal and a report.
 
 use crate::table;
 use mapper_driven::why::{Beyond, Cause, Diagnosis, HeldOut, Which, Word};
 use std::fmt::Write;
 
-/// Causes that are shown beside those that are open.
+/// Maximum number of causes shown in addition to the undecided ones.
 const BESIDE: usize = 3;
 /// Causes less likely than this are not shown.
 const NOT_WORTH: f64 = 0.005;
 
-/// The word, the causes, what is left where no fit looked, what was asked and what cannot be.
+/// The verdict, the causes, the residual that no fit examined, the question and its limits.
 pub fn why_text(found: &Diagnosis) -> String {
     let first = found.judged.first().copied().unwrap_or("");
     // Writing to a String cannot fail.
@@ -47,14 +47,14 @@ pub fn why_text(found: &Diagnosis) -> String {
     }
     if !found.not_asked.is_empty() {
         text.push_str("\nNot asked, for this side cannot say:\n");
-        let mut said: Vec<(&str, Vec<&str>)> = Vec::new();
+        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
         for effect in &found.not_asked {
-            match said.iter_mut().find(|(reason, _)| *reason == effect.reason) {
+            match reasons.iter_mut().find(|(reason, _)| *reason == effect.reason) {
                 Some((_, effects)) => effects.push(&effect.effect),
-                None => said.push((&effect.reason, vec![&effect.effect])),
+                None => reasons.push((&effect.reason, vec![&effect.effect])),
             }
         }
-        for (reason, effects) in said {
+        for (reason, effects) in reasons {
             let _ = writeln!(text, "  {}: {reason}", effects.join(", "));
         }
     }
@@ -88,7 +88,7 @@ fn headline(found: &Diagnosis) -> String {
     }
 }
 
-/// As a sentence begins.
+/// With a capital first letter.
 fn begun(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
@@ -134,7 +134,7 @@ fn causes(text: &mut String, found: &Diagnosis) {
     }
 }
 
-/// No log makes anything certain.
+/// No log makes a cause certain.
 fn percent(probability: f64) -> String {
     match 100.0 * probability {
         p if p > 99.0 => "over 99 %".to_owned(),

@@ -1,10 +1,10 @@
-//! Sentences for a terminal.
+//! Wraps sentences for a terminal.
 
-/// Text whose lines have at most `columns` characters where words allow it; what goes on is indented. Ends with a line end.
+/// Wraps text to `columns` characters where words allow it; continuation lines are indented. Ends with a line end.
 pub fn wrapped(text: &str, columns: usize, indent: usize) -> String {
     let mut lines = String::new();
     for line in text.lines() {
-        // The words' own indentation stays.
+        // Keep the indentation of the text.
         let start = line.len() - line.trim_start().len();
         let mut length = start;
         lines.push_str(&line[..start]);

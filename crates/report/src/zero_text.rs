@@ -1,4 +1,4 @@
-//! The isothermal zero, for people.
+//! The isothermal zero, as text.
 
 use crate::display::Display;
 use mapper_core::{Channel, half_width_95};
@@ -8,7 +8,7 @@ use std::fmt::Write;
 /// Columns of [`zero_rows`].
 pub const ZERO_HEADS: [&str; 4] = ["sensor", "subtracted", "known within +/-", "unit"];
 
-/// What was done, or why nothing was; `None` where no zero was asked for.
+/// The result, or why there was no zero; `None` if none was requested.
 pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
     match zero {
         ZeroOutcome::NotAsked => None,
@@ -23,13 +23,13 @@ pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
     }
 }
 
-/// A row for each sensor with an offset; none where there is no zero.
+/// A row for each sensor with an offset; none if there is no zero.
 pub fn zero_rows(zero: &ZeroOutcome, display: &Display) -> Vec<[String; 4]> {
     let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
     let row = |(channel, offset): (&Channel, &f64)| {
         let shown = |value: f64| display.difference(*channel, value).unwrap_or(0.0);
-        let half = shown(half_width_95(left(zero, *channel)));
-        // As many decimals as tell the half width with two figures.
+        let half = shown(half_width_95(offset_sigma(zero, *channel)));
+        // As many decimals as the half width needs for two figures.
         let decimals = match half > 0.0 && half.is_finite() {
             true => (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize,
             false => 2,
@@ -40,11 +40,11 @@ pub fn zero_rows(zero: &ZeroOutcome, display: &Display) -> Vec<[String; 4]> {
     zero.offsets.iter().map(row).collect()
 }
 
-fn left(zero: &IsothermalZero, channel: Channel) -> f64 {
+fn offset_sigma(zero: &IsothermalZero, channel: Channel) -> f64 {
     zero.left_sigma.get(&channel).copied().unwrap_or(f64::NAN)
 }
 
-/// Offsets subtracted from the readings, with what is not known of them, or why there are none; empty where none was asked for.
+/// Offsets subtracted from the readings with their uncertainties, or why there are none; empty if none was requested.
 pub fn zero_text(zero: &ZeroOutcome) -> String {
     match zero {
         ZeroOutcome::NotAsked => String::new(),
@@ -57,7 +57,7 @@ pub fn zero_text(zero: &ZeroOutcome) -> String {
                 zero.start_s, zero.end_s
             );
             for (channel, offset) in &zero.offsets {
-                let half = half_width_95(left(zero, *channel));
+                let half = half_width_95(offset_sigma(zero, *channel));
                 // Writing to a String cannot fail.
                 let _ = writeln!(text, "  {channel:<6} {offset:+.2} +/- {half:.2} {}", channel.unit());
             }

@@ -1,7 +1,7 @@
-//! A rig and what is read beside it, as one backend: the rig alone is told anything, and nobody waits for a reader.
+//! A rig and its auxiliary instruments as one backend: only the rig receives commands, and no instrument delays the run.
 //!
-//! Each reading stands at the time at which it was taken, so a channel has the rate of its own source: at the times of the others its
-//! column is NaN. What comes later than the rig's samples of its time stands behind them, with its own time as that of its source.
+//! Each reading keeps the time at which it was taken, so a channel has the rate of its source: at other times its column is NaN.
+//! A reading that arrives after later rig samples is appended behind them, and keeps its own time as its source time.
 
 use crate::merge::append;
 use crate::reader_link::{Answer, ReaderLink};
@@ -11,18 +11,18 @@ use mapper_core::{
 };
 use std::time::{Duration, Instant};
 
-/// What is late stands so far behind what was handed out already, s.
+/// Time offset of a late reading behind the last sample that was passed on, s.
 const BEHIND_S: f64 = 1e-6;
-/// Readings of one reader that wait for the rig's samples of their time; one that sends more is lost.
+/// Maximum number of readings of one instrument that wait for rig samples; an instrument that sends more is lost.
 const MAX_WAITING: usize = 100_000;
 
-/// A source that is read beside the rig.
+/// An auxiliary instrument.
 pub struct Reader {
-    /// What people call it.
+    /// Display name.
     pub name: String,
-    /// What reads.
+    /// Its backend.
     pub backend: Box<dyn Backend>,
-    /// Channels that are taken from it.
+    /// Channels that it provides.
     pub channels: Vec<Channel>,
 }
 
@@ -30,11 +30,11 @@ struct Source {
     name: String,
     channels: Vec<Channel>,
     link: ReaderLink,
-    /// Run time minus its own, s.
+    /// Run time minus the instrument's own time, s.
     offset_s: f64,
-    /// Over run time: what the rig's samples have not come up to yet.
+    /// In run time: readings that are later than the rig's last sample.
     waiting: SampleBatch,
-    /// It is read no more.
+    /// The instrument is no longer read.
     lost: bool,
 }
 
@@ -44,12 +44,12 @@ pub struct RigWithInstruments {
     rig: Box<dyn Backend>,
     sources: Vec<Source>,
     next_sequence: u64,
-    /// Time of the last sample handed out, and of the rig's own last one, s.
+    /// Time of the last sample that was passed on, and of the rig's own last one, s.
     last_s: Option<f64>,
     rig_last_s: Option<f64>,
 }
 
-/// A reader failed.
+/// An auxiliary instrument failed.
 #[derive(Debug, thiserror::Error)]
 #[error("the reader `{name}`: {words}")]
 struct ReaderFailed {
@@ -58,11 +58,11 @@ struct ReaderFailed {
 }
 
 impl RigWithInstruments {
-    /// `rig` with `readers` beside it. In simulated time a reader is asked whenever the rig is; otherwise each is asked on a thread of
-    /// its own, and has `deadline` to connect.
+    /// `rig` with the auxiliary instruments `readers`. In simulated time each instrument is polled together with the rig. Otherwise each
+    /// has its own thread, and `deadline` to connect.
     ///
     /// # Errors
-    /// [`BackendError::Lost`] where no thread can be started.
+    /// [`BackendError::Lost`] if no thread can be started.
     pub fn new(
         rig: Box<dyn Backend>,
         readers: Vec<Reader>,
@@ -96,7 +96,7 @@ impl RigWithInstruments {
         })
     }
 
-    /// Puts the rig's samples and the readings up to them together.
+    /// Merges the rig's samples with the readings up to them.
     fn together(&mut self, rig: SampleBatch) -> SampleBatch {
         let last_s = rig.t_s.last().copied().or(self.rig_last_s);
         self.rig_last_s = last_s;
@@ -105,7 +105,7 @@ impl RigWithInstruments {
             let due = last_s.map_or(0, |last_s| source.waiting.t_s.partition_point(|t_s| *t_s <= last_s));
             let later = split(&mut source.waiting, due);
             let mut part = std::mem::replace(&mut source.waiting, later);
-            stand_behind(&mut part, self.last_s);
+            move_behind(&mut part, self.last_s);
             parts.push(part);
         }
         let mut t_s: Vec<f64> = parts.iter().flat_map(|part| part.t_s.iter().copied()).collect();
@@ -114,13 +114,13 @@ impl RigWithInstruments {
         t_s.dedup();
         let taken = |channel: &Channel| self.sources.iter().any(|source| source.channels.contains(channel));
         let mut whole = SampleBatch { first_sequence: self.next_sequence, ..SampleBatch::default() };
-        // Truth is the rig's alone.
+        // Only the rig provides truth.
         whole.truth = truth_at(&rig, &t_s);
         put(&mut whole, rig, &t_s, &|channel| !taken(&channel));
         for (source, part) in self.sources.iter().zip(parts) {
             put(&mut whole, part, &t_s, &|channel| source.channels.contains(&channel));
         }
-        // Whoever has nothing to say just now has a column all the same.
+        // A channel without a reading has a column of NaN.
         for channel in &self.description.channels {
             if whole.column(*channel).is_none() {
                 whole.columns.push(ChannelColumn { channel: *channel, values: vec![f64::NAN; t_s.len()] });
@@ -134,15 +134,15 @@ impl RigWithInstruments {
         whole
     }
 
-    /// Lets all readers go that have been had.
-    fn let_go(&mut self) {
-        // What a reader says to that is nobody's trouble: the rig is given back.
+    /// Disconnects all instruments that were connected.
+    fn disconnect(&mut self) {
+        // Errors while disconnecting are ignored: the rig is released anyway.
         self.sources.iter_mut().for_each(|source| drop(source.link.disarm()));
     }
 }
 
 impl Source {
-    /// Takes what its backend has said, over run time. What it says besides goes into `events`.
+    /// Takes an answer of the instrument, converted to run time. Its events go into `events` as notes.
     fn take(&mut self, answer: Answer, until_s: f64, events: &mut Vec<Event>) {
         let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
         match answer {
@@ -155,10 +155,10 @@ impl Source {
                 for event in std::mem::take(&mut batch.events) {
                     let t_s = (event.t_s + offset_s).clamp(0.0, until_s.max(0.0));
                     let message = format!("{}: {}", self.name, event.message);
-                    // What a reader says of itself is no trip of the rig.
+                    // An event of an instrument is not a trip of the rig.
                     events.push(Event { t_s, kind: EventKind::Note, message });
                 }
-                // What was taken before the run began.
+                // Readings from before the start of the run are dropped.
                 let early = batch.t_s.partition_point(|t_s| *t_s < 0.0);
                 let batch = split(&mut batch, early);
                 if is_whole(&batch, self.waiting.t_s.last().copied())
@@ -186,24 +186,24 @@ impl Backend for RigWithInstruments {
         self.description.clone()
     }
 
-    /// The readers first: a rig is not touched where one of them cannot be had.
+    /// Arms the instruments first: the rig stays untouched if one of them is unavailable.
     fn arm(&mut self) -> Result<(), BackendError> {
         let mut armed_at = Vec::with_capacity(self.sources.len());
         for index in 0..self.sources.len() {
             let Some(source) = self.sources.get_mut(index) else { break };
             if let Err(error) = source.link.arm() {
                 let source = Box::new(ReaderFailed { name: source.name.clone(), words: error.to_string() });
-                self.let_go();
+                self.disconnect();
                 return Err(BackendError::Lost { t_s: 0.0, source });
             }
             (source.waiting, source.lost) = (SampleBatch::default(), false);
             armed_at.push(Instant::now());
         }
         if let Err(error) = self.rig.arm() {
-            self.let_go();
+            self.disconnect();
             return Err(error);
         }
-        // Where time is simulated all begin at 0.
+        // In simulated time all sources start at 0.
         let now = Instant::now();
         for (source, at) in self.sources.iter_mut().zip(armed_at) {
             let since_s = now.duration_since(at).as_secs_f64();
@@ -246,12 +246,12 @@ impl Backend for RigWithInstruments {
 
     fn disarm(&mut self) -> Result<(), BackendError> {
         self.rig.disarm()?;
-        self.let_go();
+        self.disconnect();
         Ok(())
     }
 }
 
-/// Whether samples go on from `last_s` with columns of one length.
+/// Whether the samples continue after `last_s`, with columns of equal length.
 fn is_whole(batch: &SampleBatch, last_s: Option<f64>) -> bool {
     let samples = batch.t_s.len();
     let lengths = batch.columns.iter().map(|column| column.values.len());
@@ -263,7 +263,7 @@ fn is_whole(batch: &SampleBatch, last_s: Option<f64>) -> bool {
         && lengths.chain(from).all(|length| length == samples)
 }
 
-/// Cuts a batch after its first `at` samples; gives what comes later.
+/// Cuts a batch after its first `at` samples; returns the later ones.
 fn split(batch: &mut SampleBatch, at: usize) -> SampleBatch {
     fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
         values.split_off(at.min(values.len()))
@@ -290,8 +290,8 @@ fn split(batch: &mut SampleBatch, at: usize) -> SampleBatch {
     }
 }
 
-/// Moves what is late behind `last_s`; its own time stays that of its source.
-fn stand_behind(part: &mut SampleBatch, last_s: Option<f64>) {
+/// Moves late readings behind `last_s`; they keep their source time.
+fn move_behind(part: &mut SampleBatch, last_s: Option<f64>) {
     let Some(last_s) = last_s else { return };
     let late = part.t_s.partition_point(|t_s| *t_s <= last_s);
     if late == 0 {
@@ -308,13 +308,13 @@ fn stand_behind(part: &mut SampleBatch, last_s: Option<f64>) {
         if *t_s > behind_s {
             break;
         }
-        // One step of a millionth of a second, or of the last bit where that is more.
+        // A step of one microsecond, or of the last bit if that is larger.
         behind_s = (behind_s + BEHIND_S).max(behind_s.next_up());
         *t_s = behind_s;
     }
 }
 
-/// Values at other times, which hold their own; `absent` elsewhere.
+/// Distributes values over a superset of their times; `absent` elsewhere.
 fn spread<T: Copy>(values: &[T], own_s: &[f64], t_s: &[f64], absent: T) -> Vec<T> {
     if own_s.len() == t_s.len() {
         return values.to_vec();
@@ -334,7 +334,7 @@ fn truth_at(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
     rig.truth.iter().map(column).collect()
 }
 
-/// Puts the wanted channels of one source into the whole.
+/// Adds the wanted channels of one source to the merged batch.
 fn put(whole: &mut SampleBatch, part: SampleBatch, t_s: &[f64], wanted: &dyn Fn(Channel) -> bool) {
     for column in part.columns.into_iter().filter(|column| wanted(column.channel)) {
         let values = spread(&column.values, &part.t_s, t_s, f64::NAN);
@@ -346,7 +346,7 @@ fn put(whole: &mut SampleBatch, part: SampleBatch, t_s: &[f64], wanted: &dyn Fn(
     }
     for from in part.provenance.into_iter().filter(|from| wanted(from.channel)) {
         let mut source_t_s = spread(&from.source_t_s, &part.t_s, t_s, f64::NAN);
-        // Where it has no sample, none is old.
+        // A time without a reading of this source is not old.
         for (source_s, t_s) in source_t_s.iter_mut().zip(t_s).filter(|(source_s, _)| source_s.is_nan()) {
             *source_s = *t_s;
         }

@@ -1,12 +1,12 @@
-//! The guard over the stream of samples itself: what is lost, comes twice, out of order, or cannot be.
+//! The guard for the sample stream itself: lost, repeated, disordered or impossible samples.
 
 use crate::guard::{Guard, Told, Trip};
 use mapper_core::{GuardName, Reaction, SampleBatch};
 
-/// So far beyond the time that was asked for a sample may lie, s: clocks of a rig and of this program differ.
+/// How far a sample may lie beyond the requested time, s: the clocks of rig and program differ.
 const AHEAD_S: f64 = 1.0;
 
-/// Trips at the first batch that cannot be right.
+/// Trips at the first invalid batch.
 #[derive(Debug, Clone, Default)]
 pub struct BatchWatch {
     next_sequence: Option<u64>,
@@ -15,7 +15,7 @@ pub struct BatchWatch {
 }
 
 impl BatchWatch {
-    /// What is wrong with a batch, in words.
+    /// Describes the fault of a batch.
     fn fault(&mut self, batch: &SampleBatch, now_s: f64) -> Option<String> {
         let samples = batch.t_s.len();
         if let Some(column) = batch.columns.iter().find(|column| column.values.len() != samples) {
@@ -83,7 +83,7 @@ mod tests {
         ] {
             let mut guard = BatchWatch::default();
             assert_eq!(guard.look(&at(0, &[0.0, 0.1], 2), 0.1, &Told::default()), None);
-            // Nothing at all is for the guards of age.
+            // An empty batch is left to the age guards.
             assert_eq!(guard.look(&SampleBatch::default(), 0.2, &Told::default()), None);
             let trip = guard.look(&batch, 0.6, &Told::default()).unwrap();
             assert!(trip.reason.contains(words), "{}", trip.reason);

@@ -1,4 +1,4 @@
-//! A backend whose calls come back in their time, whatever the rig does: each is made on a thread of its own.
+//! A backend whose calls return within a deadline, whatever the rig does: a separate thread makes them.
 
 use crate::run::words_of;
 use mapper_core::{Backend, BackendError, RigDescription, SampleBatch, Setpoints};
@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// A call, as it crosses to the thread of the rig.
+/// A call that is sent to the rig's thread.
 enum Call {
     Arm,
     Set(Setpoints),
@@ -16,11 +16,11 @@ enum Call {
     Disarm,
 }
 
-/// Number of the call, and what came of it.
+/// Number of the call, and its result.
 type Answer = (u64, Result<Option<SampleBatch>, BackendError>);
 
-/// Another backend behind deadlines. A call that has not come back is not made again: what follows waits behind it, and fails by
-/// its own deadline until the rig answers. Answers that come too late are thrown away, and the samples in them are missed.
+/// Adds deadlines to another backend. A call that has timed out is not repeated: later calls wait behind it, and time out
+/// themselves until the rig answers. Late answers are discarded, and the samples in them count as missed.
 pub struct Deadlined {
     description: RigDescription,
     calls: Sender<(u64, Call)>,
@@ -29,30 +29,30 @@ pub struct Deadlined {
     deadlines: Deadlines,
 }
 
-/// How long calls may take.
+/// Time limits of the calls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Deadlines {
-    /// To connect and arm, and to let go again.
+    /// To connect and arm, and to disconnect.
     pub arming: Duration,
     /// Every other call.
     pub call: Duration,
 }
 
-/// The rig's thread is gone.
+/// The rig's thread has ended.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct Gone(String);
 
 impl Deadlined {
-    /// `backend` with so much time for its calls.
+    /// `backend` with these deadlines for its calls.
     ///
     /// # Errors
-    /// [`BackendError::Lost`] where no thread can be started.
+    /// [`BackendError::Lost`] if no thread can be started.
     pub fn new(mut backend: Box<dyn Backend>, deadlines: Deadlines) -> Result<Self, BackendError> {
         let description = backend.describe();
         let (calls, to_do) = channel::<(u64, Call)>();
-        let (tell, answers) = channel::<Answer>();
-        // Detached on purpose: a call that hangs must not keep the program from ending.
+        let (reply, answers) = channel::<Answer>();
+        // Detached on purpose: a hanging call must not keep the program from ending.
         std::thread::Builder::new()
             .name("rig".to_owned())
             .spawn(move || {
@@ -69,7 +69,7 @@ impl Deadlined {
                         let source = Box::new(Gone(format!("the backend panicked: {}", words_of(&*panic))));
                         Err(BackendError::Lost { t_s: 0.0, source })
                     });
-                    if tell.send((number, answer)).is_err() {
+                    if reply.send((number, answer)).is_err() {
                         break;
                     }
                 }
@@ -91,7 +91,7 @@ impl Deadlined {
         self.calls.send((self.number, call)).map_err(|_| gone())?;
         loop {
             match self.answers.recv_timeout(limit) {
-                // An answer to a call that was given up.
+                // A late answer to a call that has timed out.
                 Ok((number, _)) if number < self.number => {}
                 Ok((_, answer)) => return answer,
                 Err(RecvTimeoutError::Timeout) => {
@@ -139,7 +139,7 @@ mod tests {
     use mapper_core::{Channel, SafeTrajectory};
     use std::sync::Mutex;
 
-    /// Answers nothing to a poll before it is told to go on.
+    /// Does not answer a poll until it is released.
     struct Hangs(Mutex<Receiver<()>>);
 
     impl Backend for Hangs {
@@ -179,18 +179,18 @@ mod tests {
     #[test]
     fn a_rig_that_hangs_is_given_up_and_late_answers_are_not_mixed_up() {
         let (go, going) = channel();
-        // A second, for a machine that is busy with other tests.
+        // One second allows for a machine that is busy with other tests.
         let [arming, call] = [Duration::from_secs(10), Duration::from_secs(1)];
         let mut rig = Deadlined::new(Box::new(Hangs(Mutex::new(going))), Deadlines { arming, call }).unwrap();
         rig.arm().unwrap();
         go.send(()).unwrap();
         assert_eq!(rig.poll(1.0).unwrap().t_s, [1.0]);
         assert!(matches!(rig.poll(2.0), Err(BackendError::Deadline { call: "poll", .. })));
-        // It hangs still: nothing comes through, in bounded time.
+        // It still hangs: every call fails, in bounded time.
         assert!(matches!(rig.make_safe(), Err(BackendError::Deadline { call: "make_safe", .. })));
         go.send(()).unwrap();
         go.send(()).unwrap();
-        // Whenever it is back, an answer is that to the call that was made.
+        // Once it responds again, an answer belongs to the call that was made.
         let answer = (0..1000).find_map(|_| rig.poll(3.0).ok().inspect(|_| go.send(()).unwrap_or(())));
         assert_eq!(answer.unwrap().t_s, [3.0]);
     }

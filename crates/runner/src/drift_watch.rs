@@ -1,4 +1,4 @@
-//! Watches the repeats of a run while it goes on: a difference beyond what is declared is looked at again, then acted upon.
+//! Compares repeated jumps during a run: a difference beyond the declared uncertainty is confirmed first, then acted upon.
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{
@@ -6,40 +6,40 @@ use mapper_core::{
 };
 use std::collections::{BTreeMap, VecDeque};
 
-/// Readings of this long at the end of a step are compared, s.
+/// Time at the end of a step whose readings are compared, s.
 const END_S: f64 = 20.0;
-/// A difference counts beyond so many declared standard deviations: 95 %.
+/// Threshold of a difference in declared standard deviations: 95 %.
 const WIDTH: f64 = 1.96;
-/// What is compared. T2 is taken over T1 and P2 over P1, whose own wander is not drift.
+/// Compared channels. T2 is taken relative to T1 and P2 relative to P1, so that changes of the inlet are not drift.
 const WATCHED: [Channel; 4] = [Channel::T2, Channel::P2, Channel::CompressorFlow, Channel::Tc];
 
-/// Steps of another source, with the reference jump made again where a repeat differs from its first visit.
+/// The steps of another source; a reference jump is repeated if it differs from its first visit.
 ///
-/// Finishes the step, makes the jump again, and only where that differs too does what [`OnDrift`] says.
+/// The current step is finished and the jump is repeated. If the repeat differs too, the watch applies [`OnDrift`].
 pub struct DriftWatch<'a> {
     inner: &'a mut dyn StepSource,
     on_drift: OnDrift,
     declared: BTreeMap<Channel, DeclaredUncertainty>,
     /// Readings at the end of the first visit of each jump.
     first: Vec<((OperatingPoint, OperatingPoint), Vec<f64>)>,
-    /// Last steps handed out: a jump is made again by both of its steps.
+    /// Previous step: a jump is repeated with both of its steps.
     before: Option<PlanStep>,
     current: Option<PlanStep>,
     readings: VecDeque<(f64, Vec<f64>)>,
-    /// Steps to be put in.
+    /// Steps to be inserted.
     inserted: VecDeque<PlanStep>,
-    /// Whether the jump that is running confirms a difference.
+    /// Whether the current jump is a confirmation.
     confirming: bool,
     handed_out: usize,
-    /// Time that inserted steps have added, s.
+    /// Total duration of the inserted steps, s.
     later_s: f64,
     notes: Vec<String>,
-    /// Why no further step is handed out.
+    /// Why the run ends before its last step.
     ended: Option<String>,
 }
 
 impl<'a> DriftWatch<'a> {
-    /// Watches the steps of `inner`; channels that are not in `declared` are not compared.
+    /// Watches the steps of `inner`; channels that are missing in `declared` are not compared.
     pub fn new(
         inner: &'a mut dyn StepSource,
         on_drift: OnDrift,
@@ -62,12 +62,12 @@ impl<'a> DriftWatch<'a> {
         }
     }
 
-    /// Why the run was ended before its last step, in words; `None` where drift did not end it.
+    /// Why drift ended the run before its last step; `None` if it did not.
     pub fn ended_by_drift(&self) -> Option<&str> {
         self.ended.as_deref()
     }
 
-    /// Means at the end of the step, [`WATCHED`] in order; NaN for what is not delivered.
+    /// Means at the end of the step, in the order of [`WATCHED`]; NaN for missing channels.
     fn end_means(&self) -> Vec<f64> {
         let count = self.readings.len() as f64;
         (0..WATCHED.len())
@@ -75,13 +75,13 @@ impl<'a> DriftWatch<'a> {
             .collect()
     }
 
-    /// What differs by more than is declared, in words.
+    /// Describes the differences beyond the declared uncertainty.
     fn differences(&self, first: &[f64], now: &[f64]) -> Vec<String> {
         let mut differences = Vec::new();
         for ((channel, first), now) in WATCHED.iter().zip(first).zip(now) {
             let Some(declared) = self.declared.get(channel) else { continue };
             let fixed = declared.offset_sigma.hypot(declared.gain_sigma_ratio * first);
-            // Noise of samples that follow each other is not independent: as if there were one in each two seconds.
+            // Noise of consecutive samples is correlated: they count as one sample in two seconds.
             let noise = declared.noise_sigma * (2.0 * 2.0 / END_S).sqrt();
             let limit = WIDTH * fixed.hypot(noise);
             let change = now - first;
@@ -129,7 +129,7 @@ impl StepSource for DriftWatch<'_> {
         };
         let next = next.map(|step| PlanStep {
             index: self.handed_out,
-            // Where the rig really comes from: a step after an inserted one is reached from that.
+            // The real origin: a step that follows an inserted one starts from it.
             from: self.current.as_ref().map_or(step.from, |current| Some(current.to)),
             start_s: step.start_s + self.later_s,
             ..step
@@ -179,7 +179,7 @@ impl StepSource for DriftWatch<'_> {
         let differences = self.differences(first, &now).join(", ");
         if !differences.is_empty() && self.confirming {
             self.act(&differences);
-            // What was told once is the new reference for all jumps: it is not told again at every repeat.
+            // The reported state is the new reference for all jumps, so that it is not reported at every repeat.
             self.first.clear();
             self.first.push((jump, now));
         } else if !differences.is_empty()

@@ -1,13 +1,13 @@
-//! The first seconds of a run, looked at before anything is driven far: every channel alive, in range, and in time.
+//! Checks the first seconds of a run, before the machine is driven far: every channel alive, in range, and on time.
 
 use crate::guard::{Guard, Told, Trip};
 use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable, with_unit};
 
-/// How long is looked, s.
+/// Duration of the check, s.
 const LOOK_S: f64 = 5.0;
-/// A source's clock may be off by so much, s.
+/// Allowed offset of a source's clock, s.
 const CLOCK_S: f64 = 1.0;
-/// Without these nothing can be identified: they end the run, others are noted.
+/// Channels that identification requires: a fault in one ends the run, faults in others are noted.
 pub(crate) const NEEDED: [Channel; 7] = [
     Channel::ShaftSpeed,
     Channel::CompressorFlow,
@@ -18,7 +18,7 @@ pub(crate) const NEEDED: [Channel; 7] = [
     Channel::Tc,
 ];
 
-/// Trips once, after the first seconds, where a channel is not as a sensor's would be.
+/// Trips once, after the first seconds, if a channel does not behave like its sensor.
 #[derive(Debug, Clone)]
 pub struct FirstLook {
     channels: Vec<Channel>,
@@ -29,13 +29,13 @@ pub struct FirstLook {
 }
 
 impl FirstLook {
-    /// A look at these channels.
+    /// Creates a check of these channels.
     pub fn new(channels: Vec<Channel>) -> Self {
         let seen = vec![None; channels.len()];
         FirstLook { channels, seen, clock_off_s: 0.0, over: false }
     }
 
-    /// What is wrong, and whether it is with a channel that is needed.
+    /// Describes the faults, and whether they affect a required channel.
     fn faults(&self) -> Vec<(bool, String)> {
         let mut faults: Vec<(bool, String)> = Vec::new();
         for (channel, seen) in self.channels.iter().zip(&self.seen) {
@@ -63,7 +63,7 @@ impl FirstLook {
     }
 }
 
-/// As many digits as tell a reading from its range.
+/// Formats a value with enough digits to distinguish it from the bounds of its range.
 fn digits(value: f64) -> String {
     match value.abs() {
         size if size >= 1e7 => format!("{value:.2e}"),

@@ -1,6 +1,6 @@
-//! Executes the steps of a plan, or of whatever yields steps, on any backend: setpoints, samples, guards, safe state.
+//! Executes the steps of a plan or of another step source on any backend: setpoints, samples, guards, safe state.
 //!
-//! The runner knows nothing of identification or files: what it sees goes to a [`RunObserver`].
+//! The runner is independent of identification and files: it passes its data to a [`RunObserver`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,8 +1,8 @@
-//! Batches of one second, put together as one.
+//! Merges the batches of one second.
 
 use mapper_core::{Provenance, Quality, SampleBatch};
 
-/// Appends the samples of `more`. A channel that one of both lacks is NaN there.
+/// Appends the samples of `more`. A channel that is missing in one of them is NaN there.
 pub(crate) fn append(whole: &mut SampleBatch, more: SampleBatch) {
     if whole.t_s.is_empty() {
         let events = std::mem::take(&mut whole.events);
@@ -55,7 +55,7 @@ pub(crate) fn append(whole: &mut SampleBatch, more: SampleBatch) {
     whole.t_s.extend(more.t_s);
     whole.events.extend(more.events);
     for from in &mut whole.provenance {
-        // What says nothing of its source was taken when it arrived.
+        // A sample without source time was taken when it arrived.
         let known = from.source_t_s.len().min(after);
         from.source_t_s.extend(whole.t_s.get(known..).unwrap_or_default());
         from.quality.resize(after, Quality::Good);

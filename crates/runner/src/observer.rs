@@ -1,12 +1,12 @@
-//! Who looks on while a plan is run: recorders, progress bars.
+//! Observers of a run: recorders, progress bars.
 
 use mapper_core::{Event, RigDescription, SampleBatch, StepMarker};
 
-/// What an observer could not do; the run ends in its safe state.
+/// Failure of an observer; the run ends in its safe state.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct ObserverError {
-    /// The observer's own error: what went wrong, and what to do.
+    /// The observer's own error: the failure and its remedy.
     source: Box<dyn std::error::Error + Send + Sync>,
 }
 
@@ -43,7 +43,7 @@ pub trait RunObserver {
         Ok(())
     }
 
-    /// The runner has something to tell: a guard that tripped, a stop, the safe state.
+    /// A message of the runner: a guard that tripped, a stop, the safe state.
     ///
     /// # Errors
     /// [`ObserverError`].
@@ -51,7 +51,7 @@ pub trait RunObserver {
         Ok(())
     }
 
-    /// A guard has cut a step short: it does not count.
+    /// A guard has cut the step short: it does not count.
     ///
     /// # Errors
     /// [`ObserverError`].
@@ -67,7 +67,7 @@ pub trait RunObserver {
         Ok(())
     }
 
-    /// The step that has just ended is whole: neither a stop nor a fault ended it.
+    /// The step that has just ended is complete: neither a stop nor a fault ended it.
     ///
     /// # Errors
     /// [`ObserverError`].
@@ -76,7 +76,7 @@ pub trait RunObserver {
     }
 }
 
-/// Observers side by side are an observer; the first error ends the round.
+/// Combines several observers; the first error ends the round.
 impl RunObserver for Vec<&mut dyn RunObserver> {
     fn on_start(&mut self, rig: &RigDescription) -> Result<(), ObserverError> {
         self.iter_mut().try_for_each(|observer| observer.on_start(rig))

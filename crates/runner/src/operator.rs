@@ -1,20 +1,20 @@
-//! What the operator asks for while a run goes on.
+//! The operator's requests during a run.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Sentences that wait to be recorded; whoever asks more often than the run looks is not heard.
+/// Maximum number of requests that wait to be recorded; further ones are dropped.
 const WAITING_MAX: usize = 64;
 
-/// Asked from any thread, looked at by the run after every batch of samples.
+/// Set from any thread; the run checks it after every batch of samples.
 #[derive(Debug, Default)]
 pub struct Operator {
     holds: AtomicBool,
-    said: Mutex<Vec<String>>,
+    requests: Mutex<Vec<String>>,
 }
 
 impl Operator {
-    /// Stays at the step that is under way until [`Operator::go_on`].
+    /// Holds the current step until [`Operator::go_on`].
     pub fn hold(&self) {
         self.holds.store(true, Ordering::SeqCst);
     }
@@ -29,17 +29,17 @@ impl Operator {
         self.holds.load(Ordering::SeqCst)
     }
 
-    /// Something for the recording: what was asked for, and by whom.
+    /// Adds a sentence to the recording: the request and who made it.
     pub fn say(&self, sentence: String) {
-        if let Ok(mut said) = self.said.lock()
-            && said.len() < WAITING_MAX
+        if let Ok(mut requests) = self.requests.lock()
+            && requests.len() < WAITING_MAX
         {
-            said.push(sentence);
+            requests.push(sentence);
         }
     }
 
-    /// What was said since the last call.
+    /// The requests since the last call.
     pub(crate) fn take_said(&self) -> Vec<String> {
-        self.said.lock().map(|mut said| std::mem::take(&mut *said)).unwrap_or_default()
+        self.requests.lock().map(|mut requests| std::mem::take(&mut *requests)).unwrap_or_default()
     }
 }

@@ -1,25 +1,25 @@
-//! What stands around a run besides its guards: the way into the safe state, the band of the speed, the pace of looking.
+//! Protection of a run in addition to its guards: safe shutdown, speed band, polling rate.
 
 use crate::operator::Operator;
 use mapper_core::{SafeTrajectory, SetpointRanges, SpeedBand};
 use std::sync::atomic::AtomicBool;
 
-/// See the module. [`Protection::default`] has none of it.
+/// See the module. [`Protection::default`] applies no protection.
 #[derive(Debug, Clone, Copy)]
 pub struct Protection<'a> {
-    /// The way into the safe state.
+    /// The trajectory into the safe state.
     pub safe: SafeTrajectory,
-    /// P3 at which the air is cut, Pa: the lowest that the rig may be told.
+    /// P3 at which the air is cut, Pa: the lowest setpoint that the rig accepts.
     pub p3_min_pa: f64,
-    /// What the rig accepts, the way into the safe state included; `None`: everything.
+    /// Setpoint ranges that the rig accepts, also during safe shutdown; `None`: unlimited.
     pub accepts: Option<SetpointRanges>,
-    /// How far a step may miss its speed; `None`: it is not looked at.
+    /// Allowed deviation of a step's speed; `None`: not checked.
     pub speed: Option<SpeedBand>,
     /// Set from outside to stop at the end of the step.
     pub stop_after_step: &'a AtomicBool,
-    /// Asks the rig for each sample by itself. A simulated rig is asked so only while a guard is alert.
+    /// Polls the rig sample by sample. A simulated rig is otherwise polled so only while a guard is alert.
     pub each_sample: bool,
-    /// What the operator asks for besides; `None`: nobody can.
+    /// Requests of the operator; `None`: no operator.
     pub operator: Option<&'a Operator>,
 }
 

@@ -1,10 +1,10 @@
-//! The speed at the end of a step, beside what the step asked for.
+//! The speed at the end of a step, compared with its target.
 
 use crate::guard::Trip;
 use mapper_core::{Channel, GuardName, PlanStep, SampleBatch, SpeedBand, StepKind};
 use std::collections::VecDeque;
 
-/// The speed is judged over so long, s, in steps that last at least three times that.
+/// Duration of the speed check, s; it applies to steps of at least three times this duration.
 const REACHED_S: f64 = 10.0;
 
 /// Times and speeds of the last seconds.
@@ -18,7 +18,7 @@ impl Reached {
         self.recent.clear();
     }
 
-    /// Keeps what is read up to `now_s`.
+    /// Stores the readings up to `now_s`.
     pub(crate) fn keep(&mut self, batch: &SampleBatch, now_s: f64) {
         let Some(speeds) = batch.column(Channel::ShaftSpeed) else { return };
         let rows = batch.t_s.iter().copied().zip(speeds.iter().copied());
@@ -28,7 +28,7 @@ impl Reached {
         }
     }
 
-    /// Trips where the step that ends at `now_s` has missed its speed by more than the band.
+    /// Trips if the step that ends at `now_s` has missed its speed by more than the band.
     pub(crate) fn missed(&self, band: SpeedBand, step: &PlanStep, now_s: f64) -> Option<Trip> {
         if step.dwell_s < 3.0 * REACHED_S || step.kind == StepKind::Approach || self.recent.is_empty() {
             return None;

@@ -1,4 +1,4 @@
-//! A reader's backend: asked in the place where it is used, or on a thread of its own, so that nobody waits for it.
+//! The backend of an auxiliary instrument: called directly, or on its own thread so that the run never waits for it.
 
 use crate::run::words_of;
 use mapper_core::{Backend, BackendError, SampleBatch};
@@ -6,10 +6,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-/// What came of a question.
+/// Result of a request.
 pub(crate) type Answer = Result<SampleBatch, BackendError>;
 
-/// Why a reader is gone.
+/// Why an instrument was lost.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct Gone(String);
@@ -22,13 +22,13 @@ pub(crate) enum Ask {
 
 /// See the module.
 pub(crate) enum ReaderLink {
-    /// In simulated time, where all wait for each other.
+    /// In simulated time, where all sources wait for each other.
     Here { backend: Box<dyn Backend>, answer: Option<Answer> },
     /// In real time.
     Beside {
         asks: Sender<Ask>,
         answers: Receiver<Answer>,
-        /// A question is under way.
+        /// A request is pending.
         asked: bool,
         armed: bool,
         deadline: Duration,
@@ -39,7 +39,7 @@ fn gone(words: String) -> BackendError {
     BackendError::Lost { t_s: 0.0, source: Box::new(Gone(words)) }
 }
 
-/// A panic of a reader is its own loss, not the run's.
+/// Contains a panic of an instrument: the run continues without the instrument.
 fn contained(call: impl FnOnce() -> Answer) -> Answer {
     catch_unwind(AssertUnwindSafe(call))
         .unwrap_or_else(|panic| Err(gone(format!("it panicked: {}", words_of(&*panic)))))
@@ -63,13 +63,13 @@ impl ReaderLink {
             return Ok(ReaderLink::Here { backend, answer: None });
         }
         let (asks, to_do) = channel::<Ask>();
-        let (tell, answers) = channel::<Answer>();
-        // Detached: one that hangs must not keep the program from ending.
+        let (reply, answers) = channel::<Answer>();
+        // Detached: a hanging instrument must not keep the program from ending.
         std::thread::Builder::new()
             .name("reader".to_owned())
             .spawn(move || {
                 for ask in to_do {
-                    if tell.send(answered(backend.as_mut(), &ask)).is_err() {
+                    if reply.send(answered(backend.as_mut(), &ask)).is_err() {
                         break;
                     }
                 }
@@ -92,7 +92,7 @@ impl ReaderLink {
         }
     }
 
-    /// Asks for what there is up to `until_s` of its own time; not again before it has answered.
+    /// Requests the samples up to `until_s` of the instrument's own time, unless a request is pending.
     pub(crate) fn ask(&mut self, until_s: f64) {
         match self {
             ReaderLink::Here { backend, answer } => {
@@ -104,7 +104,7 @@ impl ReaderLink {
         }
     }
 
-    /// What has come, without waiting.
+    /// The answer, if it has arrived.
     pub(crate) fn answer(&mut self) -> Option<Answer> {
         match self {
             ReaderLink::Here { answer, .. } => answer.take(),
@@ -116,14 +116,14 @@ impl ReaderLink {
         }
     }
 
-    /// Lets go.
+    /// Disconnects.
     pub(crate) fn disarm(&mut self) -> Result<(), BackendError> {
         match self {
             ReaderLink::Here { backend, .. } => answered(backend.as_mut(), &Ask::Disarm).map(drop),
             ReaderLink::Beside { armed, .. } if !*armed => Ok(()),
             ReaderLink::Beside { armed, asked, answers, deadline, .. } => {
                 *armed = false;
-                // The answer to the last question comes first.
+                // The answer to the previous request arrives first.
                 if std::mem::take(asked) {
                     let _ = answers.recv_timeout(*deadline);
                 }

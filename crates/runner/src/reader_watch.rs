@@ -1,20 +1,20 @@
-//! The guard over channels that are read beside the rig and that no other guard looks at: alive, or said.
+//! The guard for channels of auxiliary instruments that no other guard checks: it reports a channel without readings.
 
 use crate::guard::{Guard, Told, Trip};
 use mapper_core::{Channel, GuardName, Reaction, SampleBatch};
 
-/// A channel of a reader.
+/// A channel of an auxiliary instrument.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadChannel {
-    /// What people call the reader.
+    /// Display name of the instrument.
     pub reader: String,
     /// The channel.
     pub channel: Channel,
-    /// Without a reading for so long it is said, s.
+    /// Time without a reading after which the channel is reported, s.
     pub age_s: f64,
 }
 
-/// See the module. A channel without which nothing can be identified ends the run, any other is noted.
+/// See the module. Loss of a channel that identification requires ends the run; loss of any other channel is noted.
 #[derive(Debug, Clone)]
 pub struct ReaderWatch {
     channels: Vec<(ReadChannel, Option<f64>, bool)>,
@@ -22,7 +22,7 @@ pub struct ReaderWatch {
 }
 
 impl ReaderWatch {
-    /// A watch over these.
+    /// Creates a guard for these channels.
     pub fn new(channels: Vec<ReadChannel>) -> Self {
         let channels = channels.into_iter().map(|channel| (channel, None, false)).collect();
         ReaderWatch { channels, first_look_s: None }
@@ -33,16 +33,16 @@ impl Guard for ReaderWatch {
     fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Told) -> Option<Trip> {
         let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         let mut trip: Option<Trip> = None;
-        for (of, last_s, said) in &mut self.channels {
+        for (of, last_s, reported) in &mut self.channels {
             let readings = batch.column(of.channel).unwrap_or_default().iter().zip(&batch.t_s);
             if let Some((_, t_s)) = readings.rev().find(|(value, _)| value.is_finite()) {
-                (*last_s, *said) = (Some(*t_s), false);
+                (*last_s, *reported) = (Some(*t_s), false);
             }
             let since_s = last_s.unwrap_or(first_s);
-            if now_s - since_s <= of.age_s || *said {
+            if now_s - since_s <= of.age_s || *reported {
                 continue;
             }
-            *said = true;
+            *reported = true;
             let needed = crate::first_look::NEEDED.contains(&of.channel);
             let reaction = if needed { Reaction::Safe } else { Reaction::Note };
             let (reader, channel) = (&of.reader, of.channel);
@@ -82,7 +82,7 @@ mod tests {
         assert_eq!(trip.reaction, Reaction::Note);
         assert!(trip.reason.contains("`bench` has given no T_amb since 0.0 s"), "{}", trip.reason);
         assert_eq!(look(5.0, 0.1, nan), None);
-        // Back, and gone again; and the flow with it, which is graver.
+        // The channel returns and fails again, together with the flow, which is more severe.
         assert_eq!(look(6.0, nan, 298.0), None);
         let trip = look(9.5, nan, nan).unwrap();
         assert_eq!(trip.reaction, Reaction::Safe);

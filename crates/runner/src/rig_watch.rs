@@ -1,16 +1,16 @@
-//! The guard over the rig itself: it says that it has tripped, or its shaft no longer turns as it should.
+//! The guard for the rig itself: a reported trip, or a shaft that is no longer driven.
 
 use crate::guard::{Guard, Told, Trip};
 use mapper_core::{Channel, EventKind, GuardName, Reaction, SampleBatch};
 
-/// So long after a step began the shaft has come up, s: cold machines start in the warm-up.
+/// Time after the start of a step by which the shaft has come up to speed, s: cold machines start in the warm-up.
 const UP_S: f64 = 30.0;
-/// A shaft that turns slower than this share of what is asked for is not driven.
+/// A shaft below this share of its target speed is not driven.
 const COLLAPSED_RATIO: f64 = 0.5;
-/// For so long, s.
+/// Duration of the low speed before the guard trips, s.
 const COLLAPSED_S: f64 = 5.0;
 
-/// Trips where the rig has tripped by itself.
+/// Trips if the rig reports its own trip, or if the shaft speed collapses.
 #[derive(Debug, Clone, Default)]
 pub struct RigWatch {
     slow_since_s: Option<f64>,
@@ -29,11 +29,11 @@ impl RigWatch {
 }
 
 impl Guard for RigWatch {
-    fn look(&mut self, batch: &SampleBatch, _: f64, told: &Told) -> Option<Trip> {
+    fn look(&mut self, batch: &SampleBatch, _: f64, state: &Told) -> Option<Trip> {
         if let Some(event) = batch.events.iter().find(|event| event.kind == EventKind::RigTripped) {
             return self.trip(event.t_s, event.message.clone());
         }
-        let (Some(aim), Some(since_s)) = (told.aim.filter(|_| told.running), told.step_since_s) else {
+        let (Some(aim), Some(since_s)) = (state.aim.filter(|_| state.running), state.step_since_s) else {
             self.slow_since_s = None;
             return None;
         };

@@ -16,21 +16,21 @@ use mapper_core::{
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How often observers and steps see samples, s of run time.
+/// Interval at which observers and steps receive samples, s of run time.
 const POLL_INTERVAL_S: f64 = 1.0;
-/// A change of P3 by this share, or of the valve by twice as much, is a jump: sensors have to follow.
+/// Relative change of P3 that counts as a jump (twice this for the valve): sensors have to follow it.
 const JUMP_RATIO: f64 = 0.01;
 /// Longest time that a guard may hold the setpoints, s.
 const HOLD_MAX_S: f64 = 300.0;
-/// Longest time that the operator may hold a step, s: an operator who has gone home does not hold a rig for ever.
+/// Longest time that the operator may hold a step, s. It limits a hold that an operator forgets.
 const OPERATOR_HOLD_MAX_S: f64 = 4.0 * 3600.0;
-/// Pieces in which a step is approached again, and the time of each, s.
+/// Number of stages when a step is approached again, and the duration of each, s.
 const SMALLER_STEPS: u32 = 4;
 const SMALLER_STEP_S: f64 = 10.0;
-/// Steps in a row that guards may leave out; one more ends the run.
+/// Maximum number of consecutive steps that guards may skip; one more ends the run.
 const SKIPPED_MAX: u32 = 3;
 
-/// How a run ended without a fault of the program.
+/// How a run ended, if the program did not fail.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RunEnd {
     /// Every step was run.
@@ -44,30 +44,30 @@ pub enum RunEnd {
     Tripped(Trip),
 }
 
-/// Steps, a rig and everything around them.
+/// Step source, rig and everything else that a run needs.
 pub struct Runner<'a> {
-    /// What to do: [`PlanSteps`](crate::PlanSteps) for a plan.
+    /// The steps to execute: [`PlanSteps`](crate::PlanSteps) for a plan.
     pub steps: &'a mut dyn StepSource,
-    /// Where to do it.
+    /// The rig.
     pub backend: &'a mut dyn Backend,
     /// Paces the polls; see [`mapper_core::UnpacedClock`].
     pub clock: &'a mut dyn Clock,
-    /// What may end a step or the run.
+    /// Guards that may end a step or the run.
     pub guards: Vec<Box<dyn Guard>>,
-    /// Who looks on.
+    /// Receives samples and events.
     pub observer: &'a mut dyn RunObserver,
-    /// Holds the speed of each step; `None`: P3 stays as the steps have it.
+    /// Controls the speed of each step; `None`: P3 stays as planned.
     pub speed: Option<SpeedControl<'a>>,
     /// Set from outside to stop at the next poll.
     pub stop: &'a AtomicBool,
 }
 
-/// Why the way forward ended.
+/// Why the run stopped before its last step.
 pub(crate) enum Halt {
     Interrupted,
-    /// With what was read up to then and nobody has seen yet: the rig comes first.
+    /// The trip, with the samples that no observer has received yet: the rig is made safe first.
     Tripped(Trip, Option<Box<SampleBatch>>),
-    /// A guard that ends the step alone.
+    /// A guard ends this step only.
     Cut(Trip),
     Failed(RunError),
 }
@@ -83,20 +83,20 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) with: Runner<'a>,
     pub(crate) protection: &'p Protection<'p>,
     pub(crate) now_s: f64,
-    /// The last setpoints.
+    /// The most recent setpoints.
     pub(crate) sent: Option<Setpoints>,
     pub(crate) told: Told,
     sample_s: f64,
     reached: Reached,
     skipped: u32,
-    /// The step that a guard has cut short, until its end is told.
+    /// The step that a guard has cut short, until its end is reported.
     pub(crate) open: Option<StepMarker>,
-    /// Whether it was told that the run ends with the step.
+    /// Whether the operator was informed that the run ends with this step.
     pub(crate) stop_told: bool,
 }
 
 impl Runner<'_> {
-    /// Runs all steps from arming to disarming, with nothing around them but the guards.
+    /// Runs all steps from arming to disarming, with guards but without further protection.
     ///
     /// # Errors
     /// As [`Runner::run_under`].
@@ -106,10 +106,10 @@ impl Runner<'_> {
 
     /// Runs all steps from arming to disarming.
     ///
-    /// Whatever ends it, a panic included, the rig has been told to become safe and has been disarmed when this returns.
+    /// When this returns, the rig has been commanded to its safe state and disarmed, even after a panic.
     ///
     /// # Errors
-    /// [`RunError`] where the rig or an observer failed.
+    /// [`RunError`] if the rig or an observer failed.
     pub fn run_under(self, protection: &Protection<'_>) -> Result<RunEnd, RunError> {
         self.backend.arm().map_err(RunError::NotArmed)?;
         let sample_s = 1.0 / self.backend.describe().sample_rate_hz;
@@ -125,7 +125,7 @@ impl Runner<'_> {
             open: None,
             stop_told: false,
         };
-        // What a panic leaves half done is not used again but for making the rig safe.
+        // After a panic, the possibly inconsistent state is used only to make the rig safe.
         let end = match catch_unwind(AssertUnwindSafe(|| run.forward())) {
             Ok(Ok(())) => Ok(RunEnd::Completed),
             Ok(Err(halt)) => run.way_out(halt),
@@ -141,7 +141,7 @@ impl Runner<'_> {
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub(crate) fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a panic".to_owned())
@@ -154,14 +154,14 @@ impl Run<'_, '_> {
         self.pass_notes()?;
         if let Some(first) = &next {
             if let Some(soak) = self.with.steps.soak() {
-                self.rest(first, soak)?;
+                self.soak(first, soak)?;
             }
             let warm_s = self.now_s + self.with.steps.warm_up_s();
             if warm_s > self.now_s {
-                let told = self.begin(first);
-                self.send(told)?;
+                let first_setpoints = self.begin(first);
+                self.send(first_setpoints)?;
                 self.watch(warm_s, false, true)?;
-                // The first step itself tells whether its speed was reached.
+                // Whether the speed was reached is reported for the first step, not for its warm-up.
                 let now_s = self.now_s;
                 let _ = self.with.speed.as_mut().map(|speed| speed.end(now_s));
             }
@@ -180,7 +180,7 @@ impl Run<'_, '_> {
         self.watch(end_s, false, false)
     }
 
-    /// The next step. While it is being made a stop is obeyed, and a rig that runs by itself is watched.
+    /// The next step. While waiting for it, the runner obeys a stop and watches a rig that runs in real time.
     fn next_step(&mut self) -> Result<Option<PlanStep>, Halt> {
         while !self.with.steps.is_ready() {
             self.look_for_a_stop(false, self.now_s)?;
@@ -191,14 +191,14 @@ impl Run<'_, '_> {
         Ok(self.with.steps.next_step()?)
     }
 
-    /// One step, from its jump to its end, and again where a guard says so.
+    /// Executes one step, and repeats it once if a guard requests smaller steps.
     fn step(&mut self, step: &PlanStep) -> Result<(), Halt> {
         let before = self.sent;
         let mut again = false;
         loop {
-            let told = self.begin(step);
+            let setpoints = self.begin(step);
             if again && let Some(before) = before {
-                self.approach(before, told)?;
+                self.approach(before, setpoints)?;
             }
             let mut marker = StepMarker {
                 index: step.index,
@@ -207,10 +207,10 @@ impl Run<'_, '_> {
                 end_s: self.now_s + step.dwell_s,
                 from: step.from,
                 to: Some(step.to),
-                p3_pa: told.p3_pa,
-                valve_opening_ratio: told.valve_opening_ratio,
+                p3_pa: setpoints.p3_pa,
+                valve_opening_ratio: setpoints.valve_opening_ratio,
             };
-            self.send(told)?;
+            self.send(setpoints)?;
             (self.told.step_since_s, self.told.aim) = (Some(self.now_s), Some(step.to));
             self.reached.clear();
             self.with.observer.on_step_start(&marker)?;
@@ -225,15 +225,15 @@ impl Run<'_, '_> {
             let trip = match watched {
                 Err(Halt::Cut(trip)) => trip,
                 Err(halt @ Halt::Tripped(..)) => {
-                    // The rig comes first: the way out ends the step, behind its samples.
+                    // The rig comes first: the safe shutdown reports the end of the step after its samples.
                     self.open = Some(marker);
                     return Err(halt);
                 }
                 ended => {
-                    // What ended the step early outranks a marker that could not be written.
-                    let told = self.with.observer.on_step_end(&marker);
+                    // The reason for an early end takes precedence over a failure to write the marker.
+                    let recorded = self.with.observer.on_step_end(&marker);
                     ended?;
-                    told?;
+                    recorded?;
                     self.with.observer.on_step_held(&marker)?;
                     self.with.steps.after_step(&marker)?;
                     self.skipped = 0;
@@ -262,7 +262,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Goes back to `before`, then towards `to` in pieces.
+    /// Returns to `before`, then approaches `to` in stages.
     fn approach(&mut self, before: Setpoints, to: Setpoints) -> Result<(), Halt> {
         for piece in 0..SMALLER_STEPS {
             let share = f64::from(piece) / f64::from(SMALLER_STEPS);
@@ -273,7 +273,7 @@ impl Run<'_, '_> {
                 ..to
             })?;
             match self.watch(self.now_s + SMALLER_STEP_S, true, false) {
-                // The same guard again: the step itself will say so.
+                // The same guard tripped again: the step itself reports it.
                 Ok(()) | Err(Halt::Cut(_)) => {}
                 halt => return halt,
             }
@@ -281,7 +281,7 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Whether the speed was reached, as far as the campaign cares.
+    /// Checks the speed at the end of a step against the campaign's band.
     fn speed_is_reached(&mut self, step: &PlanStep) -> Result<(), Halt> {
         let missed = self.protection.speed.and_then(|band| self.reached.missed(band, step, self.now_s));
         let Some(trip) = missed else { return Ok(()) };
@@ -292,14 +292,14 @@ impl Run<'_, '_> {
         }
     }
 
-    /// What the rig is told at the start of a step.
+    /// The setpoints at the start of a step.
     fn begin(&mut self, step: &PlanStep) -> Setpoints {
         let now_s = self.now_s;
         let p3_pa = self.with.speed.as_mut().map_or(step.p3_pa, |speed| speed.begin(step, now_s));
         Setpoints { p3_pa, ..setpoints(step) }
     }
 
-    /// Tells the rig, and keeps what guards need to know of it.
+    /// Sends setpoints to the rig, and updates the state that the guards use.
     pub(crate) fn send(&mut self, setpoints: Setpoints) -> Result<(), BackendError> {
         self.with.backend.set(&setpoints)?;
         let running = setpoints.mode == RigMode::Running;
@@ -317,22 +317,22 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Tells of a step whose speed was not reached.
+    /// Reports a step whose speed was not reached.
     fn end(&mut self) -> Result<(), ObserverError> {
         let now_s = self.now_s;
         let event = self.with.speed.as_mut().and_then(|speed| speed.end(now_s));
         event.map_or(Ok(()), |event| self.with.observer.on_event(&event))
     }
 
-    /// Tells of a guard that does not end the run.
+    /// Reports a guard that does not end the run.
     fn act(&mut self, trip: &Trip, what: &str) -> Result<(), Halt> {
         let message = format!("guard `{}`: {}; {what}", trip.guard, trip.reason);
         let t_s = trip.t_s.max(self.now_s);
         Ok(self.with.observer.on_event(&Event { t_s, kind: EventKind::GuardActed, message })?)
     }
 
-    /// Keeps the machine at rest for as long as the soak asks; events mark both ends.
-    fn rest(&mut self, first: &PlanStep, soak: Soak) -> Result<(), Halt> {
+    /// Keeps the machine at rest for the duration of the soak; events mark start and end.
+    fn soak(&mut self, first: &PlanStep, soak: Soak) -> Result<(), Halt> {
         self.send(Setpoints {
             mode: RigMode::Standstill,
             oil_temperature_k: soak.oil_temperature_k,
@@ -349,26 +349,26 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Hands the source's notes to the observer.
+    /// Passes the source's notes to the observer.
     pub(crate) fn pass_notes(&mut self) -> Result<(), ObserverError> {
         let (t_s, kind) = (self.now_s, EventKind::Note);
         let mut notes = self.with.steps.take_notes().into_iter();
         notes.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))?;
-        self.pass_asked()
+        self.pass_requests()
     }
 
-    /// Records what the operator has asked for.
-    fn pass_asked(&mut self) -> Result<(), ObserverError> {
+    /// Records the operator's requests.
+    fn pass_requests(&mut self) -> Result<(), ObserverError> {
         let Some(operator) = self.protection.operator else { return Ok(()) };
         let (t_s, kind) = (self.now_s, EventKind::Note);
-        let mut said = operator.take_said().into_iter();
-        said.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
+        let mut requests = operator.take_said().into_iter();
+        requests.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
     }
 
-    /// Lets the rig run to `until_s` under the eyes of guards, observer and source. In a step the source may end it early,
-    /// and a guard may hold or cut it; outside of steps what would cut one ends the run.
+    /// Runs the rig to `until_s` while guards, observer and source receive its samples. Within a step the source may end it early,
+    /// and a guard may hold or cut it short. Outside a step, a guard that would cut a step short ends the run.
     fn watch(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
-        let (mut held_s, mut operator_held_s, mut told_to_hold) = (0.0, 0.0, false);
+        let (mut held_s, mut operator_held_s, mut hold_sent) = (0.0, 0.0, false);
         while self.now_s < until_s {
             self.look_for_a_stop(in_step, until_s)?;
             let before_s = self.now_s;
@@ -387,7 +387,7 @@ impl Run<'_, '_> {
                     _ => return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, ..trip.clone() }, None)),
                 }
             }
-            self.pass_asked()?;
+            self.pass_requests()?;
             let operator_holds = self.protection.operator.is_some_and(Operator::holds)
                 && operator_held_s < OPERATOR_HOLD_MAX_S;
             if operator_holds {
@@ -398,11 +398,11 @@ impl Run<'_, '_> {
             let ends = self.with.steps.on_batch(&batch);
             let holding = trips.iter().any(|trip| trip.reaction == Reaction::Hold)
                 || (held_s > 0.0 && Bench::new(&mut self.with.guards).is_violated());
-            // Once, when it begins: the rig says whether it still takes what it was told.
-            if (holding || operator_holds) && !told_to_hold {
+            // Sent once per hold: the backend reports whether it still accepts commands.
+            if (holding || operator_holds) && !hold_sent {
                 self.with.backend.hold()?;
             }
-            told_to_hold = holding || operator_holds;
+            hold_sent = holding || operator_holds;
             if holding {
                 let last_s =
                     batch.t_s.first().zip(batch.t_s.last()).map_or(0.0, |(first, last)| last - first);
@@ -424,7 +424,7 @@ impl Run<'_, '_> {
             if hold_speed && let (Some(speed), Some(sent)) = (&mut self.with.speed, self.sent) {
                 let (p3_pa, event) = speed.on_batch(&batch);
                 event.map_or(Ok(()), |event| self.with.observer.on_event(&event))?;
-                // At the end of a step the next one has the say.
+                // At the end of a step the next step sets P3.
                 if let Some(p3_pa) = p3_pa.filter(|_| self.now_s < until_s) {
                     self.send(Setpoints { p3_pa, ..sent })?;
                 }
@@ -433,7 +433,7 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Samples of a second, or up to `until_s`, or up to the sample at which a guard trips.
+    /// Samples of one second, up to `until_s`, or up to the sample at which a guard trips.
     fn acquire(&mut self, until_s: f64) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
         let end_s = (self.now_s + POLL_INTERVAL_S).min(until_s);
         let mut whole: Option<SampleBatch> = None;
@@ -448,7 +448,7 @@ impl Run<'_, '_> {
                 None => whole = Some(batch),
                 Some(whole) => append(whole, batch),
             }
-            // Sums of sample times end a little before the second does.
+            // Rounding: accumulated sample times fall slightly short of the full second.
             if !trips.is_empty() || end_s - self.now_s < 1e-9 * end_s.abs() {
                 self.now_s = if trips.is_empty() { end_s } else { self.now_s };
                 return Ok((whole.unwrap_or_default(), trips));

@@ -7,16 +7,16 @@ use mapper_core::BackendError;
 /// Why a run could not go on. The rig was asked to become safe before this is returned.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The rig was never had.
+    /// The rig could not be armed.
     #[error("the rig could not be armed, no step was begun on it: {0}")]
     NotArmed(#[source] BackendError),
     /// The rig failed.
     #[error("the rig failed: {0}")]
     Backend(#[from] BackendError),
-    /// Recording or another observer failed.
+    /// A recorder or another observer failed.
     #[error("{0}")]
     Observer(#[from] ObserverError),
-    /// What yields the steps failed.
+    /// The step source failed.
     #[error("{0}")]
     Source(#[from] StepSourceError),
     /// The program itself failed.
@@ -24,7 +24,7 @@ pub enum RunError {
         "the program failed on the way ({message}); the rig is safe. Please report this as a fault of the program"
     )]
     Panicked {
-        /// What it said.
+        /// Message of the panic.
         message: String,
     },
     /// The rig did not confirm its safe state.
@@ -34,20 +34,20 @@ pub enum RunError {
     NotSafe {
         /// Why the run had ended.
         why: String,
-        /// What the rig answered.
+        /// The rig's error.
         source: BackendError,
     },
 }
 
 impl RunError {
-    /// Whether nobody knows in which state the rig is.
+    /// Whether the state of the rig is unknown.
     pub fn leaves_doubt(&self) -> bool {
         match self {
             RunError::NotSafe { .. } | RunError::Panicked { .. } => true,
             RunError::Backend(error) => {
                 matches!(error, BackendError::Lost { .. } | BackendError::Deadline { .. })
             }
-            // Who does not answer may arm later.
+            // A rig that does not answer may still arm later.
             RunError::NotArmed(error) => matches!(error, BackendError::Deadline { .. }),
             RunError::Observer(_) | RunError::Source(_) => false,
         }

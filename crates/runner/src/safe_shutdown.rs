@@ -1,4 +1,4 @@
-//! The way out when something is wrong: the safe state first, then the records of why.
+//! The safe shutdown after a fault: first the safe state, then the records of the reason.
 
 use crate::guard::Told;
 use crate::protection::Protection;
@@ -7,33 +7,33 @@ use crate::run_error::RunError;
 use mapper_core::{BackendError, Event, EventKind, GuardName, SampleBatch, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Time between two setpoints on the way down, s.
+/// Time between two setpoints of the run-down, s.
 const STEP_S: f64 = 0.1;
-/// How long the rig is still watched after it was made safe, s: the recording shows that it got there.
+/// How long the rig is observed after it was made safe, s: the recording shows that it reached the safe state.
 const WATCH_S: f64 = 5.0;
-/// How often a rig is asked to become safe before it counts as lost.
+/// Number of safe-state commands before the rig counts as lost.
 const TRIES: usize = 3;
-/// Time between two of them, s of the run's clock: a link that is gone for a moment may be back.
+/// Time between two of these commands, s of the run's clock: an interrupted link may recover.
 const PAUSE_S: f64 = 0.5;
 
-/// The panic of a backend as an answer of it.
+/// A panic of the backend, as its error.
 #[derive(Debug, thiserror::Error)]
 #[error("the backend failed: {0}")]
 struct Panicked(String);
 
-/// Whoever is told may panic: the rig comes down all the same.
-fn contained(telling: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
+/// Contains a panic of an observer, so that the shutdown continues.
+fn contained(report: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
     let panicked =
         |panic: Box<dyn std::any::Any + Send>| Err(RunError::Panicked { message: words_of(&*panic) });
-    catch_unwind(AssertUnwindSafe(telling)).unwrap_or_else(panicked)
+    catch_unwind(AssertUnwindSafe(report)).unwrap_or_else(panicked)
 }
 
 impl Run<'_, '_> {
-    /// Makes the rig safe, then tells why. Nothing interrupts it, and it takes a bounded time.
+    /// Makes the rig safe, then reports the reason. It cannot be interrupted and takes a bounded time.
     pub(crate) fn way_out(&mut self, halt: Halt) -> Result<RunEnd, RunError> {
-        // The first command leaves before anything is written: a disk may be slow.
+        // The first command is sent before anything is written: a disk may be slow.
         let begun = self.first_command();
-        // A step that did not reach its speed does not count, however long it lasted.
+        // A step that missed its speed does not count, whatever its duration.
         let counts = !matches!(&halt, Halt::Tripped(trip, _) if trip.guard == GuardName::Speed);
         let (end, kind, message, unseen) = match halt {
             Halt::Interrupted => (
@@ -55,22 +55,22 @@ impl Run<'_, '_> {
                 (Err(error), EventKind::Note, message, None)
             }
         };
-        // The error that ended the run outranks any that telling of it may meet.
-        let told = contained(|| self.tell_why(unseen.as_deref(), counts, kind, &message));
+        // The error that ended the run takes precedence over errors while reporting it.
+        let reported = contained(|| self.report_reason(unseen.as_deref(), counts, kind, &message));
         let safe = self.down(begun).and_then(|()| self.cut_air());
-        let told = told.and_then(|()| contained(|| self.tell_safe(safe.as_ref().err())));
+        let reported = reported.and_then(|()| contained(|| self.report_safe(safe.as_ref().err())));
         match (end, safe) {
             (Err(error), Err(source)) => Err(RunError::NotSafe { why: error.to_string(), source }),
             (Ok(_), Err(source)) => Err(RunError::NotSafe { why: message, source }),
             (Err(error), Ok(())) => Err(error),
             (Ok(end), Ok(())) => {
-                told?;
+                reported?;
                 Ok(end)
             }
         }
     }
 
-    fn tell_why(
+    fn report_reason(
         &mut self,
         unseen: Option<&SampleBatch>,
         counts: bool,
@@ -89,7 +89,7 @@ impl Run<'_, '_> {
         Ok(self.pass_notes()?)
     }
 
-    fn tell_safe(&mut self, failed: Option<&BackendError>) -> Result<(), RunError> {
+    fn report_safe(&mut self, failed: Option<&BackendError>) -> Result<(), RunError> {
         let t_s = self.now_s;
         if let Some(error) = failed {
             let message = format!("the rig did not confirm its safe state: {error}");
@@ -98,20 +98,20 @@ impl Run<'_, '_> {
         let message = "air off, valve open".to_owned();
         self.with.observer.on_event(&Event { t_s, kind: EventKind::SafeState, message })?;
         self.with.clock.wait_until(t_s + WATCH_S);
-        // It is safe already: a backend that panics here spoils the last seconds of the recording alone.
+        // The rig is already safe: a panic of the backend here costs only the last seconds of the recording.
         match catch_unwind(AssertUnwindSafe(|| self.with.backend.poll(t_s + WATCH_S))) {
             Ok(batch) => Ok(self.with.observer.on_batch(&batch?)?),
             Err(_) => Ok(()),
         }
     }
 
-    /// Setpoints on the way down after `after_s` of it; `None` where the air is to be cut.
+    /// Setpoints `after_s` into the run-down; `None` if the air is to be cut.
     fn on_the_way(&self, from: &Setpoints, after_s: f64) -> Option<Setpoints> {
         let Protection { safe, p3_min_pa, accepts, .. } = self.protection;
         safe.setpoints(from, after_s, *p3_min_pa, accepts.as_ref())
     }
 
-    /// The first command of the way. What it started from, where it goes on.
+    /// Sends the first command of the run-down; returns its starting setpoints if the run-down continues.
     fn first_command(&mut self) -> Option<Setpoints> {
         let from = self.sent?;
         self.told = Told::default();
@@ -120,7 +120,7 @@ impl Run<'_, '_> {
         matches!(sent, Ok(Ok(()))).then_some(from)
     }
 
-    /// Takes P3 down. Where anything fails on the way, the air is cut at once.
+    /// Lowers P3 step by step. Any failure ends the run-down, and the air is cut at once.
     fn down(&mut self, from: Option<Setpoints>) -> Result<(), BackendError> {
         let Some(from) = from else { return Ok(()) };
         let steps = (self.protection.safe.within_s / STEP_S).ceil().clamp(0.0, 1e5) as usize;
@@ -143,7 +143,7 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Air off, as often as it takes, within reason.
+    /// Shuts the air off, with a limited number of retries.
     fn cut_air(&mut self) -> Result<(), BackendError> {
         let mut last = Ok(());
         for tried in 0..TRIES {

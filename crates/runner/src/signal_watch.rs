@@ -1,4 +1,4 @@
-//! The guard over one channel: value, change, age, quality, and whether it moves at all.
+//! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
 use crate::guard::{Guard, Told, Trip};
 use mapper_core::{
@@ -6,42 +6,42 @@ use mapper_core::{
 };
 use std::collections::VecDeque;
 
-/// A violation that goes on after it has tripped trips again after so long, s.
+/// A continuing violation trips again after this time, s.
 const AGAIN_S: f64 = 10.0;
-/// So near a bound, as a share of it, the rig is asked sample by sample.
+/// Relative distance to a bound below which the rig is polled sample by sample.
 const NEAR_RATIO: f64 = 0.03;
-/// Time over which the slope is taken, s.
+/// Time over which the slope is computed, s.
 const SLOPE_S: f64 = 0.5;
-/// A reading that moves by no more than this share of itself stands still (4 mK of 400 K, 2 Pa of 200 kPa): amplifiers of thermocouples and
-/// pressure transducers are noisier, and a jump of the setpoints moves a reading by a hundred times as much.
+/// A reading is frozen if it moves by no more than this ratio (4 mK of 400 K, 2 Pa of 200 kPa). The noise of thermocouple and
+/// pressure amplifiers is larger, and a jump of the setpoints moves a reading a hundred times as far.
 const STILL_RATIO: f64 = 1e-5;
-/// Readings of which a change is made are at least so far apart, as a share of its time: no rig is too fast for memory.
+/// Minimum spacing of the readings kept for a change, as a share of its time. It bounds the memory for fast rigs.
 const CHANGE_RESOLUTION_RATIO: f64 = 1e-3;
 
 /// See [`SignalGuard`].
 #[derive(Debug, Clone)]
 pub struct SignalWatch {
     spec: SignalGuard,
-    /// Time of the last good reading, by its source, s.
+    /// Source time of the last good reading, s.
     last_good_s: Option<f64>,
-    /// First time that anything was looked at, s: age counts from there.
+    /// Time of the first sample or poll, s: age counts from there.
     first_look_s: Option<f64>,
     last_value: Option<f64>,
-    /// Time and value of a reading some half a second ago, and the change since over its time, unit of the channel per second.
+    /// Time and value of a reading about half a second ago, and the slope since then, unit of the channel per second.
     anchor: Option<(f64, f64)>,
     slope_per_s: f64,
-    /// Since when the value has been beyond a bound, s.
+    /// Start of the violation of a bound, s.
     beyond_since_s: Option<f64>,
-    /// Not before this time does a violation that goes on trip again, s.
+    /// A continuing violation does not trip again before this time, s.
     quiet_until_s: Option<f64>,
-    /// Times and readings of the change's window.
+    /// Times and readings within the window of the change limit.
     recent: VecDeque<(f64, f64)>,
-    /// Since when the reading has stood still, s, and where.
+    /// Start of the period without movement, s, and its reading.
     still: Option<(f64, f64)>,
 }
 
 impl SignalWatch {
-    /// A guard by its specification.
+    /// Creates a guard from its specification.
     pub fn new(spec: SignalGuard) -> Self {
         SignalWatch {
             spec,
@@ -67,7 +67,7 @@ impl SignalWatch {
         Some(Trip { t_s, guard: self.spec.name, reaction, reason })
     }
 
-    /// The bound that a value is beyond, in words.
+    /// Describes the bound that a value violates.
     fn beyond(&self, value: f64, running: bool, slack: f64) -> Option<String> {
         let unit = self.spec.channel.unit();
         match (self.spec.above, self.spec.below) {
@@ -81,8 +81,8 @@ impl SignalWatch {
         }
     }
 
-    fn one(&mut self, t_s: f64, value: f64, told: &Told) -> Option<Trip> {
-        // Over a single sample it would be noise.
+    fn one(&mut self, t_s: f64, value: f64, state: &Told) -> Option<Trip> {
+        // The slope over a single sample would be noise.
         match self.anchor {
             Some((then_s, then)) if t_s - then_s >= SLOPE_S => {
                 self.slope_per_s = (value - then) / (t_s - then_s);
@@ -95,21 +95,21 @@ impl SignalWatch {
         let stands = |(_, there): &(f64, f64)| (value - there).abs() <= STILL_RATIO * there.abs();
         self.still = self.still.filter(stands).or(Some((t_s, value)));
         self.last_value = Some(value);
-        // Hysteresis: once beyond, it has to come back by more than it went over.
+        // Hysteresis: after a violation, the value has to return past the bound by this amount.
         let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
-        if let Some(what) = self.beyond(value, told.running, slack) {
+        if let Some(what) = self.beyond(value, state.running, slack) {
             let since_s = *self.beyond_since_s.get_or_insert(t_s);
-            // A millionth of a second is what sums of sample times are off.
+            // One microsecond covers the rounding of accumulated sample times.
             if t_s - since_s >= self.spec.dwell_s - 1e-6 {
                 return self.trip(t_s, self.spec.reaction, &what);
             }
         } else {
             self.beyond_since_s = None;
         }
-        self.changed(t_s, value).or_else(|| self.frozen(t_s, told))
+        self.changed(t_s, value).or_else(|| self.frozen(t_s, state))
     }
 
-    /// A change beyond the largest one.
+    /// Trips if the reading changes by more than the allowed change.
     fn changed(&mut self, t_s: f64, value: f64) -> Option<Trip> {
         let largest = self.spec.change?;
         while self.recent.front().is_some_and(|(then_s, _)| t_s - then_s > largest.within_s) {
@@ -135,12 +135,12 @@ impl SignalWatch {
         self.trip(t_s, self.spec.reaction, &what)
     }
 
-    /// A reading that has not moved although the setpoints have.
-    fn frozen(&mut self, t_s: f64, told: &Told) -> Option<Trip> {
-        let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.still?, told.jumped_s?);
+    /// Trips if the reading has not moved although the setpoints have.
+    fn frozen(&mut self, t_s: f64, state: &Told) -> Option<Trip> {
+        let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.still?, state.jumped_s?);
         let since_jump_s = t_s - jumped_s;
-        // It has to have been the same since before the jump.
-        if !told.running || since_jump_s < frozen_s || same_s > jumped_s {
+        // The reading must be unchanged since before the jump.
+        if !state.running || since_jump_s < frozen_s || same_s > jumped_s {
             return None;
         }
         let value = readable(self.last_value?, self.spec.channel.unit());
@@ -150,8 +150,8 @@ impl SignalWatch {
     }
 }
 
-/// Whether a sensor can read this, now: what it cannot is no reading, however long it lasts, and a limit is not held against it. Shaft and
-/// flow begin from rest while the rig already runs.
+/// Whether a sensor can read this value now. An impossible value counts as no reading and is not compared with limits.
+/// Shaft speed and flow start from zero while the rig already runs.
 fn can_be(channel: Channel, value: f64, running: bool) -> bool {
     let from_rest = matches!(channel.info().dimension, Dimension::RotationalSpeed | Dimension::MassFlow);
     value.is_finite()
@@ -160,22 +160,22 @@ fn can_be(channel: Channel, value: f64, running: bool) -> bool {
 }
 
 impl Guard for SignalWatch {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, told: &Told) -> Option<Trip> {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Told) -> Option<Trip> {
         let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         if let Some(values) = batch.column(self.spec.channel) {
             let provenance = batch.provenance_of(self.spec.channel);
             let mut found: Option<Trip> = None;
             for (index, (t_s, value)) in batch.t_s.iter().zip(values).enumerate() {
                 let bad = provenance.is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad));
-                // What a source took long ago, or has not taken anew, is as old as it says.
+                // A stale or repeated value is as old as its source time.
                 let source_s = provenance.and_then(|from| from.source_t_s.get(index)).copied();
                 let taken_s = source_s.map_or(*t_s, |source_s| source_s.min(*t_s));
                 let new = self.last_good_s.is_none_or(|last_s| taken_s > last_s);
-                // Too high is too high, whatever it is that reads so.
+                // A value above its limit counts even if it is implausible.
                 let above = value.is_finite() && self.spec.above.is_some_and(|high| *value > high);
-                let read = above || can_be(self.spec.channel, *value, told.running);
+                let read = above || can_be(self.spec.channel, *value, state.running);
                 if read && taken_s.is_finite() && !bad && new {
-                    let trip = self.one(taken_s, *value, told);
+                    let trip = self.one(taken_s, *value, state);
                     found = found.or(trip);
                 }
             }
@@ -183,7 +183,7 @@ impl Guard for SignalWatch {
                 return found;
             }
         }
-        // Silence counts from the first look on, whether samples come or not.
+        // Age counts from the first poll, even if no samples arrive.
         let since_s = self.last_good_s.unwrap_or(first_s);
         if now_s - since_s > self.spec.age_s {
             let what = format!("has given no good reading since {since_s:.1} s");
@@ -198,7 +198,7 @@ impl Guard for SignalWatch {
 
     fn is_alert(&self) -> bool {
         let Some(value) = self.last_value else { return false };
-        // Where it will be in a second, and how far away a bound is worth a closer look.
+        // A bound that the value may reach within a second needs closer polling.
         let soon = value + self.slope_per_s.max(0.0);
         self.beyond_since_s.is_some()
             || self.spec.above.is_some_and(|high| value.max(soon) > high - NEAR_RATIO * high.abs())
@@ -246,7 +246,7 @@ mod tests {
         let trip = look(&mut guard, &batch(4, &[401.5]), 0.4).unwrap();
         assert_eq!((trip.t_s, trip.reaction), (0.4, Reaction::Hold));
         assert!(trip.reason.contains("401.5 K") && trip.reason.contains("400.0 K"), "{}", trip.reason);
-        // It has been said.
+        // The violation was already reported.
         assert_eq!(look(&mut guard, &batch(5, &[401.5; 5]), 0.9), None);
     }
 
@@ -290,13 +290,13 @@ mod tests {
             assert_eq!(trip.reaction, Reaction::Safe, "{what}");
             assert!(trip.reason.contains("no good reading since 0.1 s"), "{what}: {}", trip.reason);
         }
-        // One that never said anything.
+        // A source that never delivered a reading.
         let mut guard = SignalWatch::new(spec());
         assert_eq!(look(&mut guard, &nothing, 0.0), None);
         assert!(look(&mut guard, &nothing, 0.6).is_some());
     }
 
-    /// A source whose clock is set back by an hour has taken nothing new as far as anybody can tell; one that is set on has.
+    /// A clock set back by an hour looks like a source without new readings; a clock set forward does not.
     #[test]
     fn a_clock_that_is_set_back_is_silence_and_one_that_is_set_on_is_not() {
         for (step_s, trips) in [(-3600.0, true), (3600.0, false)] {
@@ -311,7 +311,7 @@ mod tests {
         }
     }
 
-    /// degC for K, Pa for kPa and the like begin in the middle of a run: a limit is not held against them, and they are silence after a while.
+    /// Wrong units (degC for K, Pa for kPa) appear in mid-run: no limit trips on them, but they age out as missing readings.
     #[test]
     fn a_reading_that_cannot_be_is_silence_and_one_above_its_limit_is_not() {
         for (channel, good, wrong) in [
@@ -331,7 +331,7 @@ mod tests {
             let trip = look(&mut guard, &at(20, wrong, 10), 2.9).unwrap();
             assert_eq!(trip.reaction, Reaction::Safe, "{channel} {wrong}");
         }
-        // A broken wire that reads 5000 K trips as a temperature that is too high does.
+        // A broken wire that reads 5000 K trips like a temperature above its limit.
         let mut guard = SignalWatch::new(spec());
         let trip = look(&mut guard, &batch(0, &[5000.0; 3]), 0.2).unwrap();
         assert_eq!(trip.reaction, Reaction::Hold);
@@ -345,13 +345,13 @@ mod tests {
         assert!(look(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
         let mut guard = SignalWatch::new(SignalGuard { frozen_s: Some(2.0), ..spec() });
         let told = |jumped_s| Told { running: true, jumped_s: Some(jumped_s), ..Told::default() };
-        // Still without a jump; moved after one; not moved.
+        // Unchanged without a jump; moved after one; not moved.
         assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &told(9.5)), None);
         let mut moved = guard.clone();
         assert_eq!(moved.look(&batch(100, &[300.1; 30]), 12.9, &told(9.5)), None);
         let trip = guard.clone().look(&batch(100, &[300.0; 30]), 12.9, &told(9.5)).unwrap();
         assert_eq!(trip.reaction, Reaction::Safe);
-        // A digit that flickers is no movement.
+        // A flickering last digit is not movement.
         let flicker: Vec<f64> = (0..30).map(|i| 300.0 + 1e-3 * f64::from(i % 2)).collect();
         assert!(guard.look(&batch(100, &flicker), 12.9, &told(9.5)).is_some());
         assert!((trip.t_s - 11.5).abs() < 0.11 && trip.reason.contains("frozen"), "{trip:?}");

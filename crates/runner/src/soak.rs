@@ -1,9 +1,9 @@
-//! The soak before a run: the machine at rest, so that sensors which must read the same can be held against each other.
+//! The soak before a run: the machine at rest, so that sensors that should read the same can be compared.
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{PlanStep, Soak};
 
-/// The steps of another source, after a soak. All of them come later by it.
+/// The steps of another source, delayed by a soak.
 pub struct Soaked<'a> {
     inner: &'a mut dyn StepSource,
     soak: Soak,

@@ -1,12 +1,12 @@
-//! Where the steps of a run come from: a plan, or something that decides as it goes.
+//! Sources of a run's steps: a plan, or a source that decides during the run.
 
 use mapper_core::{Plan, PlanStep, SampleBatch, Soak, StepMarker};
 
-/// Why a source has no next step though it should; the run ends in its safe state.
+/// Why a source failed to provide its next step; the run ends in its safe state.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
 pub struct StepSourceError {
-    /// The source's own error: what went wrong, and what to do.
+    /// The source's own error: the failure and its remedy.
     source: Box<dyn std::error::Error + Send + Sync>,
 }
 
@@ -17,56 +17,56 @@ impl StepSourceError {
     }
 }
 
-/// Yields steps one by one, and sees what becomes of them. Guards and observers look on all the same.
+/// Provides steps one by one, and receives their results. Guards and observers are independent of it.
 ///
-/// A source that changes the steps of another names it ([`StepSource::inner`] and [`StepSource::inner_mut`], both); whatever it
-/// does not say itself is then as there, and what it is told is passed on.
+/// A source that wraps another one implements both [`StepSource::inner`] and [`StepSource::inner_mut`]. Methods that it does not
+/// implement are then forwarded to the wrapped source.
 pub trait StepSource {
-    /// The source whose steps these are; none by default.
+    /// The wrapped source; none by default.
     fn inner(&self) -> Option<&dyn StepSource> {
         None
     }
 
-    /// The same, to be told and asked.
+    /// The wrapped source, mutable.
     fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
         None
     }
 
-    /// How the machine rests before the warm-up; not at all by default.
+    /// The soak before the warm-up; none by default.
     fn soak(&self) -> Option<Soak> {
         self.inner()?.soak()
     }
 
-    /// Time at the first point before its step, s; none by default.
+    /// Warm-up time at the first point before its step, s; none by default.
     fn warm_up_s(&self) -> f64 {
         self.inner().map_or(0.0, StepSource::warm_up_s)
     }
 
-    /// Time without flow after the last step, s; none by default.
+    /// Cool-down time without flow after the last step, s; none by default.
     fn cool_down_s(&self) -> f64 {
         self.inner().map_or(0.0, StepSource::cool_down_s)
     }
 
-    /// Whether the next step is there. One that is still being made is waited for only for some milliseconds, so that rig and operator
-    /// are not forgotten meanwhile. Always by default.
+    /// Whether the next step is available. The call waits only a few milliseconds for it, because the rig and the operator need
+    /// attention meanwhile. Always true by default.
     fn is_ready(&mut self) -> bool {
         self.inner_mut().is_none_or(StepSource::is_ready)
     }
 
-    /// The next step; `None` ends the run. Its index counts up from 0. Waits where [`is_ready`](Self::is_ready) does not say that it is there.
+    /// The next step; `None` ends the run. Its index counts up from 0. Blocks unless [`is_ready`](Self::is_ready) returned true.
     ///
     /// # Errors
     /// [`StepSourceError`] ends the run in its safe state.
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError>;
 
-    /// The step that was handed out last begins with its jump; again where a guard has it made again. Nothing by default.
+    /// The latest step begins with its jump; called again if a guard has the step repeated. Does nothing by default.
     fn begins(&mut self, marker: &StepMarker) {
         if let Some(inner) = self.inner_mut() {
             inner.begins(marker);
         }
     }
 
-    /// Looks at new samples, warm-up included; true ends the current step before its time. Never does by default.
+    /// Receives new samples, warm-up included; true ends the current step early. False by default.
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
         self.inner_mut().is_some_and(|inner| inner.on_batch(batch))
     }
@@ -79,7 +79,7 @@ pub trait StepSource {
         self.inner_mut().map_or(Ok(()), |inner| inner.after_step(marker))
     }
 
-    /// A guard has left the step out; the marker holds where it was cut short.
+    /// A guard has skipped the step; the marker holds the time at which it was cut short.
     ///
     /// # Errors
     /// [`StepSourceError`] ends the run in its safe state.

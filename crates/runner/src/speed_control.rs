@@ -1,19 +1,19 @@
-//! The closed loop over the shaft speed: P3 as planned, and on top of it what the measured speed asks for.
+//! Closed-loop control of the shaft speed: P3 as planned, plus a correction from the measured speed.
 //!
-//! **Feed-forward.** The plan's P3 holds the nominal machine at the target. What the machine at hand lacks is carried from step
-//! to step as a *deficit* of turbine power, `d = ln(W_nominal(P3) / W_nominal(P3_plan))`: a turbine 10 % worse lacks the same
-//! 10 % on every speed line, while the pressure that makes up for it differs fourfold. A step starts at
+//! **Feed-forward.** The plan's P3 holds the nominal machine at the target. The turbine power missing in the real machine is kept
+//! from step to step as a *deficit*, `d = ln(W_nominal(P3) / W_nominal(P3_plan))`. A turbine that is 10 % worse has the same deficit
+//! on every speed line, while the pressure that compensates for it differs fourfold. A step starts at
 //! `P3 = P3_plan exp(d s)`, `s` = [`SpeedResponse::p3_per_power`].
 //!
-//! **Feedback.** Once the jump's own transient is over, a PI controller in its velocity form adds, once a second,
+//! **Feedback.** After the jump's own transient, a PI controller in velocity form adds, once a second,
 //! `dP3 = (tau (e - e_before) + e dt) / (lambda K)`: `e` the error of the median speed of that second, `K` and `tau` gain and
 //! time constant of the nominal machine, `lambda` the time constant of the closed loop (lambda or IMC tuning; Rivera, Morari
 //! and Skogestad, Ind. Eng. Chem. Process Des. Dev. 25 (1986)). The zero cancels the shaft's pole, so that the loop is of first
-//! order and does not overshoot. `lambda` grows with the time since the transient, as the gain of a Kalman filter falls:
-//! what is off is corrected in seconds, and later the loop follows the slow housings and hardly any noise.
+//! order without overshoot. `lambda` grows with the time since the transient, as the gain of a Kalman filter falls.
+//! An initial error is corrected within seconds; later the loop follows the slow housings and suppresses noise.
 //!
-//! **Limits.** The velocity form has no integral beside the command itself: clamping the command to its limits and to the rig's
-//! rate is all the anti-windup there is.
+//! **Limits.** In the velocity form the command itself is the only integral. Clamping the command to its limits and to the rig's
+//! rate is therefore sufficient as anti-windup.
 
 use mapper_core::{
     Channel, Event, EventKind, OperatingPoint, PlanStep, SampleBatch, SpeedControlSettings, SpeedResponse,
@@ -21,80 +21,80 @@ use mapper_core::{
 use mapper_numerics::statistics::median;
 use std::collections::VecDeque;
 
-/// Time constant of the closed loop, s: at first, and in the long run.
+/// Time constant of the closed loop, s: initial and final.
 const LAMBDA_S: (f64, f64) = (2.5, 20.0);
-/// The closed loop's time constant over the time since the transient.
+/// Ratio of the closed loop's time constant to the time since the transient.
 const LAMBDA_GROWTH: f64 = 0.4;
-/// After a jump the loop waits for so many time constants of the machine, and as long as P3 needs at the rig's rate.
+/// After a jump the loop waits for this number of machine time constants, plus the time that P3 needs at the rig's rate.
 const TRANSIENT_TIME_CONSTANTS: f64 = 5.0;
-/// Shortest time that it waits, s.
+/// Minimum wait, s.
 const TRANSIENT_MIN_S: f64 = 2.0;
-/// Longest time that it waits for the speed to stop moving, s: a machine that never rests is held all the same.
+/// Maximum wait for the speed to settle, s: after that, the loop also controls a machine that never settles.
 const TRANSIENT_MAX_S: f64 = 15.0;
-/// The transient is over when the speed moves by less than this share of it in a second.
+/// The transient is over when the relative change of speed per second falls below this.
 const AT_REST_RATIO: f64 = 1e-3;
-/// Commands closer to what was sent than this share of the band, as a speed, are not sent: valves wear.
+/// Smallest change of the command that is sent, as a share of the speed band: it saves valve wear.
 const SENT_SHARE: f64 = 0.05;
-/// Largest deficit, plus or minus: beyond it something else is wrong, a sensor of the speed above all.
+/// Largest deficit in either direction: a larger one indicates another fault, most likely of the speed sensor.
 const DEFICIT_MAX: f64 = 0.4;
-/// Smallest weight of a step's own deficit in what is carried on: what housings add to single steps averages out.
+/// Minimum weight of a step's own deficit in the running average, which averages out the effect of the housings.
 const LEARNING_MIN_RATIO: f64 = 0.3;
-/// Seconds at the end of a step over which its speed is judged, s.
+/// Time at the end of a step over which its speed is judged, s.
 const END_S: f64 = 10.0;
-/// Seconds beyond the band after which what was off counts as new.
+/// Consecutive seconds beyond the band after which the loop restarts with its fast time constant.
 const OFF_SECONDS: usize = 3;
 
-/// What the loop may do.
+/// Limits of the control loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedControlLimits {
     /// Lowest P3, Pa.
     pub p3_min_pa: f64,
-    /// Highest P3, Pa: as far below the limit as its sensor may read too high, or the guard would end the run. A step whose
-    /// plan has more keeps it.
+    /// Highest P3, Pa. It stays below the guard's limit by the sensor's error, so that the guard does not end the run. A step
+    /// with a higher planned P3 keeps it.
     pub p3_max_pa: f64,
-    /// Fastest change of P3, Pa/s; `None`: the rig's own business.
+    /// Maximum rate of P3, Pa/s; `None`: the rig limits it.
     pub p3_slew_max_pa_s: Option<f64>,
     /// Highest shaft speed, rpm.
     pub speed_max_rpm: f64,
 }
 
-/// The nominal machine's answer at a step; `None` where it has none, and P3 stays as planned.
+/// Response of the nominal machine at a step; `None` if there is none, and P3 stays as planned.
 pub type ResponseAt<'a> = Box<dyn FnMut(&PlanStep) -> Option<SpeedResponse> + 'a>;
 
-/// Holds the shaft speed of a run. Time comes with the samples; equal samples give equal commands.
+/// Controls the shaft speed of a run. Time comes from the samples, so equal samples give equal commands.
 pub struct SpeedControl<'a> {
     settings: SpeedControlSettings,
     limits: SpeedControlLimits,
     response_at: ResponseAt<'a>,
-    /// Deficit that steps begin with.
+    /// Deficit with which steps begin.
     deficit: f64,
-    /// Steps it was learnt from.
+    /// Number of steps in the deficit's average.
     learnt: usize,
     hold: Option<Hold>,
     /// The last command, Pa.
     sent_pa: Option<f64>,
 }
 
-/// The point that is held.
+/// The operating point under control.
 #[derive(Debug)]
 struct Hold {
     target: OperatingPoint,
     plan_pa: f64,
     response: SpeedResponse,
     start_s: f64,
-    /// The transient is not over before, s.
+    /// Earliest end of the transient, s.
     not_before_s: f64,
-    /// What the loop asks for, Pa: the command but for changes too small to be sent.
+    /// Command of the loop, Pa; it differs from the last command by changes too small to be sent.
     wanted_pa: f64,
-    /// Since when the loop is closed, or has begun anew, s.
+    /// Time at which the loop was closed or restarted, s.
     closed_s: Option<f64>,
-    /// Time and error of the second before.
+    /// Time and speed error of the previous second.
     before: Option<(f64, f64)>,
-    /// Seconds in a row beyond the band.
+    /// Consecutive seconds beyond the band.
     off: usize,
     /// Time and speed of the last seconds.
     recent: VecDeque<(f64, f64)>,
-    /// Since when a limit is in the way, and whether that was told.
+    /// Start of saturation at a limit, and whether it was reported.
     saturated: Option<(f64, bool)>,
 }
 
@@ -115,7 +115,7 @@ impl Hold {
 }
 
 impl<'a> SpeedControl<'a> {
-    /// A loop that has learnt nothing yet.
+    /// Creates a controller without a learnt deficit.
     pub fn new(
         settings: SpeedControlSettings,
         limits: SpeedControlLimits,
@@ -124,12 +124,12 @@ impl<'a> SpeedControl<'a> {
         SpeedControl { settings, limits, response_at, deficit: 0.0, learnt: 0, hold: None, sent_pa: None }
     }
 
-    /// Deficit of turbine power that the next step begins with, natural logarithm.
+    /// Deficit of turbine power with which the next step begins, natural logarithm.
     pub fn deficit(&self) -> f64 {
         self.deficit
     }
 
-    /// P3 with which a step begins at `t_s`, Pa. Where the step goes on at the point that is held, what holds it.
+    /// P3 with which a step begins at `t_s`, Pa. A step at the current point continues with the current command.
     pub fn begin(&mut self, step: &PlanStep, t_s: f64) -> f64 {
         if let Some(hold) = &mut self.hold
             && hold.target.is_same_place(&step.to)
@@ -157,7 +157,7 @@ impl<'a> SpeedControl<'a> {
             recent: VecDeque::new(),
             saturated: None,
         };
-        // What was learnt elsewhere never drives the nominal machine beyond the speed limit.
+        // A deficit learnt at other points must not drive the nominal machine beyond the speed limit.
         let room_pa = (self.limits.speed_max_rpm - step.to.speed_rpm).max(0.0) / response.rpm_per_pa;
         hold.wanted_pa = self.allowed(hold.p3_pa(self.deficit).min(step.p3_pa + room_pa), &hold);
         let from_pa = self.sent_pa.unwrap_or(hold.wanted_pa);
@@ -174,10 +174,10 @@ impl<'a> SpeedControl<'a> {
         p3_pa
     }
 
-    /// Looks at new samples: the next P3 to send, if there is one, Pa, and what is to be told.
+    /// Processes new samples: returns the next P3 to send, Pa, and an event, if any.
     pub fn on_batch(&mut self, batch: &SampleBatch) -> (Option<f64>, Option<Event>) {
         let Some(mut hold) = self.hold.take() else { return (None, None) };
-        let told = self.advance(&mut hold, batch);
+        let event = self.advance(&mut hold, batch);
         let smallest_pa =
             SENT_SHARE * self.settings.band_ratio * hold.target.speed_rpm / hold.response.rpm_per_pa;
         let send = self.sent_pa.is_none_or(|sent_pa| (hold.wanted_pa - sent_pa).abs() > smallest_pa);
@@ -186,7 +186,7 @@ impl<'a> SpeedControl<'a> {
             self.sent_pa = next;
         }
         self.hold = Some(hold);
-        (next, told)
+        (next, event)
     }
 
     fn advance(&mut self, hold: &mut Hold, batch: &SampleBatch) -> Option<Event> {
@@ -201,7 +201,7 @@ impl<'a> SpeedControl<'a> {
         let before = hold.before.replace((now_s, error_rpm));
         let (before_s, error_before_rpm) = before?;
         let dt_s = now_s - before_s;
-        // A batch that ends where the one before did has nothing new.
+        // A batch without later samples adds nothing.
         if dt_s <= 0.0 {
             return None;
         }
@@ -221,7 +221,7 @@ impl<'a> SpeedControl<'a> {
         let closed_for_s = now_s - hold.closed_s.unwrap_or(now_s);
         let lambda_s = (LAMBDA_GROWTH * closed_for_s).clamp(LAMBDA_S.0, LAMBDA_S.1);
         let response = &hold.response;
-        // After a silence the speed is corrected by what is seen now, not for all that was missed.
+        // After a gap in the samples, the integral counts a limited time only.
         let counted_s = dt_s.min(0.5 * lambda_s);
         let change_pa = (response.time_constant_s * (error_rpm - error_before_rpm) + error_rpm * counted_s)
             / (lambda_s * response.rpm_per_pa);
@@ -233,7 +233,7 @@ impl<'a> SpeedControl<'a> {
         self.saturation(hold, now_s, rated_pa)
     }
 
-    /// P3 within the rig's limits, and no farther from the plan's than any deficit goes, Pa.
+    /// P3 within the rig's limits and within the largest deficit from the plan, Pa.
     fn allowed(&self, p3_pa: f64, hold: &Hold) -> f64 {
         let (low_pa, high_pa) = (hold.p3_pa(-DEFICIT_MAX), hold.p3_pa(DEFICIT_MAX));
         p3_pa
@@ -242,17 +242,17 @@ impl<'a> SpeedControl<'a> {
             .min(self.limits.p3_max_pa.max(hold.plan_pa))
     }
 
-    /// Tells once in a step that a limit is in the way: after seconds, so that a passing touch is none.
+    /// Reports saturation once per step, after some seconds, so that a brief contact with the limit is ignored.
     fn saturation(&self, hold: &mut Hold, now_s: f64, asked_pa: f64) -> Option<Event> {
         let speed_rpm = hold.reached_rpm()?;
         if asked_pa == hold.wanted_pa {
-            hold.saturated = hold.saturated.filter(|(_, told)| *told);
+            hold.saturated = hold.saturated.filter(|(_, reported)| *reported);
             return None;
         }
-        let (since_s, told) = hold.saturated.unwrap_or((now_s, false));
-        let tell = !told && now_s - since_s >= OFF_SECONDS as f64;
-        hold.saturated = Some((since_s, told || tell));
-        tell.then(|| Event {
+        let (since_s, reported) = hold.saturated.unwrap_or((now_s, false));
+        let report = !reported && now_s - since_s >= OFF_SECONDS as f64;
+        hold.saturated = Some((since_s, reported || report));
+        report.then(|| Event {
             t_s: now_s,
             kind: EventKind::Note,
             message: format!(
@@ -278,7 +278,7 @@ impl<'a> SpeedControl<'a> {
         }
     }
 
-    /// A step has ended at `t_s`: what it was off, if that is beyond the band. What it took is carried on.
+    /// Ends a step at `t_s`: updates the deficit, and reports a speed beyond the band.
     pub fn end(&mut self, t_s: f64) -> Option<Event> {
         let hold = self.hold.as_ref()?;
         if hold.closed_s.is_some() {

@@ -1,12 +1,12 @@
-//! Stopping from outside: at once, or with the step.
+//! Stops requested from outside: immediately, or at the end of the step.
 
 use crate::run::{Halt, Run};
 use mapper_core::{Event, EventKind};
 use std::sync::atomic::Ordering;
 
 impl Run<'_, '_> {
-    /// Whether somebody wants the run to end. Outside of a step it ends at once; within one, what was asked for is said, once, with
-    /// how long it takes: whoever asked must not think that nobody has heard.
+    /// Checks for a requested stop. Outside a step the run ends immediately. Within a step, one event confirms the request and states the
+    /// remaining time, so that the operator knows that the stop was received.
     pub(crate) fn look_for_a_stop(&mut self, in_step: bool, until_s: f64) -> Result<(), Halt> {
         let with_step = self.protection.stop_after_step.load(Ordering::Relaxed);
         if self.with.stop.load(Ordering::Relaxed) || (with_step && !in_step) {

@@ -1,5 +1,5 @@
-//! Goes to the surge-side end of each line after all other steps, and closes the valve in small steps as far as what is read
-//! says it may.
+//! The surge search: after all other steps it visits the surge-side end of each line, and closes the valve in small steps as far
+//! as the readings allow.
 
 use crate::source::{StepSource, StepSourceError};
 use mapper_core::{
@@ -8,18 +8,18 @@ use mapper_core::{
 };
 use mapper_surge::{Move, SurgeEstimate, SurgeReading, Why, next_move};
 
-/// Time at the end of a line before the first look, s: the machine comes from elsewhere on the map.
+/// Time at the end of a line before the first reading, s: the machine comes from elsewhere on the map.
 const ARRIVE_S: f64 = 40.0;
-/// Time after the valve was opened again, s.
+/// Time after the valve was reopened, s.
 const RETURN_S: f64 = 10.0;
-/// Speed is taken from so much at the end of a step, s.
+/// Time at the end of a step over which the speed is averaged, s.
 const SPEED_S: f64 = 5.0;
-/// Largest correction of the commanded speed, ratio: more is no turbine that is a little off.
+/// Largest correction of the commanded speed, ratio: a larger one indicates a fault rather than a weaker turbine.
 const MAX_TRIM_RATIO: f64 = 0.1;
-/// Samples in a row without forward flow that are surge, whatever the rig says.
+/// Consecutive samples without forward flow that count as surge, independent of the rig's own report.
 const REVERSED_SAMPLES: usize = 2;
 
-/// What holds the machine at a point, by the nominal model.
+/// Boundary conditions that hold the machine at a point, by the nominal model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
     /// Turbine inlet total pressure, Pa.
@@ -28,43 +28,43 @@ pub struct Held {
     pub t3_k: f64,
     /// Oil inlet temperature, K.
     pub oil_temperature_k: f64,
-    /// What is expected there.
+    /// Prediction for this point.
     pub predicted: Predicted,
     /// Surge margin of the nominal machine, ratio.
     pub surge_margin_ratio: f64,
 }
 
-/// What holds the machine at a point; `None` where it cannot be held within the campaign's limits.
+/// Returns the conditions that hold the machine at a point; `None` if they violate the campaign's limits.
 pub type Hold<'a> = &'a dyn Fn(OperatingPoint) -> Option<Held>;
 
-/// Steps of another source, and behind them the approaches to surge: one for each speed, slowest first.
+/// The steps of another source, followed by the approaches to surge: one for each speed, slowest first.
 pub struct SurgeSearch<'a> {
     inner: &'a mut dyn StepSource,
     seek: SurgeSeek,
     reference: ReferenceState,
     hold: Hold<'a>,
-    /// The step nearest surge of each speed, as the inner source made them.
+    /// The step nearest surge at each speed, from the inner source.
     line_ends: Vec<PlanStep>,
-    /// Lines that are still to be approached, the next one last; `None` while the inner source has steps.
+    /// Remaining lines, the next one last; `None` while the inner source has steps.
     lines: Option<Vec<PlanStep>>,
     approach: Option<Approach>,
     handed_out: usize,
     last: Option<OperatingPoint>,
-    /// Begin of the next step by the plan's time, s.
+    /// Start of the next step in the plan's time, s.
     start_s: f64,
     notes: Vec<String>,
     surges: usize,
 }
 
-/// The line that is being approached.
+/// The current approach.
 struct Approach {
     end: PlanStep,
     stage: Stage,
     looks: Vec<SurgeReading>,
-    /// What is read at the current step.
+    /// Readings of the current step.
     readings: Recording,
     nominal_margin_ratio: Option<f64>,
-    /// Commanded over wanted speed.
+    /// Ratio of commanded to wanted speed.
     trim_ratio: f64,
     surged: bool,
     reversed_samples: usize,
@@ -73,7 +73,7 @@ struct Approach {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     Arrive,
-    /// SurgeReading at this opening.
+    /// Take a reading at this opening.
     SurgeReading(f64),
     Return,
     Over,
@@ -83,7 +83,7 @@ const READ: [Channel; 5] =
     [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::T1, Channel::P1, Channel::P2];
 
 impl<'a> SurgeSearch<'a> {
-    /// The steps of `inner`, then the approaches. `reference` is that of corrected values.
+    /// The steps of `inner`, then the approaches. `reference` is the reference state of corrected values.
     pub fn new(
         inner: &'a mut dyn StepSource,
         seek: SurgeSeek,
@@ -106,10 +106,10 @@ impl<'a> SurgeSearch<'a> {
         }
     }
 
-    /// Time of a line besides its looks, s.
+    /// Time of a line without its readings, s.
     pub const AROUND_S: f64 = ARRIVE_S + RETURN_S;
 
-    /// How often the compressor went into surge on the way.
+    /// Number of surge events during the approaches.
     pub fn surges(&self) -> usize {
         self.surges
     }
@@ -123,7 +123,7 @@ impl<'a> SurgeSearch<'a> {
         }
     }
 
-    /// The next step of the approaches; `None` when all lines are done.
+    /// The next step of the approaches; `None` after the last line.
     fn next_of_approaches(&mut self) -> Option<PlanStep> {
         let lines = self.lines.get_or_insert_with(|| {
             let mut lines = std::mem::take(&mut self.line_ends);
@@ -138,7 +138,7 @@ impl<'a> SurgeSearch<'a> {
             if let Some(step) = approach.step(&self.seek, self.hold) {
                 return Some(step);
             }
-            // Beyond what the rig may be told: what was seen so far has to do.
+            // The point is outside the limits: the line ends with the readings so far.
             let speed_rpm = approach.end.to.speed_rpm;
             self.notes.push(format!(
                 "surge search: {speed_rpm:.0} rpm cannot be held any further within the limits; the line is left"
@@ -165,7 +165,7 @@ impl Approach {
         }
     }
 
-    /// The step of the current stage; index, begin and origin are not filled in.
+    /// The step of the current stage, without index, start time and origin.
     fn step(&mut self, seek: &SurgeSeek, hold: Hold<'_>) -> Option<PlanStep> {
         let safe = self.end.to.valve_opening_ratio;
         let (opening, dwell_s) = match self.stage {
@@ -176,7 +176,7 @@ impl Approach {
         };
         let to = OperatingPoint { speed_rpm: self.end.to.speed_rpm, valve_opening_ratio: opening };
         let mut step = PlanStep { kind: StepKind::Approach, to, dwell_s, ..self.end.clone() };
-        // The way back needs no leave of the limits: the line's end itself is within them.
+        // The return needs no check: the end of the line is within the limits.
         if self.stage != Stage::Return {
             let held = hold(OperatingPoint { speed_rpm: to.speed_rpm * self.trim_ratio, ..to })?;
             (step.p3_pa, step.t3_k, step.oil_temperature_k) = (held.p3_pa, held.t3_k, held.oil_temperature_k);
@@ -189,7 +189,7 @@ impl Approach {
         Some(step)
     }
 
-    /// Keeps what is read; true where the compressor surges.
+    /// Stores the readings; true if the compressor surges.
     fn read(&mut self, batch: &SampleBatch) -> bool {
         for channel in READ {
             if let Some(values) = batch.column(channel) {
@@ -207,7 +207,7 @@ impl Approach {
         surges
     }
 
-    /// Corrects the commanded speed by what was reached.
+    /// Corrects the commanded speed by the measured one.
     fn trim(&mut self, end_s: f64) {
         let Some(series) = self.readings.series.get(&Channel::ShaftSpeed) else { return };
         let (_, values) = series.slice(end_s - SPEED_S, end_s);
@@ -219,7 +219,7 @@ impl Approach {
         }
     }
 
-    /// What follows from the step that has ended; a note where the line is done.
+    /// Decides how the approach continues after a step; a note if the line ends.
     fn conclude(
         &mut self,
         marker: &StepMarker,
@@ -332,7 +332,7 @@ impl StepSource for SurgeSearch<'_> {
     fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         match &mut self.approach {
             None => self.inner.skipped(marker),
-            // The valve opens: a guard has the say over how far a line is followed.
+            // The valve opens: a guard limits how far a line is followed.
             Some(approach) => {
                 approach.stage = match approach.stage {
                     Stage::SurgeReading(_) | Stage::Arrive => Stage::Return,

@@ -1,19 +1,19 @@
-//! The guard against surge, by what flow and pressures do: no rig says by itself that it surges.
+//! The guard against surge. It detects surge from flow and pressures, because rigs do not report it.
 //!
-//! In deep surge flow and pressure swing at some hertz; before it they swing irregularly and ever more. Looked at each tenth of a
-//! second, both are folded into noise of the same size. What counts is the median size of the second difference of three
-//! looks: it knows nothing of level and slope, and a jump of the operating point is in a few of them alone.
+//! In deep surge, flow and pressure oscillate at a few hertz; before it, they fluctuate irregularly with growing amplitude. Sampling
+//! at 10 Hz folds both into noise of the same size. The guard uses the median size of the second difference of three samples:
+//! it is insensitive to level and slope, and a jump of the operating point affects only a few of these differences.
 
 use crate::guard::{Guard, Told, Trip};
 use mapper_core::{Channel, GuardName, SampleBatch, SurgeVariation};
 use mapper_numerics::statistics::median;
 use std::collections::VecDeque;
 
-/// Time between two looks, s.
+/// Sampling interval of the guard, s.
 const LOOK_S: f64 = 0.1;
-/// Looks that are held against each other: two seconds.
+/// Number of samples that are compared: two seconds.
 const LOOKS: usize = 20;
-/// Median size of a second difference of independent normal noise over its standard deviation: 0.6745 sqrt(6).
+/// Ratio of the median absolute second difference to the standard deviation of independent normal noise: 0.6745 sqrt(6).
 const SECOND_DIFFERENCE: f64 = 1.652;
 
 /// See [`SurgeVariation`].
@@ -21,17 +21,17 @@ const SECOND_DIFFERENCE: f64 = 1.652;
 pub struct SurgeWatch {
     spec: SurgeVariation,
     next_look_s: f64,
-    /// Newest reading of flow, P2 and P1 since the last look: they may come from several sources, each at its own times.
+    /// Newest readings of flow, P2 and P1 since the last sample. They may come from several sources with different times.
     newest: [f64; 3],
-    /// Flow, P2 and P1 of the last looks.
+    /// Flow, P2 and P1 of the last samples.
     looks: VecDeque<[f64; 3]>,
     since_s: Option<f64>,
     last_s: f64,
-    said: bool,
+    reported: bool,
 }
 
 impl SurgeWatch {
-    /// A guard by its specification.
+    /// Creates a guard from its specification.
     pub fn new(spec: SurgeVariation) -> Self {
         SurgeWatch {
             spec,
@@ -40,11 +40,11 @@ impl SurgeWatch {
             looks: VecDeque::new(),
             since_s: None,
             last_s: 0.0,
-            said: false,
+            reported: false,
         }
     }
 
-    /// Standard deviation of one of the three over its mean; 0 where it cannot be said.
+    /// Standard deviation of one of the three channels relative to its mean; 0 if too few readings exist.
     fn variation_ratio(&self, which: usize) -> f64 {
         let values: Vec<f64> =
             self.looks.iter().map(|look| look[which]).filter(|value| value.is_finite()).collect();
@@ -68,10 +68,10 @@ impl SurgeWatch {
 }
 
 impl Guard for SurgeWatch {
-    fn look(&mut self, batch: &SampleBatch, _: f64, told: &Told) -> Option<Trip> {
-        if !told.running {
+    fn look(&mut self, batch: &SampleBatch, _: f64, state: &Told) -> Option<Trip> {
+        if !state.running {
             self.looks.clear();
-            (self.since_s, self.said) = (None, false);
+            (self.since_s, self.reported) = (None, false);
             return None;
         }
         let columns =
@@ -90,12 +90,12 @@ impl Guard for SurgeWatch {
                 self.looks.pop_front();
             }
             let Some((flow, pressure)) = self.surges() else {
-                (self.since_s, self.said) = (None, false);
+                (self.since_s, self.reported) = (None, false);
                 continue;
             };
             let since_s = *self.since_s.get_or_insert(*t_s);
-            if t_s - since_s > self.spec.dwell_s && !self.said {
-                self.said = true;
+            if t_s - since_s > self.spec.dwell_s && !self.reported {
+                self.reported = true;
                 return Some(Trip {
                     t_s: *t_s,
                     guard: GuardName::Surge,
@@ -118,7 +118,7 @@ impl Guard for SurgeWatch {
     }
 
     fn is_alert(&self) -> bool {
-        // A jump may touch the line: only what goes on is worth a closer look.
+        // A jump may exceed the threshold briefly: only a lasting violation needs sample-by-sample polling.
         self.since_s.is_some_and(|since_s| self.last_s - since_s > self.spec.dwell_s - 1.0)
     }
 }
@@ -131,7 +131,7 @@ mod tests {
     const SPEC: SurgeVariation =
         SurgeVariation { flow_ratio: 0.05, pressure_ratio: 0.01, dwell_s: 5.0, reaction: Reaction::Safe };
 
-    /// Flow of 0.05 kg/s and P2 of 150 kPa at 100 Hz with these relative courses; when it trips, s.
+    /// Time of the trip, s, for a flow of 0.05 kg/s and P2 of 150 kPa at 100 Hz with these relative variations.
     fn trips_at_s(flow: impl Fn(f64) -> f64, p2: impl Fn(f64) -> f64) -> Option<f64> {
         let mut guard = SurgeWatch::new(SPEC);
         let told = Told { running: true, ..Told::default() };
@@ -147,9 +147,8 @@ mod tests {
         })
     }
 
-    /// A surge cycle of 7.3 Hz, 8 % of the flow and 1.6 % of P2, from 10 s on: it has to be seen within the two seconds of the
-    /// looks after the dwell, unless its frequency lies
-    /// within some 2 Hz of a multiple of the 10 Hz of the looks, where folding makes it slow.
+    /// A surge cycle of 7.3 Hz, 8 % of the flow and 1.6 % of P2, from 10 s on. The guard has to trip within two seconds after the dwell.
+    /// Frequencies within about 2 Hz of a multiple of the 10 Hz sampling rate are excluded: folding makes them slow.
     #[test]
     fn a_surge_cycle_trips_after_its_dwell() {
         for hertz in [3.7, 4.3, 7.3, 16.9] {
@@ -162,7 +161,7 @@ mod tests {
     #[test]
     fn jumps_ramps_and_flow_noise_alone_do_not_trip() {
         let swing = |t: f64| (std::f64::consts::TAU * 7.3 * t).sin();
-        // The operating point jumps by half each ten seconds.
+        // The operating point jumps by 50 % every ten seconds.
         let jump = |t: f64| if (t / 10.0) as i64 % 2 == 0 { 0.0 } else { 0.5 };
         assert_eq!(trips_at_s(jump, jump), None);
         assert_eq!(trips_at_s(|t| 0.02 * t, |t| 0.02 * t), None);

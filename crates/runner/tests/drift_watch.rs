@@ -1,4 +1,4 @@
-//! The watch over repeats: what differs is made again, and only what differs again is acted upon.
+//! The drift watch: a differing jump is repeated, and only a confirmed difference has consequences.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
@@ -8,7 +8,7 @@ use mapper_core::{
 use mapper_runner::{DriftWatch, StepSource, StepSourceError};
 use std::collections::BTreeMap;
 
-/// Three times slow to fast, with a point between.
+/// Three sweeps from slow to fast, with a point between.
 struct Steps(usize);
 
 const SPEEDS: [f64; 8] = [70e3, 130e3, 90e3, 70e3, 130e3, 90e3, 70e3, 130e3];
@@ -43,7 +43,7 @@ impl StepSource for Steps {
     }
 }
 
-/// Runs all steps with T2 = 350 K + `drift(t)`; speeds as run, and notes.
+/// Runs all steps with T2 = 350 K + `drift(t)`; returns the executed speeds and the notes.
 fn run(on_drift: OnDrift, drift: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<String>) {
     let declared = BTreeMap::from([(
         Channel::T2,
@@ -61,7 +61,7 @@ fn run(on_drift: OnDrift, drift: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<String>)
         watch.on_batch(&SampleBatch {
             t_s: times.clone(),
             columns: vec![
-                // An inlet that warms by itself is not drift.
+                // A warming inlet is not drift.
                 column(Channel::T1, times.iter().map(|t_s| 298.0 + 0.01 * t_s).collect()),
                 column(Channel::T2, times.iter().map(|t_s| 350.0 + 0.01 * t_s + drift(*t_s)).collect()),
             ],
@@ -95,7 +95,7 @@ fn without_drift_nothing_is_put_in() {
 
 #[test]
 fn drift_is_confirmed_and_then_the_run_is_held() {
-    // 1 K from 350 s on: seen at the second visit, beyond 1.96 times the declared 0.25 K.
+    // 1 K from 350 s on: detected at the second visit, beyond 1.96 times the declared 0.25 K.
     let (speeds, notes) = run(OnDrift::Hold, |t_s| if t_s > 350.0 { 1.0 } else { 0.0 });
     assert_eq!(speeds, [70e3, 130e3, 90e3, 70e3, 130e3, 70e3, 130e3], "the jump again, and no further");
     assert!(notes[0].contains("T2 by +1.0000 K") && notes[0].contains("made again"), "{notes:?}");

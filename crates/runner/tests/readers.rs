@@ -1,4 +1,4 @@
-//! A rig with sources beside it: the virtual lab, and others that give, keep back or lose what they are asked for.
+//! A rig with auxiliary instruments: the virtual lab, and instruments that deliver, delay or lose their readings.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
@@ -11,8 +11,8 @@ use mapper_physics::params::BoundaryConditions;
 use mapper_runner::{Reader, RigWithInstruments};
 use std::time::Duration;
 
-/// Gives its own time as T_amb, so many times a second; later by so much; lost at a time.
-struct Beside {
+/// Returns its own time as T_amb at this rate, with a delay, until its loss at a given time.
+struct Instrument {
     rate_hz: f64,
     late_s: f64,
     lost_s: f64,
@@ -20,7 +20,7 @@ struct Beside {
     next: u64,
 }
 
-impl Backend for Beside {
+impl Backend for Instrument {
     fn describe(&self) -> RigDescription {
         RigDescription {
             backend: "beside".to_owned(),
@@ -65,9 +65,10 @@ impl Backend for Beside {
     }
 }
 
-fn rig(beside: Beside) -> RigWithInstruments {
+fn rig(instrument: Instrument) -> RigWithInstruments {
     let lab = VirtualLab::new(LabSettings::ideal(Model::nominal(), BoundaryConditions::default()));
-    let reader = Reader { name: "cell".to_owned(), backend: Box::new(beside), channels: vec![Channel::TAmb] };
+    let reader =
+        Reader { name: "cell".to_owned(), backend: Box::new(instrument), channels: vec![Channel::TAmb] };
     let mut rig = RigWithInstruments::new(Box::new(lab), vec![reader], Duration::from_secs(5)).unwrap();
     rig.arm().unwrap();
     rig.set(&Setpoints {
@@ -81,8 +82,8 @@ fn rig(beside: Beside) -> RigWithInstruments {
     rig
 }
 
-fn beside(rate_hz: f64) -> Beside {
-    Beside { rate_hz, late_s: 0.0, lost_s: f64::INFINITY, simulated_time: true, next: 0 }
+fn instrument(rate_hz: f64) -> Instrument {
+    Instrument { rate_hz, late_s: 0.0, lost_s: f64::INFINITY, simulated_time: true, next: 0 }
 }
 
 /// Finite readings of a channel with their times.
@@ -95,12 +96,12 @@ fn readings(batches: &[SampleBatch], channel: Channel) -> Vec<(f64, f64)> {
     batches.iter().flat_map(of).collect()
 }
 
-/// A faster one and a slower one: each keeps its own rate and times, nothing is lost, and the polling changes nothing.
+/// A faster and a slower instrument keep their own rates and times. No reading is lost, and polling does not change them.
 #[test]
 fn each_channel_has_the_times_of_its_own_source() {
     for rate_hz in [2.5, 10.0, 1000.0] {
         let polled = |untils: &[f64]| {
-            let mut rig = rig(beside(rate_hz));
+            let mut rig = rig(instrument(rate_hz));
             assert_eq!(rig.describe().channels.len(), 19);
             let batches: Vec<SampleBatch> =
                 untils.iter().map(|until_s| rig.poll(*until_s).unwrap()).collect();
@@ -111,23 +112,23 @@ fn each_channel_has_the_times_of_its_own_source() {
             }
             rig.make_safe().unwrap();
             rig.disarm().unwrap();
-            // The lab's own steps end with a poll: its values differ in the last bits, its times do not.
+            // The lab's solver steps end with a poll: values differ in the last bits, times do not.
             let t2 = readings(&batches, Channel::T2).into_iter().map(|(t_s, _)| t_s).collect::<Vec<f64>>();
             (readings(&batches, Channel::TAmb), t2)
         };
         let (air, t2) = polled(&[1.0, 1.04, 3.0]);
         assert_eq!((air.clone(), t2.clone()), polled(&[3.0]), "{rate_hz} Hz");
         assert!(air.iter().all(|(t_s, value)| t_s == value), "{rate_hz} Hz");
-        // What is beyond the rig's last sample waits for the next one.
+        // Readings beyond the rig's last sample wait for the next one.
         let last_s = *t2.last().unwrap();
         assert_eq!(air.len(), (last_s * rate_hz).floor() as usize + 1, "{rate_hz} Hz");
     }
 }
 
-/// A reading that comes late stands behind what was handed out, and says when it was taken; one that never comes holds nobody up.
+/// A late reading follows the samples already passed on, and keeps its source time. A lost instrument delays nothing.
 #[test]
 fn what_is_late_keeps_the_time_of_its_source_and_a_lost_reader_is_said() {
-    let mut rig = rig(Beside { late_s: 0.25, lost_s: 2.0, ..beside(10.0) });
+    let mut rig = rig(Instrument { late_s: 0.25, lost_s: 2.0, ..instrument(10.0) });
     let batches: Vec<SampleBatch> =
         (1..=30).map(|tenth| rig.poll(f64::from(tenth) * 0.1 + 0.01).unwrap()).collect();
     let air = readings(&batches, Channel::TAmb);
@@ -147,10 +148,10 @@ fn what_is_late_keeps_the_time_of_its_source_and_a_lost_reader_is_said() {
     assert_eq!(readings(&batches, Channel::T2).len(), 31, "the rig goes on");
 }
 
-/// In real time a reader that hangs is on its own: the rig is polled all the same.
+/// In real time a hanging instrument does not delay the polling of the rig.
 #[test]
 fn nobody_waits_for_a_reader_in_real_time() {
-    struct Hangs(std::sync::mpsc::Receiver<()>, Beside);
+    struct Hangs(std::sync::mpsc::Receiver<()>, Instrument);
     impl Backend for Hangs {
         fn describe(&self) -> RigDescription {
             self.1.describe()
@@ -162,7 +163,7 @@ fn nobody_waits_for_a_reader_in_real_time() {
             self.1.set(setpoints)
         }
         fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
-            // Until the test is over.
+            // Blocks until the test is over.
             let _ = self.0.recv();
             self.1.poll(until_s)
         }
@@ -175,9 +176,9 @@ fn nobody_waits_for_a_reader_in_real_time() {
     }
     let (release, held) = std::sync::mpsc::channel::<()>();
     let lab = VirtualLab::new(LabSettings::ideal(Model::nominal(), BoundaryConditions::default()));
-    let hangs = Hangs(held, Beside { simulated_time: false, ..beside(10.0) });
+    let hangs = Hangs(held, Instrument { simulated_time: false, ..instrument(10.0) });
     let reader = Reader { name: "cell".to_owned(), backend: Box::new(hangs), channels: vec![Channel::TAmb] };
-    // To connect, on a machine that is busy with other tests; letting go waits for it twice.
+    // Time to connect, on a machine that is busy with other tests; disconnecting waits for it twice.
     let mut rig = RigWithInstruments::new(Box::new(lab), vec![reader], Duration::from_secs(1)).unwrap();
     assert!(!rig.describe().simulated_time);
     rig.arm().unwrap();

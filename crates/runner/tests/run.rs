@@ -1,4 +1,4 @@
-//! Runs on the virtual lab: the way through, and each way out.
+//! Runs on the virtual lab: the complete run, and each early end.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod faults;
@@ -43,7 +43,7 @@ fn plan() -> Plan {
         },
         warm_up_s: 10.0,
         cool_down_s: 5.0,
-        // 50 and 110 krpm by the reference table of steady states.
+        // 50 and 110 krpm from the reference table of steady states.
         steps: vec![step(0, 123_527.6, 50e3), step(1, 173_717.1, 110e3)],
         figures: PlanFigures {
             sum_gradient_k: 0.0,
@@ -71,7 +71,7 @@ struct Notebook {
     starts: Vec<StepMarker>,
     ends: Vec<StepMarker>,
     abandoned: Vec<StepMarker>,
-    /// Raised when this much run time was seen.
+    /// Raised once this run time is reached.
     stop_at_s: Option<(f64, &'static AtomicBool)>,
     /// Writing fails from this run time on.
     fail_at_s: Option<f64>,
@@ -114,7 +114,7 @@ impl RunObserver for Notebook {
     }
 }
 
-/// The lab, with a record of whether it was made safe and let go.
+/// The lab, with a record of whether it was made safe and disarmed.
 struct Watched {
     lab: VirtualLab,
     made_safe: bool,
@@ -180,7 +180,7 @@ fn a_plan_is_run_in_time_and_without_gaps() {
     assert!(notebook.events.is_empty());
 }
 
-/// Trips where the shaft has turned faster than 80 krpm for so long.
+/// Trips after the shaft has turned faster than 80 krpm for this time.
 fn overspeed(dwell_s: f64) -> SignalWatch {
     SignalWatch::new(SignalGuard {
         name: GuardName::Overspeed,
@@ -204,7 +204,7 @@ fn a_tripped_guard_makes_the_rig_safe_and_says_so() {
     let RunEnd::Tripped(trip) = end else { panic!("{end:?}") };
     assert!((30.0..32.0).contains(&trip.t_s), "{trip:?}");
     assert_eq!(notebook.events, [EventKind::GuardTripped, EventKind::SafeState]);
-    // The unfinished step ends where it was stopped, and the shaft is seen to slow down.
+    // The unfinished step ends at the stop, and the recording shows the shaft slow down.
     assert!(notebook.ends[1].end_s < 33.0);
     let fastest = notebook.samples.iter().map(|sample| sample.1).fold(0.0, f64::max);
     assert!(notebook.samples.last().unwrap().1 < 0.8 * fastest);
@@ -219,11 +219,11 @@ fn the_operator_stops_at_the_next_poll() {
     assert_eq!(notebook.events, [EventKind::Interrupted, EventKind::SafeState]);
 }
 
-/// Gives one step of half a second, then makes the next one for ever, as a script may.
+/// Provides one step of half a second, then prepares the next one for ever, like an endless script.
 struct NeverReady<'a> {
     first: Option<PlanStep>,
     looks: u32,
-    /// Raised at the third look.
+    /// Raised at the third call.
     stop: &'a AtomicBool,
     stops: bool,
 }
@@ -240,7 +240,7 @@ impl StepSource for NeverReady<'_> {
     }
 }
 
-/// A wall clock that passes only during waits.
+/// A wall clock that advances only during waits.
 struct Idle(std::cell::Cell<f64>);
 
 impl Wall for &Idle {
@@ -257,7 +257,7 @@ fn never_ready(stop: &AtomicBool, stops: bool) -> NeverReady<'_> {
     NeverReady { first, looks: 0, stop, stops }
 }
 
-/// A step that is never made does not delay a stop by the operator.
+/// A step that never becomes ready does not delay the operator's stop.
 #[test]
 fn the_operator_stops_while_a_step_is_being_made() {
     let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
@@ -277,7 +277,7 @@ fn the_operator_stops_while_a_step_is_being_made() {
     assert!(rig.made_safe && rig.disarmed);
 }
 
-/// On a rig that goes on by itself guards see every sample meanwhile: the shaft is above their limit for long enough after the step's end.
+/// On a real-time rig, guards receive every sample meanwhile: the shaft stays above their limit long enough after the step.
 #[test]
 fn guards_look_while_a_step_is_being_made() {
     let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
@@ -308,7 +308,7 @@ fn a_recorder_that_fails_ends_the_run_with_its_own_words() {
     assert_eq!(error.to_string(), "the disk is full");
 }
 
-/// Holds the first step as soon as it has begun, and lets it go on at a time.
+/// Holds the first step from its start, and releases it at a given time.
 struct HoldsFirst<'a> {
     operator: &'a Operator,
     until_s: f64,
@@ -355,7 +355,7 @@ fn a_held_step_lasts_until_it_is_let_go_on() {
     };
     let end = runner.run_under(&Protection { operator: Some(&operator), ..Protection::default() }).unwrap();
     assert_eq!(end, RunEnd::Completed);
-    // It begins at 10 s, is held until the second that ends at 60 s, and has its 20 s besides; the next one is as planned.
+    // It starts at 10 s, is held until the second that ends at 60 s, then lasts its 20 s; the next one is as planned.
     let [first, second] = holds.notebook.ends[..] else { panic!("{:?}", holds.notebook.ends) };
     assert!((first.end_s - 10.0 - 20.0 - 50.0).abs() <= 1.0, "{first:?}");
     assert!((second.end_s - second.start_s - 20.0).abs() < 1e-9, "{second:?}");

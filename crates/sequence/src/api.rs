@@ -1,4 +1,4 @@
-//! Everything a script may call: one row a function, from which registration and documentation are made.
+//! All functions that a script may call: one row per function defines its registration and its documentation.
 
 use crate::error::throw;
 use crate::result::StepResult;
@@ -13,24 +13,24 @@ pub(crate) type Shared = Arc<Mutex<Session>>;
 
 /// One function or property.
 pub struct Entry {
-    /// The chapter of the documentation it stands in.
+    /// Chapter of the documentation.
     pub group: &'static str,
-    /// As a script writes it.
+    /// Call syntax in a script.
     pub signature: &'static str,
     /// One or two sentences.
     pub doc: &'static str,
     register: fn(&mut Engine, &Shared),
 }
 
-/// A point as scripts hold it.
+/// A point, as scripts use it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Point(OperatingPoint);
 
-/// Drift of T2 and Tc at which a point counts as settled where the script does not say, K/s: 1 K in a minute.
+/// Default drift of T2 and Tc at which a point counts as settled, K/s: 1 K in a minute.
 const SETTLED_RATE_K_S: f64 = 1.0 / 60.0;
 
-/// Standard errors of which nothing is known, as scripts see them. Not infinite: rhai compares by relative differences,
-/// and infinity is greater than nothing there. An efficiency lies between 0 and 1.
+/// Standard errors of unknown quantities, as scripts receive them. They are finite because rhai compares by relative differences:
+/// no value exceeds another next to infinity. An efficiency lies between 0 and 1.
 const SIGMA_ETA_MAX: f64 = 1.0;
 const SIGMA_H_MAX_W_M2K: f64 = 1e6;
 
@@ -48,7 +48,7 @@ pub fn functions() -> &'static [Entry] {
     TABLE
 }
 
-/// Registers everything of [`TABLE`], and how points and results are shown.
+/// Registers all rows of [`TABLE`], and the text form of points and results.
 pub(crate) fn register(engine: &mut Engine, session: &Shared) {
     engine.register_type_with_name::<Point>("Point").register_type_with_name::<StepResult>("Result");
     engine.register_fn("==", |a: Point, b: Point| a == b).register_fn("!=", |a: Point, b: Point| a != b);

@@ -1,24 +1,24 @@
-//! What stops a script, with its place in the script.
+//! Errors of a script, with their position in it.
 
 use rhai::{Dynamic, EvalAltResult, ParseError, Position};
 use std::fmt;
 use std::path::PathBuf;
 
-/// Longest source line that is shown, characters.
+/// Maximum number of characters of a source line in a message.
 const LINE_LIMIT: usize = 200;
-/// Longest message that is kept, characters: a script may throw anything.
+/// Maximum number of characters of a message: a script may throw anything.
 const MESSAGE_LIMIT: usize = 1000;
 
-/// Why a sequence could not go on.
+/// Why a sequence cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
-    /// The script has a mistake, or was refused a step.
+    /// The script has an error, or one of its steps was refused.
     #[error("{0}")]
     Script(Box<ScriptError>),
     /// The script's thread could not be started.
     #[error("the thread of the sequence script could not be started: {0}")]
     Thread(#[source] std::io::Error),
-    /// The script computes for too long between two steps.
+    /// The script computes too long between two steps.
     #[error(
         "the sequence script has computed for {limit_s} s since its last step and was ended; let it do less between two steps"
     )]
@@ -26,7 +26,7 @@ pub enum SequenceError {
         /// Limit, s.
         limit_s: u64,
     },
-    /// The script's thread is gone: a fault of the program.
+    /// The script's thread has ended unexpectedly: a fault of the program.
     #[error("the sequence script ended without a result: this is a fault of the program")]
     Lost,
 }
@@ -36,15 +36,15 @@ pub enum SequenceError {
 pub struct ScriptError {
     /// The script's file.
     pub path: PathBuf,
-    /// Line, from 1; `None` where the whole script is meant.
+    /// Line, from 1; `None` if the error concerns the whole script.
     pub line: Option<usize>,
     /// Column, from 1, in characters.
     pub column: Option<usize>,
     /// The line itself, without control characters.
     pub source_line: String,
-    /// What is wrong, with values and units.
+    /// The error, with values and units.
     pub message: String,
-    /// What to do; empty where the message says it.
+    /// The remedy; empty if the message contains it.
     pub remedy: String,
     /// Lines from which the function with the error was called, innermost first.
     pub called_from: Vec<usize>,
@@ -84,7 +84,7 @@ impl ScriptError {
     }
 
     fn new(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
-        // One character for one, so that the column still fits; terminals obey control characters.
+        // Replaced one for one, so that the column still fits; terminals would interpret control characters.
         let harmless = |c: char| match c {
             '\t' => ' ',
             c if c.is_control() => '?',
@@ -107,7 +107,7 @@ impl ScriptError {
         }
     }
 
-    /// A mistake that is seen without running the script.
+    /// An error that is found without running the script.
     pub(crate) fn at(path: PathBuf, text: &str, at: Position, message: String, remedy: String) -> Self {
         Self::new(path, text, at, message, remedy)
     }
@@ -128,20 +128,20 @@ impl ScriptError {
         let at = error.position();
         let (message, remedy) = words(error);
         let mut made = Self::new(path, text, at, message, remedy);
-        // A deep recursion is told by its ends.
+        // A deep recursion is shown by its first and last calls.
         called_from.truncate(5);
         made.called_from = called_from;
         made
     }
 }
 
-/// A refusal as it travels through the script: thrown, so that the script may catch it and choose another step.
+/// A refusal inside the script: it is thrown, so that the script may catch it and choose another step.
 pub(crate) fn throw(message: String, remedy: &str) -> Box<EvalAltResult> {
     let thrown = if remedy.is_empty() { message } else { format!("{message}{REMEDY_MARK}{remedy}") };
     Box::new(EvalAltResult::ErrorRuntime(thrown.into(), Position::NONE))
 }
 
-/// Separates message and remedy in what is thrown; a script that shows the text shows a line end.
+/// Separates message and remedy in the thrown text; a script that prints the text shows a line break.
 const REMEDY_MARK: char = '\n';
 
 fn words(error: EvalAltResult) -> (String, String) {

@@ -1,4 +1,4 @@
-//! What the nominal machine expects of each step, its housings' memory carried from step to step.
+//! Predicts each step with the nominal machine; the thermal state of its housings is kept from step to step.
 
 use crate::request::SequenceRequest;
 use mapper_core::Predicted;
@@ -8,14 +8,14 @@ use mapper_physics::params::BoundaryConditions;
 use mapper_physics::simulate::SimulationError;
 use mapper_physics::steady::SteadyState;
 
-/// A step that ends within this of its planned time ends in the planned state, s: an interval of the forecast.
+/// A step whose duration is within this of the planned one ends in the planned state, s: one forecast interval.
 const AS_PLANNED_S: f64 = 0.5;
 
-/// The nominal machine along a sequence.
+/// State of the nominal machine along a sequence.
 pub(crate) struct Nominal {
-    /// At the start of the current step; `None` before the first.
+    /// State at the start of the current step; `None` before the first.
     state: Option<State>,
-    /// Planned duration of the current step, s, and the state it would end in.
+    /// Planned duration of the current step, s, and its final state.
     planned: Option<(f64, State)>,
 }
 
@@ -24,7 +24,7 @@ impl Nominal {
         Nominal { state: None, planned: None }
     }
 
-    /// What a step to `target` is expected to give.
+    /// Predicts the result of a step to `target`.
     pub(crate) fn forecast(
         &mut self,
         request: &SequenceRequest,
@@ -42,7 +42,7 @@ impl Nominal {
         Ok(step.predicted(&request.window, &request.settle_bands, has_jump))
     }
 
-    /// The step has lasted `duration_s`.
+    /// Ends the current step after `duration_s`.
     pub(crate) fn finish(
         &mut self,
         request: &SequenceRequest,

@@ -1,13 +1,13 @@
-//! Sequences written in rhai, above the planner: a script says which step comes next, and sees what the steps so far
-//! have given.
+//! Sequences written in rhai, an alternative to the planner: a script chooses each next step from the results of the
+//! previous ones.
 //!
-//! A script yields steps and nothing else. It has no file, no network, no clock and no rig; each step is checked
-//! against the campaign's limits before it leaves the script ([`SequenceRequest`]), and whoever runs it keeps its own guards.
-//! Operations, call depth and the size of every value are bounded, so that no script hangs or fills the memory.
+//! A script can only yield steps. It has no access to files, network, clock or rig. Each step is checked against the campaign's
+//! limits before it leaves the script ([`SequenceRequest`]), and the runner of the steps keeps its own guards.
+//! Operations, call depth and the size of every value are bounded, so that no script hangs or exhausts the memory.
 //!
-//! [`SequenceRunner`] runs a script on its own thread and meets it at each step: the script stands still while a step
-//! is run, and the caller stands still while the script thinks. What a script may call is one table, from which both
-//! the functions and their documentation ([`functions`]) are made.
+//! [`SequenceRunner`] runs a script on its own thread and synchronises with it at each step. The script waits while a step
+//! is executed, and the caller waits while the script computes. One table defines the functions that a script may call, and both
+//! their registration and their documentation ([`functions`]) come from it.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,11 +1,11 @@
-//! Functions and properties that a script names and nobody has, found without running it: a branch that is seldom taken may
-//! be the first to fail, at night.
+//! Finds unknown functions and properties in a script without running it. Otherwise a rarely taken branch might fail only during
+//! a long run.
 
 use mapper_yaml::closest;
 use rhai::{AST, ASTNode, Engine, Expr, Position, Stmt};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the engine knows by itself and lists nowhere.
+/// Functions that the engine provides but does not list.
 const KEYWORDS: [&str; 12] = [
     "print",
     "debug",
@@ -20,21 +20,21 @@ const KEYWORDS: [&str; 12] = [
     "this",
     "parse_json",
 ];
-/// How the engine names the function that reads a property.
+/// The engine's name for the function that reads a property.
 const GETTER: &str = "get$";
 
-/// Everything that may be called, with the numbers of arguments it takes.
+/// All callable names, with their numbers of arguments.
 type Known = BTreeMap<String, BTreeSet<usize>>;
 
-/// A name that nothing has: where, what is wrong, and what to do.
+/// An unknown name: position, message and remedy.
 pub(crate) struct Unknown {
     pub(crate) at: Position,
     pub(crate) message: String,
     pub(crate) remedy: String,
 }
 
-/// Refuses the first call of a function that does not exist, or not with so many arguments, and the first property that
-/// nothing has.
+/// Refuses the first call of an unknown function, a call with a wrong number of arguments, and the first unknown
+/// property.
 pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), Unknown> {
     let mut known = Known::new();
     let registered = |function: rhai::FuncInfo<'_>| {
@@ -46,7 +46,7 @@ pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), Unknown> {
     for function in ast.iter_functions() {
         known.entry(function.name.to_owned()).or_default().insert(function.params.len());
     }
-    // A script's own maps have whatever properties it gives them.
+    // A script's own maps may have any property.
     let mut maps = false;
     let mut wrong: Vec<(Position, String, String)> = Vec::new();
     let mut property = None;

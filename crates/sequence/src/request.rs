@@ -1,4 +1,4 @@
-//! What a sequence is made from: the campaign's points, times and limits, and the nominal machine that judges points.
+//! The inputs of a sequence: the campaign's points, times and limits, and the nominal machine that checks points.
 
 use mapper_core::{Limits, OperatingPoint, SettleBands, Timing, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;
@@ -7,28 +7,28 @@ use mapper_physics::params::BoundaryConditions;
 use mapper_physics::reach::{clause, reach};
 use mapper_physics::steady::SteadyState;
 
-/// Asks the planner for the order of a set of points; the error is a sentence for people.
+/// Requests the planner's order of a set of points; the error is a readable sentence.
 pub type OrderPoints = Box<dyn Fn(&[OperatingPoint]) -> Result<Vec<OperatingPoint>, String> + Send>;
 
-/// Everything a sequence depends on, beside its script.
+/// All inputs of a sequence except its script.
 pub struct SequenceRequest {
     /// The campaign's grid.
     pub points: Vec<OperatingPoint>,
-    /// Durations; the dwell holds where the script says nothing else.
+    /// Durations; the dwell applies unless the script sets its own.
     pub timing: Timing,
-    /// Part of a step over which gradients are forecast.
+    /// Part of a step over which gradients are predicted.
     pub window: WindowRule,
-    /// When a point counts as settled.
+    /// Criterion for a settled point.
     pub settle_bands: SettleBands,
     /// The nominal machine.
     pub model: Model,
-    /// Nominal boundary conditions; P3 and valve are the steps'.
+    /// Nominal boundary conditions; each step has its own P3 and valve opening.
     pub boundary: BoundaryConditions,
-    /// What is held at the outlet temperature of each point instead.
+    /// Temperatures that follow the compressor outlet at each point instead.
     pub follow_outlet: FollowOutlet,
-    /// What no step may leave.
+    /// Limits of every step.
     pub limits: Limits,
-    /// The planner.
+    /// Calls the planner.
     pub order: OrderPoints,
 }
 

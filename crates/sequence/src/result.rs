@@ -1,21 +1,21 @@
-//! What a finished step has given.
+//! The result of a finished step.
 
 use mapper_core::{IdentifiedPoint, OperatingPoint, Verdict};
 
-/// A finished step as a script sees it.
+/// A finished step, as the script receives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepResult {
     /// Number of the step, from 1, as tables print it.
     pub number: usize,
-    /// Where it aimed.
+    /// Its target.
     pub target: OperatingPoint,
-    /// Where it came from; `None` for the first step.
+    /// Its origin; `None` for the first step.
     pub from: Option<OperatingPoint>,
     /// Its start, run time, s.
     pub start_s: f64,
     /// Its end, run time, s.
     pub end_s: f64,
-    /// What was identified; `None` where not even its place on the map is known.
+    /// The identified point; `None` if not even its place on the map is known.
     pub identified: Option<IdentifiedPoint>,
 }
 
@@ -24,12 +24,12 @@ impl StepResult {
         self.identified.as_ref().and_then(value)
     }
 
-    /// Efficiency, fraction; `None` where there is none to be used.
+    /// Efficiency, fraction; `None` if no usable value exists.
     pub fn eta(&self) -> Option<f64> {
         self.identified(|point| point.eta).filter(|_| self.verdict() != "unusable")
     }
 
-    /// Standard error of the efficiency, fraction; infinite where nothing is known of it.
+    /// Standard error of the efficiency, fraction; infinite if unknown.
     pub fn sigma_eta(&self) -> f64 {
         let known = self.eta().and_then(|_| self.identified(|point| point.eta_uncertainty));
         known.map_or(f64::INFINITY, |uncertainty| uncertainty.combined_standard_error())
@@ -40,13 +40,13 @@ impl StepResult {
         self.identified(|point| point.h_w_m2k).filter(|_| self.verdict() != "unusable")
     }
 
-    /// Standard error of the heat-transfer coefficient, W/(m2 K); infinite where nothing is known of it.
+    /// Standard error of the heat-transfer coefficient, W/(m2 K); infinite if unknown.
     pub fn sigma_h_w_m2k(&self) -> f64 {
         let known = self.h_w_m2k().and_then(|_| self.identified(|point| point.h_uncertainty));
         known.map_or(f64::INFINITY, |uncertainty| uncertainty.combined_standard_error())
     }
 
-    /// `good`, `doubtful` or `unusable`; `unusable` as well where there is no point.
+    /// `good`, `doubtful` or `unusable`; also `unusable` if there is no point.
     pub fn verdict(&self) -> &'static str {
         match self.identified.as_ref().map(|point| point.verdict) {
             Some(Verdict::Good) => "good",

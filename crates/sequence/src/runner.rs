@@ -1,4 +1,4 @@
-//! A script on its own thread, met at each step.
+//! Runs a script on its own thread and synchronises with it at each step.
 
 use crate::error::{ScriptError, SequenceError};
 use crate::names::Unknown;
@@ -15,31 +15,31 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long is waited at once for a script's next step: a stop is seen within this.
+/// Duration of one wait for a script's next step; a stop is noticed within this time.
 const WAIT: Duration = Duration::from_millis(20);
-/// Waits that a script may take for one step: a minute, in which it could have a plan of the whole grid made several times.
+/// Maximum number of waits for one step: one minute, enough to plan the whole grid several times.
 const WAITS_MAX: u32 = 3_000;
 
-/// A script's text, and the name it has in messages.
+/// A script's text, and its name in messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Script {
-    /// Its file.
+    /// Path of its file.
     pub path: PathBuf,
     /// Its text.
     pub text: String,
 }
 
-/// A running script. Dropping it ends the script where it stands.
+/// A running script. Dropping it ends the script at its current operation.
 #[derive(Debug)]
 pub struct SequenceRunner {
     /// `None` once the script has ended.
     to_script: Option<SyncSender<Option<StepResult>>>,
     from_script: Option<Receiver<FromScript>>,
-    /// Whether the script has been asked for the step that it is to give next.
+    /// Whether the next step has been requested.
     asked: bool,
-    /// Waits since then.
+    /// Waits since the request.
     waits: u32,
-    /// What the script has given, until it is fetched.
+    /// The script's answer, until it is fetched.
     answer: Option<Result<FromScript, SequenceError>>,
     budget: Arc<Budget>,
     notes: Vec<String>,
@@ -47,12 +47,12 @@ pub struct SequenceRunner {
 }
 
 impl SequenceRunner {
-    /// Makes the script ready; nothing of it is run before the first [`next_step`](Self::next_step).
+    /// Prepares the script; it starts to run at the first [`next_step`](Self::next_step).
     ///
     /// # Errors
-    /// [`SequenceError::Thread`] where no thread can be started.
+    /// [`SequenceError::Thread`] if no thread can be started.
     pub fn start(script: Script, request: SequenceRequest) -> Result<Self, SequenceError> {
-        // Asking does not wait for a script that is still being read.
+        // A buffer of one, so that a request does not wait while the script is parsed.
         let (to_script, from_caller) = sync_channel(1);
         let (to_caller, from_script) = sync_channel(0);
         let budget = Arc::new(Budget::default());
@@ -74,8 +74,8 @@ impl SequenceRunner {
         })
     }
 
-    /// Hands over what the last step has given (`None` before the first), and lets the script go on to its next step, without waiting
-    /// for it. Nothing happens where the script is asked already.
+    /// Passes the result of the last step (`None` before the first) to the script and requests its next step, without waiting
+    /// for it. Does nothing if a request is pending.
     pub fn ask(&mut self, finished: Option<StepResult>) {
         if std::mem::replace(&mut self.asked, true) {
             return;
@@ -86,8 +86,8 @@ impl SequenceRunner {
         }
     }
 
-    /// Whether [`next_step`](Self::next_step) will return at once; waits some milliseconds for that. For the script that is to be ended
-    /// drop this.
+    /// Whether [`next_step`](Self::next_step) will return at once; waits some milliseconds for that. To end the script, drop the
+    /// runner.
     pub fn is_ready(&mut self) -> bool {
         let Some(from_script) = self.from_script.as_ref().filter(|_| self.to_script.is_some()) else {
             return true;
@@ -112,12 +112,12 @@ impl SequenceRunner {
         self.answer.is_some()
     }
 
-    /// The script's next step, which it is asked for with what the last one has given (`None` before the first) where it was not
-    /// [asked](Self::ask) before. `Ok(None)` when the script has ended.
+    /// The script's next step; `Ok(None)` when the script has ended. If the step was not [requested](Self::ask) before, `finished`
+    /// passes the result of the last step (`None` before the first).
     ///
     /// # Errors
-    /// [`SequenceError::Script`] with the script's line, [`SequenceError::TooSlow`] where it computes for too long; the script has ended
-    /// then.
+    /// [`SequenceError::Script`] with the script's line, [`SequenceError::TooSlow`] if it computes too long; the script has then
+    /// ended.
     pub fn next_step(&mut self, finished: Option<StepResult>) -> Result<Option<SequenceStep>, SequenceError> {
         if self.to_script.is_none() {
             return Ok(None);
@@ -147,12 +147,12 @@ impl SequenceRunner {
 
 impl Drop for SequenceRunner {
     fn drop(&mut self) {
-        // The script ends at its next operation. Both ends go before the thread is waited for: it may stand at either.
+        // The script ends at its next operation. Both channels are closed before the join: the thread may wait at either.
         self.budget.cancel();
         self.to_script = None;
         self.from_script = None;
         if let Some(thread) = self.thread.take() {
-            // A panic of its thread has been reported as `Lost`.
+            // A panic of the thread has been reported as `Lost`.
             let _ = thread.join();
         }
     }
@@ -169,7 +169,7 @@ fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
     engine.compile(&script.text).map_err(|error| fail(&error))
 }
 
-/// The life of a script's thread.
+/// Main function of a script's thread.
 fn run(script: &Script, budget: &Arc<Budget>, session: Session) {
     let mut engine = engine(session.request.points.len(), budget);
     let session = Arc::new(Mutex::new(session));

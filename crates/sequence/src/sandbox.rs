@@ -1,4 +1,4 @@
-//! The rhai engine of a script: what it lacks, and how much it may use.
+//! The rhai engine of a script: its restrictions and its resource limits.
 
 use rhai::packages::{
     ArithmeticPackage, BasicArrayPackage, BasicFnPackage, BasicIteratorPackage, BasicMapPackage,
@@ -8,20 +8,20 @@ use rhai::{Dynamic, Engine, EvalAltResult, Position};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// Operations of a whole script, those of its closures included. The order of a second for plain ones; time is bounded without a
-/// clock first, so that a script does the same on every machine.
+/// Operations of a whole script, including its closures: about one second of plain ones. Operations limit the computing time
+/// independently of a clock, so that a script behaves the same on every machine.
 pub(crate) const OPERATION_LIMIT: u64 = 5_000_000;
 /// Depth of calls.
 pub(crate) const CALL_DEPTH_LIMIT: usize = 32;
 /// Depth of expressions.
 const EXPRESSION_DEPTH_LIMIT: usize = 64;
-/// Length of a string, bytes. `replace` may make this squared before it is measured.
+/// Length of a string, bytes. `replace` may square this before it is measured.
 const STRING_LIMIT: usize = 4096;
-/// Elements of an array, those of arrays within included; at least twice the grid.
+/// Elements of an array, including nested arrays; at least twice the grid.
 const ARRAY_LIMIT: usize = 4096;
 /// Entries of a map.
 const MAP_LIMIT: usize = 1024;
-/// Variables at once.
+/// Simultaneous variables.
 const VARIABLE_LIMIT: usize = 128;
 /// Functions of a script.
 const FUNCTION_LIMIT: usize = 128;
@@ -30,7 +30,7 @@ pub(crate) const SCRIPT_LIMIT: usize = 256 << 10;
 /// Stack of a script's thread, bytes: room for values nested as deeply as an array is long.
 pub(crate) const STACK_BYTES: usize = 256 << 20;
 
-/// What a script has used, and whether it is to end: shared by all that it calls.
+/// Resources that a script has used, and whether it has to end: shared by all its functions.
 #[derive(Debug, Default)]
 pub(crate) struct Budget {
     operations: AtomicU64,
@@ -42,7 +42,7 @@ pub(crate) struct Budget {
 pub(crate) enum ScriptEnd {
     /// It used up its operations.
     OutOfOperations,
-    /// Whoever runs it does not want it any more.
+    /// The runner does not need it any more.
     Cancelled,
 }
 
@@ -62,7 +62,7 @@ impl Budget {
     }
 }
 
-/// An engine with arithmetic, strings, arrays and maps, and nothing else: no modules, no `eval`, no clock, no `sleep`.
+/// An engine with arithmetic, strings, arrays and maps only: no modules, no `eval`, no clock, no `sleep`.
 pub(crate) fn engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
     let mut engine = Engine::new_raw();
     ArithmeticPackage::new().register_into_engine(&mut engine);
@@ -75,11 +75,11 @@ pub(crate) fn engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
     BasicArrayPackage::new().register_into_engine(&mut engine);
     BasicMapPackage::new().register_into_engine(&mut engine);
     engine.disable_symbol("eval");
-    // A value reached through `this` would escape the measuring of variables below.
+    // A value reached through `this` would bypass the measurement of variables below.
     engine.disable_symbol("this");
     let element_limit = ARRAY_LIMIT.max(2 * grid_points);
-    // The engine measures what functions and operators give, but not what `a[i] = b` makes of `a`, and arrays in arrays
-    // would multiply. So each variable is measured whenever it is used.
+    // The engine measures the results of functions and operators, but not of `a[i] = b`, so that nested arrays
+    // could multiply. Therefore each variable is measured whenever it is used.
     #[allow(deprecated, reason = "not deprecated but marked as open to change")]
     engine.on_var(move |name, _, context| {
         let room = context.scope().get(name).and_then(|value| room_after(value, element_limit));
@@ -90,7 +90,7 @@ pub(crate) fn engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
             _ => Ok(None),
         }
     });
-    // The engine counts the operations of a closure by themselves each time it is called, so they are counted here.
+    // The engine counts the operations of each closure call separately, so they are added up here.
     let budget = Arc::clone(budget);
     engine.on_progress(move |_| budget.operation().map(Dynamic::from));
     engine
@@ -106,7 +106,7 @@ pub(crate) fn engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
     engine
 }
 
-/// What is left of `room` elements after those of a value, arrays and maps within included; `None` where they do not fit.
+/// Subtracts the elements of a value, including nested arrays and maps, from `room`; `None` if they do not fit.
 fn room_after(value: &Dynamic, room: usize) -> Option<usize> {
     if let Ok(array) = value.as_array_ref() {
         let room = room.checked_sub(array.len())?;

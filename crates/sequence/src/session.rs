@@ -1,4 +1,4 @@
-//! The script's side of a sequence: what its functions do.
+//! The implementation of the functions that a script calls.
 
 use crate::error::throw;
 use crate::forecast::Nominal;
@@ -13,31 +13,31 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) type Thrown = Box<EvalAltResult>;
 
-/// Steps of a sequence at most.
+/// Maximum number of steps of a sequence.
 const STEP_LIMIT: usize = 2_000;
-/// Longest step, s: four hours. Its samples are kept until it is identified.
+/// Maximum duration of a step, s: four hours. Its samples stay in memory until it is identified.
 const DWELL_LIMIT_S: f64 = 14_400.0;
-/// Longest sequence, s: three days, which the rehearsal has to simulate.
+/// Maximum duration of a sequence, s: three days, all of which the rehearsal has to simulate.
 const DURATION_LIMIT_S: f64 = 3.0 * 86_400.0;
-/// Points that are judged without a step that goes there, at most: so many and some for each point of the grid. Each takes
+/// Maximum number of checked points without a step to them, plus an allowance for each point of the grid. Each check takes
 /// the time of some thousand operations.
 const CHECK_LIMIT: usize = 2_000;
 const CHECKS_OF_POINT: usize = 10;
-/// Points that the planner is given at once, at most; in total twice as many. As many as the grid in any case.
+/// Maximum number of points in one call of the planner (at least the grid); twice as many in total.
 const ORDER_LIMIT: usize = 100;
-/// Notes that are kept, and characters of each.
+/// Maximum number of notes, and of characters in each.
 const NOTE_LIMIT: usize = 1000;
 const NOTE_LENGTH_LIMIT: usize = 500;
 
-/// Everything the functions of a script share.
+/// State shared by the functions of a script.
 pub(crate) struct Session {
     pub request: SequenceRequest,
-    /// Time at the points that follow, s.
+    /// Dwell time of the following points, s.
     pub dwell_s: f64,
     pub results: Vec<StepResult>,
     nominal: Nominal,
     checks: usize,
-    /// Points given to the planner so far.
+    /// Points passed to the planner so far.
     ordered: usize,
     notes: Vec<String>,
     noted: usize,
@@ -70,7 +70,7 @@ impl Session {
         self.from_caller.recv().map_err(|_| stopped())
     }
 
-    /// Tells how the script ended. A caller that has gone need not know.
+    /// Reports how the script ended, unless the caller is gone.
     pub fn end(&mut self, end: impl FnOnce(Vec<String>) -> FromScript) {
         let message = end(std::mem::take(&mut self.notes));
         let _ = self.to_caller.send(message);
@@ -105,7 +105,7 @@ impl Session {
         self.request.check(point).map_err(|Refusal { message, remedy }| throw(message, &remedy))
     }
 
-    /// Whether a step may go to a point.
+    /// Whether a step may go to this point.
     pub fn reachable(&mut self, point: OperatingPoint) -> Result<bool, Thrown> {
         if self.checks >= self.check_limit() {
             self.check(point)?;
@@ -113,9 +113,9 @@ impl Session {
         Ok(self.check(point).is_ok())
     }
 
-    /// The planner's order of a set.
+    /// The planner's order of a set of points.
     pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, Thrown> {
-        // Searching an order takes longer than in proportion: a set larger than any grid is refused by itself.
+        // The search time grows faster than the number of points: a set larger than the grid is refused.
         let largest = ORDER_LIMIT.max(self.request.points.len());
         if points.len() > largest {
             let message =
@@ -135,7 +135,7 @@ impl Session {
             .map_err(|message| throw(format!("the planner cannot order the points: {message}"), ""))
     }
 
-    /// The result of a step by its number, from 1.
+    /// The result of a step, by its number from 1.
     pub fn result(&self, number: i64) -> Result<StepResult, Thrown> {
         let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
         index.and_then(|index| self.results.get(index)).cloned().ok_or_else(|| {
@@ -145,7 +145,7 @@ impl Session {
         })
     }
 
-    /// Turbine inlet temperature of what follows, K.
+    /// Sets the turbine inlet temperature of the following steps, K.
     pub fn hold_t3(&mut self, t3_k: f64) -> Result<(), Thrown> {
         if self.request.follow_outlet.turbine_inlet {
             return Err(follows("turbine inlet temperature"));
@@ -159,7 +159,7 @@ impl Session {
         Ok(())
     }
 
-    /// Oil inlet temperature of what follows, K.
+    /// Sets the oil inlet temperature of the following steps, K.
     pub fn hold_oil(&mut self, oil_k: f64) -> Result<(), Thrown> {
         if self.request.follow_outlet.oil {
             return Err(follows("oil temperature"));
@@ -168,7 +168,7 @@ impl Session {
         Ok(())
     }
 
-    /// Goes to a point and comes back when the step has been run.
+    /// Goes to a point and returns when the step has been executed.
     pub fn step(&mut self, to: OperatingPoint, dwell_s: f64, hold: Hold) -> Result<StepResult, Thrown> {
         let (index, start_s) = (self.results.len(), self.now_s());
         if index >= STEP_LIMIT {
@@ -211,7 +211,7 @@ impl Session {
         Ok(result)
     }
 
-    /// Does a step once more by the same jump.
+    /// Repeats a step by the same jump.
     pub fn repeat(&mut self, number: i64) -> Result<StepResult, Thrown> {
         let before = self.result(number)?;
         let Some(from) = before.from else {
@@ -237,7 +237,7 @@ impl Session {
     }
 }
 
-/// Temperatures that the model is asked for, K; what a rig accepts is checked before it is touched.
+/// Temperature range of the model, K; the limits of a rig are checked before the run.
 const PLAUSIBLE_K: std::ops::RangeInclusive<f64> = 250.0..=1400.0;
 
 fn plausible(what: &str, value_k: f64) -> Result<f64, Thrown> {
@@ -253,12 +253,12 @@ fn follows(what: &str) -> Thrown {
     throw(message, "take it out of `boundary.follow_outlet`")
 }
 
-/// The caller has gone: the script ends, and cannot catch it.
+/// Ends the script because the caller is gone; the script cannot catch this.
 fn stopped() -> Thrown {
     Box::new(EvalAltResult::ErrorTerminated(().into(), Position::NONE))
 }
 
-/// One thread alone has the session; a lock that a panic has left is as good as any.
+/// Only one thread uses the session, so a lock poisoned by a panic is still usable.
 pub(crate) fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
     session.lock().unwrap_or_else(PoisonError::into_inner)
 }

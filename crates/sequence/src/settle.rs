@@ -1,16 +1,16 @@
-//! Whether a point has settled, seen in the samples alone.
+//! Decides from the samples alone whether a point has settled.
 
 use mapper_core::{Channel, SampleBatch, SettleBands};
 use mapper_numerics::statistics::median;
 use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 use std::collections::VecDeque;
 
-/// Samples over which drifts are judged, s.
+/// Time over which drifts are judged, s.
 const SPAN_S: f64 = 30.0;
-/// Maximum number of samples that are kept; a rig that is faster is looked at over a shorter span.
+/// Maximum number of stored samples; a rig with a higher sampling rate is judged over a shorter time.
 const SAMPLE_LIMIT: usize = 100_000;
 
-/// When a step that waits may end.
+/// Condition for the end of a step that waits until it has settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SettleRule {
     /// Largest drift of T2 and Tc over the last 30 s, K/s.
@@ -21,9 +21,9 @@ pub struct SettleRule {
 
 /// Watches the samples of one step.
 ///
-/// A point has settled here when its operating point has ([`mapper_physics::settled`]) for the last 30 s, and when over
-/// these the slopes of T2 and Tc (least squares) are within the rate as well. Channels that a rig lacks do not count;
-/// without T2 nothing settles.
+/// A point has settled if its operating point has settled ([`mapper_physics::settled`]) for the last 30 s, and if the least-squares
+/// slopes of T2 and Tc over this time are within the rate. Channels that a rig does not measure are ignored, except T2: without T2
+/// no point settles.
 #[derive(Debug, Clone)]
 pub struct SettleWatch {
     rule: SettleRule,
@@ -36,7 +36,7 @@ const CHANNELS: [Channel; COLUMNS - 1] =
     [Channel::T2, Channel::Tc, Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2];
 
 impl SettleWatch {
-    /// A watch over a step that starts at `start_s` of the run.
+    /// Creates a watch for a step that starts at `start_s` of the run.
     pub fn new(rule: SettleRule, start_s: f64) -> Self {
         SettleWatch { rule, start_s, samples: VecDeque::new() }
     }
@@ -123,8 +123,8 @@ mod tests {
         }
     }
 
-    /// A step response of 10 K with 60 s settles to 1 K/min where 10/60 exp(-t/60) = 1/60, at 138 s; seen over the
-    /// last 30 s it comes a few seconds to half a span later.
+    /// A step response of 10 K with 60 s settles to 1 K/min when 10/60 exp(-t/60) = 1/60, at 138 s. Judged over the last 30 s,
+    /// it settles between a few seconds and half this time later.
     #[test]
     fn an_exponential_settles_when_its_slope_says_so() {
         let mut watch = new_watch();

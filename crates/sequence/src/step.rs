@@ -1,28 +1,28 @@
-//! What a script hands over at each step.
+//! Data that a script passes on at each step.
 
 use crate::error::ScriptError;
 use crate::settle::SettleRule;
 use mapper_core::PlanStep;
 
-/// How long a step lasts.
+/// End condition of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hold {
-    /// As long as the step says.
+    /// After the step's duration.
     Dwell,
-    /// Until it has settled, at most as long as the step says.
+    /// When it has settled, after the step's duration at the latest.
     UntilSettled(SettleRule),
 }
 
-/// A step that a script wants to be run, checked against the campaign's limits.
+/// A step requested by a script, checked against the campaign's limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SequenceStep {
-    /// The step; its `dwell_s` is the longest time it may take.
+    /// The step; its `dwell_s` is its maximum duration.
     pub step: PlanStep,
-    /// When it may end earlier.
+    /// Condition for an earlier end.
     pub hold: Hold,
 }
 
-/// What comes from the script's thread, with the notes since the last time.
+/// A message from the script's thread, with the notes since the last one.
 #[derive(Debug)]
 pub(crate) enum FromScript {
     Step(Box<SequenceStep>, Vec<String>),

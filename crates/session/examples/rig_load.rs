@@ -1,16 +1,16 @@
-//! What a run costs and how late it is on a stand with 24 sensors, beside a pressure at 1 kHz: docs/performance.md.
+//! Measures CPU time and latency of a run on a stand with 24 sensors, and with an additional pressure at 1 kHz: docs/performance.md.
 //!
 //! ```text
 //! cargo run --release -p mapper-session --example rig_load
 //! ```
 //!
-//! prints one table; a word behind `--` makes one part of it alone:
+//! This prints one table. A word after `--` runs only one part:
 //!
 //! ```text
-//! load      # an hour at 100 Hz, and beside 1 kHz, scaled time
-//! clock     # two minutes in real time, jitter of its polls
-//! trip      # from the sample that violates a guard to the command
-//! resume    # a run of 12 hours that goes on
+//! load      # one hour at 100 Hz, and the same with 1 kHz, in scaled time
+//! clock     # polling jitter during two minutes in real time
+//! trip      # delay from the sample that violates a guard to the command
+//! resume    # resuming a run of 12 hours
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
@@ -25,30 +25,30 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// What the stand does, and what was seen of it.
-struct Seen {
+/// Log of the stand's actions.
+struct StandLog {
     rate_hz: f64,
     real_time: bool,
-    /// The shaft reads too high from here on, s.
+    /// The speed reading is too high from this time on, s.
     trips_s: f64,
-    /// P3, opening and speed of each step.
+    /// P3, valve opening and speed of each step.
     steps: Vec<(f64, f64, f64)>,
     polled: Vec<(f64, Instant)>,
     violated: Option<Instant>,
-    told: Option<Instant>,
+    commanded: Option<Instant>,
 }
 
-static SEEN: Mutex<Seen> = Mutex::new(Seen {
+static LOG: Mutex<StandLog> = Mutex::new(StandLog {
     rate_hz: 100.0,
     real_time: false,
     trips_s: f64::INFINITY,
     steps: Vec::new(),
     polled: Vec::new(),
     violated: None,
-    told: None,
+    commanded: None,
 });
 
-/// Readings that cost next to nothing: levels with a little noise.
+/// Low-cost readings: constant levels with little noise.
 struct Stand {
     channels: Vec<Channel>,
     elements: Vec<Element>,
@@ -57,7 +57,7 @@ struct Stand {
     controls: bool,
     next: u64,
     speed_rpm: f64,
-    told: Option<Setpoints>,
+    setpoints: Option<Setpoints>,
     noise: u64,
 }
 
@@ -67,19 +67,19 @@ impl Stand {
         self.noise ^= self.noise >> 7;
         self.noise ^= self.noise << 17;
         let noise = (self.noise >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
-        let told = self.told;
+        let setpoints = self.setpoints;
         let level = match channel {
             Channel::ShaftSpeed if t_s >= trips_s => 2e5,
             Channel::ShaftSpeed => self.speed_rpm,
             Channel::CompressorFlow | Channel::TurbineFlow => 0.08,
             Channel::P1 | Channel::P4 => 99e3,
             Channel::P2 => 160e3,
-            Channel::P3 => told.map_or(1e5, |told| told.p3_pa),
-            Channel::T3 => told.map_or(300.0, |told| told.t3_k),
-            Channel::P3Command => return told.map_or(f64::NAN, |told| told.p3_pa),
-            Channel::T3Command => return told.map_or(f64::NAN, |told| told.t3_k),
-            Channel::ValveCommand => return told.map_or(f64::NAN, |told| told.valve_opening_ratio),
-            Channel::TOilCommand => return told.map_or(f64::NAN, |told| told.oil_temperature_k),
+            Channel::P3 => setpoints.map_or(1e5, |set| set.p3_pa),
+            Channel::T3 => setpoints.map_or(300.0, |set| set.t3_k),
+            Channel::P3Command => return setpoints.map_or(f64::NAN, |set| set.p3_pa),
+            Channel::T3Command => return setpoints.map_or(f64::NAN, |set| set.t3_k),
+            Channel::ValveCommand => return setpoints.map_or(f64::NAN, |set| set.valve_opening_ratio),
+            Channel::TOilCommand => return setpoints.map_or(f64::NAN, |set| set.oil_temperature_k),
             Channel::T2 => 360.0,
             Channel::TOil => 363.0,
             _ => 300.0,
@@ -105,19 +105,19 @@ impl Backend for Stand {
         }
     }
     fn arm(&mut self) -> Result<(), BackendError> {
-        (self.next, self.told) = (0, None);
+        (self.next, self.setpoints) = (0, None);
         Ok(())
     }
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        let mut seen = SEEN.lock().unwrap();
-        if seen.violated.is_some() && seen.told.is_none() {
-            seen.told = Some(Instant::now());
+        let mut log = LOG.lock().unwrap();
+        if log.violated.is_some() && log.commanded.is_none() {
+            log.commanded = Some(Instant::now());
         }
         let near = |step: &&(f64, f64, f64)| {
             (step.0 - setpoints.p3_pa).abs() < 1.0 && (step.1 - setpoints.valve_opening_ratio).abs() < 1e-9
         };
-        self.speed_rpm = seen.steps.iter().find(near).map_or(self.speed_rpm, |step| step.2);
-        self.told = Some(*setpoints);
+        self.speed_rpm = log.steps.iter().find(near).map_or(self.speed_rpm, |step| step.2);
+        self.setpoints = Some(*setpoints);
         Ok(())
     }
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
@@ -127,7 +127,7 @@ impl Backend for Stand {
             t_s.push(self.next as f64 / self.rate_hz);
             self.next += 1;
         }
-        let trips_s = SEEN.lock().unwrap().trips_s;
+        let trips_s = LOG.lock().unwrap().trips_s;
         let mut columns = Vec::with_capacity(self.channels.len());
         for channel in self.channels.clone() {
             let values = t_s.iter().map(|t_s| self.value(channel, *t_s, trips_s)).collect();
@@ -139,12 +139,12 @@ impl Backend for Stand {
             elements.push(ElementColumn { element, values });
         }
         if self.controls {
-            let mut seen = SEEN.lock().unwrap();
-            if seen.real_time {
+            let mut log = LOG.lock().unwrap();
+            if log.real_time {
                 let now = Instant::now();
-                seen.polled.push((until_s, now));
-                if seen.violated.is_none() && t_s.last().is_some_and(|t_s| *t_s >= trips_s) {
-                    seen.violated = Some(now);
+                log.polled.push((until_s, now));
+                if log.violated.is_none() && t_s.last().is_some_and(|t_s| *t_s >= trips_s) {
+                    log.violated = Some(now);
                 }
             }
         }
@@ -160,8 +160,8 @@ impl Backend for Stand {
 
 fn driver(name: &str, _: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
     let (rate_hz, real_time) = {
-        let seen = SEEN.lock().unwrap();
-        (seen.rate_hz, seen.real_time)
+        let log = LOG.lock().unwrap();
+        (log.rate_hz, log.real_time)
     };
     let controls = name == "stand";
     let all = mapper_core::CHANNELS.iter().map(|row| row.channel);
@@ -175,7 +175,7 @@ fn driver(name: &str, _: &serde_json::Value) -> Result<Box<dyn Backend>, Backend
         controls,
         next: 0,
         speed_rpm: 0.0,
-        told: None,
+        setpoints: None,
         noise: 88172645463325252,
     }))
 }
@@ -191,7 +191,7 @@ impl Wall for Clock {
     }
 }
 
-/// Time of this process on any core so far, s; Linux counts it in hundredths.
+/// CPU time of this process on all cores, s; Linux has a resolution of 0.01 s.
 fn cpu_s() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let after = stat.rsplit(')').next().unwrap_or_default();
@@ -226,7 +226,7 @@ struct Cost {
     end: String,
 }
 
-/// One run. `stop_at`: the step in whose begin it is stopped.
+/// Makes one run. `stop_at`: the run is stopped at the start of this step.
 fn run(text: &str, parent: &Path, real_time: bool, stop_at: usize, resume: Option<&Path>) -> Cost {
     let files = |path: &Path| std::fs::read_to_string(path);
     let origin = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/turbo_a.yaml"));
@@ -251,7 +251,7 @@ fn run(text: &str, parent: &Path, real_time: bool, stop_at: usize, resume: Optio
     let request = RunRequest { resume, ..RunRequest::new(&campaign, text, parent) };
     let prepared = session.prepare(request).unwrap();
     let steps = &prepared.plan().steps;
-    SEEN.lock().unwrap().steps =
+    LOG.lock().unwrap().steps =
         steps.iter().map(|step| (step.p3_pa, step.to.valve_opening_ratio, step.to.speed_rpm)).collect();
     let outcome = match real_time {
         true => prepared.run_paced(&session, &mut PacedClock::new(Clock(Instant::now()), 1.0), true),
@@ -289,17 +289,17 @@ fn load(folder: &Path) {
 
 fn clock(folder: &Path) {
     {
-        let mut seen = SEEN.lock().unwrap();
-        (seen.real_time, seen.trips_s) = (true, f64::INFINITY);
-        seen.polled.clear();
+        let mut log = LOG.lock().unwrap();
+        (log.real_time, log.trips_s) = (true, f64::INFINITY);
+        log.polled.clear();
     }
     let stops = run(&campaign(60, ""), folder, true, 1, None);
-    let seen = SEEN.lock().unwrap();
-    let (from_s, from) = seen.polled[10];
+    let log = LOG.lock().unwrap();
+    let (from_s, from) = log.polled[10];
     let late = |(until_s, at): &(f64, Instant)| {
         1e3 * (at.duration_since(from).as_secs_f64() - (until_s - from_s)).abs()
     };
-    let mut late_ms: Vec<f64> = seen.polled[10..].iter().map(late).collect();
+    let mut late_ms: Vec<f64> = log.polled[10..].iter().map(late).collect();
     late_ms.sort_by(f64::total_cmp);
     let at = |share: f64| late_ms[((late_ms.len() - 1) as f64 * share) as usize];
     let words = format!(
@@ -317,17 +317,17 @@ fn trip(folder: &Path) {
     let mut took_ms = Vec::new();
     for turn in 0..TRIPS {
         {
-            let mut seen = SEEN.lock().unwrap();
-            (seen.real_time, seen.trips_s) = (true, 2.0 + 0.003 * f64::from(turn));
-            (seen.violated, seen.told) = (None, None);
+            let mut log = LOG.lock().unwrap();
+            (log.real_time, log.trips_s) = (true, 2.0 + 0.003 * f64::from(turn));
+            (log.violated, log.commanded) = (None, None);
         }
         let guards = "guards: {overspeed: {dwell: 0 s}}\n";
         let cost = run(&campaign(60, guards), folder, true, usize::MAX, None);
-        let seen = SEEN.lock().unwrap();
-        let (Some(violated), Some(told)) = (seen.violated, seen.told) else {
+        let log = LOG.lock().unwrap();
+        let (Some(violated), Some(commanded)) = (log.violated, log.commanded) else {
             panic!("not seen: {}", cost.end);
         };
-        took_ms.push(1e3 * told.duration_since(violated).as_secs_f64());
+        took_ms.push(1e3 * commanded.duration_since(violated).as_secs_f64());
     }
     took_ms.sort_by(f64::total_cmp);
     let words = format!(
@@ -340,8 +340,8 @@ fn trip(folder: &Path) {
 
 fn resume(folder: &Path) {
     {
-        let mut seen = SEEN.lock().unwrap();
-        (seen.real_time, seen.trips_s, seen.rate_hz) = (false, f64::INFINITY, 10.0);
+        let mut log = LOG.lock().unwrap();
+        (log.real_time, log.trips_s, log.rate_hz) = (false, f64::INFINITY, 10.0);
     }
     for (name, more) in [("by its plan", ""), ("told again", "drift: {on_drift: continue}\n")] {
         let text = campaign(900, more);
@@ -363,7 +363,7 @@ fn resume(folder: &Path) {
     }
 }
 
-/// Step in whose begin the long run is stopped.
+/// The long run is stopped at the start of this step.
 const STOPPED_AT: usize = 46;
 const TRIPS: i32 = 20;
 

@@ -1,4 +1,4 @@
-//! How near its target the closed loop holds the speed of each step, on the virtual lab with sensor noise, over seeds.
+//! Measures how closely the speed loop follows its target at each step, on the virtual lab with sensor noise, over several seeds.
 //!
 //! ```text
 //! cargo run --release -p mapper-session --example speed_study

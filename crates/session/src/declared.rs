@@ -1,4 +1,4 @@
-//! What a campaign declares, as identification and diagnosis need it.
+//! Converts a campaign's declarations into the configuration of identification and diagnosis.
 
 use mapper_campaign::Campaign;
 use mapper_core::{ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Method, ReferenceState, WindowRule};
@@ -7,7 +7,7 @@ use mapper_observe::declared_uncertainties;
 use mapper_record::{ChannelMap, MachineConstants};
 use std::collections::BTreeMap;
 
-/// How the recordings of this campaign are identified.
+/// Identification settings for the recordings of this campaign.
 pub fn identification(campaign: &Campaign) -> IdentifyConfig {
     let chosen = &campaign.identification;
     let tap = |channel: Channel| {
@@ -39,14 +39,13 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
     }
 }
 
-/// What is declared of the sensors of a recording that is read by this channel map.
+/// Declared uncertainty of the sensors in a recording that is read with this channel map.
 pub fn declared(campaign: &Campaign, map: &ChannelMap) -> BTreeMap<Channel, DeclaredUncertainty> {
     let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
     declared_uncertainties(&sensors, &campaign.tolerances, &map.sensors)
 }
 
-/// As [`identification`], for a recording that is read by this channel map: what it says of sensors, noise and window counts
-/// before the campaign.
+/// Same as [`identification`], for a recording that is read with this channel map. The map overrides the campaign for sensors, noise and window.
 pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyConfig {
     let identification = identification(campaign);
     IdentifyConfig {
@@ -60,8 +59,7 @@ pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyCon
     }
 }
 
-/// How a recording is identified of which nothing is known but what its channel map says. A pipe diameter stands there for
-/// a static tap alone.
+/// Identification settings for a recording that has a channel map but no campaign. A pipe diameter in the map always means a static tap.
 pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) -> IdentifyConfig {
     let usual = IdentifyConfig::default();
     let tap = |diameter_m: Option<f64>| {

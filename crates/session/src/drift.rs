@@ -1,4 +1,4 @@
-//! Whether the rig stayed the same over one or more recordings.
+//! Checks whether the rig stayed the same over one or more recordings.
 
 use crate::declared::identification_with;
 use crate::fusing::{Fused, fused, recordings};
@@ -11,23 +11,22 @@ use mapper_identify::{IdentifyConfig, ZeroOutcome};
 use mapper_observe::FusedChannel;
 use mapper_record::ChannelMap;
 
-/// What is said of the recordings, and the zero that was subtracted from them.
+/// Drift report of the recordings, with the zero that was subtracted from them.
 #[derive(Debug)]
 pub struct Drift {
-    /// The answer.
+    /// The drift report.
     pub report: DriftReport,
-    /// What became of channels with several sensors; what is left out of one recording is left out of all.
+    /// Result of sensor fusion. A sensor excluded from one recording is excluded from all.
     pub sensors: Vec<FusedChannel>,
-    /// What came of the isothermal zero.
+    /// Result of the isothermal zero.
     pub zero: ZeroOutcome,
 }
 
 impl Session<'_> {
-    /// Judges recordings in the order in which they were made. The machine is that of `campaign`; there is no verdict on a
-    /// recording of another one.
+    /// Compares recordings in the order in which they were made. They must be of the machine in `campaign`.
     ///
     /// # Errors
-    /// [`SessionError::Drift`] where there is nothing to compare, [`SessionError::Model`] where the campaign's map is unusable.
+    /// [`SessionError::Drift`] if there is nothing to compare, [`SessionError::Model`] if the campaign's map is unusable.
     pub fn drift(
         &self,
         recorded: &[Recorded],
@@ -68,7 +67,7 @@ impl Session<'_> {
     }
 }
 
-/// The zero of the first run, subtracted from all: a zero of its own for each would hide what drifted between them.
+/// Subtracts the zero of the first run from all runs. A separate zero for each run would hide drift between them.
 fn zeroed_alike(
     recordings: Vec<Recording>,
     config: IdentifyConfig,
@@ -79,13 +78,12 @@ fn zeroed_alike(
         .map_or(ZeroOutcome::NotAsked, |first| ZeroOutcome::of(first, &config, campaign.zero));
     let off = |recording: Recording| zero.take_off(recording, config.clone()).0;
     let recordings = recordings.into_iter().map(off).collect();
-    // What is declared of the offsets stands: they are no drift, and a zero knows them better by far than the model knows the
-    // machine, whose own errors would have to be something that changes.
+    // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as
+    // changes.
     (recordings, config, zero)
 }
 
-/// What has to be the same in all runs: machine, boundary conditions, points and their timing. Seed, name, rig and what is
-/// written may differ from night to night.
+/// Fingerprint of what must be the same in all runs: machine, boundary conditions, points and timing. Seed, name, rig and output may differ.
 fn fingerprint(recorded: &Recorded) -> Option<String> {
     let (read, file) = (&recorded.read, &recorded.path);
     let of_campaign = || {

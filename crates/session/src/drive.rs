@@ -1,4 +1,4 @@
-//! Steps, a rig and who looks on: the one place that starts the runner.
+//! Starts the runner with steps, a rig and observers. No other module starts it.
 
 use crate::guards::guards;
 use mapper_campaign::Campaign;
@@ -12,11 +12,11 @@ use mapper_runner::{
 };
 use std::sync::atomic::AtomicBool;
 
-/// Drives the rig through the steps, after the soak where the campaign has one, under the campaign's guards, and holds their
-/// speeds unless the campaign says not to. `model`: the nominal machine, which the loop is tuned by.
+/// Runs the steps on the rig, after the soak if the campaign has one. Guards and the speed loop follow the campaign; `model` is the nominal
+/// machine that tunes the loop.
 ///
 /// # Errors
-/// [`RunError`] where rig, steps or observer fail; the rig is safe then.
+/// [`RunError`] if rig, steps or observer fail; the rig is safe then.
 pub fn drive(
     campaign: &Campaign,
     model: &Model,
@@ -38,23 +38,23 @@ pub fn drive(
 
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// How fast a run goes, and how it is stopped.
+/// Pace and stop flags of a run.
 pub struct Pace<'a> {
     /// Waits for the rig.
     pub clock: &'a mut dyn Clock,
-    /// Asks for each sample by itself: of a rig whose time is not simulated, or is paced.
+    /// Polls each sample separately. Needed if the rig runs in real time or is paced.
     pub each_sample: bool,
-    /// Set from outside to stop at once.
+    /// Set by the caller to stop at once.
     pub stop: &'a AtomicBool,
-    /// Set from outside to stop at the end of the step.
+    /// Set by the caller to stop at the end of the step.
     pub stop_after_step: &'a AtomicBool,
-    /// What the operator asks for besides.
+    /// Other operator requests.
     pub operator: Option<&'a Operator>,
-    /// Channels that are read beside the rig, which have to stay alive.
+    /// Channels of auxiliary instruments, which must stay alive.
     pub read: &'a [ReadChannel],
 }
 
-/// As [`drive`], at a pace.
+/// Same as [`drive`], at a given pace.
 ///
 /// # Errors
 /// As [`drive`].
@@ -97,10 +97,10 @@ pub fn drive_paced(
     .run_under(&protection)
 }
 
-/// So many declared standard deviations P3 may read too high.
+/// Allowed positive error of the P3 reading, in declared standard deviations.
 const READS_TOO_HIGH_SIGMAS: f64 = 4.0;
 
-/// The loop over the shaft speed as the campaign has it.
+/// The speed loop that the campaign asks for.
 fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedControl<'a>> {
     let sensor = campaign.sensors.get(&Channel::P3).map(|sensor| sensor.declared).unwrap_or_default();
     let high_pa = campaign.limits.p3_max_pa;
@@ -123,7 +123,7 @@ fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedCo
     Some(SpeedControl::new(campaign.speed_control?, limits, Box::new(response_at)))
 }
 
-/// Time at rest before the plan begins, s.
+/// Soak time before the plan begins, s.
 pub fn soak_s(campaign: &Campaign) -> f64 {
     campaign.zero.map_or(0.0, |zero| zero.duration_s)
 }

@@ -1,4 +1,4 @@
-//! Why a session could not do what it was asked.
+//! Errors of a session.
 
 use crate::error_kind::ErrorKind;
 use crate::variant::VariantError;
@@ -18,7 +18,7 @@ use mapper_sequence::SequenceError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A name as a shell takes it for one word.
+/// Quotes a name so that a shell reads it as one word.
 fn word(name: &str) -> String {
     let plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || "-_./:@".contains(c));
     if plain { name.to_owned() } else { format!("'{}'", name.replace('\'', r"'\''")) }
@@ -28,16 +28,16 @@ fn in_doubt_text(rigs: &[String]) -> String {
     if rigs.is_empty() { "no rig is in doubt".to_owned() } else { format!("in doubt: {}", rigs.join(", ")) }
 }
 
-/// Why a session could not do what it was asked.
+/// Why a session could not complete a request.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// The campaign cannot be read, or has mistakes.
+    /// The campaign cannot be read or has mistakes.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
-    /// The nightly campaign cannot be read, or has mistakes.
+    /// The nightly campaign cannot be read or has mistakes.
     #[error(transparent)]
     Nightly(#[from] NightlyError),
-    /// A nightly campaign names one whose steps come from a script.
+    /// A nightly campaign lists a campaign whose steps come from a script.
     #[error(
         "{}: a nightly run compares the same points night after night; the steps of this campaign come from a script, \
          which may visit others. Give it a grid instead of `sequence`", .path.display()
@@ -46,7 +46,7 @@ pub enum SessionError {
         /// The campaign.
         path: PathBuf,
     },
-    /// The machines of a nightly campaign are wrong.
+    /// The machine list of a nightly campaign is wrong.
     #[error(transparent)]
     Variant(#[from] VariantError),
     /// Two runs of a night have the same campaign, machine, method and seed.
@@ -55,7 +55,7 @@ pub enum SessionError {
         /// The run.
         key: String,
     },
-    /// Runs that were made elsewhere are not those of the night.
+    /// Rows made elsewhere do not match the runs of this night.
     #[error(
         "the runs that were made elsewhere are not those of this nightly campaign: {lacks}; make the study again from it"
     )]
@@ -63,13 +63,13 @@ pub enum SessionError {
         /// What differs.
         lacks: String,
     },
-    /// A log without steps has too little.
+    /// A log without steps has too little data.
     #[error(transparent)]
     Driven(#[from] mapper_driven::DrivenError),
-    /// Nothing to identify was given.
+    /// No recording was given.
     #[error("no recording was given; name a run directory or a recording")]
     NoRecording,
-    /// Recordings that cannot be identified together.
+    /// The recordings cannot be identified together.
     #[error(
         "{} and {} cannot be identified together: their campaigns have another {differs}; identify each by itself, or give the campaign \
          that holds for all with `--campaign`", .first.display(), .other.display()
@@ -77,34 +77,34 @@ pub enum SessionError {
     NotTogether {
         /// The first recording.
         first: PathBuf,
-        /// The one that differs from it.
+        /// The recording that differs from it.
         other: PathBuf,
         /// What differs.
         differs: &'static str,
     },
-    /// A method that does not exist.
+    /// An unknown method.
     #[error("`{name}` is not a method: {source}")]
     Method {
-        /// What was written.
+        /// The name given.
         name: String,
-        /// The methods that exist.
+        /// The known methods.
         source: serde_json::Error,
     },
-    /// The campaign's map is not usable.
+    /// The campaign's map is unusable.
     #[error("the nominal model has no map: {0}")]
     Model(#[from] mapper_campaign::NominalTableError),
-    /// There is no plan.
+    /// No plan is possible.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// A file does not hold a plan.
+    /// A file does not contain a plan.
     #[error("{} is not a plan: {source}", .path.display())]
     NotAPlan {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: serde_json::Error,
     },
-    /// A stored plan was made from something else.
+    /// A stored plan no longer matches its inputs.
     #[error(
         "{} is stale: {} changed since it was made; make it again with `mapper plan CAMPAIGN --out FILE`",
         .path.display(), .changed.join(" and ")
@@ -115,20 +115,20 @@ pub enum SessionError {
         /// What has changed.
         changed: Vec<&'static str>,
     },
-    /// A backend could not be made: its name or its settings are wrong.
+    /// A backend could not be made because its name or its settings are wrong.
     #[error(transparent)]
     Backend(BackendError),
-    /// A source beside the rig cannot be made, or gives what it should not.
+    /// An auxiliary instrument cannot be created, or delivers the wrong channels.
     #[error("the reader at `{at}`: {source}")]
     Reader {
-        /// Keys of the campaign down to it.
+        /// Key path of the instrument in the campaign.
         at: String,
-        /// Path below that, where it is one of the backend's own settings.
+        /// Path below that, if the fault is in one of the backend's own settings.
         setting: String,
         /// What is wrong.
         source: mapper_core::BackendCause,
     },
-    /// A stored plan that no plan may be like.
+    /// A stored plan violates a limit that applies to every plan.
     #[error("{}: {why}; make it again with `mapper plan CAMPAIGN --out FILE`", .path.display())]
     WrongPlan {
         /// The file.
@@ -136,13 +136,13 @@ pub enum SessionError {
         /// What is wrong.
         why: String,
     },
-    /// Nothing came of a recording.
+    /// No point was identified from a recording.
     #[error("no point was identified: the recording has no step that is long enough to be one. {why}")]
     NoPoints {
-        /// What is known of it.
+        /// What is known about the recording.
         why: String,
     },
-    /// A recording that was given twice.
+    /// A recording was given twice.
     #[error(
         "{} and {} hold the same readings; give each recording once, or its noise would count as new evidence",
         .first.display(),
@@ -154,12 +154,12 @@ pub enum SessionError {
         /// The other.
         second: PathBuf,
     },
-    /// A run that cannot go on.
+    /// A run cannot be resumed.
     #[error("{} cannot be resumed: {why}", .run.display())]
     NotResumable {
         /// Its directory.
         run: PathBuf,
-        /// Why.
+        /// The reason.
         why: String,
     },
     /// Another runner has the rig.
@@ -167,10 +167,10 @@ pub enum SessionError {
     RigInUse {
         /// The rig.
         rig: String,
-        /// Who has it.
+        /// The current owner.
         owner: String,
     },
-    /// A runner died with the rig in its hands.
+    /// A runner ended without releasing the rig.
     #[error(
         "the rig `{rig}` was left by {owner}, which ended with the rig in its hands; a driver makes it safe by itself then. Look at the rig; then go on with \
          `mapper run --resume {}`, or clear it with `mapper rig acknowledge {}`", .run.display(), word(.rig)
@@ -178,12 +178,12 @@ pub enum SessionError {
     RigAbandoned {
         /// The rig.
         rig: String,
-        /// The run it was left by.
+        /// The run that left it.
         run: PathBuf,
-        /// Who left it.
+        /// The owner that left it.
         owner: String,
     },
-    /// A rig that nobody has looked at since it was in doubt.
+    /// The rig is locked out, and the lockout has not been acknowledged.
     #[error(
         "the rig `{rig}` is latched since the run {}: {reason}. Look at the rig; then clear it with `mapper rig acknowledge {}`",
         .run.display(), word(.rig)
@@ -191,26 +191,26 @@ pub enum SessionError {
     RigLatched {
         /// The rig.
         rig: String,
-        /// Why.
+        /// The reason.
         reason: String,
         /// The run.
         run: PathBuf,
     },
-    /// A rig without latch and without a runner that died, or no rig of that name.
+    /// The rig has no lockout and no abandoned run, or no rig has this name.
     #[error("nothing was acknowledged: the rig `{rig}` is in no doubt, or its name is another; {}", in_doubt_text(.in_doubt))]
     NothingToAcknowledge {
         /// The rig.
         rig: String,
-        /// Those that are in doubt.
+        /// Rigs that wait for acknowledgement.
         in_doubt: Vec<String>,
     },
-    /// The rig was never had: there is no run.
+    /// The rig could not be armed, so there is no run.
     #[error(transparent)]
     NotArmed(RunError),
-    /// The run cannot begin as things are.
+    /// The preflight check refused the run.
     #[error("the run was not begun: {0}")]
     Preflight(String),
-    /// A rig that needs a guard that the campaign does not have.
+    /// The rig needs a guard that the campaign does not have.
     #[error(
         "backend `{backend}` must not be run without these guards: {guards}; give their limits in `limits:` or `guards:` of the \
          campaign, with a reaction that ends the run"
@@ -221,7 +221,7 @@ pub enum SessionError {
         /// What is missing.
         guards: String,
     },
-    /// A guard over a channel that the rig does not deliver.
+    /// A guard watches a channel that the rig does not deliver.
     #[error("backend `{backend}` does not deliver what is to be guarded: {channels}")]
     GuardBlind {
         /// The backend.
@@ -229,12 +229,12 @@ pub enum SessionError {
         /// Channels and their guards.
         channels: String,
     },
-    /// A run could not go on; the rig is safe.
+    /// A run failed; the rig is safe.
     #[error("{source}\nThe recording up to then is {}.", .recording.display())]
     Run {
-        /// Why.
+        /// The reason.
         source: RunError,
-        /// What was recorded.
+        /// The recording up to the failure.
         recording: PathBuf,
     },
     /// A sequence script has a mistake.
@@ -254,22 +254,22 @@ pub enum SessionError {
         /// What tripped it.
         reason: String,
     },
-    /// A script that makes no step.
+    /// A script makes no step.
     #[error("the sequence script {} makes no step", .path.display())]
     NoSteps {
         /// The script.
         path: PathBuf,
     },
-    /// A suspected effect is not an effect.
+    /// A suspected effect is not a valid effect.
     #[error(transparent)]
     Effect(Box<dyn std::error::Error + Send + Sync>),
-    /// This program has no way to read effects.
+    /// This program cannot read effects from files.
     #[error("{}: this program does not read effects from files", .path.display())]
     EffectUnread {
         /// The file.
         path: PathBuf,
     },
-    /// A suspected effect has the name of another.
+    /// A suspected effect has the same name as another.
     #[error("{}: there is already an effect `{id}`; choose another name", .path.display())]
     EffectTaken {
         /// The script.
@@ -280,16 +280,16 @@ pub enum SessionError {
     /// A recording cannot be read or written.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A log of another program cannot be read.
+    /// The log of another program cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// What was said about how to read a log is wrong.
+    /// A log option is wrong.
     #[error(transparent)]
     LogOption(#[from] OptionError),
-    /// The channel map cannot be read, or has mistakes.
+    /// The channel map cannot be read or has mistakes.
     #[error(transparent)]
     ChannelMap(#[from] ChannelMapError),
-    /// Nobody says what machine was recorded.
+    /// The recorded machine is unknown.
     #[error("the machine is not known: the recording carries no campaign. {remedy}")]
     MachineUnknown {
         /// What to do.
@@ -307,10 +307,10 @@ pub enum SessionError {
     /// A recording cannot be diagnosed.
     #[error(transparent)]
     Gap(#[from] GapError),
-    /// A diagnosis cannot be held against a recording.
+    /// A diagnosis cannot be validated against a recording.
     #[error(transparent)]
     Twin(#[from] TwinError),
-    /// The calibration that ships cannot be read.
+    /// The built-in calibration cannot be read.
     #[error("failed to read the calibration of the diagnosis: {0}")]
     Calibration(#[source] serde_json::Error),
     /// A history cannot be opened or written.
@@ -319,7 +319,7 @@ pub enum SessionError {
     /// A map cannot be written in a format.
     #[error(transparent)]
     Export(#[from] ExportError),
-    /// A file that is no diagnosis, or no forecast, or not the one that was sealed.
+    /// The file is not a diagnosis or forecast, or has another hash than the pre-registered one.
     #[error("{}: {why}", .path.display())]
     TwinFile {
         /// The file.
@@ -335,25 +335,25 @@ pub enum SessionError {
         /// Its mistakes.
         source: ImportError,
     },
-    /// A map format that does not exist.
+    /// An unknown map format.
     #[error("there is no map format `{name}`; the formats are {}", .known.join(", "))]
     UnknownFormat {
-        /// What was asked for.
+        /// The name given.
         name: String,
         /// The formats.
         known: Vec<&'static str>,
     },
-    /// A file that is of no known map format.
+    /// The extension of a file matches no known map format.
     #[error("{}: maps are read from files with the extension {}; this one has `{extension}`", .path.display(), .known.join(", "))]
     UnknownExtension {
         /// The file.
         path: PathBuf,
         /// Its extension.
         extension: String,
-        /// The extensions that are read.
+        /// The readable extensions.
         known: Vec<&'static str>,
     },
-    /// A new file of no known map format.
+    /// The extension of a new file matches no known map format.
     #[error("{}: give the format by the extension or by `--to`: {}", .path.display(), .known.join(", "))]
     FormatUnsaid {
         /// The file.
@@ -366,13 +366,13 @@ pub enum SessionError {
     Fit {
         /// The format.
         format: &'static str,
-        /// Why.
+        /// The reason.
         source: mapper_assemble::MapFitError,
     },
-    /// A machine is no FMU.
+    /// A machine cannot be written as an FMU.
     #[error(transparent)]
     Fmu(#[from] crate::fmu_error::FmuExportError),
-    /// A file is there already.
+    /// The file already exists.
     #[error("{} is there already and is kept; choose another name", .path.display())]
     Exists {
         /// The file.
@@ -381,23 +381,23 @@ pub enum SessionError {
     /// A file or directory could not be read, written or made.
     #[error("failed to {action} {}: {source}", .path.display())]
     File {
-        /// What was tried: "read", "write", "create".
+        /// The attempted action: "read", "write" or "create".
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// A parent directory is full of runs.
+    /// A parent directory has too many runs.
     #[error("{} already holds 999 runs from this second", .parent.display())]
     TooManyRuns {
         /// The directory.
         parent: PathBuf,
     },
-    /// Data could not be written as JSON: a fault of the program.
+    /// Data could not be written as JSON: a defect of the program.
     #[error("failed to write JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// The operator stopped it.
+    /// The operator stopped the work.
     #[error("stopped by the operator")]
     Interrupted,
 }
@@ -412,7 +412,7 @@ impl SessionError {
         }
     }
 
-    /// What kind of trouble it is.
+    /// Category of the error.
     pub fn kind(&self) -> ErrorKind {
         use SessionError as E;
         match self {
@@ -467,7 +467,7 @@ impl SessionError {
                 RunError::Observer(_) | RunError::Panicked { .. } => ErrorKind::Failure,
                 RunError::NotSafe { .. } => ErrorKind::Rig,
             },
-            // Only reading fails for reasons that are not the recording's.
+            // Only these errors come from the file system; all others come from the recording itself.
             E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
             | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
             E::Record(RecordError::ChannelMap(_) | RecordError::LogWithoutMap { .. }) => ErrorKind::BadInput,

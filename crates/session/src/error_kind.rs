@@ -1,17 +1,17 @@
-//! Kinds of trouble, by whom or what has to act.
+//! Error categories, by who or what has to act.
 
-/// What kind of trouble it is: what an exit code or a status page tells.
+/// Category of an error, for exit codes and status pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// A file could not be read or written, or the program is at fault.
+    /// A file could not be read or written, or the program has a defect.
     Failure,
     /// The campaign or another input has mistakes.
     BadInput,
-    /// There is no plan, or the plan given is stale.
+    /// No plan is possible, or the given plan is stale.
     NoPlan,
     /// The rig failed.
     Rig,
-    /// The recording does not hold what is needed.
+    /// The recording does not contain the required data.
     BadRecording,
     /// Stopped by the operator.
     Interrupted,

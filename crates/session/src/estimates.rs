@@ -1,4 +1,4 @@
-//! Each step identified by itself as soon as it has ended: what whoever looks on sees before all are identified together.
+//! Identifies each step as soon as it ends, so that observers see a preliminary result before the joint identification.
 
 use crate::SessionEvent;
 use crate::event::OnEvent;
@@ -8,17 +8,17 @@ use mapper_runner::{ObserverError, RunObserver};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::Scope;
 
-/// Steps that wait to be identified; a run that is faster than that loses estimates, and no time.
+/// Steps that may wait for identification. If the run is faster, estimates are dropped and the run is not delayed.
 const WAITING_MAX: usize = 4;
 
-/// Keeps the last two steps, and hands them to a thread of its own: identifying never delays the rig.
+/// Keeps the last two steps and sends them to a separate thread, so that identification never delays the rig.
 pub(crate) struct Estimates {
     recent: Recording,
     to_thread: SyncSender<Recording>,
 }
 
 impl Estimates {
-    /// Begins; the thread ends with the value.
+    /// Starts the thread, which ends when this value is dropped.
     pub(crate) fn begin<'scope, 'env>(
         scope: &'scope Scope<'scope, 'env>,
         config: IdentifyConfig,
@@ -51,7 +51,7 @@ impl RunObserver for Estimates {
     }
 }
 
-/// Puts samples behind a recording, as they are read back: what a sensor did not give is not there.
+/// Appends samples to a recording as a file reader would: missing readings are omitted.
 pub(crate) fn keep(recent: &mut Recording, batch: &SampleBatch) {
     for column in &batch.columns {
         let series = recent.series.entry(column.channel).or_default();
@@ -62,7 +62,7 @@ pub(crate) fn keep(recent: &mut Recording, batch: &SampleBatch) {
     }
 }
 
-/// Adds a step that has ended, and forgets what lies before the one before it: all that identifying the last one needs.
+/// Adds an ended step and drops data before the previous one. Identification of the last step needs only these two.
 pub(crate) fn two_last_steps(recent: &mut Recording, marker: &StepMarker) {
     if recent.steps.len() > 1 {
         recent.steps.remove(0);
@@ -77,7 +77,7 @@ pub(crate) fn two_last_steps(recent: &mut Recording, marker: &StepMarker) {
     recent.steps.push(*marker);
 }
 
-/// Each step by itself. What is assumed of alpha_A is left out of the standard errors: no further visit would improve it.
+/// Settings for single steps. The standard errors exclude the assumed alpha_A, because further visits would not reduce that part.
 pub(crate) fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
     let method = match config.method {
         Method::Joint => Method::Dynamic,

@@ -1,9 +1,9 @@
-//! What happens while a session works, as data for whoever looks on.
+//! Events of a session, as data for observers.
 
 use mapper_core::{Channel, Event, IdentifiedPoint, RigDescription, StepMarker};
 use serde::Serialize;
 
-/// Something that happened.
+/// One event.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum SessionEvent {
@@ -11,48 +11,47 @@ pub enum SessionEvent {
     RunStarted {
         /// The rig.
         rig: RigDescription,
-        /// Steps planned; a script may make more or fewer.
+        /// Planned steps; a script may make more or fewer.
         steps: usize,
-        /// Rig time planned, soak, warm-up and cool-down included, s.
+        /// Planned rig time including soak, warm-up and cool-down, s.
         duration_s: f64,
     },
-    /// The rig has come so far.
+    /// Current time of the rig.
     RigTime {
         /// Run time, s.
         t_s: f64,
     },
-    /// A step begins; the marker's `end_s` is the planned one.
+    /// A step begins; `end_s` of the marker is the planned end.
     StepStarted(StepMarker),
-    /// A step has ended; the marker's `end_s` is the real one.
+    /// A step has ended; `end_s` of the marker is the actual end.
     StepEnded(StepMarker),
-    /// The rig or the runner has something to tell: a guard that tripped, surge, a stop, the safe state, a note.
+    /// Message from the rig or the runner: tripped guard, surge, stop, safe state or note.
     Told(Event),
-    /// The rig is safe and let go; what follows is made from the recording.
+    /// The rig is safe and released. All further work uses the recording.
     RigReleased,
-    /// The last good reading of each channel.
+    /// Latest valid reading of each channel.
     Readings {
         /// Run time, s.
         t_s: f64,
-        /// SI.
+        /// Values in SI units.
         values: Vec<(Channel, f64)>,
     },
-    /// A step that has just ended, identified by itself: before the zero is subtracted and before all steps are identified
-    /// together.
+    /// Preliminary result of a step that has just ended, before zero subtraction and joint identification.
     PointEstimated(Box<IdentifiedPoint>),
     /// A point was identified.
     PointIdentified(Box<IdentifiedPoint>),
-    /// Long work that has no steps has come so far.
+    /// Progress of long work that has no steps.
     Progress {
-        /// Share done, 0 to 1.
+        /// Completed share, 0 to 1.
         done_ratio: f64,
-        /// What is being done, for people.
+        /// Description of the work.
         what: String,
     },
-    /// Some of many pieces of work are done.
+    /// Progress of work in separate pieces.
     PiecesDone {
-        /// Pieces done.
+        /// Completed pieces.
         done: usize,
-        /// Pieces in total.
+        /// Total pieces.
         of: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! What a stand may do to tell causes apart: the planner's jumps, steps of T3 and oil that limits and rig accept, and a soak.
+//! Experiments that can distinguish causes: the planner's jumps, accepted steps of T3 and oil temperature, and a soak.
 
 use crate::declared::identification_with;
 use crate::planning::PlanInputs;
@@ -13,19 +13,19 @@ use mapper_physics::reach::reach;
 use mapper_planner::PlanRequest;
 use mapper_record::ChannelMap;
 
-/// Points up to which every jump between them is simulated to see whether it is allowed.
+/// Maximum number of points for which all jumps are simulated to check the limits.
 const MAX_POINTS: usize = 40;
-/// Changes of the turbine inlet and of the oil temperature that are tried, K.
+/// Candidate changes of turbine inlet temperature and oil temperature, K.
 const T3_STEPS_K: [f64; 3] = [100.0, 50.0, -100.0];
 const OIL_STEPS_K: [f64; 2] = [40.0, -20.0];
-/// Distance that such a step keeps from the highest T3, K: the cell wanders and sensors read high, and a guard watches that limit.
+/// Margin to the maximum T3, K. The test cell fluctuates, sensors may read high, and a guard watches this limit.
 const T3_ROOM_K: f64 = 15.0;
-/// Time of such a step, s: housings follow in minutes.
+/// Duration of such a step, s. Housings need minutes to respond.
 const DWELL_S: f64 = 300.0;
-/// Time of a soak, s: what the shipped campaigns take.
+/// Duration of a soak, s, as in the shipped campaigns.
 const SOAK_S: f64 = 1800.0;
 
-/// All that may be done.
+/// All permitted experiments.
 ///
 /// # Errors
 /// As [`PlanInputs::of`].
@@ -37,7 +37,7 @@ pub(crate) fn experiments(
 ) -> Result<Vec<Experiment>, SessionError> {
     let mut all: Vec<Experiment> =
         allowed_jumps(campaign, model)?.into_iter().map(Experiment::jump).collect();
-    // What nobody says is accepted is not offered.
+    // Temperature steps need a declared range of accepted setpoints.
     if let Some(accepts) = registry.accepts(campaign, model) {
         let places = corners(&campaign.points);
         all.extend(places.iter().flat_map(|point| temperature_steps(campaign, model, *point, &accepts)));
@@ -46,7 +46,7 @@ pub(crate) fn experiments(
     Ok(all)
 }
 
-/// A soak before the next run, where the campaign does not have one already.
+/// A soak before the next run, if the campaign has none.
 fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
     if campaign.zero.is_some() {
         return None;
@@ -65,14 +65,13 @@ fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
     Some(Experiment { jump, beside: Beside::Soak(soak) })
 }
 
-/// The jumps that the planner allows between the points of the campaign; none for grids too large to simulate them all,
-/// and for campaigns that are no grid.
+/// Jumps between the campaign's points that the planner allows. Empty for grids too large to simulate and for campaigns without a grid.
 fn allowed_jumps(campaign: &Campaign, model: &Model) -> Result<Vec<AllowedJump>, SessionError> {
     if campaign.points.len() > MAX_POINTS {
         return Ok(Vec::new());
     }
     let inputs = PlanInputs::of(campaign)?;
-    // Whether a jump is allowed does not depend on the error that is expected after it.
+    // The check of a jump does not depend on the expected error after it.
     let request = PlanRequest { method: None, ..inputs.request(campaign, model) };
     let Ok(graph) = mapper_planner::jump_graph(&request) else { return Ok(Vec::new()) };
     let allowed = graph.edge_weights().filter(|jump| jump.rejections.is_empty());
@@ -100,7 +99,7 @@ fn corners(points: &[OperatingPoint]) -> Vec<OperatingPoint> {
     corners
 }
 
-/// Steps of T3 and of the oil at a point, speed and opening held, that leave no limit and are accepted.
+/// Accepted steps of T3 and oil temperature within the limits, at constant speed and valve opening.
 fn temperature_steps(
     campaign: &Campaign,
     model: &Model,

@@ -1,24 +1,24 @@
-//! Files: nothing that is there is replaced unless somebody says so, and never more of it read than a limit.
+//! File access: existing files are replaced only on request, and reads have a size limit.
 
 use crate::SessionError;
 use serde::Serialize;
 use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 
-/// What becomes of a file that is there already.
+/// Treatment of an existing file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Existing {
-    /// It stays, and nothing is written.
+    /// Keep it and write nothing.
     #[default]
     Kept,
-    /// It is replaced, once the new one is whole.
+    /// Replace it once the new file is complete.
     Replaced,
 }
 
 /// Writes a file.
 ///
 /// # Errors
-/// [`SessionError::Exists`] where it is there and is to be kept, [`SessionError::File`] where it cannot be written.
+/// [`SessionError::Exists`] if it exists and must be kept, [`SessionError::File`] if it cannot be written.
 pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), SessionError> {
     if existing == Existing::Kept || !path.exists() {
         return write_new(path, bytes);
@@ -31,28 +31,28 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
         .map_err(SessionError::file("write", path))
 }
 
-/// Writes a file that is not there yet.
+/// Writes a new file.
 ///
 /// # Errors
-/// [`SessionError::Exists`] where it is there, [`SessionError::File`] where it cannot be written.
+/// [`SessionError::Exists`] if it already exists, [`SessionError::File`] if it cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
     std::fs::File::create_new(path)
         .and_then(|mut file| file.write_all(bytes))
         .map_err(SessionError::file("write", path))
 }
 
-/// Indented JSON with a line end behind it.
+/// Returns indented JSON with a final line break.
 ///
 /// # Errors
-/// [`SessionError::Json`] where the value cannot be written as JSON.
+/// [`SessionError::Json`] if the value cannot be written as JSON.
 pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
 }
 
-/// Reads a file without ever holding much more than `limit_bytes`, whatever the file claims to be.
+/// Reads a file without holding much more than `limit_bytes` in memory, whatever size the file reports.
 ///
 /// # Errors
-/// [`SessionError::File`] where it cannot be read, or is larger.
+/// [`SessionError::File`] if it cannot be read or is too large.
 pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SessionError> {
     let failed = SessionError::file("read", path);
     let mut bytes = Vec::new();

@@ -1,4 +1,4 @@
-//! The sources of an FMU, compiled for this computer by its own C compiler.
+//! Compiles the sources of an FMU for this computer with its own C compiler.
 
 use crate::fmu_error::FmuExportError;
 use crate::{SessionError, files};
@@ -6,10 +6,10 @@ use mapper_fmu::FmuFile;
 use std::path::Path;
 use std::process::Command;
 
-/// Largest library that is taken into an archive, bytes.
+/// Largest library accepted into an archive, bytes.
 const LIBRARY_MAX_BYTES: u64 = 64 << 20;
 
-/// The standard's name for this computer and the ending of its libraries; `None` where there is no such name.
+/// FMI platform name of this computer and its library extension; `None` if FMI has no such name.
 const PLATFORM: Option<(&str, &str)> = if cfg!(all(target_os = "linux", target_arch = "x86_64")) {
     Some(("linux64", "so"))
 } else if cfg!(all(target_os = "macos", target_arch = "x86_64")) {
@@ -18,7 +18,7 @@ const PLATFORM: Option<(&str, &str)> = if cfg!(all(target_os = "linux", target_a
     None
 };
 
-/// Adds the library to the files of an FMU; returns the folder it lies in. The compiler is `$CC`, or else `cc`.
+/// Adds the compiled library to the files of an FMU and returns its folder. The compiler is `$CC`, or `cc` by default.
 pub(crate) fn with_binary(fmu: &mut Vec<FmuFile>, identifier: &str) -> Result<String, SessionError> {
     let compiler =
         std::env::var("CC").ok().filter(|name| !name.is_empty()).unwrap_or_else(|| "cc".to_owned());
@@ -56,8 +56,8 @@ pub(crate) fn with_binary(fmu: &mut Vec<FmuFile>, identifier: &str) -> Result<St
             failed(format!("{error}; install a C compiler, name one in CC, or leave `--compile` out"))
         })?;
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        return Err(failed(said.chars().take(2000).collect()).into());
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        return Err(failed(stderr.chars().take(2000).collect()).into());
     }
     let bytes = files::read_at_most(&library, LIBRARY_MAX_BYTES)?;
     let folder = format!("binaries/{platform}");

@@ -1,30 +1,30 @@
-//! Why a machine is no FMU.
+//! Errors of FMU export.
 
 use mapper_fmu::FmuError;
 use mapper_physics::steady::SteadyError;
 use mapper_physics::tabulated_map::MapError;
 
-/// Why a machine is no FMU.
+/// Why a machine cannot be written as an FMU.
 #[derive(Debug, thiserror::Error)]
 pub enum FmuExportError {
-    /// The recording gives no map of enough lines.
+    /// The recording gives too few map lines.
     #[error("an FMU needs a map of the whole machine: {0}")]
     NoMap(String),
-    /// The map is none that a model can run on.
+    /// The map cannot be used for simulation.
     #[error("the map is none that a model can run on: {0}")]
     Map(#[from] MapError),
-    /// It has nowhere to begin.
+    /// The model has no steady start point.
     #[error("there is no steady state to begin at: {0}")]
     Start(#[from] SteadyError),
     /// The archive cannot be made.
     #[error(transparent)]
     Fmu(#[from] FmuError),
-    /// No compiler, or one that refuses.
+    /// The compiler is missing or fails.
     #[error("the sources cannot be compiled with `{compiler}`: {why}")]
     Compiler {
-        /// The program that was called.
+        /// The compiler command.
         compiler: String,
-        /// What it said.
+        /// The compiler's output.
         why: String,
     },
 }

@@ -1,4 +1,4 @@
-//! A machine as an FMU: the nominal one of a campaign, or what a recording says of it.
+//! Writes a machine as an FMU: the nominal machine of a campaign, or the machine identified from a recording.
 
 use crate::files::{Existing, write_file};
 use crate::fmu_binary::with_binary;
@@ -24,15 +24,15 @@ use std::sync::Arc;
 pub struct WrittenFmu {
     /// The file.
     pub file: PathBuf,
-    /// Where its numbers come from, in one sentence.
+    /// Source of its numbers, in one sentence.
     pub origin: String,
-    /// Shaft speed at which it begins, rpm.
+    /// Shaft speed at the start, rpm.
     pub start_speed_rpm: f64,
-    /// Folder of the library for this computer; `None` where it holds sources alone.
+    /// Folder of the library for this computer; `None` if the FMU contains sources only.
     pub binary: Option<String>,
 }
 
-/// A machine on the way into an FMU.
+/// A machine to be exported as an FMU.
 struct Made {
     name: String,
     origin: String,
@@ -44,7 +44,7 @@ impl Session<'_> {
     /// Writes the nominal machine of a campaign.
     ///
     /// # Errors
-    /// [`SessionError::Fmu`] where it is no FMU, and as [`write_file`].
+    /// [`SessionError::Fmu`] if export fails; otherwise as [`write_file`].
     pub fn nominal_fmu(
         &self,
         campaign: &Campaign,
@@ -67,12 +67,11 @@ impl Session<'_> {
         write(Made { name: machine.name.clone(), origin, params, map }, campaign, compile, out, existing)
     }
 
-    /// Identifies a recording by its campaign's method and writes the machine as found: map and, where the joint method found
-    /// one, thermal model; what no recording tells of, as declared.
+    /// Identifies a recording by its campaign's method and writes the identified map and, for the joint method, the thermal model. Parameters
+    /// without information in the recording keep their declared values.
     ///
     /// # Errors
-    /// [`SessionError`] where the machine is not known or the recording cannot be identified, [`SessionError::Fmu`] where what
-    /// it gives is no machine.
+    /// [`SessionError`] if the machine is unknown or identification fails, [`SessionError::Fmu`] if the result is not a complete machine.
     pub fn identified_fmu(
         &self,
         recorded: Recorded,
@@ -83,7 +82,7 @@ impl Session<'_> {
     ) -> Result<WrittenFmu, SessionError> {
         let campaign = recorded.known("Give `--campaign FILE`")?.clone();
         let identified = self.identify(vec![recorded], channels, None)?;
-        // Points without a place are no part of a map, and no reason to have none.
+        // Points without map coordinates are skipped; they do not prevent a map.
         let has_place = |point: &&IdentifiedPoint| {
             let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];
             place.iter().all(|value| value.is_finite())
@@ -123,7 +122,7 @@ impl Session<'_> {
     }
 }
 
-/// The declared parameters with what was found in place of them.
+/// Declared parameters, replaced by the identified values where they exist.
 fn with_found(declared: &Params, found: &ThermalModel) -> Params {
     let mut params = *declared;
     let compressor = &mut params.compressor;
@@ -178,7 +177,7 @@ fn write(
     })
 }
 
-/// Where the machine begins: at rest at the point of the grid in the middle, or at the first other that it can hold.
+/// Start state: steady at the middle point of the grid, or at the first other point with a steady state.
 fn start(made: &Made, campaign: &Campaign) -> Result<SteadyState, SteadyError> {
     let model = match &made.map {
         FmuMap::ClosedForm(map) => Model::new(made.params, Arc::new(*map)),

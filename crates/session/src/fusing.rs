@@ -1,4 +1,4 @@
-//! Several sensors of a channel become one reading before anything is made of a recording: one way for all commands.
+//! Fuses several sensors of a channel into one reading. All commands use the same procedure.
 
 use crate::recorded::Recorded;
 use mapper_campaign::Campaign;
@@ -9,15 +9,15 @@ use mapper_observe::{FusedChannel, fuse, judge_elements};
 use mapper_record::ChannelMap;
 use std::collections::BTreeMap;
 
-/// Recordings with one reading of each channel, and what is declared of it.
+/// Recordings with one reading per channel, and the declared uncertainty of that reading.
 pub(crate) struct Fused {
     pub(crate) recordings: Vec<Recording>,
     pub(crate) config: IdentifyConfig,
-    /// What became of the sensors, by recording; empty where every channel has one.
+    /// Fusion result by recording; empty if every channel has one sensor.
     pub(crate) channels: Vec<Vec<FusedChannel>>,
 }
 
-/// Fuses the sensors of recordings that are compared with each other: what is left out of one is left out of all.
+/// Fuses the sensors of recordings that are compared with each other. A sensor excluded from one is excluded from all.
 pub(crate) fn fused(
     recordings: Vec<Recording>,
     config: IdentifyConfig,
@@ -44,17 +44,17 @@ pub(crate) fn fused(
     Fused { recordings, config, channels }
 }
 
-/// The recordings of several runs as they are on file.
+/// The recordings of several runs as stored.
 pub(crate) fn recordings(recorded: &[Recorded]) -> Vec<Recording> {
     recorded.iter().map(|recorded| recorded.read.recording.clone()).collect()
 }
 
-/// Puts the uncertainty of a fused channel into the configuration; of several recordings the widest counts.
+/// Copies the uncertainty of a fused channel into the configuration. For several recordings the largest applies.
 fn take_over(config: &mut IdentifyConfig, fused: &FusedChannel, campaign: Option<&Campaign>) {
     let DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio } = fused.declared;
     if noise_sigma > 0.0 || offset_sigma > 0.0 || gain_sigma_ratio > 0.0 {
         let entry = config.declared.entry(fused.channel).or_default();
-        // A gain that nobody declares for a sensor is that of the tolerances, which is in the configuration already.
+        // If no gain is declared for a sensor, the gain tolerance already in the configuration applies.
         let gain_sigma_ratio = if gain_sigma_ratio > 0.0 { gain_sigma_ratio } else { entry.gain_sigma_ratio };
         *entry = DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio };
     }
@@ -64,8 +64,8 @@ fn take_over(config: &mut IdentifyConfig, fused: &FusedChannel, campaign: Option
     }
 }
 
-/// What is declared of each sensor of the channels that have several. The channel map speaks of the sensors of this very
-/// recording; the campaign counts where it has as many. What is said of a channel with one sensor holds for each of several.
+/// Declared uncertainty of each sensor in channels with several sensors. The channel map takes precedence; the campaign applies if its number of
+/// sensors matches. A declaration for a channel as a whole applies to each of its sensors.
 fn declared(
     recording: &Recording,
     campaign: Option<&Campaign>,
@@ -77,11 +77,11 @@ fn declared(
         let as_many = |declared: &&RedundantSensors| declared.elements.len() == count;
         let sensor = campaign.and_then(|campaign| campaign.sensors.get(&channel));
         let each = map.sensors.get(&channel).copied().or(sensor.map(|sensor| sensor.declared));
-        let said = map.redundant.get(&channel).filter(as_many);
-        let said = said.or_else(|| {
+        let given = map.redundant.get(&channel).filter(as_many);
+        let given = given.or_else(|| {
             sensor?.redundant.as_ref().filter(as_many).filter(|_| !map.sensors.contains_key(&channel))
         });
-        said.cloned().unwrap_or_else(|| RedundantSensors::alike(channel, count, each.unwrap_or_default()))
+        given.cloned().unwrap_or_else(|| RedundantSensors::alike(channel, count, each.unwrap_or_default()))
     };
     channels.map(|channel| (channel, of(channel))).collect()
 }

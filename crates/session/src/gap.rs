@@ -1,4 +1,4 @@
-//! The gap between nominal model and rig: drift is looked for first, a zero subtracted, then the diagnosis.
+//! Explains the gap between nominal model and rig: drift search first, then zero subtraction, then diagnosis.
 
 use crate::declared::identification_with;
 use crate::experiments::experiments;
@@ -38,26 +38,26 @@ use std::collections::BTreeMap;
 use std::slice;
 use std::sync::Arc;
 
-/// What a recording says of the gap.
+/// Result of a gap diagnosis.
 pub struct Gap {
-    /// The diagnosis, with what it was made from.
+    /// The diagnosis with its inputs.
     pub diagnosed: Diagnosed,
-    /// What drifted while it was recorded; `None` where nothing was seen, or where nothing can be said, as without repeats.
+    /// Drift during the recording; `None` if none was found or none can be detected, for example without repeats.
     pub drift: Option<DriftReport>,
-    /// What became of channels with several sensors.
+    /// Result of sensor fusion.
     pub sensors: Vec<FusedChannel>,
-    /// What came of the isothermal zero.
+    /// Result of the isothermal zero.
     pub zero: ZeroOutcome,
 }
 
 impl Gap {
-    /// For a program: the diagnosis, what was found in it, drift and zero.
+    /// Machine-readable output: diagnosis, identified effects, drift and zero.
     ///
     /// # Errors
     /// [`SessionError::Json`]: none in practice.
     pub fn json(&self) -> Result<Value, SessionError> {
         let mut value = serde_json::to_value(&self.diagnosed.diagnosis)?;
-        // What the model lacks in both recordings is part of the rig and of no machine that could be written down.
+        // An effect that is present in both recordings belongs to the rig; it does not describe a complete machine.
         let whole = self.diagnosed.diagnosis.since.is_none();
         value["found"] = json!(whole.then(|| Found::of(&self.diagnosed)).flatten());
         value["drift"] = self.drift.as_ref().map_or(Value::Null, drift_json);
@@ -69,7 +69,7 @@ impl Gap {
     }
 }
 
-/// What drifted, without the points.
+/// Drift without the individual points.
 fn drift_json(drift: &DriftReport) -> Value {
     json!({"verdict": drift.verdict, "drifts": drift.drifts, "reason": drift.reason})
 }
@@ -78,7 +78,8 @@ impl Session<'_> {
     /// Diagnoses one recording with candidate effects.
     ///
     /// # Errors
-    /// [`SessionError::OtherMachine`] where the recording is not of the campaign's machine, [`SessionError::Gap`] where the recording lacks what is needed or the nominal model cannot follow it.
+    /// [`SessionError::OtherMachine`] if the recording is not of the campaign's machine, [`SessionError::Gap`] if required data are missing or
+    /// the nominal model cannot follow it.
     pub fn diagnose_gap(
         &self,
         recorded: &Recorded,
@@ -87,7 +88,7 @@ impl Session<'_> {
         effects: Vec<Arc<dyn Effect>>,
         healthy: Option<&Recorded>,
     ) -> Result<Gap, SessionError> {
-        // Drift comes first: of the whole work it is about this share.
+        // The drift search runs first and takes about this share of the total time.
         let progress = |done_ratio: f64, what: &str| {
             self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
@@ -124,7 +125,7 @@ impl Session<'_> {
         (diagnosis.laws, diagnosis.forces) = (found.laws, found.forces);
         if let Some(places) = found.places {
             diagnosis.r#where = places;
-            // A sensor beside the largest place is one beside the place that has just been found.
+            // The best extra sensor is one next to the location that was just found.
             if matches!(diagnosis.next, Some(Next::Sensor { .. })) {
                 diagnosis.next = Some(look_beside(&diagnosis.r#where));
             }
@@ -136,7 +137,7 @@ impl Session<'_> {
             "the law is to be confirmed: give it to the next diagnosis with --effect, and measure there"
                 .clone_into(reason);
         }
-        // What was wrong with the file belongs to what is said about it.
+        // Reader warnings belong to the remarks of the diagnosis.
         let warnings = recorded.read.warnings.iter().map(ToString::to_string);
         diagnosed.diagnosis.warnings.extend(warnings);
         diagnosed.diagnosis.off_at_rest = off_at_rest;
@@ -147,7 +148,7 @@ impl Session<'_> {
         Ok(Gap { diagnosed, drift, sensors, zero })
     }
 
-    /// A recording as the diagnosis takes it: drift of a sensor and offsets at rest subtracted.
+    /// A recording prepared for the diagnosis: sensor drift and zero offsets are subtracted.
     fn prepared_for_gap(
         &self,
         recorded: &Recorded,
@@ -156,7 +157,7 @@ impl Session<'_> {
     ) -> Result<Prepared, SessionError> {
         same_machine(recorded, campaign)?;
         let mut model = nominal_model(campaign)?;
-        // A recording in which drift cannot be looked for may still have a gap.
+        // A recording that does not permit a drift search may still have a gap.
         let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
         let drift = drift.map(|drift| drift.report).filter(|report| !report.drifts.is_empty());
         let config = identification_with(campaign, map);
@@ -167,7 +168,7 @@ impl Session<'_> {
         model.params.t2_probe_diameter_m = config.probe_diameter_m;
         let ready = |drift: Option<&DriftReport>| {
             let recording = taken_off(raw.clone(), drift);
-            // A zero leaves less of the offsets.
+            // The zero reduces the offset uncertainty.
             let zero = ZeroOutcome::with_a_fault(&recording, &config, campaign.zero);
             let off_at_rest = off_at_rest(&zero, &config.declared);
             let (recording, zeroed) = zero.take_off(recording, config.clone());
@@ -190,10 +191,10 @@ impl Session<'_> {
         Ok(Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest })
     }
 
-    /// Holds the machine that a diagnosis found against a recording that it has not seen; nothing is fitted.
+    /// Validates the machine found by a diagnosis against an independent recording. Nothing is fitted.
     ///
     /// # Errors
-    /// As [`Session::diagnose_gap`], and [`SessionError::Twin`] where diagnosis and recording do not belong together.
+    /// As [`Session::diagnose_gap`], and [`SessionError::Twin`] if diagnosis and recording do not belong together.
     pub fn hold_twin(
         &self,
         recorded: &Recorded,
@@ -206,10 +207,10 @@ impl Session<'_> {
         Ok(hold(&study_of(&recording, campaign, declared, model, effects)?, found)?)
     }
 
-    /// What the machine that a diagnosis found is expected to read at the end of each step of a campaign's plan.
+    /// Expected readings of the diagnosed machine at the end of each planned step of a campaign.
     ///
     /// # Errors
-    /// [`SessionError`] where no plan can be made, or the twin cannot follow it.
+    /// [`SessionError`] if no plan can be made, or the calibrated model cannot follow it.
     pub fn forecast_twin(
         &self,
         campaign: &Campaign,
@@ -248,7 +249,7 @@ impl Session<'_> {
     }
 }
 
-/// A recording as the diagnosis sees it.
+/// A recording in the form that the diagnosis needs.
 fn study_of(
     recording: &Recording,
     campaign: &Campaign,
@@ -266,8 +267,8 @@ fn study_of(
     Ok(Study::with_actuators(recording, table, declared, model, effects, actuators))
 }
 
-/// Whether tolerances alone leave nothing but noise of a recording: then there is no drift that could be subtracted, whatever
-/// repeats look like. A diagnosis is much the keener of the two.
+/// Whether tolerances alone explain the recording down to noise. In that case apparent drift in repeats is not subtracted, because the diagnosis
+/// is much more sensitive.
 fn leaves_noise(zeroed: &Zeroed, campaign: &Campaign, model: &Model) -> bool {
     let look = || -> Result<bool, GapError> {
         let study =
@@ -288,24 +289,24 @@ struct Zeroed {
     off_at_rest: Vec<String>,
 }
 
-/// A recording made ready for the diagnosis.
+/// A recording prepared for the diagnosis.
 struct Prepared {
     recording: Recording,
     declared: Declared,
     model: Model,
     drift: Option<DriftReport>,
-    /// A drift that was seen and does not stand.
+    /// A detected drift that was rejected.
     doubted: Option<String>,
     sensors: Vec<FusedChannel>,
     zero: ZeroOutcome,
-    /// What the zero says of sensors that are off by more than is declared.
+    /// Remarks of the zero on sensors with offsets beyond their declaration.
     off_at_rest: Vec<String>,
 }
 
-/// Declared standard deviations from which on an offset at rest is more than what was declared.
+/// Zero offset, in declared standard deviations, above which a sensor is reported.
 const BEYOND_SIGMAS: f64 = 3.0;
 
-/// A sentence for each sensor that is off at rest by more than is declared of it.
+/// One sentence for each sensor whose zero offset exceeds its declaration.
 fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<String> {
     let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
     let beyond = zero.offsets.iter().filter_map(|(channel, off)| {
@@ -324,21 +325,21 @@ fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertai
     beyond.collect()
 }
 
-/// Share of the time that the search for drift takes.
+/// Share of the time taken by the drift search.
 const DRIFT_SHARE: f64 = 0.15;
-/// Share after which the catalogue is done, and what lies beyond it begins.
+/// Share of the time after which the effect library is finished and the search for unmodelled effects begins.
 const CATALOGUE_END: f64 = 0.7;
 
-/// The recording to be diagnosed: the drift of a sensor is subtracted.
+/// The recording for the diagnosis, with sensor drift subtracted.
 fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
     drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
 }
 
-/// Probability of a cause outside the catalogue below which nothing is made of it where a drift was subtracted: how well the
-/// drift's course is known is in no tolerance of the diagnosis, and what is left of it looks like a small unknown cause.
+/// After drift subtraction, unmodelled causes below this probability are ignored. The uncertainty of the drift's time history is not in any
+/// tolerance, and its residual resembles a small unmodelled cause.
 const SURELY_OUTSIDE: f64 = 0.9;
 
-/// Puts what drifted beside the diagnosis, which names no culprit for it.
+/// Adds the drift to the diagnosis, which does not name a cause for it.
 fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     let Some(drift) = drift else { return };
     let taken_off = drift.drifts.iter().all(|drift| drift.cause.kind() == CauseKind::Sensor);
@@ -360,7 +361,7 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
         diagnosis.next = None;
         diagnosis.experiments.clear();
     }
-    // What changes with time is in no law.
+    // A change with time cannot be expressed as a closure term.
     diagnosis.laws.clear();
     if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;

@@ -1,4 +1,4 @@
-//! What ends a step or a run before harm is done, and what watches its repeats.
+//! Guards that end a step or a run before damage, and the drift watch on repeats.
 
 use crate::SessionError;
 use crate::declared::declared;
@@ -10,8 +10,8 @@ use mapper_runner::{
     SurgeWatch,
 };
 
-/// The guards of a run of this campaign on this rig. A signal that nobody has declared a guard for, and that the rig does not
-/// deliver, is left out; one that is declared, or that the rig needs, is not: it trips.
+/// Guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared or required guards
+/// are always included and trip without their signal.
 pub fn guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChannel]) -> Vec<Box<dyn Guard>> {
     let set = campaign.guard_set();
     let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
@@ -32,10 +32,10 @@ pub fn guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChannel]) -
     guards
 }
 
-/// Refuses a rig without a guard that it calls necessary, or without the channel that the guard looks at.
+/// Checks that every guard the rig requires is present, and that its channel is delivered.
 ///
 /// # Errors
-/// [`SessionError::Unguarded`] with every guard that is missing, [`SessionError::GuardBlind`] with the channels.
+/// [`SessionError::Unguarded`] with all missing guards, [`SessionError::GuardBlind`] with the channels.
 pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), SessionError> {
     let set = campaign.guard_set();
     let missing: Vec<GuardName> =
@@ -53,10 +53,10 @@ pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), Ses
     }
 }
 
-/// Watches the repeats of a run, where the campaign says what to do about drift; gives the steps back where it does not.
+/// Watches the repeats of a run if the campaign defines a reaction to drift; otherwise returns the steps.
 ///
 /// # Errors
-/// The steps: no fault, nobody asked for a watch.
+/// The steps themselves, if no watch was requested; this is not a fault.
 pub fn drift_watch<'a>(
     campaign: &Campaign,
     steps: &'a mut dyn StepSource,

@@ -1,4 +1,4 @@
-//! From a recording to identified points beside their truth, where there is any: one way for all who need it.
+//! Converts a recording into identified points, with their truth if known. All commands use this module.
 
 use crate::declared::{identification_of, identification_with};
 use crate::fusing::fused;
@@ -23,51 +23,51 @@ use serde_json::{Value, json};
 use mapper_surge::SurgeMarks;
 use std::path::{Path, PathBuf};
 
-/// Rest before the first step, s, that is worth a word: thermocouples in a housing need it to come to the others.
+/// Minimum soak before the first step, s, that triggers a remark. Thermocouples in a housing need this time to equalise.
 const UNUSED_REST_S: f64 = 600.0;
 
-/// What a recording gives.
+/// Identification result of a recording.
 #[derive(Debug)]
 pub struct Identified {
-    /// The recording as it was identified: several are joined, several sensors are fused, the isothermal zero is subtracted.
+    /// The identified recording: joined from several files, with fused sensors and the isothermal zero subtracted.
     pub recording: Recording,
-    /// Where each step of it comes from.
+    /// Origin of each of its steps.
     pub origins: Vec<StepOrigin>,
-    /// How it was identified.
+    /// The identification settings.
     pub config: IdentifyConfig,
-    /// The points, with the truth where the recording holds it.
+    /// The points, with the truth if the recording contains it.
     pub points: Vec<ScoredPoint>,
-    /// What the points share (joint method).
+    /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
-    /// What the two-parameter method makes of the same steps (joint method).
+    /// Two-parameter results for the same steps (joint method).
     pub two_parameter: Vec<TwoParameter>,
-    /// Faults of sensors or machine without which the recording contradicts itself.
+    /// Faults of sensors or machine that are needed to explain the recording.
     pub faults: Vec<FoundFault>,
-    /// What became of channels with several sensors.
+    /// Result of sensor fusion.
     pub sensors: Vec<FusedChannel>,
-    /// What came of the zero.
+    /// Result of the zero.
     pub zero: ZeroOutcome,
-    /// How far the points are from the truth; `None` on a real rig.
+    /// Errors of the points against the truth; `None` on a real rig.
     pub score: Option<ScoreSummary>,
-    /// Surge-side ends that were sought; `None` where none were.
+    /// Surge-side limits of the map; `None` if there was no search.
     pub surge: Option<SoughtSurge>,
-    /// What else is to be known of it.
+    /// Other remarks.
     pub remarks: Vec<String>,
 }
 
-/// What came of the search for surge.
+/// Result of the surge search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SoughtSurge {
-    /// The marks in order of speed, with the truth where the recording holds it.
+    /// The marks in order of speed, with the truth if the recording contains it.
     pub marks: Vec<ScoredMark>,
-    /// Lines on which surge was not found, in words.
+    /// Remarks on lines without a surge point.
     pub remarks: Vec<String>,
-    /// How often the compressor went into surge.
+    /// Number of surge events of the compressor.
     pub surges: usize,
 }
 
 impl Identified {
-    /// For a program. `recording`: the first file; `warnings`: what was wrong with the files.
+    /// Machine-readable output. `recording`: the first file; `warnings`: the reader's warnings.
     pub fn json(&self, recording: Option<&Path>, warnings: &[String]) -> Value {
         let mut value = json!({
             "recording": recording,
@@ -95,16 +95,16 @@ impl Identified {
         self.points.iter().map(|scored| &scored.point)
     }
 
-    /// That there is a point at all.
+    /// Checks that there is at least one point.
     ///
     /// # Errors
-    /// [`SessionError::NoPoints`] with what is known of the recording, `warnings` of its reader among it.
+    /// [`SessionError::NoPoints`] with the known facts, including the `warnings` of the reader.
     pub fn has_points(&self, warnings: &[String]) -> Result<(), SessionError> {
         let why: Vec<&str> = warnings.iter().chain(&self.remarks).map(String::as_str).collect();
         if self.points.is_empty() { Err(SessionError::NoPoints { why: why.join("; ") }) } else { Ok(()) }
     }
 
-    /// Jumps that were made more than once.
+    /// Jumps that were repeated.
     pub fn repeats(&self) -> Vec<RepeatedJump> {
         let points: Vec<IdentifiedPoint> = self.points_alone().cloned().collect();
         repeated_jumps(&self.recording.steps, &points)
@@ -112,14 +112,13 @@ impl Identified {
 }
 
 impl Session<'_> {
-    /// Identifies all steps of one recording, or of several of the same machine together. Machine, sensors and window come from
-    /// the campaign of the first, or else from the channel map; the zero is that of the first, subtracted from all.
+    /// Identifies all steps of one recording, or of several of the same machine together. Machine, sensors and window come from the campaign of
+    /// the first, or from the channel map. The zero of the first is subtracted from all.
     ///
     /// # Errors
-    /// [`SessionError::NoRecording`] where there is none, [`SessionError::MachineUnknown`] where neither campaign nor channel map
-    /// says what machine it is, [`SessionError::OtherMachine`] where a recording is not of the campaign's machine,
-    /// [`SessionError::NotTogether`] where the recordings' own campaigns differ, [`SessionError::Identify`] where the recording
-    /// lacks what the method needs.
+    /// [`SessionError::NoRecording`] for an empty list, [`SessionError::MachineUnknown`] if neither campaign nor channel map defines the
+    /// machine, [`SessionError::OtherMachine`] if a recording is of another machine, [`SessionError::NotTogether`] if the recordings' own
+    /// campaigns differ, [`SessionError::Identify`] if data that the method needs are missing.
     pub fn identify(
         &self,
         recorded: Vec<Recorded>,
@@ -130,7 +129,7 @@ impl Session<'_> {
         beside_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
     }
 
-    /// As [`identify`](Session::identify), with the truths that are being read.
+    /// Same as [`identify`](Session::identify), and compares with the truths in the recordings.
     pub(crate) fn identify_and_score(
         &self,
         recorded: Vec<Recorded>,
@@ -203,7 +202,7 @@ impl Session<'_> {
     }
 }
 
-/// That a recording rests before its first step, as a zero needs it, and nobody asked for one.
+/// Remark that a recording has a soak long enough for a zero, but no zero was requested.
 fn rest_unused(recording: &Recording, config: &IdentifyConfig) -> Option<String> {
     let settings = ZeroSettings { shortest_s: UNUSED_REST_S, ..ZeroSettings::default() };
     let rest = isothermal_zero(recording, config, &settings).ok().filter(|rest| !rest.offsets.is_empty())?;
@@ -216,13 +215,13 @@ fn rest_unused(recording: &Recording, config: &IdentifyConfig) -> Option<String>
     ))
 }
 
-/// What is kept of each recording beside what is identified.
+/// Metadata kept for each recording.
 struct Source {
     steps: Vec<StepMarker>,
     approaches: Option<Recording>,
 }
 
-/// The campaign that all recordings belong to; `None` where none names one.
+/// The campaign that all recordings belong to; `None` if none names one.
 fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionError> {
     let first = recorded.first().ok_or(SessionError::NoRecording)?;
     let Some(campaign) = &first.campaign else { return Ok(None) };
@@ -244,7 +243,7 @@ fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionErro
     Ok(Some(campaign))
 }
 
-/// The points beside their truth, each from the recording that it comes from.
+/// The points with their truth, each from its own recording.
 fn scored(
     sources: &[Source],
     truths: &[Truth],
@@ -274,7 +273,7 @@ fn scored(
     scored.into_iter().map(|(_, found)| found).collect()
 }
 
-/// The marks of all approaches beside their truth; `None` where surge was not sought.
+/// The marks of all approaches with their truth; `None` if there was no surge search.
 fn sought(
     sources: &[Source],
     truths: &[Truth],

@@ -1,4 +1,4 @@
-//! A look into the log of another program.
+//! Inspects the log of another program.
 
 use crate::{Registry, SessionError};
 use mapper_logs::proposal::{Proposal, channel_map_text, propose};
@@ -6,27 +6,27 @@ use mapper_logs::{Layout, LogFile, LogOptions, Survey, survey};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// What a log holds, and the channel map that it suggests.
+/// Contents of a log, and the channel map proposed for it.
 #[derive(Debug)]
 pub struct Inspected {
     /// The file.
     pub path: PathBuf,
     /// Name of its format.
     pub format: &'static str,
-    /// Groups, columns, and what was found by looking.
+    /// Groups, columns and detected layout.
     pub layout: Layout,
     /// Rates, ranges, gaps.
     pub survey: Survey,
-    /// The suggestion.
+    /// The proposed channel map.
     pub proposal: Proposal,
-    /// Keys and values with which it was read.
+    /// Options that were used to read it.
     pub options: Vec<(String, String)>,
 }
 
-/// Reads a log once and suggests a channel map; `options` are keys and values of how it is to be read.
+/// Reads a log once and proposes a channel map; `options` are keys and values of the log reader.
 ///
 /// # Errors
-/// [`SessionError::LogOption`] for a wrong key or value, [`SessionError::Log`] where the file cannot be read as a log.
+/// [`SessionError::LogOption`] for a wrong key or value, [`SessionError::Log`] if the file cannot be read as a log.
 pub fn inspect_log(
     registry: &Registry,
     path: &Path,
@@ -44,7 +44,7 @@ pub fn inspect_log(
 }
 
 impl Inspected {
-    /// For a program; absent numbers are null.
+    /// Machine-readable output; missing numbers are null.
     pub fn json(&self) -> Value {
         let columns = self.layout.columns.iter().zip(&self.survey.columns).map(|(column, data)| {
             json!({
@@ -76,7 +76,7 @@ impl Inspected {
         })
     }
 
-    /// The suggestion as the text of a channel map.
+    /// The proposal as text of a channel map.
     pub fn channel_map(&self) -> String {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
         channel_map_text(&name, &self.layout, &self.proposal, &self.options)

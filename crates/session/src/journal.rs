@@ -1,5 +1,5 @@
-//! The journal of a run: what it is of, and which steps are safely in the recording. One line of JSON each, so that the last may
-//! be torn and all before it hold.
+//! The journal of a run: its identity and the steps safely recorded. Each entry is one line of JSON, so that a torn last line leaves all earlier
+//! lines valid.
 
 use crate::SessionError;
 use mapper_campaign::Campaign;
@@ -10,10 +10,10 @@ use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// Largest journal that is read, bytes: some hundred thousand steps.
+/// Maximum size of a journal, bytes: some hundred thousand steps.
 const READ_MAX: u64 = 16 << 20;
 
-/// What has to be the same for a run to go on.
+/// Properties that must be unchanged to resume a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Name of the machine.
@@ -26,32 +26,32 @@ pub struct Identity {
     pub model_sha256: String,
     /// Hash of the plan.
     pub plan_sha256: String,
-    /// The backend, and the rig behind it.
+    /// The backend and its rig.
     pub backend: String,
     /// Hash of the backend's settings.
     pub settings_sha256: String,
-    /// Hash of what the rig says of itself; journals of older runs lack it.
+    /// Hash of the rig description; missing in journals of older runs.
     #[serde(default)]
     pub rig_sha256: Option<String>,
 }
 
-/// The hash of what a rig says of itself: channels, rate, what it accepts, its safe trajectory.
+/// Hash of the rig description: channels, rate, accepted ranges, safe trajectory.
 ///
 /// # Errors
-/// [`SessionError::Json`] where it cannot be written as JSON.
+/// [`SessionError::Json`] if it cannot be written as JSON.
 pub fn rig_sha256(rig: &RigDescription) -> Result<String, SessionError> {
     Ok(mapper_planner::sha256_hex(&serde_json::to_string(rig)?))
 }
 
 impl Identity {
-    /// Of a run.
+    /// Identity of a run.
     ///
     /// # Errors
-    /// [`SessionError::Json`] where the plan cannot be written as JSON.
+    /// [`SessionError::Json`] if the plan cannot be written as JSON.
     pub fn of(campaign: &Campaign, plan: &Plan, rig: &RigDescription) -> Result<Self, SessionError> {
         let hash = |text: &str| mapper_planner::sha256_hex(text);
         let behind = rig.exclusive.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
-        // The rig has a hash of its own, so that what differs is said by its name.
+        // The rig has a separate hash, so that a difference in the rig is reported as such.
         let mut without_rig = plan.clone();
         without_rig.made_from.rig_sha256 = None;
         Ok(Identity {
@@ -69,7 +69,7 @@ impl Identity {
         })
     }
 
-    /// What differs, in words.
+    /// Names of the properties that differ.
     pub fn differences(&self, now: &Identity) -> Vec<&'static str> {
         let other = |then: &Option<String>, now: &Option<String>| {
             then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
@@ -88,22 +88,22 @@ impl Identity {
     }
 }
 
-/// One line.
+/// One journal entry.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Entry {
-    /// A part of the run begins, with its recording.
+    /// A part of the run begins, with a new recording.
     Part {
-        /// What it is of.
+        /// Identity of the run.
         identity: Identity,
-        /// Name of its recording, in the directory of the run.
+        /// File name of its recording in the run directory.
         recording: String,
     },
-    /// The soak is over, and in the recording.
+    /// The soak is complete and recorded.
     Soaked,
-    /// A step is over, and in the recording: its place in the plan, written as its number.
+    /// A step is complete and recorded. Holds its index in the plan, stored as the step number.
     StepSaved(#[serde(with = "mapper_core::step_number")] usize),
-    /// The run is over, in words.
+    /// The run has ended; holds the reason.
     Ended(String),
 }
 
@@ -111,20 +111,20 @@ pub enum Entry {
 #[derive(Debug)]
 pub struct Journal {
     file: File,
-    /// Whether each line goes through to the disk: for rigs that outlive a computer.
+    /// Whether each line is flushed to disk. Needed for rigs that keep running if the computer fails.
     synced: bool,
 }
 
 impl Journal {
-    /// Opens the journal of a run, at its end.
+    /// Opens the journal of a run to append.
     ///
     /// # Errors
-    /// As the system says.
+    /// The system's error.
     pub fn open(path: &Path, synced: bool) -> std::io::Result<Self> {
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
         let mut text = Vec::new();
         (&mut file).take(READ_MAX).read_to_end(&mut text)?;
-        // A line that a kill has torn ends here.
+        // Terminates a line that was torn by a crash.
         if text.last().is_some_and(|last| *last != b'\n') {
             file.write_all(b"\n")?;
         }
@@ -134,7 +134,7 @@ impl Journal {
     /// Writes one line.
     ///
     /// # Errors
-    /// As the system says.
+    /// The system's error.
     pub fn write(&mut self, entry: &Entry) -> std::io::Result<()> {
         let mut line = serde_json::to_vec(entry)?;
         line.push(b'\n');
@@ -143,28 +143,28 @@ impl Journal {
     }
 }
 
-/// A part of a run, as its journal has it.
+/// One part of a run, as read from its journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JournalPart {
-    /// What it is of.
+    /// Identity of the run.
     pub identity: Identity,
-    /// Name of its recording.
+    /// File name of its recording.
     pub recording: String,
-    /// Whether its soak is in the recording.
+    /// Whether its soak is recorded.
     pub soaked: bool,
-    /// Steps that are in the recording.
+    /// Recorded steps.
     pub saved: BTreeSet<usize>,
-    /// Whether it came to the end of the run's steps.
+    /// Whether it reached the end of the run's steps.
     pub completed: bool,
 }
 
-/// How a run ends that has made every step, in the journal's words.
+/// The journal's end text for a run that made every step.
 pub(crate) const COMPLETED: &str = "Completed.";
 
-/// The parts of a run. Lines that cannot be read are passed over: a step that is not known to be saved is run again.
+/// Reads the parts of a run. Unreadable lines are skipped: a step not known to be saved is run again.
 ///
 /// # Errors
-/// As the system says.
+/// The system's error.
 pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(READ_MAX).read_to_end(&mut bytes)?;
@@ -212,7 +212,7 @@ mod tests {
         }
     }
 
-    /// Cut at every byte: what is read is what was written whole, and the journal can be written on.
+    /// Cuts the journal at every byte: all complete lines are read, and the journal can be continued.
     #[test]
     fn a_journal_cut_anywhere_holds_what_was_written_before() {
         let directory = tempfile::tempdir().unwrap();
@@ -235,7 +235,7 @@ mod tests {
         for cut in 0..=whole.len() {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let parts = read_journal(&path).unwrap();
-            // A line counts without its end too: it is whole.
+            // A complete line counts even without its line break.
             let written = ends.iter().filter(|end| **end > 0 && **end <= cut + 1).count();
             let saved: usize = parts.iter().map(|part| part.saved.len() + usize::from(part.soaked) + 1).sum();
             assert_eq!(saved, written, "cut at {cut}");

@@ -1,7 +1,7 @@
-//! The application as a library: everything between arguments and words.
+//! The application as a library, without argument parsing and text output.
 //!
-//! A [`Session`] is opened with the plug-ins it may use, somebody who looks on, and a flag that stops it. The command line,
-//! nightly runs, blind cases and any other program drive the same session. A whole campaign, from its file to its map:
+//! A [`Session`] gets its plug-ins, an observer and a stop flag from its creator. The command line, nightly runs, blind cases and any other
+//! program use the same session. A complete campaign, from its file to its map:
 //!
 //! ```
 //! use mapper_backends::virtual_lab;

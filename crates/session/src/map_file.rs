@@ -1,4 +1,4 @@
-//! Map files: reading and writing by format.
+//! Reads and writes map files by format.
 
 use crate::files::{Existing, write_file};
 use crate::{Registry, SessionError};
@@ -9,7 +9,7 @@ use std::io::Read;
 use std::path::Path;
 
 impl Registry {
-    /// Reads a map; the extension says the format, `given` the reference state where the file does not.
+    /// Reads a map. The extension selects the format; `given` is the reference state if the file has none.
     ///
     /// # Errors
     /// [`SessionError::UnknownExtension`], [`SessionError::File`], or [`SessionError::Import`] with the file's mistakes.
@@ -25,7 +25,7 @@ impl Registry {
             known: self.formats.read_extensions().collect(),
         })?;
         let mut bytes = Vec::new();
-        // One byte more than allowed tells a file that is too large from one that just fits.
+        // One byte above the limit shows that the file is too large.
         let limit = MAP_FILE_SIZE_LIMIT as u64 + 1;
         std::fs::File::open(path)
             .and_then(|file| file.take(limit).read_to_end(&mut bytes))
@@ -33,10 +33,10 @@ impl Registry {
         format.read(&bytes, given).map_err(|source| SessionError::Import { path: path.to_owned(), source })
     }
 
-    /// The format of a name, in which maps can be written.
+    /// Finds the writable map format of this name.
     ///
     /// # Errors
-    /// [`SessionError::UnknownFormat`] where there is none.
+    /// [`SessionError::UnknownFormat`] if there is none.
     pub fn written_format(&self, name: &str) -> Result<&'static MapFormat, SessionError> {
         self.formats.written().find(|format| format.name == name).ok_or_else(|| SessionError::UnknownFormat {
             name: name.to_owned(),
@@ -44,18 +44,18 @@ impl Registry {
         })
     }
 
-    /// Whether every format that the campaign names can be written: before a run, not after it.
+    /// Checks before a run that every format in the campaign can be written.
     ///
     /// # Errors
-    /// [`SessionError::UnknownFormat`] with the first that cannot.
+    /// [`SessionError::UnknownFormat`] with the first format that cannot be written.
     pub fn check_formats(&self, campaign: &Campaign) -> Result<(), SessionError> {
         campaign.outputs.formats.iter().try_for_each(|format| self.written_format(format.name()).map(drop))
     }
 
-    /// The format of a new map file: by name, or else by the file's extension.
+    /// The format of a new map file, by name or by the file's extension.
     ///
     /// # Errors
-    /// [`SessionError::FormatUnsaid`] where neither says a format.
+    /// [`SessionError::FormatUnsaid`] if neither gives a format.
     pub fn format_of(&self, path: &Path, name: Option<&str>) -> Result<&'static MapFormat, SessionError> {
         let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         let found = match name {
@@ -73,10 +73,10 @@ impl Registry {
     }
 }
 
-/// Writes a map into a file.
+/// Writes a map to a file.
 ///
 /// # Errors
-/// [`SessionError::Export`] where the format cannot hold the map, and as [`write_file`].
+/// [`SessionError::Export`] if the format cannot represent the map; otherwise as [`write_file`].
 pub fn write_map(
     path: &Path,
     format: &MapFormat,
@@ -86,11 +86,10 @@ pub fn write_map(
     write_file(path, &format.write(map)?, existing)
 }
 
-/// Writes a map into a file; a format that is a table over the whole map gets a fitted one. Returns the map written, and
-/// whether it was fitted for this.
+/// Writes a map to a file. A format that tabulates the whole map gets a fitted one. Returns the written map and whether it was fitted here.
 ///
 /// # Errors
-/// As [`write_map`], and [`SessionError::Fit`] where the map cannot be fitted.
+/// As [`write_map`], and [`SessionError::Fit`] if the map cannot be fitted.
 pub fn write_map_fitted_if_needed(
     path: &Path,
     format: &MapFormat,

@@ -1,4 +1,4 @@
-//! What a night said, as a file beside the history, so that its picture can lead there.
+//! The report of a night, stored next to the history so that its picture can link to it.
 
 use crate::{Existing, SessionError, write_file};
 use mapper_history::{Comparison, ListedRun, Metric, Night, StoredNight};
@@ -6,15 +6,15 @@ use mapper_report::{night_text, runs_text};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// The report of the night that began then (ms since 1970-01-01 00:00 UTC), e.g. `runs/history.nights/1763942400000.txt`.
+/// Report path of the night that began at this time (ms since 1970-01-01 00:00 UTC), e.g. `runs/history.nights/1763942400000.txt`.
 pub fn night_report_path(history: &Path, started_ms: i64) -> PathBuf {
     history.with_extension("nights").join(format!("{started_ms}.txt"))
 }
 
-/// Writes what the night said, and a row for each of its runs.
+/// Writes the report of the night, with a row for each run.
 ///
 /// # Errors
-/// [`SessionError::File`] where there is no room for it.
+/// [`SessionError::File`] if it cannot be written.
 pub fn keep_night_report(history: &Path, night: &Night, comparison: &Comparison) -> Result<(), SessionError> {
     let path = night_report_path(history, night.started_ms);
     let folder = path.parent().unwrap_or(history);
@@ -40,18 +40,18 @@ pub fn keep_night_report(history: &Path, night: &Night, comparison: &Comparison)
     write_file(&path, text.as_bytes(), Existing::Replaced)
 }
 
-/// How a picture leads to the report of a night: from beside it, or from the root of the disk. `None` where there is no report.
+/// Link from a picture to the report of a night, relative if possible and absolute otherwise. `None` if there is no report.
 pub fn night_report_link(picture: &Path, history: &Path, started_ms: i64) -> Option<String> {
     let report = std::fs::canonicalize(night_report_path(history, started_ms)).ok()?;
     let folder = picture.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = std::fs::canonicalize(folder).ok()?;
     match report.strip_prefix(folder) {
-        Ok(beside) => Some(escaped(beside)),
+        Ok(relative) => Some(escaped(relative)),
         Err(_) => Some(format!("file://{}", escaped(&report))),
     }
 }
 
-/// A path as addresses have it.
+/// A path with URL escapes.
 fn escaped(path: &Path) -> String {
     let mut text = String::new();
     for byte in path.to_string_lossy().bytes() {

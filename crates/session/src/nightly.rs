@@ -1,4 +1,4 @@
-//! A night: full maps on the simulated rig, compared with the nights before.
+//! A nightly campaign: full maps on the simulated rig, compared with earlier nights.
 
 use crate::nightly_run::NightlyRun;
 use crate::planning::nominal_model;
@@ -17,7 +17,7 @@ pub struct PreparedNight {
 }
 
 impl PreparedNight {
-    /// Reads every campaign of the night. Mistakes are found before anything runs.
+    /// Reads every campaign of the night, so that mistakes are found before any run.
     ///
     /// # Errors
     /// [`SessionError`] of the first campaign that cannot be part of a night.
@@ -62,10 +62,10 @@ impl PreparedNight {
         &self.runs
     }
 
-    /// Rows that were made elsewhere, where they are those of this night's runs.
+    /// Checks that rows made elsewhere match the runs of this night.
     ///
     /// # Errors
-    /// [`SessionError::OtherNight`] where a run is missing, or belongs to another night.
+    /// [`SessionError::OtherNight`] if a run is missing or belongs to another night.
     pub fn checked(&self, rows: Vec<RunRow>) -> Result<Vec<RunRow>, SessionError> {
         let here = self.runs.iter().map(|run| &run.key);
         if here.eq(rows.iter().map(|row| &row.key)) {
@@ -88,22 +88,21 @@ impl PreparedNight {
     }
 }
 
-/// A method as campaigns write it.
+/// Parses a method name as written in campaigns.
 fn method(name: &str) -> Result<Method, SessionError> {
     serde_json::from_value(name.into())
         .map_err(|source| SessionError::Method { name: name.to_owned(), source })
 }
 
 impl Session<'_> {
-    /// Runs everything on `jobs` threads, all cores where it is not given. Rows come in the order of the nightly campaign,
-    /// whatever the number of threads.
+    /// Runs all campaigns on `jobs` threads (default: all cores). Rows come in the order of the nightly campaign for any number of threads.
     ///
     /// # Errors
-    /// [`SessionError::Interrupted`] where the operator stopped it, [`SessionError::File`] where there is no room for the
-    /// recordings. A run that fails is a row that says why.
+    /// [`SessionError::Interrupted`] if the operator stopped it, [`SessionError::File`] if the recordings cannot be stored. A failed run becomes
+    /// a row with its reason.
     pub fn night(&self, night: &PreparedNight, jobs: Option<usize>) -> Result<Vec<RunRow>, SessionError> {
         let runs = &night.runs;
-        // A machine that the backend does not know is told before anything runs.
+        // Machines that the backend does not know are reported before any run.
         for run in runs.iter().filter(|run| run.machine.is_some()) {
             self.registry.make_sources(&run.campaign, &run.model)?;
         }
@@ -112,15 +111,15 @@ impl Session<'_> {
             .prefix("mapper-nightly-")
             .tempdir()
             .map_err(SessionError::file("create a directory in", &room))?;
-        let told = |done, of| self.tell(SessionEvent::PiecesDone { done, of });
-        let engine = Engine { jobs, stop: self.stop, told: &told };
+        let on_progress = |done, of| self.tell(SessionEvent::PiecesDone { done, of });
+        let engine = Engine { jobs, stop: self.stop, told: &on_progress };
         let one =
             |index: usize, run: &NightlyRun| self.nightly_run(run, &scratch.path().join(index.to_string()));
-        // What was not begun was stopped.
+        // A missing row means that the operator stopped the night before this run.
         engine.each(runs, one)?.into_iter().collect::<Option<_>>().ok_or(SessionError::Interrupted)
     }
 
-    /// One run in a new directory of its own, which is gone afterwards: a night of recordings need not fit on the disk.
+    /// Makes one run in a new directory and deletes it afterwards, because a night of recordings may not fit on the disk.
     ///
     /// # Errors
     /// As [`Session::night`].

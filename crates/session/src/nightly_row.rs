@@ -1,11 +1,11 @@
-//! What the history keeps of a nightly run.
+//! History entry of a nightly run.
 
 use mapper_core::{Plan, Verdict};
 use mapper_history::{Metric, PointRow};
 use mapper_record::score::ScoredPoint;
 use std::collections::BTreeMap;
 
-/// The figures that are watched; those without a value are left out.
+/// The monitored metrics; those without a value are omitted.
 pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
     let mean = |values: Vec<f64>| {
         let count = values.len() as f64;
@@ -13,7 +13,7 @@ pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f
     };
     let score = mapper_record::score::summarise(points);
     let good = points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count();
-    // True means over the points that have a result as well: the same points in both.
+    // Means of the truth use the same points as means of the results.
     let both = |scored: &&ScoredPoint| scored.point.eta.is_some() && scored.truth.is_some();
     let with_eta: Vec<&ScoredPoint> = points.iter().filter(both).collect();
     Metric::ALL
@@ -41,7 +41,7 @@ pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f
         .collect()
 }
 
-/// One row a point; a point that is visited again is told apart by its visit.
+/// One row for each point; repeat visits are distinguished by their visit number.
 pub(crate) fn point_rows(points: &[ScoredPoint]) -> Vec<PointRow> {
     let mut visits: BTreeMap<(u64, u64), usize> = BTreeMap::new();
     points

@@ -1,4 +1,4 @@
-//! One run of the night: as any other run, its files in a directory of its own.
+//! One run of a nightly campaign, with its files in a separate directory.
 
 use crate::drive::drive;
 use crate::files::json_text;
@@ -24,17 +24,17 @@ pub struct NightlyRun {
     pub campaign: Campaign,
     /// Its nominal model.
     pub model: Model,
-    /// The machine, where it is one of many.
+    /// The machine, if it is one of several.
     pub machine: Option<Variant>,
-    /// What the run is, from night to night.
+    /// Key of the run, the same every night.
     pub key: RunKey,
 }
 
 impl NightlyRun {
-    /// A campaign by a method with a seed, on one of many machines where one is given.
+    /// A campaign with a method, a seed and, optionally, one of several machines.
     ///
     /// # Errors
-    /// [`VariantError`] where the machine cannot be put into the campaign.
+    /// [`VariantError`] if the machine cannot be put into the campaign.
     pub fn new(
         mut campaign: Campaign,
         model: Model,
@@ -58,10 +58,10 @@ impl NightlyRun {
         Ok(NightlyRun { campaign, model, machine, key })
     }
 
-    /// Plans, runs, records, identifies and scores. What fails stands in the row.
+    /// Plans, runs, records, identifies and scores. A failure becomes part of the row.
     ///
     /// # Errors
-    /// [`SessionError::Interrupted`] where the operator stopped it.
+    /// [`SessionError::Interrupted`] if the operator stopped it.
     pub(crate) fn run(&self, session: &Session<'_>, directory: &Path) -> Result<RunRow, SessionError> {
         let mut row = RunRow {
             key: self.key.clone(),
@@ -94,11 +94,11 @@ impl NightlyRun {
         Ok(())
     }
 
-    /// One recording identified by each of the methods: the points beside their truth as `points.json` of a run has them.
-    /// `Err` within: a guard stopped the run, and why.
+    /// Identifies one recording by each of the methods and returns the points with their truth, as in a run's `points.json`. The inner `Err` is
+    /// the reason if a guard stopped the run.
     ///
     /// # Errors
-    /// [`SessionError`] where the campaign cannot be planning, run or identified.
+    /// [`SessionError`] if the campaign cannot be planned, run or identified.
     pub fn points(
         &self,
         session: &Session<'_>,
@@ -118,7 +118,7 @@ impl NightlyRun {
         methods.iter().map(one).collect::<Result<_, _>>().map(Ok)
     }
 
-    /// Runs the campaign and reads the recording; `Err` within: a guard stopped it, and why.
+    /// Runs the campaign and reads the recording. The inner `Err` is the reason if a guard stopped the run.
     fn recorded(
         &self,
         plan: &Plan,
@@ -146,7 +146,7 @@ impl NightlyRun {
             ..RecordingHeader::default()
         };
         let mut recorder = Recorder::new(RecordingWriter::create(recording, &header)?);
-        // A night runs many at once: nobody could follow their steps.
+        // A night runs many campaigns in parallel; no step events are sent.
         let mut steps = PlanSteps::new(plan);
         let end =
             drive(&self.campaign, &self.model, &mut steps, backend.as_mut(), &mut recorder, session.stop)

@@ -1,4 +1,4 @@
-//! Who looks on while a campaign runs: the recorder, and whoever opened the session.
+//! Observers of a running campaign: the recorder, and the forwarder to the session's own observer.
 
 use crate::SessionEvent;
 use crate::event::OnEvent;
@@ -8,13 +8,13 @@ use mapper_record::{RecordError, RecordingWriter, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
 use std::fs::File;
 
-/// Writes everything into the run's recording, and into its journal what is safely there.
+/// Writes everything to the recording, and the safely recorded steps to the journal.
 pub(crate) struct Recorder {
     writer: RecordingWriter,
     journal: Option<Journal>,
-    /// Written, and not known to be flushed: with the time up to which samples were flushed then, s.
+    /// Entries whose data may not be flushed yet, with the flushed sample time at that moment, s.
     pending: Vec<(Entry, Option<f64>)>,
-    /// The recording once more, to send it through to the disk: where a rig outlives a computer.
+    /// A second handle to the recording, to flush it to disk. Used if the rig keeps running when the computer fails.
     through: Option<File>,
 }
 
@@ -23,7 +23,7 @@ impl Recorder {
         Recorder { writer, journal: None, pending: Vec::new(), through: None }
     }
 
-    /// Keeps a journal, and sends all through to the disk where `through` is given.
+    /// Keeps a journal, and flushes everything to disk if `through` is given.
     pub(crate) fn with_journal(self, journal: Journal, through: Option<File>) -> Self {
         Recorder { journal: Some(journal), through, ..self }
     }
@@ -34,7 +34,7 @@ impl Recorder {
         }
     }
 
-    /// Writes what has been flushed since it was written into the journal.
+    /// Writes pending entries to the journal once their data are flushed.
     fn journal_what_is_saved(&mut self) -> Result<(), ObserverError> {
         let saved_s = self.writer.saved_until_s();
         if let Some(file) = &self.through {
@@ -53,14 +53,14 @@ impl Recorder {
         let Some(mut journal) = journal else { return };
         let entries = pending.into_iter().map(|(entry, _)| entry).chain([Entry::Ended(end.to_owned())]);
         for entry in entries {
-            // The recording is whole; a journal that lacks its end costs a step at most.
+            // The recording is complete; a missing end entry costs at most one step.
             if journal.write(&entry).is_err() {
                 break;
             }
         }
     }
 
-    /// Ends the file. `end`: how the run ended, for the journal.
+    /// Closes the file. `end`: how the run ended, for the journal.
     pub(crate) fn finish(self, end: &str) -> Result<(), RecordError> {
         self.writer.finish()?;
         Recorder::journal_the_end(self.journal, self.pending, end);
@@ -74,7 +74,7 @@ impl RunObserver for Recorder {
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        // The batch's own events are written with it.
+        // This also writes the batch's own events.
         self.writer.write_batch(batch).map_err(ObserverError::of)?;
         self.journal_what_is_saved()
     }
@@ -101,12 +101,12 @@ impl RunObserver for Recorder {
     }
 }
 
-/// Passes on what the runner sees as events of the session.
+/// Forwards the runner's events as session events.
 pub(crate) struct Teller<'a> {
     pub on_event: OnEvent<'a>,
-    /// Steps planned.
+    /// Planned steps.
     pub steps: usize,
-    /// Rig time planned, soak included, s.
+    /// Planned rig time including soak, s.
     pub duration_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The plan of a campaign, and what it is made from.
+//! The plan of a campaign and its inputs.
 
 use crate::SessionError;
 use crate::declared::identification;
@@ -14,20 +14,20 @@ use mapper_planner::{PlanRequest, PredictedMethod, made_from, make_plan, sha256_
 /// The nominal model of a campaign.
 ///
 /// # Errors
-/// [`SessionError::Model`] where the map cannot be read; a checked campaign has none of that.
+/// [`SessionError::Model`] if the map cannot be read, which a checked campaign excludes.
 pub fn nominal_model(campaign: &Campaign) -> Result<Model, SessionError> {
     Ok(mapper_campaign::nominal_model(campaign)?)
 }
 
-/// The plan of a campaign with a grid, with what seeking surge behind it takes.
+/// The plan of a campaign with a grid, including the time of a subsequent surge search.
 ///
 /// # Errors
-/// [`SessionError::Plan`] where points cannot be reached or no order is allowed.
+/// [`SessionError::Plan`] if points cannot be reached or no order is allowed.
 pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
     plan_of(campaign, &PlanInputs::of(campaign)?.request(campaign, model))
 }
 
-/// The same of a request that was made from the campaign.
+/// Same as [`plan`], for a request that was already made from the campaign.
 ///
 /// # Errors
 /// As [`plan`].
@@ -38,7 +38,7 @@ pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, S
     Ok(plan)
 }
 
-/// The points of a campaign in the order of its plan, which is not forecast any further.
+/// The points of a campaign in planned order, without any further forecast.
 ///
 /// # Errors
 /// As [`plan`].
@@ -48,10 +48,10 @@ pub(crate) fn best_order(campaign: &Campaign, model: &Model) -> Result<Vec<Opera
     Ok(make_plan(&request)?.steps.into_iter().map(|step| step.to).collect())
 }
 
-/// What the plan of a campaign is made from: a plan whose hashes differ is stale.
+/// Hashes of the plan's inputs: a plan with other hashes is stale.
 ///
 /// # Errors
-/// [`SessionError::Json`] where the campaign cannot be written as JSON.
+/// [`SessionError::Json`] if the campaign cannot be written as JSON.
 pub(crate) fn fingerprint(campaign: &Campaign, model: &Model) -> Result<MadeFrom, SessionError> {
     let Some(script) = &campaign.sequence else {
         return Ok(made_from(&PlanInputs::of(campaign)?.request(campaign, model)));
@@ -61,7 +61,7 @@ pub(crate) fn fingerprint(campaign: &Campaign, model: &Model) -> Result<MadeFrom
     Ok(MadeFrom { script_sha256, ..fingerprint(&without_script, model)? })
 }
 
-/// What a request for a plan borrows besides campaign and model.
+/// Data that a plan request borrows in addition to campaign and model.
 #[derive(Debug)]
 pub struct PlanInputs {
     canonical: String,
@@ -69,15 +69,15 @@ pub struct PlanInputs {
 }
 
 impl PlanInputs {
-    /// Those of a campaign.
+    /// Inputs of a campaign.
     ///
     /// # Errors
-    /// [`SessionError::Json`] where the campaign cannot be written as JSON.
+    /// [`SessionError::Json`] if the campaign cannot be written as JSON.
     pub fn of(campaign: &Campaign) -> Result<Self, SessionError> {
         Ok(PlanInputs { canonical: serde_json::to_string(campaign)?, method: predicted_method(campaign) })
     }
 
-    /// The request for the plan of `campaign`, from which these were made.
+    /// The plan request for `campaign`, from which these inputs were made.
     pub fn request<'a>(&'a self, campaign: &'a Campaign, model: &'a Model) -> PlanRequest<'a> {
         let transient = matches!(campaign.identification.method, Method::Joint | Method::Dynamic);
         PlanRequest {
@@ -103,7 +103,7 @@ impl PlanInputs {
     }
 }
 
-/// The campaign's method as the planner sees it, after the zero that the campaign asks for; `None` for points that are imported.
+/// Error forecast of the campaign's method after its zero; `None` for imported points.
 fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     let config = identification_after_zero(campaign);
     let scope = match campaign.identification.method {
@@ -115,7 +115,7 @@ fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
     Some(Box::new(Forecaster::of(config, scope)))
 }
 
-/// How the campaign's recording will be identified, as far as it is known before its zero.
+/// Expected identification settings after the zero, as far as known before the run.
 fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
     let config = identification(campaign);
     match campaign.zero {

@@ -1,4 +1,4 @@
-//! The identification methods as the planner sees them.
+//! The identification methods in the form that the planner needs.
 
 use mapper_identify::{
     Expected, ExpectedRow, ExpectedStep, IdentifyConfig, MAX_RESTING_ETA, PressureTap, expected,
@@ -6,12 +6,12 @@ use mapper_identify::{
 };
 use mapper_planner::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
 
-/// Which steps a method looks at together.
+/// Which steps a method identifies together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scope {
-    /// Each by itself (`dynamic`).
+    /// Each step separately (`dynamic`).
     EachStep,
-    /// All of them (`joint`).
+    /// All steps together (`joint`).
     AllSteps,
     /// Settled points only (`steady`).
     Settled,
@@ -27,7 +27,7 @@ pub(crate) struct Forecaster {
 impl Forecaster {
     /// The method under `config`.
     pub(crate) fn of(config: IdentifyConfig, scope: Scope) -> Self {
-        // A forecast's pressures are total ones.
+        // A forecast uses total pressures.
         let total = PressureTap::Total;
         Forecaster { config: IdentifyConfig { inlet_tap: total, outlet_tap: total, ..config }, scope }
     }

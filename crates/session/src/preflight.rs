@@ -1,15 +1,15 @@
-//! What is looked at before the rig is touched.
+//! Checks before the rig is armed.
 
 use crate::SessionError;
 use mapper_core::{Plan, RigDescription, RigMode, Setpoints, step_number};
 use std::path::Path;
 
-/// Bytes of a recording for one sample of one channel: measured on the virtual lab with its truth, and half as much again.
+/// Recording size for one sample of one channel, bytes: measured on the virtual lab with truth, plus 50 %.
 const BYTES_PER_VALUE: f64 = 40.0;
-/// What is left free besides, bytes.
+/// Additional free space required, bytes.
 const SPARE_BYTES: f64 = 50e6;
 
-/// Refuses a plan that the rig would refuse on the way.
+/// Rejects a plan with a setpoint that the rig would refuse during the run.
 ///
 /// # Errors
 /// [`SessionError::Preflight`] with the first step that it does not accept.
@@ -30,10 +30,10 @@ pub(crate) fn check_setpoints(plan: &Plan, rig: &RigDescription) -> Result<(), S
     Ok(())
 }
 
-/// Refuses a disk that has no room for the whole run. A rig whose time is simulated may be run again.
+/// Rejects a disk without room for the whole run. Rigs with simulated time are exempt, because their run can be repeated.
 ///
 /// # Errors
-/// [`SessionError::Preflight`] with what is there and what is needed.
+/// [`SessionError::Preflight`] with the available and the required space.
 pub(crate) fn check_room(
     directory: &Path,
     duration_s: f64,
@@ -54,7 +54,7 @@ pub(crate) fn check_room(
     }
 }
 
-/// Free bytes of a file system for this user; `None` where it does not say.
+/// Free bytes of a file system for this user; `None` if unknown.
 #[cfg(unix)]
 fn free_bytes(directory: &Path) -> Option<f64> {
     let found = rustix::fs::statvfs(directory).ok()?;

@@ -1,4 +1,4 @@
-//! What is known of a campaign before it is run: how long it takes, and what of it will come to nothing.
+//! Forecast of a campaign before its run: duration, and parts that will give no result.
 
 use crate::drive::soak_s;
 use crate::planning::{PlanInputs, plan_of};
@@ -12,42 +12,41 @@ use mapper_physics::standstill::{StandstillState, relax};
 use mapper_physics::thermocouple::time_constant_s;
 use mapper_planner::{PlanRequest, max_steps};
 
-/// How far from the cell's temperature a cold machine's housings are reckoned with, K, as the zero does when it finds the
-/// limit that Tc relaxes to.
+/// Assumed temperature difference between cold housings and test cell, K. The zero uses the same value to find the limit that Tc relaxes to.
 const WARM_K: f64 = 3.0;
-/// Longest soak that is tried, s.
+/// Longest soak tried, s.
 const LONGEST_SOAK_S: f64 = 86_400.0;
-/// Soaks that are tried lie this far apart, s.
+/// Spacing of the soaks tried, s.
 const SOAK_STEP_S: f64 = 300.0;
 
-/// Time constants of the T2 probe that a window has at least: what it has brought along is below 1 % then.
+/// Minimum window length in time constants of the T2 probe. The effect of the preceding step is then below 1 %.
 const PROBE_TIME_CONSTANTS: f64 = 5.0;
 
-/// Points up to which all steps of a campaign are simulated to find concerns; of more, every n-th point stands for the others, so that
-/// the largest grid takes seconds.
+/// Maximum number of points for which all steps are simulated to find concerns. Larger grids are sampled at every n-th point, so that the
+/// forecast takes seconds.
 const MAX_SIMULATED_POINTS: usize = 200;
 
-/// Effort of the search for the order whose steps are simulated: concerns hardly depend on the order.
+/// Effort of the search for the simulated order; concerns hardly depend on the order.
 const QUICK_EFFORT: f64 = 0.05;
 
-/// What a campaign will be.
+/// Forecast of a campaign.
 #[derive(Debug)]
 pub struct Prospects {
-    /// Number of steps; the largest that there can be if the grid is too large to plan it here.
+    /// Number of steps; the upper bound if the grid is too large to plan here.
     pub steps: usize,
-    /// Whether that is the exact number.
+    /// Whether the number is exact.
     pub is_planned: bool,
-    /// Rig time from the beginning of the soak to the end of the cool-down, s; the longest for the largest number of steps.
+    /// Rig time from the start of the soak to the end of the cool-down, s; the maximum if the number of steps is an upper bound.
     pub duration_s: f64,
-    /// What is to be feared of it.
+    /// Expected problems.
     pub concerns: Vec<Concern>,
 }
 
 impl Session<'_> {
-    /// Simulates the steps of the campaign, or rehearses its script, and looks for what will come to nothing.
+    /// Simulates the steps of the campaign, or rehearses its script, and looks for parts that will give no result.
     ///
     /// # Errors
-    /// [`SessionError`] where there is no plan, or the script fails.
+    /// [`SessionError`] if there is no plan, or the script fails.
     pub fn prospects(&self, campaign: &Campaign, model: &Model) -> Result<Prospects, SessionError> {
         let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
         let plan = match &campaign.sequence {
@@ -59,7 +58,7 @@ impl Session<'_> {
             settling(campaign, &plan),
             probe(campaign, &plan),
             required_error(campaign, &plan),
-            resting(campaign, &plan),
+            uninformative_steps(campaign, &plan),
         ];
         let is_planned = every == 1 || campaign.sequence.is_some();
         let (steps, duration_s) = if is_planned {
@@ -79,7 +78,7 @@ impl Session<'_> {
     }
 }
 
-/// The plan of every n-th point, without its bound.
+/// The plan of every n-th point, without its error bound.
 fn plan_of_sample(campaign: &Campaign, model: &Model, every: usize) -> Result<Plan, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
     let mut request = PlanRequest { bound: false, effort: QUICK_EFFORT, ..inputs.request(campaign, model) };
@@ -94,7 +93,7 @@ fn plan_of_sample(campaign: &Campaign, model: &Model, every: usize) -> Result<Pl
     plan_of(campaign, &PlanRequest { points: &points, ..request })
 }
 
-/// A soak after which the housings are still on their way to the cell's temperature, from as far away as the zero reckons with.
+/// A soak too short for the housings to reach the cell temperature, from the largest difference that the zero assumes.
 fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
     let soak = campaign.zero?;
     let settings = ZeroSettings::from(soak);
@@ -102,7 +101,7 @@ fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
     let warm_k = ambient_k + WARM_K;
     let start = StandstillState { tc_k: warm_k, tt_k: warm_k };
     let tc_k = |after_s: f64| relax(&model.params, start, soak.oil_temperature_k, ambient_k, after_s).tc_k;
-    // As the zero sees it: from the first to the last third of its stretch.
+    // As in the zero: from the first to the last third of its segment.
     let drift_k_min = |duration_s: f64| {
         let third_s = duration_s.min(settings.longest_s) / 3.0;
         let middle_k = |from_s: f64| tc_k(from_s + 0.5 * third_s);
@@ -134,11 +133,11 @@ fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
     ))
 }
 
-/// Steps that settle so late that `window: auto` has too little left.
+/// Steps that settle too late for `window: auto`.
 fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let transient = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
     let auto = campaign.identification.window == WindowRule::Auto;
-    // A script's steps are judged by what it sees itself.
+    // A script evaluates its own steps.
     if !(transient && auto && campaign.sequence.is_none()) {
         return None;
     }
@@ -170,8 +169,8 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     ))
 }
 
-/// Steps that tell too little of alpha_A, probe and heating/cooling ratio for any good point.
-fn resting(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+/// Steps with too little information on alpha_A, probe and heating/cooling ratio for any point with verdict good.
+fn uninformative_steps(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
     let settings = campaign.identification.joint;
     let unpredicted = joint && settings != JointSettings::all_off() && plan.figures.rms_error_eta.is_none();
@@ -185,7 +184,7 @@ fn resting(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     })
 }
 
-/// A required error that the longest dwell does not reach.
+/// A required error that is not reached even with the longest dwell.
 fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let Dwell::RequiredSigmaEta(required) = campaign.timing.dwell else { return None };
     let found = plan.figures.rms_error_eta?;
@@ -204,7 +203,7 @@ fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     })
 }
 
-/// A window of which the declared T2 probe spends a large part on what came before.
+/// A window dominated by the response of the declared T2 probe to the preceding step.
 fn probe(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let params = &campaign.machine.params;
     let (diameter_m, pipe_m) = (params.t2_probe_diameter_m, params.compressor.outlet_diameter_m);

@@ -1,4 +1,4 @@
-//! A recording read from a file, with the campaign that says what was recorded.
+//! A recording read from a file, with the campaign that describes the recorded machine.
 
 use crate::resume::BrokenOff;
 use crate::run_directory;
@@ -9,26 +9,25 @@ use mapper_observe::OtherMachine;
 use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use std::path::{Path, PathBuf};
 
-/// A recording, where it came from, and the campaign it belongs to.
+/// A recording, its file and its campaign.
 #[derive(Debug)]
 pub struct Recorded {
     /// The file.
     pub path: PathBuf,
-    /// What is in it.
+    /// The contents.
     pub read: ReadReport,
-    /// Given by the caller, or attached to the recording.
+    /// The campaign given by the caller, or the one attached to the recording.
     pub campaign: Option<Campaign>,
-    /// The approaches to surge, which are no part of what is identified; `None` where there are none.
+    /// The surge approaches, which are not identified; `None` if there are none.
     pub approaches: Option<Recording>,
 }
 
 impl Recorded {
-    /// Reads a run directory, an MCAP file or a log of any format of the registry. What says the machine is, in this order: the campaign given, the `machine` of the
-    /// channel map, the campaign attached to the recording.
+    /// Reads a run directory, an MCAP file or a log of any format of the registry. The machine comes from the first of these: the given
+    /// campaign, the `machine` of the channel map, the campaign attached to the recording.
     ///
     /// # Errors
-    /// [`SessionError::Record`] where the recording cannot be read, [`SessionError::Campaign`] where the attached campaign
-    /// has mistakes.
+    /// [`SessionError::Record`] if the recording cannot be read, [`SessionError::Campaign`] if the attached campaign has mistakes.
     pub fn read(
         registry: &Registry,
         path: &Path,
@@ -46,8 +45,8 @@ impl Recorded {
         Ok(Recorded::of(file, read, campaign))
     }
 
-    /// As [`read`](Recorded::read), but all recordings of a run directory: one that was broken off and went on has several, and of each the
-    /// steps that hold.
+    /// Same as [`read`](Recorded::read), for all recordings of a run directory. A resumed run has several; only the valid steps of each are
+    /// returned.
     ///
     /// # Errors
     /// As [`read`](Recorded::read).
@@ -69,7 +68,7 @@ impl Recorded {
         let mut all = Vec::new();
         for (place, part) in broken_off.parts.iter().enumerate() {
             let mut recorded = Recorded::read(registry, &path.join(&part.recording), map, given)?;
-            // The last part may have ended with the run or been broken off: what it has whole holds.
+            // The last part may have ended normally or been interrupted: all its complete steps are valid.
             if place < last {
                 recorded.read.recording.steps.retain(|step| part.saved.contains(&step.index));
             }
@@ -78,13 +77,13 @@ impl Recorded {
         Ok(all)
     }
 
-    /// What was read of a file, with the approaches to surge taken off.
+    /// The contents of a file, with the surge approaches separated.
     pub(crate) fn of(path: PathBuf, mut read: ReadReport, campaign: Option<Campaign>) -> Recorded {
         let approaches = read.recording.split_off_approaches();
         Recorded { path, read, campaign, approaches }
     }
 
-    /// The campaign, or that nobody says what machine was recorded.
+    /// Returns the campaign, or an error if the machine is unknown.
     ///
     /// # Errors
     /// [`SessionError::MachineUnknown`] with `remedy`.
@@ -93,16 +92,16 @@ impl Recorded {
     }
 }
 
-/// The journal of a run that went on after it was broken off; `None` for anything else.
+/// The journal of a run that was resumed; `None` for anything else.
 fn broken_off(path: &Path) -> Option<BrokenOff> {
     let broken_off = path.is_dir().then(|| BrokenOff::read(path).ok())??;
     (broken_off.parts.len() > 1).then_some(broken_off)
 }
 
-/// Refuses a recording that was given twice: its noise would count as new evidence.
+/// Rejects a recording that was given twice: its noise would count as new evidence.
 ///
 /// # Errors
-/// [`SessionError::SameRecording`] with both paths, whatever the files are called.
+/// [`SessionError::SameRecording`] with both paths, regardless of the file names.
 pub(crate) fn all_differ(recorded: &[Recorded]) -> Result<(), SessionError> {
     for (place, second) in recorded.iter().enumerate() {
         let series = &second.read.recording.series;
@@ -117,7 +116,7 @@ pub(crate) fn all_differ(recorded: &[Recorded]) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// The campaign attached to a recording; `None` where it carries none.
+/// The campaign attached to a recording; `None` if there is none.
 pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option<Campaign>, SessionError> {
     let Some(text) = &read.campaign_text else { return Ok(None) };
     let origin = file.with_file_name(run_directory::CAMPAIGN);
@@ -125,7 +124,7 @@ pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option
     Ok(Some(checked.map_err(|findings| CampaignError::Mistakes(Box::new(findings)))?))
 }
 
-/// A file named by the campaign of a recording. The sequence script, which nothing here needs, may be missing.
+/// Reads a file named by the campaign of a recording. A missing sequence script is no error, because it is not needed here.
 fn read_beside(path: &Path) -> std::io::Result<String> {
     let text = mapper_campaign::read_text(path);
     if path.extension().is_some_and(|extension| extension == "rhai") {
@@ -135,18 +134,18 @@ fn read_beside(path: &Path) -> std::io::Result<String> {
     }
 }
 
-/// A channel map from a file.
+/// Reads a channel map from a file.
 ///
 /// # Errors
-/// [`SessionError::ChannelMap`] where it cannot be read, and with its mistakes.
+/// [`SessionError::ChannelMap`] with the read error or the file's mistakes.
 pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
     Ok(ChannelMap::load(file)?)
 }
 
-/// Refuses a recording of another machine than the campaign's.
+/// Rejects a recording of another machine than the campaign's.
 ///
 /// # Errors
-/// [`OtherMachine`], by the one rule of [`mapper_observe::same_machine`].
+/// [`OtherMachine`], by the rule of [`mapper_observe::same_machine`].
 pub(crate) fn same_machine(recorded: &Recorded, campaign: &Campaign) -> Result<(), OtherMachine> {
     let machine = &campaign.machine;
     mapper_observe::same_machine(&recorded.read.metadata, &machine.name, machine.serial_number.as_deref())

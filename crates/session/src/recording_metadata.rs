@@ -1,11 +1,11 @@
-//! What a recording says of its run.
+//! Metadata of a recording.
 
 use crate::program::PROGRAM;
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, RigDescription};
 use std::collections::BTreeMap;
 
-/// What a recording says of its run.
+/// Metadata of a run for its recording.
 pub(crate) fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, String> {
     let reference = campaign.reference;
     let always = [
@@ -29,8 +29,7 @@ pub(crate) fn metadata(campaign: &Campaign, plan: &Plan) -> BTreeMap<String, Str
     always.into_iter().chain(sometimes).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
-/// Epoch time of run time 0, ns, of a run that was started at `started_ns`; 0 where the rig's time is simulated, so that equal
-/// runs have equal bytes.
+/// Epoch time of run time 0, ns, for a run started at `started_ns`; 0 for simulated time, so that equal runs give equal bytes.
 pub fn start_time_ns(rig: &RigDescription, started_ns: u64) -> u64 {
     if rig.simulated_time { 0 } else { started_ns }
 }

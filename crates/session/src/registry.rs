@@ -1,4 +1,4 @@
-//! The plug-ins that a session works with, handed in by whoever opens it.
+//! The plug-ins of a session, passed in by its creator.
 
 use crate::SessionError;
 use mapper_campaign::Campaign;
@@ -15,30 +15,30 @@ use std::sync::Arc;
 /// Reads a suspected effect from a file.
 pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
 
-/// Makes a backend that is no plug-in, a driver, from its name and its settings.
+/// Creates a driver, a backend that is not a plug-in, from its name and settings.
 pub type MakeDriver = fn(&str, &serde_json::Value) -> Result<Box<dyn Backend>, BackendError>;
 
-/// Every plug-in of a session, and what the program is that opens it.
+/// All plug-ins of a session, and the commit of the program that creates it.
 #[derive(Clone)]
 pub struct Registry {
     /// Rigs, real and simulated.
     pub backends: Vec<BackendPlugin>,
-    /// How a backend is made that is none of them; `None`: there are no others.
+    /// Factory for backends that are not plug-ins; `None` if there are no drivers.
     pub driver: Option<MakeDriver>,
-    /// The catalogue of effects.
+    /// The effect library.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// How a suspected effect is read from a file.
+    /// Reads a suspected effect from a file.
     pub read_effect: ReadEffect,
     /// Map formats, read and written.
     pub formats: MapFormats,
-    /// Formats of logs that other programs wrote.
+    /// Log formats of other programs.
     pub logs: LogFormats,
-    /// Commit that the program was built from; empty where nobody knows it.
+    /// Commit that the program was built from; empty if unknown.
     pub commit: &'static str,
 }
 
 impl Default for Registry {
-    /// No plug-ins at all.
+    /// A registry without plug-ins.
     fn default() -> Self {
         Registry {
             backends: Vec::new(),
@@ -57,22 +57,22 @@ fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
 }
 
 impl Registry {
-    /// The backend that a campaign asks for: a plug-in, or a driver of that name.
+    /// The backend that a campaign names: a plug-in, or a driver of that name.
     ///
     /// # Errors
-    /// [`SessionError::Backend`] where the name is unknown or the settings are wrong.
+    /// [`SessionError::Backend`] if the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
         self.made(&campaign.backend, campaign, model).map_err(SessionError::Backend)
     }
 
-    /// What the rig of a campaign accepts, where that is known without starting a driver.
+    /// Setpoint ranges of a campaign's rig, if they are known without starting a driver.
     pub(crate) fn accepts(&self, campaign: &Campaign, model: &Model) -> Option<SetpointRanges> {
         let BackendChoice { name, settings, .. } = &campaign.backend;
         let nominal = nominal_rig(campaign, model, &self.effects);
         BackendPlugin::make_by_name(&self.backends, name, &nominal, settings).ok()?.describe().accepts
     }
 
-    /// One backend by its name.
+    /// Creates one backend by name.
     pub(crate) fn made(
         &self,
         wanted: &BackendChoice,
@@ -88,10 +88,10 @@ impl Registry {
         BackendPlugin::make_by_name(&self.backends, &wanted.name, &nominal, &wanted.settings)
     }
 
-    /// The catalogue, and the effects that scripts define.
+    /// The effect library with effects defined by scripts.
     ///
     /// # Errors
-    /// A script that cannot be read, is not an effect, or takes the name of another.
+    /// A script that cannot be read, is not an effect, or reuses the name of another.
     pub fn effects_with(&self, scripts: &[PathBuf]) -> Result<Vec<Arc<dyn Effect>>, SessionError> {
         let mut effects = self.effects.clone();
         for path in scripts {
@@ -106,7 +106,7 @@ impl Registry {
     }
 }
 
-/// What a backend is told of machine and rig.
+/// Nominal machine and rig data for a backend.
 fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) -> NominalRig {
     let sensors = || campaign.sensors.iter();
     NominalRig {

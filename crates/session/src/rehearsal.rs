@@ -1,4 +1,4 @@
-//! A sequence script rehearsed on the nominal machine: what fails there never touches the rig.
+//! Rehearses a sequence script on the nominal machine, so that its errors never reach the rig.
 
 use crate::drive::drive;
 use crate::planning::{fingerprint, plan};
@@ -11,23 +11,23 @@ use mapper_core::{Plan, PlanStep, StepMarker, VisitOrder};
 use mapper_physics::model::Model;
 use mapper_runner::{RunEnd, RunError, RunObserver, StepSource, StepSourceError};
 
-/// What the plan of a script says of its objective.
+/// Objective recorded in the plan of a script.
 const OBJECTIVE: &str = "sequence";
 /// The backend of the rehearsal.
 const REHEARSED_ON: &str = "virtual_lab";
 
-/// What a script made of the nominal machine.
+/// Result of a rehearsal.
 pub struct Rehearsal {
-    /// The steps in the order they came, with the standard errors found.
+    /// The steps in executed order, with their standard errors.
     pub plan: Plan,
     /// The script's notes.
     pub notes: Vec<String>,
 }
 
-/// Runs the script on the virtual lab of the nominal machine, where nothing is recorded.
+/// Runs the script on the virtual lab of the nominal machine, without a recording.
 ///
 /// # Errors
-/// [`SessionError`] where the script has a mistake, makes no step, or a guard trips.
+/// [`SessionError`] if the script has a mistake, makes no step, or a guard trips.
 pub fn rehearse(
     session: &Session<'_>,
     campaign: &Campaign,
@@ -36,7 +36,7 @@ pub fn rehearse(
 ) -> Result<Rehearsal, SessionError> {
     let base = base_plan(campaign, model)?;
     let choice = BackendChoice { name: REHEARSED_ON.to_owned(), settings: serde_json::json!({}) };
-    // Only the script's own steps: a rehearsal has no sensors to be zeroed.
+    // Only the script's own steps: the sensors of a rehearsal need no zero.
     let nominal = Campaign { backend: choice, zero: None, ..campaign.clone() };
     let mut backend = session.registry.make_backend(&nominal, model)?;
     let mut steps = Rehearsing { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
@@ -64,7 +64,7 @@ struct Nobody;
 
 impl RunObserver for Nobody {}
 
-/// Steps on the nominal machine: what is identified there is the forecast.
+/// Steps on the nominal machine; their identified points are the forecast.
 struct Rehearsing {
     steps: ScriptedSteps,
     notes: Vec<String>,
@@ -100,9 +100,9 @@ impl StepSource for Rehearsing {
     }
 }
 
-/// A plan without the script's steps: hashes and times.
+/// A plan with hashes and times but without the script's steps.
 fn base_plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
-    // The planner plans one point alone: the script decides on the others.
+    // The planner plans one point only; the script selects the others.
     let points = campaign.points.iter().copied().take(1).collect();
     let one = Campaign {
         sequence: None,

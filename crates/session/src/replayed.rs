@@ -1,7 +1,6 @@
-//! A run that goes on although its steps depend on all that was measured: what was recorded is told to the source of the steps once
-//! more, which then stands where it stood.
+//! Resumes a run whose steps depend on measured data. The recorded data are replayed to the step source, which returns to its earlier state.
 //!
-//! The source sees one time that goes on over all parts. Equal calls, equal steps: each is held against the recorded one.
+//! The source sees one continuous time over all parts. Equal calls give equal steps, and each step is checked against the recorded one.
 
 use crate::SessionError;
 use crate::resume::{AGAIN_FROM, BrokenOff};
@@ -12,44 +11,44 @@ use mapper_core::{
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{RunEnd, RunError, StepSource, StepSourceError};
 
-/// What was read is told in pieces of so long, s, as it was polled.
+/// Length of a replayed batch, s, as in the original polls.
 const PIECE_S: f64 = 1.0;
-/// Between two parts of a run, in the time that the source sees, s.
+/// Gap between two parts of a run in the source's time, s.
 const BETWEEN_S: f64 = 1.0;
-/// Half of what a recording rounds times to, and what sums of sample times are off, s.
+/// Half the time resolution of a recording, plus the rounding error of summed sample times, s.
 const ROUNDED_S: f64 = 1e-6;
-/// Targets that differ by less are the same, ratio: what a recording keeps of them.
+/// Relative tolerance for equal targets: the resolution of a recording.
 const SAME_RATIO: f64 = 1e-9;
 
-/// The steps of a source that has been told what there is, from the first missing one on.
-struct GoesOn<'a> {
+/// A step source after replay, from the first missing step on.
+struct ResumedSteps<'a> {
     inner: &'a mut dyn StepSource,
-    /// The step that is made once more.
-    again: Option<PlanStep>,
-    making_again: bool,
-    /// What the source sees of run time is later by this, s.
+    /// The step that is repeated.
+    repeat: Option<PlanStep>,
+    repeating: bool,
+    /// Offset from run time to the source's time, s.
     later_s: f64,
     notes: Vec<String>,
 }
 
-/// Drives the steps; those of a broken-off run from where they stood.
+/// Runs the steps; those of an interrupted run continue from its last state.
 pub(crate) fn going_on(
     broken_off: Option<&BrokenOff>,
     steps: &mut dyn StepSource,
     drive: impl FnOnce(&mut dyn StepSource) -> Result<RunEnd, RunError>,
 ) -> Result<RunEnd, RunError> {
     let Some(broken_off) = broken_off else { return drive(steps) };
-    let mut goes_on = GoesOn::after(broken_off, steps).map_err(StepSourceError::of)?;
+    let mut goes_on = ResumedSteps::after(broken_off, steps).map_err(StepSourceError::of)?;
     drive(&mut goes_on)
 }
 
-impl<'a> GoesOn<'a> {
-    /// Tells `inner` what the parts of a broken-off run have measured.
+impl<'a> ResumedSteps<'a> {
+    /// Replays the measured data of an interrupted run to `inner`.
     ///
     /// # Errors
-    /// [`SessionError::NotResumable`] where the source now yields another step than was recorded; what reading says.
+    /// [`SessionError::NotResumable`] if the source now yields another step than the recorded one; otherwise read errors.
     fn after(broken_off: &BrokenOff, inner: &'a mut dyn StepSource) -> Result<Self, SessionError> {
-        let mut told = Told { inner, broken_off, later_s: 0.0, last: None, held: 0 };
+        let mut replay = Replay { inner, broken_off, later_s: 0.0, last: None, replayed_steps: 0 };
         for part in &broken_off.parts {
             let path = broken_off.directory.join(&part.recording);
             let holds = |index: usize| index < AGAIN_FROM && part.saved.contains(&index);
@@ -59,33 +58,33 @@ impl<'a> GoesOn<'a> {
             let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
             let steps: Vec<StepMarker> =
                 read.recording.steps.iter().filter(|step| holds(step.index)).copied().collect();
-            told.part(read.recording, &steps)?;
+            replay.part(read.recording, &steps)?;
         }
-        let Told { inner, later_s, last, held, .. } = told;
-        // What was said then stands in the recordings.
+        let Replay { inner, later_s, last, replayed_steps, .. } = replay;
+        // These notes are already in the recordings.
         inner.take_notes();
-        let again = last.map(|last: PlanStep| PlanStep {
+        let repeat = last.map(|last: PlanStep| PlanStep {
             index: AGAIN_FROM + broken_off.parts.len(),
             kind: StepKind::Repeat,
             from: None,
             ..last
         });
-        let said = format!(
+        let note = format!(
             "resumed: {} steps hold, and were told to the source of the steps again; {}nobody knows how far the housings have cooled, so they \
              are warmed up again{}",
-            held,
+            replayed_steps,
             if broken_off.soaked() { "the soak is not repeated; " } else { "" },
-            if again.is_some() { ", and the last step that holds is made once more" } else { "" },
+            if repeat.is_some() { ", and the last step that holds is made once more" } else { "" },
         );
-        Ok(GoesOn { inner, again, making_again: false, later_s, notes: vec![said] })
+        Ok(ResumedSteps { inner, repeat, repeating: false, later_s, notes: vec![note] })
     }
 
-    fn seen(&self, marker: &StepMarker) -> StepMarker {
+    fn shifted(&self, marker: &StepMarker) -> StepMarker {
         StepMarker { start_s: marker.start_s + self.later_s, end_s: marker.end_s + self.later_s, ..*marker }
     }
 }
 
-impl StepSource for GoesOn<'_> {
+impl StepSource for ResumedSteps<'_> {
     fn inner(&self) -> Option<&dyn StepSource> {
         Some(self.inner)
     }
@@ -95,37 +94,37 @@ impl StepSource for GoesOn<'_> {
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
-        if let Some(again) = self.again.take() {
-            self.making_again = true;
-            return Ok(Some(again));
+        if let Some(repeat) = self.repeat.take() {
+            self.repeating = true;
+            return Ok(Some(repeat));
         }
-        self.making_again = false;
+        self.repeating = false;
         self.inner.next_step()
     }
 
     fn begins(&mut self, marker: &StepMarker) {
-        if !self.making_again {
-            let seen = self.seen(marker);
-            self.inner.begins(&seen);
+        if !self.repeating {
+            let shifted = self.shifted(marker);
+            self.inner.begins(&shifted);
         }
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
-        let mut seen = batch.clone();
-        seen.t_s.iter_mut().for_each(|t_s| *t_s += self.later_s);
-        seen.events.iter_mut().for_each(|event| event.t_s += self.later_s);
-        let ends = self.inner.on_batch(&seen);
-        ends && !self.making_again
+        let mut shifted = batch.clone();
+        shifted.t_s.iter_mut().for_each(|t_s| *t_s += self.later_s);
+        shifted.events.iter_mut().for_each(|event| event.t_s += self.later_s);
+        let ends = self.inner.on_batch(&shifted);
+        ends && !self.repeating
     }
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        let seen = self.seen(marker);
-        if self.making_again { Ok(()) } else { self.inner.after_step(&seen) }
+        let shifted = self.shifted(marker);
+        if self.repeating { Ok(()) } else { self.inner.after_step(&shifted) }
     }
 
     fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        let seen = self.seen(marker);
-        if self.making_again { Ok(()) } else { self.inner.skipped(&seen) }
+        let shifted = self.shifted(marker);
+        if self.repeating { Ok(()) } else { self.inner.skipped(&shifted) }
     }
 
     fn take_notes(&mut self) -> Vec<String> {
@@ -135,31 +134,31 @@ impl StepSource for GoesOn<'_> {
     }
 }
 
-/// A source that is being told.
-struct Told<'a, 'b> {
+/// A step source during replay.
+struct Replay<'a, 'b> {
     inner: &'a mut dyn StepSource,
     broken_off: &'b BrokenOff,
     later_s: f64,
     last: Option<PlanStep>,
-    held: usize,
+    replayed_steps: usize,
 }
 
-impl Told<'_, '_> {
+impl Replay<'_, '_> {
     fn part(&mut self, recording: Recording, steps: &[StepMarker]) -> Result<(), SessionError> {
         let mut pieces = Pieces::new(recording, self.later_s);
         for step in steps {
-            let seen = StepMarker {
+            let shifted = StepMarker {
                 start_s: step.start_s + self.later_s,
                 end_s: step.end_s + self.later_s,
                 ..*step
             };
-            // Before the first step the source has it handed out already, as in the run.
-            self.handed_out(&seen)?;
-            pieces.tell(self.inner, seen.start_s);
-            self.inner.begins(&seen);
-            pieces.tell(self.inner, seen.end_s);
-            self.inner.after_step(&seen).map_err(|error| self.refused(error.to_string()))?;
-            self.held += 1;
+            // Before the first step, the source has already handed out its step, as in the original run.
+            self.handed_out(&shifted)?;
+            pieces.tell(self.inner, shifted.start_s);
+            self.inner.begins(&shifted);
+            pieces.tell(self.inner, shifted.end_s);
+            self.inner.after_step(&shifted).map_err(|error| self.refused(error.to_string()))?;
+            self.replayed_steps += 1;
         }
         if let Some(last) = steps.last() {
             self.later_s += last.end_s + BETWEEN_S;
@@ -167,7 +166,7 @@ impl Told<'_, '_> {
         Ok(())
     }
 
-    /// Has the source hand out the step that was recorded; those that a guard had left out come before it.
+    /// Makes the source hand out the recorded step. Steps that a guard skipped come before it.
     fn handed_out(&mut self, recorded: &StepMarker) -> Result<(), SessionError> {
         loop {
             let next = self.inner.next_step().map_err(|error| self.refused(error.to_string()))?;
@@ -207,7 +206,7 @@ impl Told<'_, '_> {
                     next.to.valve_opening_ratio
                 )));
             }
-            // What stands near surge is no place to come from.
+            // A point near surge is not a valid start for a jump.
             if next.kind != StepKind::Approach {
                 self.last = Some(next);
             }
@@ -223,15 +222,15 @@ impl Told<'_, '_> {
     }
 }
 
-/// A recording, cut into batches as they came.
+/// A recording, divided into batches as in the original run.
 struct Pieces {
-    /// All in the time that the source sees.
+    /// The recording in the source's time.
     recording: Recording,
     /// Times of all channels.
     t_s: Vec<f64>,
-    /// Where each series stands.
+    /// Read position in each series.
     cursors: Vec<usize>,
-    /// Samples and events told.
+    /// Number of replayed samples and events.
     done: usize,
     events_done: usize,
     until_s: f64,
@@ -258,15 +257,15 @@ impl Pieces {
         Pieces { recording, t_s, cursors, done: 0, events_done: 0, until_s: later_s }
     }
 
-    /// Tells all up to a time, a second at a time.
+    /// Replays all data up to a time, in batches of one second.
     fn tell(&mut self, source: &mut dyn StepSource, until_s: f64) {
         while self.until_s < until_s {
             let piece_s = (self.until_s + PIECE_S).min(until_s);
-            // A recording keeps whole nanoseconds of a time.
+            // A recording rounds times to whole nanoseconds.
             let end_s = piece_s + ROUNDED_S;
             let to = self.t_s.partition_point(|t_s| *t_s <= end_s).max(self.done);
             let t_s = self.t_s.get(self.done..to).unwrap_or_default().to_vec();
-            // Each series is gone through once, for all pieces together.
+            // Passes through each series once for all batches.
             let values = |(series, at): (&Series, &mut usize)| -> Vec<f64> {
                 let value = |t_s: &f64| {
                     while series.t_s.get(*at).is_some_and(|own_s| own_s < t_s) {
@@ -301,7 +300,7 @@ impl Pieces {
                 t_s,
                 ..SampleBatch::default()
             };
-            // Whether it would end the step is known: the step has ended.
+            // The return value is not needed: the end of the step is already recorded.
             source.on_batch(&batch);
             (self.done, self.events_done, self.until_s) = (to, events_to, piece_s);
         }

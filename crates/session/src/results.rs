@@ -1,4 +1,4 @@
-//! What a run or a recording gives: points, map, report; data for whoever asks, files in its directory.
+//! Results of a run or recording: points, map and report, as data and as files in its directory.
 
 use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
@@ -21,14 +21,14 @@ use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Everything that came of a run, with the files it was written to; written as JSON, the one object that a run prints.
+/// All results of a run and their files. As JSON, this is the one object that a run prints.
 #[derive(Debug, Serialize)]
 pub struct Results {
     /// The run's directory.
     pub run: PathBuf,
-    /// Its recording, or the first of those that were identified together.
+    /// Its recording, or the first of several that were identified together.
     pub recording: PathBuf,
-    /// The others.
+    /// The other recordings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub further_recordings: Vec<PathBuf>,
     /// Identified points, repeats included.
@@ -37,48 +37,48 @@ pub struct Results {
     pub map: BTreeMap<String, PathBuf>,
     /// The test report.
     pub report: PathBuf,
-    /// The same and more as a page for a browser.
+    /// The extended report as a page for a browser.
     pub page: PathBuf,
-    /// How far the points are from the truth; `None` on a real rig.
+    /// Errors of the points against the truth; `None` on a real rig.
     pub score: Option<ScoreSummary>,
-    /// Jumps that were made more than once.
+    /// Jumps that were repeated.
     pub repeats: Vec<RepeatedJump>,
-    /// What the points share (joint method).
+    /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
-    /// What the two-parameter method makes of the same steps (joint method).
+    /// Two-parameter results for the same steps (joint method).
     pub two_parameter: Vec<TwoParameter>,
-    /// What became of channels with several sensors.
+    /// Result of sensor fusion.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sensors: Vec<FusedChannel>,
-    /// What came of the isothermal zero.
+    /// Result of the isothermal zero.
     pub zero: ZeroOutcome,
-    /// Surge-side ends that were sought; `None` where none were.
+    /// Surge-side limits of the map; `None` if there was no search.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surge: Option<SoughtSurge>,
-    /// What else is to be known.
+    /// Other remarks.
     pub remarks: Vec<String>,
     /// The map itself; `None` where there is none.
     #[serde(skip)]
     pub compressor_map: Option<CompressorMap>,
 }
 
-/// What is known of where recordings come from.
+/// Provenance of recordings.
 pub(crate) struct Told {
     campaign: Option<Campaign>,
     plan: Option<Plan>,
-    /// How it ended, or how the points were made.
+    /// How the run ended, or how the points were made.
     outcome: String,
     machine: String,
-    /// When, as people read it.
+    /// Test date for people.
     tested_at: Option<String>,
     sources: Vec<ReportSource>,
 }
 
 impl Told {
-    /// What recordings say of themselves.
+    /// Provenance from the recordings themselves.
     pub(crate) fn of(recorded: &[Recorded]) -> Told {
         let campaign = recorded.first().and_then(|first| first.campaign.clone());
-        // Recordings of one run have one plan.
+        // Recordings of one run have the same plan.
         let plans: Vec<Option<&[u8]>> = recorded.iter().map(|one| one.read.plan_json.as_deref()).collect();
         let plan = match plans.as_slice() {
             [Some(first), others @ ..] if others.iter().all(|other| *other == Some(*first)) => {
@@ -92,7 +92,7 @@ impl Told {
         Told {
             outcome: String::new(),
             machine: campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone()),
-            // Simulated time has no date; the directory of its run has.
+            // Simulated time has no date; the name of the run directory has one.
             tested_at: sources
                 .first()
                 .and_then(|source| instant(source.start_time_ns))
@@ -103,7 +103,7 @@ impl Told {
         }
     }
 
-    /// Units of the map's pictures: those that the campaign wants shown.
+    /// Units of the map's pictures, as requested by the campaign.
     fn map_units(&self) -> MapUnits {
         let Some(campaign) = &self.campaign else { return MapUnits::default() };
         let display = Display::new(&campaign.display);
@@ -125,16 +125,16 @@ impl Told {
 /// One recording of a run.
 pub(crate) struct RunPart {
     pub(crate) recording: PathBuf,
-    /// Steps of it that hold; `None`: all.
+    /// Valid steps of it; `None`: all.
     pub(crate) saved: Option<BTreeSet<usize>>,
 }
 
 impl Session<'_> {
-    /// Reads the recording of a run back, identifies, assembles, exports and reports, all into `directory`.
+    /// Reads the recording of a run, identifies, assembles, exports and reports. All files go into `directory`.
     ///
     /// # Errors
-    /// [`SessionError`] where the recording cannot be identified or a file cannot be written. A map that cannot be
-    /// assembled or fitted is a remark.
+    /// [`SessionError`] if the recording cannot be identified or a file cannot be written. If a map cannot be assembled or fitted, a remark says
+    /// so.
     pub(crate) fn results(
         &self,
         campaign: &Campaign,
@@ -162,7 +162,7 @@ impl Session<'_> {
         let mut files = paths.into_iter();
         let recording = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
-        let told = Told {
+        let origin = Told {
             campaign: Some(campaign.clone()),
             plan: Some(plan.clone()),
             outcome: outcome.to_owned(),
@@ -170,14 +170,14 @@ impl Session<'_> {
             tested_at: instant(started_ns),
             sources: Vec::new(),
         };
-        self.written(&told, identified, (recording, further), remarks, directory)
+        self.written(&origin, identified, (recording, further), remarks, directory)
     }
 
-    /// Identifies recordings and leaves what a run leaves, points, map and report, in `directory`, which is made where it is
-    /// missing. Nothing that is there is replaced: where it has results already, nothing is identified.
+    /// Identifies recordings and writes the same results as a run, points, map and report, to `directory`. Creates it if missing. Existing
+    /// results are never replaced and stop the identification.
     ///
     /// # Errors
-    /// As [`Session::identify`]; [`SessionError::File`] where a file is there or cannot be written.
+    /// As [`Session::identify`]; [`SessionError::File`] if a file exists or cannot be written.
     pub fn identify_into(
         &self,
         recorded: Vec<Recorded>,
@@ -195,15 +195,14 @@ impl Session<'_> {
         let mut files = recorded.iter().map(|one| one.path.clone());
         let first = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
-        let told = Told::of(&recorded);
+        let origin = Told::of(&recorded);
         let identified = self.identify(recorded, map, method)?;
-        let told = Told { outcome: identified_by(identified.config.method), ..told };
+        let origin = Told { outcome: identified_by(identified.config.method), ..origin };
         std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
-        self.written(&told, identified, (first, further), remarks, directory)
+        self.written(&origin, identified, (first, further), remarks, directory)
     }
 
-    /// The page of one run, whose recordings are `shown`, with the maps of others to hold it against and the diagnosis of its gap, where one was
-    /// made. Nothing is written.
+    /// The page of the run with recordings `shown`, with other runs' maps for comparison and its gap diagnosis, if any. Writes no file.
     ///
     /// # Errors
     /// As [`Session::identify`].
@@ -214,13 +213,13 @@ impl Session<'_> {
         channels: &ChannelMap,
         gap: Option<&Gap>,
     ) -> Result<String, SessionError> {
-        let told = Told::of(&shown);
+        let origin = Told::of(&shown);
         let mut remarks: Vec<String> =
             shown.iter().flat_map(|one| remarks_of(one, shown.len() > 1)).collect();
         let identified = self.identify(shown, channels, None)?;
-        let told = Told { outcome: identified_by(identified.config.method), ..told };
+        let origin = Told { outcome: identified_by(identified.config.method), ..origin };
         remarks.extend(identified.remarks.iter().cloned());
-        let map = compressor_map(&told.machine, &identified, &mut remarks);
+        let map = compressor_map(&origin.machine, &identified, &mut remarks);
         let reference = identified.config.reference;
         let mut other_maps: Vec<(String, CompressorMap)> = Vec::new();
         for other in others {
@@ -236,24 +235,24 @@ impl Session<'_> {
             other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
         let repeats = identified.repeats();
         let program = program_and_commit(self.registry.commit);
-        let report = run_report_of(&told, &identified, map.as_ref(), &program, &remarks, &repeats, false);
+        let report = run_report_of(&origin, &identified, map.as_ref(), &program, &remarks, &repeats, false);
         page_of(&identified, &report, &others, gap)
     }
 
-    /// The files of what was identified.
+    /// Writes the files of an identification.
     fn written(
         &self,
-        told: &Told,
+        origin: &Told,
         identified: Identified,
         (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
         mut remarks: Vec<String>,
         directory: &Path,
     ) -> Result<Results, SessionError> {
         remarks.extend(identified.remarks.iter().cloned());
-        let compressor_map = compressor_map(&told.machine, &identified, &mut remarks);
+        let compressor_map = compressor_map(&origin.machine, &identified, &mut remarks);
         let map = match &compressor_map {
             Some(map) => {
-                export(self.registry, &told.formats(), map, &told.map_units(), directory, &mut remarks)?
+                export(self.registry, &origin.formats(), map, &origin.map_units(), directory, &mut remarks)?
             }
             None => BTreeMap::new(),
         };
@@ -276,7 +275,7 @@ impl Session<'_> {
         let program = program_and_commit(self.registry.commit);
         let has_picture = map.contains_key("svg");
         let shown = run_report_of(
-            told,
+            origin,
             &identified,
             compressor_map.as_ref(),
             &program,
@@ -311,7 +310,7 @@ impl Session<'_> {
     }
 }
 
-/// How a recording is called beside others: by its run's directory, or by its file.
+/// Name of a recording in comparisons: its run directory, or its file.
 fn name_of(path: &Path) -> String {
     let named = match path.file_name() {
         Some(file) if file == run_directory::RECORDING => path.parent().and_then(Path::file_name),
@@ -324,9 +323,9 @@ fn identified_by(method: Method) -> String {
     format!("Identified by the method `{method}`.")
 }
 
-/// What the report and the page show of what was identified.
+/// Contents of the report and the page.
 fn run_report_of<'a>(
-    told: &'a Told,
+    origin: &'a Told,
     identified: &'a Identified,
     map: Option<&'a CompressorMap>,
     program: &'a str,
@@ -335,17 +334,17 @@ fn run_report_of<'a>(
     has_picture: bool,
 ) -> RunReport<'a> {
     RunReport {
-        machine: &told.machine,
-        campaign: told.campaign.as_ref(),
-        plan: told.plan.as_ref(),
-        tested_at: told.tested_at.as_deref(),
+        machine: &origin.machine,
+        campaign: origin.campaign.as_ref(),
+        plan: origin.plan.as_ref(),
+        tested_at: origin.tested_at.as_deref(),
         program,
         map,
         recording: &identified.recording,
         used: &identified.config.declared,
         zero: &identified.zero,
-        sources: &told.sources,
-        outcome: &told.outcome,
+        sources: &origin.sources,
+        outcome: &origin.outcome,
         remarks,
         reference: identified.config.reference,
         method: identified.config.method,
@@ -365,7 +364,7 @@ fn run_report_of<'a>(
     }
 }
 
-/// The page of what was identified, beside other runs' maps.
+/// The page of an identification, with other runs' maps.
 fn page_of(
     identified: &Identified,
     report: &RunReport<'_>,
@@ -378,7 +377,7 @@ fn page_of(
     Ok(run_page(&RunPage { report, courses: &courses, gap, others })?)
 }
 
-/// A recording as a report names it.
+/// Source entry of a recording in a report.
 fn source(recorded: &Recorded) -> ReportSource {
     let recording = &recorded.read.recording;
     let spans = recording.series.values().filter_map(|series| series.t_s.first().zip(series.t_s.last()));
@@ -392,7 +391,7 @@ fn source(recorded: &Recorded) -> ReportSource {
     }
 }
 
-/// What was wrong with a file; its name in front where there are several.
+/// Reader warnings of a file, prefixed with its name if there are several.
 fn remarks_of(recorded: &Recorded, several: bool) -> Vec<String> {
     let named = |warning: &mapper_record::ReadWarning| match several {
         true => format!("{}: {warning}", recorded.path.display()),
@@ -401,7 +400,7 @@ fn remarks_of(recorded: &Recorded, several: bool) -> Vec<String> {
     recorded.read.warnings.iter().map(named).collect()
 }
 
-/// The map of all points that have a place on it, with a surface through it where it has enough of them.
+/// The map of all points with map coordinates, with a fitted surface if there are enough of them.
 fn compressor_map(
     machine: &str,
     identified: &Identified,
@@ -442,7 +441,7 @@ fn export(
         let format = registry.written_format(name)?;
         let bytes = match format.write_in(map, units) {
             Ok(bytes) => bytes,
-            // A campaign of a few points has a map, but no surface through it.
+            // A campaign of a few points has a map but no fitted surface.
             Err(error @ ExportError::NeedsFit { .. }) => {
                 remarks.push(error.to_string());
                 continue;

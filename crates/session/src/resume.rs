@@ -1,4 +1,4 @@
-//! A run that goes on after it was broken off: what of it holds, and what has to be done again.
+//! Resumes an interrupted run: determines the valid parts and the steps to repeat.
 
 use crate::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, run_directory};
@@ -9,15 +9,15 @@ use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
-/// Places of steps that are made once more to come from where the missing one comes from.
+/// First index for steps that are repeated only to approach a missing step from its planned predecessor.
 pub(crate) const AGAIN_FROM: usize = StepMarker::AGAIN_FROM;
 
-/// Whether the steps of a campaign depend on what was measured.
+/// Whether the steps of a campaign depend on measured data.
 pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
     campaign.sequence.is_some() || campaign.surge_search.is_some() || campaign.on_drift.is_some()
 }
 
-/// What is known of a run that was broken off.
+/// State of an interrupted run.
 #[derive(Debug, Clone)]
 pub struct BrokenOff {
     /// Its directory.
@@ -26,10 +26,10 @@ pub struct BrokenOff {
 }
 
 impl BrokenOff {
-    /// Reads the journal of a run's directory.
+    /// Reads the journal of a run directory.
     ///
     /// # Errors
-    /// [`SessionError::NotResumable`] where there is none.
+    /// [`SessionError::NotResumable`] if there is none.
     pub fn read(directory: &Path) -> Result<Self, SessionError> {
         let why = |why: String| SessionError::NotResumable { run: directory.to_owned(), why };
         let path = directory.join(run_directory::JOURNAL);
@@ -41,11 +41,11 @@ impl BrokenOff {
         Ok(BrokenOff { directory: directory.to_owned(), parts })
     }
 
-    /// Leaves out what a later part has made anew, and the line along which surge was sought last: a search goes on from what the
-    /// machine was told just before, and begins its line again.
+    /// Removes steps that a later part repeated, and the last line of the surge search. The search depends on its preceding data and restarts
+    /// that line.
     ///
     /// # Errors
-    /// What reading a recording says.
+    /// Read errors of a recording.
     pub(crate) fn keep_what_goes_on(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
         if !depends_on_readings(campaign) {
             return Ok(());
@@ -72,20 +72,20 @@ impl BrokenOff {
         Ok(())
     }
 
-    /// Steps of the plan, by their place in it, that are in one of the recordings.
+    /// Steps that are in one of the recordings, by index in the plan.
     pub(crate) fn saved(&self) -> BTreeSet<usize> {
         self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect()
     }
 
-    /// Whether one of the recordings has the soak.
+    /// Whether one of the recordings contains the soak.
     pub fn soaked(&self) -> bool {
         self.parts.iter().any(|part| part.soaked)
     }
 
-    /// Refuses what is not the same run, and what has nothing left to do.
+    /// Rejects a run with another identity, or one with no remaining work.
     ///
     /// # Errors
-    /// [`SessionError::NotResumable`] with what differs or why.
+    /// [`SessionError::NotResumable`] with the differences or the reason.
     pub(crate) fn check(&self, campaign: &Campaign, plan: &Plan, now: &Identity) -> Result<(), SessionError> {
         let why = |why: String| Err(SessionError::NotResumable { run: self.directory.clone(), why });
         for part in &self.parts {
@@ -100,17 +100,17 @@ impl BrokenOff {
         Ok(())
     }
 
-    /// Whether every step is there, and nothing but the map may be missing.
+    /// Whether every step is recorded, so that at most the map is missing.
     pub(crate) fn is_whole(&self, campaign: &Campaign, plan: &Plan) -> bool {
         if depends_on_readings(campaign) {
-            // Only the end of the run says that no further step would have come.
+            // Only a completed run shows that no further step was due.
             return self.parts.last().is_some_and(|part| part.completed);
         }
         let saved = self.saved();
         plan.steps.iter().all(|step| saved.contains(&step.index))
     }
 
-    /// What is done again and why, in a sentence.
+    /// One sentence on the repeated work and its reason.
     pub(crate) fn said(&self, campaign: &Campaign, plan: &Plan, saved: &BTreeSet<usize>) -> String {
         let soak = match (campaign.zero.is_some(), self.soaked()) {
             (false, _) => "without a soak, as before",
@@ -126,7 +126,7 @@ impl BrokenOff {
     }
 }
 
-/// The steps of a plan that are missing, each after the step that the plan has before it.
+/// The missing steps of a plan, each after its planned predecessor.
 pub(crate) struct MissingSteps<'a> {
     plan: &'a Plan,
     next: VecDeque<PlanStep>,
@@ -134,13 +134,13 @@ pub(crate) struct MissingSteps<'a> {
 }
 
 impl<'a> MissingSteps<'a> {
-    pub(crate) fn new(plan: &'a Plan, saved: &BTreeSet<usize>, said: String) -> Self {
+    pub(crate) fn new(plan: &'a Plan, saved: &BTreeSet<usize>, note: String) -> Self {
         let mut next: VecDeque<PlanStep> = VecDeque::new();
         for (place, step) in plan.steps.iter().enumerate() {
             if saved.contains(&step.index) {
                 continue;
             }
-            // Where the rig does not come from where the plan has it come from, it is brought there.
+            // If the rig is not at the planned predecessor, that step is repeated first.
             let comes_from = place.checked_sub(1).and_then(|before| plan.steps.get(before));
             if let Some(before) = comes_from
                 && next.back().is_none_or(|last| last.index != before.index)
@@ -150,7 +150,7 @@ impl<'a> MissingSteps<'a> {
             }
             next.push_back(step.clone());
         }
-        MissingSteps { plan, next, notes: vec![said] }
+        MissingSteps { plan, next, notes: vec![note] }
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a run gives beside the compressor's map: thermal model, turbine, pictures of h and of errors.
+//! Results in addition to the compressor map: thermal model, turbine, pictures of h and of errors.
 
 use crate::files::{json_text, write_new};
 use crate::recorded::Recorded;
@@ -14,22 +14,22 @@ use mapper_report::{
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Files that were written, and what is in them.
+/// The written files and their contents.
 #[derive(Debug, Serialize)]
 pub struct RigFiles {
     /// The files.
     pub files: Vec<PathBuf>,
     /// The turbine at each point.
     pub turbine: Vec<TurbinePoint>,
-    /// What the points share (joint method).
+    /// Parameters common to all points (joint method).
     pub thermal: Option<ThermalModel>,
 }
 
 impl Session<'_> {
-    /// Identifies a recording by its campaign's method and writes the files into `out`, which is made where it is missing.
+    /// Identifies a recording by its campaign's method and writes the files to `out`. Creates the directory if missing.
     ///
     /// # Errors
-    /// [`SessionError`] where the machine is not known, the recording cannot be identified or a file cannot be written.
+    /// [`SessionError`] if the machine is unknown, the recording cannot be identified or a file cannot be written.
     pub fn rig_files(
         &self,
         recorded: Recorded,
@@ -73,7 +73,7 @@ fn png(figure: &Figure) -> Result<Vec<u8>, SessionError> {
     Ok(figure.to_png(2.0).map_err(ExportError::failed("png"))?)
 }
 
-/// Errors of the points whose truth is known.
+/// Errors of the points with known truth.
 fn errors(points: &[ScoredPoint]) -> Vec<ErrorAtGradient> {
     points
         .iter()

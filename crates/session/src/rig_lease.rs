@@ -1,21 +1,21 @@
-//! The rig and the readers of a run, held while it lasts: each may be had but once.
+//! Exclusive locks on the rig and auxiliary instruments of a run.
 
 use crate::SessionError;
 use crate::rig_state::{Claim, Latch, Owner, RigStates};
 use std::path::Path;
 
-/// What a run holds.
+/// The locks of a run.
 #[derive(Default)]
 pub(crate) struct RigLease {
-    /// The rig, where it is one that can be had but once.
+    /// The rig, if it can have only one user.
     rig: Option<Claim>,
-    /// Readers, and where the rig is reached: a lock each. A runner that died with one leaves nothing behind: the rig's own
-    /// name says what there is to say.
+    /// Auxiliary instruments and the rig's address, one lock each. An abandoned lock of these needs no acknowledgement: the lock on the rig's
+    /// name already records it.
     readers: Vec<Claim>,
 }
 
 impl RigLease {
-    /// Takes the rig and the readers by their names. `resumes`: the run that goes on.
+    /// Locks the rig and the instruments by name. `resumes`: the run to resume.
     pub(crate) fn take(
         states: &RigStates,
         rig: Option<&str>,
@@ -27,12 +27,12 @@ impl RigLease {
         Ok(RigLease { rig, readers })
     }
 
-    /// Writes down who has the rig.
+    /// Records the owner of the rig.
     pub(crate) fn sign(&mut self, run: &Path, started: &str) -> Result<(), SessionError> {
         self.rig.as_mut().map_or(Ok(()), |claim| claim.sign(&owner(run, started)))
     }
 
-    /// Gives all back, the rig latched where it is in doubt.
+    /// Releases all locks. The rig is locked out if its state is uncertain.
     pub(crate) fn give_back(self, doubt: Option<String>, run: &Path) -> Result<(), SessionError> {
         for reader in self.readers {
             reader.release()?;
@@ -59,7 +59,7 @@ fn owner(run: &Path, started: &str) -> Owner {
 mod tests {
     use super::*;
 
-    /// Two campaigns may call one controller by two names.
+    /// Two campaigns may give one controller different names.
     #[test]
     fn one_controller_is_one_rig_whatever_it_is_called() {
         let directory = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
-//! Who has a rig, and whether it may be had at all: a lock with its owner, and a latch that somebody has to acknowledge.
+//! Ownership of rigs: a lock with its owner, and a lockout that must be acknowledged.
 //!
-//! Both are small files in one directory, named after the rig. The lock is one of the operating system: it goes with the process
-//! that has it, however that ends. What its owner wrote stays, so that a runner that died with the rig in its hands is known.
+//! Both are small files in one directory, named after the rig. The operating system releases the lock when the owning process ends in any way.
+//! The owner's entry remains, so that a run that ended without releasing the rig is known.
 
 use crate::SessionError;
 use crate::files::json_text;
@@ -11,22 +11,22 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Largest of these files that is read, bytes.
+/// Maximum size of these files, bytes.
 const READ_MAX: u64 = 64 << 10;
 
-/// How the lock of a place is named, as a file, where a rig is reached.
+/// File name prefix of the lock for a rig's address.
 const PLACE: &str = "at_";
 
-/// Who runs, or ran, a rig.
+/// Current or last owner of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {
-    /// Number of the process.
+    /// Process ID.
     pub process: u32,
-    /// Name of the computer; empty where it is not known.
+    /// Host name; empty if unknown.
     pub host: String,
     /// Directory of the run.
     pub run: PathBuf,
-    /// When it started, as the name of the run's directory has it.
+    /// Start time, as in the name of the run directory.
     pub started: String,
 }
 
@@ -43,7 +43,7 @@ impl std::fmt::Display for Owner {
     }
 }
 
-/// Why a rig is latched.
+/// Reason of a lockout.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Latch {
     /// What happened.
@@ -52,13 +52,13 @@ pub struct Latch {
     pub run: PathBuf,
 }
 
-/// Locks and latches of rigs.
+/// Locks and lockouts of rigs.
 #[derive(Debug, Clone)]
 pub struct RigStates {
     directory: PathBuf,
 }
 
-/// A rig that this process has. Dropping it without [`release`](Claim::release) leaves the owner's name: the rig is in doubt.
+/// A rig locked by this process. If dropped without [`release`](Claim::release), the owner's entry remains and the rig needs acknowledgement.
 #[derive(Debug)]
 pub struct Claim {
     states: RigStates,
@@ -66,21 +66,21 @@ pub struct Claim {
     lock: File,
 }
 
-/// What is known of a rig.
+/// Status of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct RigStatus {
     /// The rig.
     pub rig: String,
-    /// Who has it, or had it when it died.
+    /// The current owner, or the one that ended without releasing the rig.
     pub owner: Option<Owner>,
-    /// Whether the owner is still there.
+    /// Whether the owner is still running.
     pub in_use: bool,
-    /// Why no run may begin.
+    /// Lockout that prevents further runs.
     pub latch: Option<Latch>,
 }
 
 impl RigStates {
-    /// The states in a directory, which is made when it is needed.
+    /// States in a directory, which is created on demand.
     pub fn new(directory: &Path) -> Self {
         RigStates { directory: directory.to_owned() }
     }
@@ -98,11 +98,11 @@ impl RigStates {
         Ok((file.map_err(SessionError::file("open", &path))?, path))
     }
 
-    /// Takes a rig. A runner that died with it is no obstacle where `resumes` is its run.
+    /// Locks a rig. An abandoned run is no obstacle if it is the run in `resumes`.
     ///
     /// # Errors
-    /// [`SessionError::RigInUse`], [`SessionError::RigAbandoned`] and [`SessionError::RigLatched`] with what is known;
-    /// [`SessionError::File`] as the system says.
+    /// [`SessionError::RigInUse`], [`SessionError::RigAbandoned`] and [`SessionError::RigLatched`] with the known facts; [`SessionError::File`]
+    /// for system errors.
     pub fn claim(&self, rig: &str, resumes: Option<&Path>) -> Result<Claim, SessionError> {
         let (mut lock, path) = self.open(rig)?;
         let locked = lock.try_lock();
@@ -131,15 +131,15 @@ impl RigStates {
     fn latch_of(&self, rig: &str) -> Option<Latch> {
         let path = self.file(rig, "latch");
         let mut file = File::open(path).ok()?;
-        // A latch that cannot be read is a latch all the same.
+        // An unreadable lockout file still locks the rig out.
         let unreadable = Latch { reason: "the latch cannot be read".to_owned(), run: PathBuf::new() };
         Some(read_json(&mut file).unwrap_or(unreadable))
     }
 
-    /// What is known of a rig.
+    /// Status of a rig.
     ///
     /// # Errors
-    /// [`SessionError::File`] as the system says.
+    /// [`SessionError::File`] for system errors.
     pub fn status(&self, rig: &str) -> Result<RigStatus, SessionError> {
         if !self.file(rig, "lock").exists() {
             return Ok(RigStatus {
@@ -155,7 +155,7 @@ impl RigStates {
         Ok(RigStatus { rig: rig.to_owned(), owner, in_use, latch: self.latch_of(rig) })
     }
 
-    /// All rigs that a run has had, as their files are named.
+    /// All rigs used so far, by file name.
     pub fn known(&self) -> Vec<RigStatus> {
         let entries = std::fs::read_dir(&self.directory).into_iter().flatten().flatten();
         let name = |file: String| {
@@ -167,17 +167,17 @@ impl RigStates {
         names.iter().filter_map(|name| self.status(name).ok()).collect()
     }
 
-    /// Those that wait for somebody to look at them.
+    /// Rigs that wait for acknowledgement.
     fn in_doubt(&self) -> Vec<String> {
         let waits = |status: &RigStatus| status.latch.is_some() || (status.owner.is_some() && !status.in_use);
         self.known().into_iter().filter(waits).map(|status| status.rig).collect()
     }
 
-    /// Somebody has looked at the rig: the next run may begin.
+    /// Acknowledges that the rig was inspected, so that the next run may begin.
     ///
     /// # Errors
-    /// [`SessionError::RigInUse`] where a run is under way; [`SessionError::NothingToAcknowledge`] where the rig is in no doubt;
-    /// [`SessionError::File`] as the system says.
+    /// [`SessionError::RigInUse`] during a run; [`SessionError::NothingToAcknowledge`] if the rig needs no acknowledgement;
+    /// [`SessionError::File`] for system errors.
     pub fn acknowledge(&self, rig: &str) -> Result<RigStatus, SessionError> {
         let status = self.status(rig)?;
         if status.owner.is_none() && status.latch.is_none() && !status.in_use {
@@ -204,10 +204,10 @@ impl RigStates {
 }
 
 impl Claim {
-    /// Writes down who has the rig.
+    /// Records the owner of the rig.
     ///
     /// # Errors
-    /// [`SessionError::File`] as the system says.
+    /// [`SessionError::File`] for system errors.
     pub fn sign(&mut self, owner: &Owner) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "lock");
         let text = json_text(owner)?;
@@ -221,27 +221,27 @@ impl Claim {
         self.lock.sync_all()
     }
 
-    /// Lets no further run begin before somebody has acknowledged this.
+    /// Prevents further runs until this lockout is acknowledged.
     ///
     /// # Errors
-    /// [`SessionError::File`] as the system says.
+    /// [`SessionError::File`] for system errors.
     pub fn latch(&self, latch: &Latch) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "latch");
         let text = json_text(latch)?;
         std::fs::write(&path, text).map_err(SessionError::file("write", &path))
     }
 
-    /// Gives the rig back: it is safe.
+    /// Releases the rig in a safe state.
     ///
     /// # Errors
-    /// [`SessionError::File`] as the system says.
+    /// [`SessionError::File`] for system errors.
     pub fn release(mut self) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "lock");
         self.write(b"").map_err(SessionError::file("write", &path))
     }
 }
 
-/// Whether two paths are one directory, however they are written.
+/// Whether two paths refer to the same directory.
 fn same_place(a: &Path, b: &Path) -> bool {
     let resolved = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     resolved(a) == resolved(b)
@@ -276,9 +276,9 @@ mod tests {
         let second = states.claim("opc.tcp://bench:4840", None).unwrap_err().to_string();
         assert!(second.contains("process 7 on cell-3") && second.contains("runs/a"), "{second}");
         assert!(states.claim("another", None).is_ok());
-        // In use, it is not acknowledged either.
+        // A rig in use cannot be acknowledged.
         assert!(matches!(states.acknowledge("opc.tcp://bench:4840"), Err(SessionError::RigInUse { .. })));
-        // Dropped, not released: what a kill leaves.
+        // Dropping without release leaves the same state as a killed process.
         drop(first);
         let stale = states.claim("opc.tcp://bench:4840", None).unwrap_err();
         assert!(matches!(stale, SessionError::RigAbandoned { .. }), "{stale}");

@@ -1,4 +1,4 @@
-//! A whole run: plan, drive the rig, record, identify, assemble, report.
+//! A complete run: plan, drive the rig, record, identify, assemble, report.
 
 use crate::declared::identification;
 use crate::drive::{Pace, drive_paced, soak_s};
@@ -33,31 +33,31 @@ use mapper_runner::{Deadlined, Deadlines, PlanSteps, RunError, RunObserver, Step
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Time that a rig has for its calls: to connect and to let go a little more than a driver has (docs/protocol.md).
+/// Deadlines for rig calls. Arming and release get slightly more time than a driver has (docs/protocol.md).
 const DEADLINES: Deadlines = Deadlines { arming: Duration::from_secs(11), call: Duration::from_secs(2) };
 
-/// What to run.
+/// Request for a run.
 pub struct RunRequest<'a> {
     /// The campaign.
     pub campaign: &'a Campaign,
-    /// Its text, kept beside the run and in the recording.
+    /// Its text, stored with the run and in the recording.
     pub campaign_text: &'a str,
-    /// A stored plan to run instead of making one.
+    /// A stored plan to run instead of a new one.
     pub plan: Option<&'a Path>,
-    /// Directory for the run's own directory, which is made.
+    /// Parent directory, in which the run directory is created.
     pub parent: &'a Path,
-    /// When the run starts, ns since 1970-01-01 UTC: for recordings of rigs whose time is not simulated.
+    /// Start time, ns since 1970-01-01 UTC, for recordings of rigs in real time.
     pub started_ns: u64,
-    /// The same in the name of the run's directory, e.g. `20261122T101500Z`.
+    /// Start time in the name of the run directory, e.g. `20261122T101500Z`.
     pub started_name: &'a str,
-    /// Directory of the locks and latches of rigs; `.rigs` in `parent` if none is given.
+    /// Directory of the locks and lockouts of rigs; `.rigs` in `parent` by default.
     pub rig_states: Option<&'a Path>,
-    /// Goes on with this run.
+    /// The interrupted run to resume.
     pub resume: Option<BrokenOff>,
 }
 
 impl<'a> RunRequest<'a> {
-    /// A run on a simulated rig, whose time begins at 0: its directory is `<parent>/<campaign>-run`.
+    /// A run on a simulated rig, with time starting at 0. Its directory is `<parent>/<campaign>-run`.
     pub fn new(campaign: &'a Campaign, campaign_text: &'a str, parent: &'a Path) -> Self {
         RunRequest {
             campaign,
@@ -72,17 +72,17 @@ impl<'a> RunRequest<'a> {
     }
 }
 
-/// A run that is ready to start: nothing has been touched yet.
+/// A run that is ready to start; nothing has been written or armed yet.
 pub struct PreparedRun<'a> {
     request: RunRequest<'a>,
     model: Model,
-    /// The plan to be run; where a script decides, its forecast.
+    /// The plan to run; for a script, its forecast.
     plan: Plan,
     scripted: Option<ScriptedSteps>,
     sources: Sources,
 }
 
-/// How a run ended. Whatever ended it, the rig is safe and what was recorded is kept.
+/// Outcome of a run. In all cases the rig is safe and the recording is kept.
 #[derive(Debug)]
 pub struct RunOutcome {
     /// The run's directory.
@@ -91,23 +91,22 @@ pub struct RunOutcome {
     pub recording: PathBuf,
     /// How it ended.
     pub end: Ended,
-    /// What was identified, or why nothing was.
+    /// The results, or the reason why there are none.
     pub results: Result<Results, SessionError>,
 }
 
 impl RunOutcome {
-    /// How it ended, in a sentence.
+    /// One sentence on how it ended.
     pub fn sentence(&self) -> String {
         sentence(&self.end)
     }
 }
 
 impl<'s> Session<'s> {
-    /// Makes the plan, or holds the stored one against it, rehearses a script and makes the backend. What fails here never
-    /// touches the rig.
+    /// Makes the plan or checks the stored one, rehearses a script and creates the backend. Errors here never reach the rig.
     ///
     /// # Errors
-    /// [`SessionError`] where there is no plan, the stored one is stale, the script fails or the backend's settings are wrong.
+    /// [`SessionError`] if there is no plan, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
         let (campaign, mut request) = (request.campaign, request);
         if let Some(broken_off) = &mut request.resume {
@@ -150,12 +149,12 @@ impl<'s> Session<'s> {
 }
 
 impl PreparedRun<'_> {
-    /// The plan that would be run.
+    /// The plan to run.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// The nominal model that it was made with.
+    /// The nominal model used for the plan.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -165,7 +164,7 @@ impl PreparedRun<'_> {
         self.sources.backend.describe()
     }
 
-    /// Drives the rig as fast as it goes, records, identifies, reports.
+    /// Drives the rig at full speed, records, identifies, reports.
     ///
     /// # Errors
     /// As [`PreparedRun::run_paced`].
@@ -173,10 +172,10 @@ impl PreparedRun<'_> {
         self.run_paced(session, &mut UnpacedClock, false)
     }
 
-    /// Drives the rig by a clock, records, identifies, reports. `each_sample`: asks the rig for each sample by itself.
+    /// Drives the rig by a clock, records, identifies, reports. `each_sample`: polls each sample separately.
     ///
     /// # Errors
-    /// Where the rig is not to be had, or the run's files cannot be made. What ends the run itself is its outcome, not an error.
+    /// If the rig is not available or the run's files cannot be created. Failures during the run are part of its outcome.
     pub fn run_paced(
         mut self,
         session: &Session<'_>,
@@ -202,7 +201,7 @@ impl PreparedRun<'_> {
             before => format!("recording-{}.mcap", before + 1),
         };
         let recording = directory.join(&name);
-        // Where there are several sources, each has its own times.
+        // With several sources, each has its own sample times.
         let writer = RecordingWriter::create(&recording, &self.header(plan_json))?
             .leaving_out_absent(!self.sources.read.is_empty());
         let path = directory.join(run_directory::JOURNAL);
@@ -212,7 +211,7 @@ impl PreparedRun<'_> {
         journal
             .write(&Entry::Part { identity, recording: name })
             .map_err(SessionError::file("write", &path))?;
-        // A rig in real time outlives this computer: what is recorded goes through to the disk.
+        // A rig in real time keeps running if this computer fails, so the recording is flushed to disk.
         let through = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
         let recorder = Recorder::new(writer).with_journal(journal, through);
         let read = self.sources.read.clone();
@@ -230,7 +229,7 @@ impl PreparedRun<'_> {
         if let Ended::Failed(error @ RunError::NotArmed(_)) = end {
             return Err(self.never_begun(error, &directory));
         }
-        // A run that failed has its own reason; one that did not must have a whole file.
+        // A failed run has its own reason; any other run must have a complete file.
         if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
             finished?;
         }
@@ -241,10 +240,10 @@ impl PreparedRun<'_> {
         Ok(RunOutcome { directory, recording, end, results })
     }
 
-    /// A rig that was not had leaves no run: what was made for it goes again.
+    /// Removes the files of a run whose rig was not armed.
     fn never_begun(&self, error: RunError, directory: &Path) -> SessionError {
         if self.request.resume.is_none() && !error.leaves_doubt() {
-            // What cannot be removed is in nobody's way.
+            // A remaining directory does no harm.
             let _ = std::fs::remove_dir_all(directory);
         }
         SessionError::NotArmed(error)
@@ -264,7 +263,7 @@ impl PreparedRun<'_> {
         session.results(campaign, &executed?, &sentence(end), started_ns, directory, parts)
     }
 
-    /// A run that was broken off behind its last step: the map alone is missing, and the rig is left alone.
+    /// Identifies a run that was interrupted after its last step. Only the map is missing, so the rig is not used.
     fn identify_whole(&self, session: &Session<'_>) -> Result<Option<RunOutcome>, SessionError> {
         let Some(broken_off) = &self.request.resume else { return Ok(None) };
         if !broken_off.is_whole(self.request.campaign, &self.plan) {
@@ -279,7 +278,7 @@ impl PreparedRun<'_> {
         Ok(Some(RunOutcome { directory, recording, end, results }))
     }
 
-    /// The rig and its readers, where they can be had but once.
+    /// Locks the rig and its auxiliary instruments if they can have only one user.
     fn hold(&self, rig: &RigDescription) -> Result<RigLease, SessionError> {
         let usual = self.request.parent.join(".rigs");
         let states = RigStates::new(self.request.rig_states.unwrap_or(&usual));
@@ -289,7 +288,7 @@ impl PreparedRun<'_> {
         RigLease::take(&states, rig.exclusive.as_deref(), &shared, resumes)
     }
 
-    /// The directory of the run: a new one with what the run is made from, or that of the run that goes on.
+    /// The run directory: a new one with the inputs of the run, or that of the resumed run.
     fn directory(&self) -> Result<PathBuf, SessionError> {
         if let Some(broken_off) = &self.request.resume {
             return Ok(broken_off.directory.clone());
@@ -304,7 +303,7 @@ impl PreparedRun<'_> {
         }
         if let Some(source) = &campaign.sequence {
             write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
-            // A run that goes on finds it where its campaign names it.
+            // A resumed run finds the script under the name in its campaign.
             if Path::new(&source.named) != Path::new(run_directory::SEQUENCE) {
                 run_directory::keep_beside(&directory, &source.named, &source.text)?;
             }
@@ -312,7 +311,7 @@ impl PreparedRun<'_> {
         Ok(directory)
     }
 
-    /// The recordings of a run that goes on.
+    /// The earlier recordings of a resumed run.
     fn parts_before(&self, directory: &Path) -> Vec<RunPart> {
         let parts = self.request.resume.iter().flat_map(|broken_off| &broken_off.parts);
         parts
@@ -331,11 +330,11 @@ impl PreparedRun<'_> {
     ) -> (Ended, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
         let mut missing;
-        // A run that goes on goes by its plan as it stood, or by what it is told again.
+        // A resumed run uses its unchanged plan, or replays its data.
         let resumes = self.request.resume.as_ref();
         let told_again = resumes.filter(|_| depends_on_readings(self.request.campaign));
         let by_plan = resumes.filter(|_| told_again.is_none());
-        // What was measured at rest holds for the whole run.
+        // The soak data apply to the whole run.
         let without_soak;
         let mut campaign = self.request.campaign;
         if resumes.is_some_and(BrokenOff::soaked) {
@@ -346,8 +345,8 @@ impl PreparedRun<'_> {
             (Some(scripted), _) => scripted,
             (None, Some(broken_off)) => {
                 let saved = broken_off.saved();
-                let said = broken_off.said(campaign, &self.plan, &saved);
-                missing = MissingSteps::new(&self.plan, &saved, said);
+                let note = broken_off.said(campaign, &self.plan, &saved);
+                missing = MissingSteps::new(&self.plan, &saved, note);
                 &mut missing
             }
             (None, None) => &mut planned,
@@ -386,7 +385,7 @@ impl PreparedRun<'_> {
                 Err(steps) => (go(steps), None),
             };
             let (recorder, recorded) = recorder.end();
-            // What could not be written of the very end is told after it.
+            // A write error at the very end is reported after the run.
             let end = end.and_then(|end| recorded.map(|()| end).map_err(RunError::from));
             (end, drifted, recorder)
         });
@@ -396,7 +395,7 @@ impl PreparedRun<'_> {
         (end, finished, doubt)
     }
 
-    /// The plan as it was run; a script's is written beside its forecast.
+    /// The plan as executed; a script's is stored next to its forecast.
     fn executed(&self, directory: &Path) -> Result<Plan, SessionError> {
         let Some(steps) = &self.scripted else { return Ok(self.plan.clone()) };
         let executed = steps.executed(&self.plan);
@@ -417,8 +416,8 @@ impl PreparedRun<'_> {
     }
 }
 
-/// Results that a part of the run left before, all together or some of them, go into a directory of their own, so that the newest stand on
-/// top and nothing is written over.
+/// Moves earlier results of this run, complete or partial, into a separate directory. The newest results stay at the top and nothing is
+/// overwritten.
 fn set_aside(run: &Path) -> Result<(), SessionError> {
     let entries = std::fs::read_dir(run).map_err(SessionError::file("read", run))?;
     let results: Vec<_> = entries

@@ -1,39 +1,39 @@
-//! Where a run's files go: one new directory each, never an old one.
+//! Run directories: each run gets a new one.
 
 use crate::SessionError;
 use crate::files::write_new;
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
-/// The file names within a run directory.
+/// File names in a run directory: the recording.
 pub const RECORDING: &str = "recording.mcap";
-/// The plan that was run.
+/// The executed plan.
 pub const PLAN: &str = "plan.json";
-/// The steps that a sequence script has made of the run.
+/// The executed steps of a sequence script.
 pub const EXECUTED: &str = "executed_plan.json";
 /// The campaign as it was read.
 pub const CAMPAIGN: &str = "campaign.yaml";
-/// The sequence script, where there is one.
+/// The sequence script, if any.
 pub const SEQUENCE: &str = "sequence.rhai";
 /// Identified points.
 pub const POINTS: &str = "points.json";
-/// What of the run is safely recorded.
+/// The journal of safely recorded steps.
 pub const JOURNAL: &str = "journal.jsonl";
 /// The test report.
 pub const REPORT: &str = "report.md";
 
-/// The same and more as a page for a browser.
+/// The extended report as a page for a browser.
 pub const PAGE: &str = "report.html";
 
-/// Whether a file of this name is made from what was recorded: points, map, report, page, and the steps of a script.
+/// Whether a file of this name is a result: points, map, report, page, or executed steps of a script.
 pub(crate) fn is_result(name: &str) -> bool {
     [POINTS, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")
 }
 
-/// Creates `<parent>/<campaign>-<time>`, with `-2`, `-3`, ... behind it where that exists already.
+/// Creates `<parent>/<campaign>-<time>`, with suffix `-2`, `-3`, ... if it already exists.
 ///
 /// # Errors
-/// [`SessionError::File`] where a directory cannot be made, [`SessionError::TooManyRuns`] after 999 of the same name.
+/// [`SessionError::File`] if a directory cannot be created, [`SessionError::TooManyRuns`] after 999 of the same name.
 pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, SessionError> {
     std::fs::create_dir_all(parent).map_err(SessionError::file("create", parent))?;
     for attempt in 1..=999 {
@@ -48,8 +48,8 @@ pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, Sess
     Err(SessionError::TooManyRuns { parent: parent.to_owned() })
 }
 
-/// Keeps a file that the campaign names where the campaign of the run directory names it. One outside the campaign's own
-/// directory is found where it is, or given with `--campaign` later.
+/// Stores a file named by the campaign under the same relative path in the run directory. A file outside the campaign's directory stays in
+/// place, or is given later with `--campaign`.
 pub(crate) fn keep_beside(directory: &Path, named: &str, text: &str) -> Result<(), SessionError> {
     let named = Path::new(named);
     if !named.components().all(|part| matches!(part, Component::Normal(_))) {
@@ -62,7 +62,7 @@ pub(crate) fn keep_beside(directory: &Path, named: &str, text: &str) -> Result<(
     write_new(&path, text.as_bytes())
 }
 
-/// When the run in this directory was started, as people read it, by the directory's name; `None` for any other name.
+/// Start time for people, from the name of the run directory; `None` for any other name.
 pub(crate) fn started(directory: &Path) -> Option<String> {
     directory.file_name()?.to_str()?.rsplit('-').find_map(instant)
 }

@@ -1,4 +1,4 @@
-//! How a run ended, and what that leaves.
+//! Outcome of a run.
 
 use crate::journal::COMPLETED;
 use mapper_core::Reaction;
@@ -7,9 +7,9 @@ use mapper_runner::{RunEnd, RunError};
 /// How a run ended.
 #[derive(Debug)]
 pub enum Ended {
-    /// Every step was run.
+    /// Every step was executed.
     Completed,
-    /// Drift was seen, and the campaign says to stop then.
+    /// Drift was detected, and the campaign asks to stop in that case.
     Drifted {
         /// What drifted.
         reason: String,
@@ -31,7 +31,7 @@ pub enum Ended {
 }
 
 impl Ended {
-    /// What the runner says, and the watch over drift besides.
+    /// Combines the runner's result with that of the drift watch.
     pub(crate) fn of(end: Result<RunEnd, RunError>, drifted: Option<String>) -> Self {
         match (end, drifted) {
             (Ok(RunEnd::Completed), None) => Ended::Completed,
@@ -43,7 +43,7 @@ impl Ended {
     }
 }
 
-/// Why nobody knows in which state the rig is, or has to look at it before the next run.
+/// Why the rig's state is unknown, or must be inspected before the next run.
 pub(crate) fn doubt(end: &Result<RunEnd, RunError>) -> Option<String> {
     match end {
         Ok(RunEnd::Tripped(trip)) if trip.reaction == Reaction::Latch => Some(trip.reason.clone()),
@@ -52,14 +52,14 @@ pub(crate) fn doubt(end: &Result<RunEnd, RunError>) -> Option<String> {
     }
 }
 
-/// How a run ended, in a sentence for its report.
+/// One sentence for the report on how a run ended.
 pub(crate) fn sentence(end: &Ended) -> String {
     let what = match end {
         Ended::Completed => return COMPLETED.to_owned(),
         Ended::Drifted { reason } => format!("({reason})"),
         Ended::Interrupted { t_s } => format!("by the operator at {t_s:.0} s"),
         Ended::Tripped { t_s, reason } => format!("by a guard at {t_s:.1} s ({reason})"),
-        // A script's error shows its line below the first one.
+        // A script's error shows its source line below the first line.
         Ended::Failed(error) => {
             format!("by a fault ({})", error.to_string().lines().next().unwrap_or_default())
         }

@@ -1,40 +1,40 @@
-//! What a signal means for a run.
+//! Reaction of a run to signals.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// What a run is about: a signal means something else in each.
+/// Phase of a run; it determines the reaction to a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Phase {
-    /// Nothing has been touched: a signal ends the process.
+    /// No file or rig is in use: a signal ends the process.
     Planning,
     /// The rig is in use: nothing ends the process before it is safe.
     Rig,
-    /// The rig is safe and the recording whole: the first signal is answered, the second ends the process.
+    /// The rig is safe and the recording complete: the first signal gets a message, the second ends the process.
     Results,
 }
 
-/// What a signal has led to.
+/// Reaction to a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signalled {
-    /// A flag that the run obeys.
+    /// A stop flag for the run was set.
     Raised,
-    /// Nothing yet: the run goes on, and the user needs an answer.
+    /// The run continues, and the user gets a message.
     Answered,
     /// The process may end.
     Ends,
 }
 
-/// How a run is stopped.
+/// Stop flags of a run.
 #[derive(Debug, Clone)]
 pub struct RunStop {
-    /// At the end of the step: Ctrl-C once.
+    /// Stop at the end of the step: Ctrl-C once.
     pub after_step: Arc<AtomicBool>,
-    /// Now: Ctrl-C twice, SIGTERM, SIGHUP. Nothing ends the process before the rig is safe.
+    /// Stop now: Ctrl-C twice, SIGTERM, SIGHUP. Nothing ends the process before the rig is safe.
     pub now: Arc<AtomicBool>,
     phase: Arc<AtomicU8>,
-    /// Whether a signal was answered while results were made.
+    /// Whether a signal has already arrived while results are made.
     answered: Arc<AtomicBool>,
 }
 
@@ -50,12 +50,12 @@ impl Default for RunStop {
 }
 
 impl RunStop {
-    /// The run has come to this.
+    /// Enters a phase.
     pub fn enter(&self, phase: Phase) {
         self.phase.store(phase as u8, Ordering::SeqCst);
     }
 
-    /// A signal has come; `gentle`: the rig may finish its step first.
+    /// Handles a signal; `gentle`: the rig may finish its step first.
     pub fn signalled(&self, gentle: bool) -> Signalled {
         let phase = self.phase.load(Ordering::SeqCst);
         if phase == Phase::Rig as u8 {

@@ -1,4 +1,4 @@
-//! A sequence script at work: its steps for the runner, and for the script what each has given.
+//! Runs a sequence script: passes its steps to the runner and their results to the script.
 
 use crate::SessionError;
 use crate::declared::identification;
@@ -12,18 +12,18 @@ use mapper_physics::model::Model;
 use mapper_runner::{StepSource, StepSourceError};
 use mapper_sequence::{Hold, Script, SequenceRequest, SequenceRunner, SettleWatch, StepResult};
 
-/// The steps of a script, each identified as soon as it has ended.
+/// The steps of a script, each identified as soon as it ends.
 pub(crate) struct ScriptedSteps {
     script: SequenceRunner,
     config: IdentifyConfig,
     warm_up_s: f64,
     cool_down_s: f64,
-    /// The last two steps and their samples: all that identifying the last one needs.
+    /// The last two steps with their samples. Identification of the last step needs only these.
     recent: Recording,
     now: Option<PlanStep>,
     settling: Option<SettleWatch>,
     pub(crate) finished: Option<StepResult>,
-    /// Steps that have ended, with their real times.
+    /// Ended steps with their actual times.
     pub done: Vec<PlanStep>,
 }
 
@@ -34,7 +34,7 @@ impl ScriptedSteps {
         let script = SequenceRunner::start(script, request(campaign, model))?;
         Ok(ScriptedSteps {
             script,
-            // A script sees a step at once, the joint method all of them at the end.
+            // A script gets each step immediately; the joint method identifies all steps at the end.
             config: single_steps(identification(campaign)),
             warm_up_s: campaign.timing.warm_up_s,
             cool_down_s: campaign.timing.cool_down_s,
@@ -46,7 +46,7 @@ impl ScriptedSteps {
         })
     }
 
-    /// The steps that were run as a plan, with the rest of a plan from `base`.
+    /// The executed steps as a plan, with all other fields from `base`.
     pub fn executed(&self, base: &Plan) -> Plan {
         with_steps(base.clone(), self.done.clone())
     }
@@ -100,7 +100,7 @@ impl StepSource for ScriptedSteps {
         Ok(())
     }
 
-    /// The script learns that there is no result.
+    /// Reports to the script that there is no result.
     fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(step) = self.now.take() else { return Ok(()) };
         self.finished = Some(StepResult {
@@ -135,7 +135,7 @@ fn with_steps(mut plan: Plan, steps: Vec<PlanStep>) -> Plan {
     plan
 }
 
-/// What a script sees of the campaign.
+/// Campaign data available to a script.
 fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
     let (planned, machine) = (campaign.clone(), model.clone());
     SequenceRequest {
@@ -148,7 +148,7 @@ fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
         follow_outlet: campaign.follow_outlet,
         limits: campaign.limits,
         order: Box::new(move |points| {
-            // What is visited again is the script's own business.
+            // The script itself decides on repeat visits.
             let subset = Campaign {
                 points: points.to_vec(),
                 sequence: None,

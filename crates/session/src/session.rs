@@ -1,32 +1,32 @@
-//! What every operation of a session shares.
+//! Common data of all session operations.
 
 use crate::event::OnEvent;
 use crate::{Registry, SessionEvent};
 use mapper_runner::Operator;
 use std::sync::atomic::AtomicBool;
 
-/// Plug-ins, somebody who looks on, and a way to stop.
+/// Plug-ins, an observer and stop flags.
 #[derive(Clone, Copy)]
 pub struct Session<'a> {
     /// The plug-ins.
     pub registry: &'a Registry,
-    /// Called with everything that happens.
+    /// Called with every event.
     pub on_event: OnEvent<'a>,
-    /// Set from outside to stop at the next sample; the rig is brought into its safe state.
+    /// Set by the caller to stop at the next sample; the rig then goes to its safe state.
     pub stop: &'a AtomicBool,
-    /// Set from outside to stop a run at the end of its step.
+    /// Set by the caller to stop a run at the end of its step.
     pub stop_after_step: &'a AtomicBool,
-    /// What the operator asks for during a run besides; `None`: nobody can.
+    /// Other operator requests during a run; `None` if there is no operator.
     pub operator: Option<&'a Operator>,
-    /// Whether each step of a run is identified by itself as soon as it has ended, for whoever looks on.
+    /// Whether each step is identified separately as soon as it ends, for observers.
     pub estimates: bool,
 }
 
-/// Nobody stops a session that was opened without a flag.
+/// Stop flag of a session that is never stopped.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 impl<'a> Session<'a> {
-    /// A session that nobody looks at and nobody stops.
+    /// A session without observer and stop flag.
     pub fn new(registry: &'a Registry) -> Self {
         Session {
             registry,
@@ -38,7 +38,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Tells whoever looks on.
+    /// Sends an event to the observer.
     pub(crate) fn tell(&self, event: SessionEvent) {
         (self.on_event)(&event);
     }

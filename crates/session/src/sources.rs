@@ -1,4 +1,4 @@
-//! A campaign's sources of channels: the rig, and what is read beside it.
+//! The data sources of a campaign: the rig and auxiliary instruments.
 
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
@@ -8,14 +8,14 @@ use mapper_physics::model::Model;
 use mapper_runner::{ReadChannel, Reader, RigWithInstruments};
 use std::time::Duration;
 
-/// Time that a reader has to connect, as a rig has.
+/// Connection timeout of an auxiliary instrument, equal to that of a rig.
 const CONNECTS_WITHIN: Duration = Duration::from_secs(11);
-/// A reader is silent that has missed so many of its own samples, and is older than any signal may be.
+/// Number of missed samples after which an instrument counts as silent, if its data are also older than the allowed signal age.
 const MISSED: f64 = 3.0;
-/// Age of a signal where no guard says another, s.
+/// Maximum signal age if no guard sets one, s.
 const USUAL_AGE_S: f64 = 3.0;
 
-/// Why a source beside the rig cannot be one.
+/// Why a source cannot serve as an auxiliary instrument.
 #[derive(Debug, thiserror::Error)]
 enum ReaderProblem {
     #[error(
@@ -28,22 +28,22 @@ enum ReaderProblem {
     Twice { channel: Channel, other: String },
 }
 
-/// The rig with its readers, and what guards have to know of these.
+/// The rig with its auxiliary instruments, and their channels for the guards.
 pub struct Sources {
-    /// As one backend.
+    /// All sources combined into one backend.
     pub backend: Box<dyn Backend>,
-    /// Every channel that is read beside the rig.
+    /// Every channel of an auxiliary instrument.
     pub read: Vec<ReadChannel>,
-    /// Names of readers that no two runs may have at once.
+    /// Names of instruments that only one run may use at a time.
     pub exclusive: Vec<String>,
 }
 
 impl Registry {
-    /// The rig of a campaign with everything that is read beside it. Nothing is connected.
+    /// The rig of a campaign with all auxiliary instruments, not yet connected.
     ///
     /// # Errors
-    /// As [`Registry::make_backend`]; [`SessionError::Reader`] for a source that is not one, gives other channels than are wanted, or
-    /// the same as another.
+    /// As [`Registry::make_backend`]; [`SessionError::Reader`] for an invalid source, missing channels, or channels that another source also
+    /// provides.
     pub fn make_sources(&self, campaign: &Campaign, model: &Model) -> Result<Sources, SessionError> {
         let rig = self.make_backend(campaign, model)?;
         if campaign.readers.is_empty() {
@@ -80,7 +80,7 @@ impl Registry {
     }
 }
 
-/// The channels that are taken from a reader.
+/// The channels to take from an auxiliary instrument.
 fn wanted(
     choice: &ReaderChoice,
     rig: &RigDescription,
@@ -103,7 +103,7 @@ fn wanted(
                     rig.channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ");
                 return wrong(below("channels"), ReaderProblem::Lacks { channel: *channel, gives });
             }
-            // What is listed is meant: the rig's own is left out.
+            // A listed channel replaces the rig's own.
             for channel in listed {
                 if let Some(other) = from(channel, taken).filter(|other| other != "the rig") {
                     return wrong(below("channels"), ReaderProblem::Twice { channel: *channel, other });

@@ -1,4 +1,4 @@
-//! A plan from a file, which anybody may have written: held against what it was made from, and against all that a plan may ask for.
+//! Reads a plan from an untrusted file and checks it against its inputs and the limits of all plans.
 
 use crate::SessionError;
 use crate::files::read_at_most;
@@ -6,32 +6,32 @@ use mapper_campaign::Campaign;
 use mapper_core::{MadeFrom, OperatingPoint, Plan, PlanStep, step_number};
 use std::path::Path;
 
-/// Largest plan file that is read, bytes.
+/// Maximum size of a plan file, bytes.
 const FILE_MAX_BYTES: u64 = 32 << 20;
-/// Steps at most.
+/// Maximum number of steps.
 const STEPS_MAX: usize = 20_000;
-/// Shortest step, s, and slowest point, rpm: less is none.
+/// Minimum duration of a step, s, and minimum speed of a point, rpm.
 const DWELL_MIN_S: f64 = 0.1;
 const SPEED_MIN_RPM: f64 = 1.0;
 /// Longest step, warm-up or cool-down, s: a day, as in campaigns.
 const STEP_MAX_S: f64 = 86_400.0;
 /// Longest run, s: two weeks.
 const RUN_MAX_S: f64 = 14.0 * 86_400.0;
-/// A plan's own numbers went through a file: so far they may lie beyond a limit, ratio.
+/// Relative tolerance on limits, because the plan's numbers were rounded in a file.
 const ROUNDING_RATIO: f64 = 1e-9;
 
-/// A plan from a file, refused where what it was made from is no longer `now`.
+/// Reads a plan from a file and rejects it if its inputs differ from `now`.
 ///
 /// # Errors
-/// [`SessionError::StalePlan`] with what has changed; [`SessionError::NotAPlan`] and [`SessionError::File`] where the
-/// file does not hold a plan; [`SessionError::WrongPlan`] where it asks for what no plan may ask for.
+/// [`SessionError::StalePlan`] with the differences; [`SessionError::NotAPlan`] and [`SessionError::File`] if the file does not contain a plan;
+/// [`SessionError::WrongPlan`] if the plan violates a limit.
 pub fn stored_plan(path: &Path, now: &MadeFrom, campaign: &Campaign) -> Result<Plan, SessionError> {
     let bytes = read_at_most(path, FILE_MAX_BYTES)?;
     let wrong = |why: String| SessionError::WrongPlan { path: path.to_owned(), why };
     let stored: Plan = serde_json::from_slice(&bytes)
         .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
     let then = &stored.made_from;
-    // A plan that was made without a rig may be run on any.
+    // A plan made without a rig may be run on any rig.
     let other = |then: &Option<String>, now: &Option<String>| {
         then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
     };
@@ -47,14 +47,14 @@ pub fn stored_plan(path: &Path, now: &MadeFrom, campaign: &Campaign) -> Result<P
     if !changed.is_empty() {
         return Err(SessionError::StalePlan { path: path.to_owned(), changed });
     }
-    match objection(&stored, campaign) {
+    match violation(&stored, campaign) {
         None => Ok(stored),
         Some(why) => Err(wrong(why)),
     }
 }
 
-/// What is wrong with a plan, in words.
-fn objection(plan: &Plan, campaign: &Campaign) -> Option<String> {
+/// The first violation in a plan, in words.
+fn violation(plan: &Plan, campaign: &Campaign) -> Option<String> {
     if plan.steps.is_empty() || plan.steps.len() > STEPS_MAX {
         return Some(format!("it has {} steps; a plan has 1 to {STEPS_MAX}", plan.steps.len()));
     }
@@ -93,7 +93,7 @@ fn of_step(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<String>
     ] {
         let (lowest, highest) = (low * (1.0 - ROUNDING_RATIO), high * (1.0 + ROUNDING_RATIO));
         if !(lowest..=highest).contains(&value) {
-            // As digits, 1e300 would fill the screen.
+            // In plain digits, 1e300 would fill the screen.
             let value = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
             return Some(format!("asks for {what} = {value}{unit}, outside {low} to {high}{unit}"));
         }

@@ -1,4 +1,4 @@
-//! The search for surge: what holds the machine on the way, how long it will take, and the marks that came of it.
+//! The surge search: control near surge, forecast of its duration, and its marks.
 
 use crate::declared::declared;
 use mapper_campaign::Campaign;
@@ -11,8 +11,8 @@ use mapper_record::ChannelMap;
 use mapper_runner::{Held, SurgeSearch};
 use mapper_surge::{SurgeErrors, SurgeMarks, surge_marks};
 
-/// What holds the nominal machine at a point near surge or beyond its own surge line; `None` where turbine pressure or outlet
-/// temperature would leave the campaign's limits.
+/// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
+/// campaign's limits.
 pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint) -> Option<Held> {
     let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
     let held = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
@@ -29,7 +29,7 @@ pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint
     })
 }
 
-/// How long the search will take, by the nominal machine.
+/// Forecast of the search on the nominal machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurgeForecast {
     /// Speed lines.
@@ -40,7 +40,7 @@ pub struct SurgeForecast {
     pub duration_s: f64,
 }
 
-/// What the search behind a plan will take; `None` where the campaign has none.
+/// Forecast of the search after a plan; `None` if the campaign has none.
 pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option<SurgeForecast> {
     let seek = campaign.surge_search?;
     let mut ends: Vec<OperatingPoint> = Vec::new();
@@ -76,7 +76,7 @@ impl SurgeForecast {
     }
 }
 
-/// Counts in what the search behind a plan will take, and says so in its remarks.
+/// Adds the search to a plan's duration and remarks.
 pub(crate) fn count_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
     if let Some((seek, forecast)) = campaign.surge_search.zip(surge_forecast(campaign, model, plan)) {
         plan.surge_search_s = forecast.duration_s;

@@ -1,4 +1,4 @@
-//! An observer on a thread of its own: a disk that stalls for a moment holds up neither the rig nor its guards.
+//! Runs an observer on a separate thread, so that a short disk stall delays neither the rig nor its guards.
 
 use mapper_core::{Event, SampleBatch, StepMarker};
 use mapper_runner::{ObserverError, RunObserver};
@@ -6,10 +6,10 @@ use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 
-/// What may wait for the observer: some seconds of a rig's samples. Beyond them the run waits, and nothing is lost.
+/// Queue length: some seconds of samples. If the queue is full the run waits, so no data are lost.
 const WAITING_MAX: usize = 32;
 
-/// What an observer is told.
+/// Message to an observer.
 enum ObserverMessage {
     StepStart(StepMarker),
     Batch(SampleBatch),
@@ -19,13 +19,12 @@ enum ObserverMessage {
     StepHeld(StepMarker),
 }
 
-/// The observer takes no more.
+/// The observer accepts no more messages.
 #[derive(Debug, thiserror::Error)]
 #[error("nothing is recorded any more, after an error that was told before")]
 struct Gone;
 
-/// Passes what it is told on to an observer elsewhere, in order, until that one fails. Its error is told by the next call; after
-/// that every call fails.
+/// Forwards messages in order to an observer on another thread until that observer fails. The next call returns its error; all later calls fail.
 pub(crate) struct ThreadedObserver<'scope, O> {
     to_thread: SyncSender<ObserverMessage>,
     thread: ScopedJoinHandle<'scope, O>,
@@ -33,13 +32,13 @@ pub(crate) struct ThreadedObserver<'scope, O> {
 }
 
 impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
-    /// Begins.
+    /// Starts the thread.
     pub(crate) fn begin<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
-        let (to_thread, told) = sync_channel(WAITING_MAX);
+        let (to_thread, messages) = sync_channel(WAITING_MAX);
         let (fail, failed) = channel();
         let thread = scope.spawn(move || {
-            // The error is there before the end of the thread shows.
-            if let Err(error) = told.iter().try_for_each(|told| observe(&mut observer, told)) {
+            // The error must be stored before the end of the thread becomes visible.
+            if let Err(error) = messages.iter().try_for_each(|message| observe(&mut observer, message)) {
                 let _ = fail.send(error);
             }
             observer
@@ -47,7 +46,7 @@ impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
         ThreadedObserver { to_thread, thread, failed }
     }
 
-    /// Waits until the observer has seen everything, and gives it back, with its error where no call has told that.
+    /// Waits until the observer has processed all messages. Returns it with its error, if no call has returned that.
     pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
         drop(self.to_thread);
         let observer = self.thread.join().unwrap_or_else(|panicked| resume_unwind(panicked));
@@ -56,16 +55,16 @@ impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
 }
 
 impl<O> ThreadedObserver<'_, O> {
-    fn tell(&mut self, told: ObserverMessage) -> Result<(), ObserverError> {
-        match self.to_thread.send(told) {
+    fn tell(&mut self, message: ObserverMessage) -> Result<(), ObserverError> {
+        match self.to_thread.send(message) {
             Ok(()) => Ok(()),
             Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(Gone))),
         }
     }
 }
 
-fn observe(observer: &mut impl RunObserver, told: ObserverMessage) -> Result<(), ObserverError> {
-    match told {
+fn observe(observer: &mut impl RunObserver, message: ObserverMessage) -> Result<(), ObserverError> {
+    match message {
         ObserverMessage::StepStart(marker) => observer.on_step_start(&marker),
         ObserverMessage::Batch(batch) => observer.on_batch(&batch),
         ObserverMessage::Event(event) => observer.on_event(&event),
@@ -101,16 +100,16 @@ impl<O> RunObserver for ThreadedObserver<'_, O> {
     }
 }
 
-/// An observer here or aside.
+/// An observer on this thread or another.
 pub(crate) enum Placed<'scope, O> {
-    /// Where time is simulated: nothing can be late, and handing each second of it over would take longer than the second.
+    /// For simulated time: a delay does no harm, and a handover to a thread would cost more than the observer's own work.
     Here(O),
-    /// Beside a rig.
+    /// For a rig in real time.
     ThreadedObserver(ThreadedObserver<'scope, O>),
 }
 
 impl<'scope, O: RunObserver + Send + 'scope> Placed<'scope, O> {
-    /// The observer in its place.
+    /// The observer, on either thread.
     pub(crate) fn observer(&mut self) -> &mut dyn RunObserver {
         match self {
             Placed::Here(observer) => observer,
@@ -118,7 +117,7 @@ impl<'scope, O: RunObserver + Send + 'scope> Placed<'scope, O> {
         }
     }
 
-    /// As [`ThreadedObserver::end`].
+    /// Same as [`ThreadedObserver::end`].
     pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
         match self {
             Placed::Here(observer) => (observer, Ok(())),
@@ -134,7 +133,7 @@ mod tests {
     use std::io;
     use std::thread::scope;
 
-    /// Counts what it is told, and fails at a certain count.
+    /// Counts messages and fails at a given count.
     struct Counts {
         told: Vec<f64>,
         fails_at: usize,
@@ -166,7 +165,7 @@ mod tests {
         error.unwrap();
     }
 
-    /// Wherever it fails, the error is told once, and nothing that is told later passes for seen.
+    /// For a failure at any call, the error is returned once, and no later message counts as observed.
     #[test]
     fn an_error_is_told_and_nothing_after_it_passes() {
         for fails_at in [0, 1, 50, 99] {
@@ -181,7 +180,7 @@ mod tests {
             let full = io::Error::from(io::ErrorKind::StorageFull).to_string();
             let [first, later @ ..] = errors.as_slice() else { panic!("no error") };
             assert_eq!(first.as_ref().unwrap_err().to_string(), full, "{fails_at}");
-            // The end has nothing to say where a call has said it.
+            // If a call has returned the error, the end must not return it.
             if let [calls @ .., end] = later {
                 assert!(calls.iter().all(Result::is_err) && end.is_ok(), "{fails_at}");
             }

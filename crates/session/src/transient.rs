@@ -1,4 +1,4 @@
-//! One side of a machine from a log without steps: what is found of it, and which cause explains what is left.
+//! Analyses one side of a machine from a log without steps: its parameters, and the cause that explains the residual.
 
 use crate::declared::declared;
 use crate::files::{Existing, json_text, write_file};
@@ -21,18 +21,18 @@ use std::sync::Arc;
 /// Name of the report's files.
 const STEM: &str = "transient";
 
-/// What a log without steps says of one side.
+/// Result of a log without steps for one side.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Transient {
-    /// What agrees with it, whatever the cause; of the compressor side.
+    /// Findings independent of the cause; compressor side only.
     #[serde(flatten)]
     pub identified: Option<DrivenOutcome>,
-    /// Which cause explains it, against the campaign's machine.
+    /// The diagnosis of the cause, relative to the campaign's machine.
     pub why: Diagnosis,
 }
 
 impl Transient {
-    /// For people.
+    /// Text for people.
     pub fn text(&self) -> String {
         let identified =
             self.identified.as_ref().map_or_else(String::new, |found| transient_text(found) + "\n");
@@ -41,12 +41,12 @@ impl Transient {
 }
 
 impl Session<'_> {
-    /// Finds what a log without steps says of one side of its campaign's machine, and which of `effects` explains it: fitted
-    /// before `fit_until_s` (time of the log, s; all of it where none is given), predicted from there on.
+    /// Analyses a log without steps of one side of its campaign's machine, and determines which of `effects` explains it. Fits the data before
+    /// `fit_until_s` (log time, s; default: all) and predicts the later data.
     ///
     /// # Errors
-    /// [`SessionError::MachineUnknown`] where no campaign says what machine it is, [`SessionError::OtherMachine`] where it is
-    /// another, [`SessionError::Driven`] where the log has too little.
+    /// [`SessionError::MachineUnknown`] if no campaign defines the machine, [`SessionError::OtherMachine`] if it is another,
+    /// [`SessionError::Driven`] if the log has too little data.
     pub fn transient(
         &self,
         recorded: &Recorded,
@@ -88,7 +88,7 @@ impl Session<'_> {
     }
 }
 
-/// Writes text, JSON and pictures of what was found into a directory, which is made where it is missing; gives the files.
+/// Writes text, JSON and pictures of the result to a directory. Creates it if missing and returns the files.
 ///
 /// # Errors
 /// As [`write_file`].

@@ -1,4 +1,4 @@
-//! The machine that a diagnosis found, as the virtual lab of a campaign.
+//! Converts a diagnosed machine into the virtual lab of a campaign.
 
 use crate::SessionError;
 use mapper_gap::twin::{Found, TwinError};
@@ -6,7 +6,7 @@ use mapper_physics::effect::{Effect, EffectParameter};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Deviations that the virtual lab takes.
+/// Deviations that the virtual lab supports.
 const DEVIATIONS: [&str; 8] = [
     "flow_meter_gain",
     "flow_map",
@@ -18,20 +18,20 @@ const DEVIATIONS: [&str; 8] = [
     "oil_conductance",
 ];
 
-/// What the virtual lab is to be.
+/// Settings of the virtual lab.
 pub struct Twin<'a> {
-    /// The machine as found.
+    /// The identified machine.
     pub found: &'a Found,
-    /// The diagnosis that it stands in.
+    /// File of its diagnosis.
     pub source: &'a Path,
-    /// Lag of P3 behind its command, as the diagnosis takes it, s.
+    /// Lag of P3 behind its command assumed by the diagnosis, s.
     pub p3_lag_s: f64,
 }
 
-/// A campaign's text with a virtual lab that is the machine as found, in place of its backend.
+/// A campaign's text with its backend replaced by a virtual lab of the identified machine.
 ///
 /// # Errors
-/// [`TwinError::Effect`] where an effect is not in the catalogue.
+/// [`TwinError::Effect`] if an effect is not in the library.
 pub fn twin_campaign(
     campaign_text: &str,
     twin: &Twin<'_>,
@@ -40,13 +40,13 @@ pub fn twin_campaign(
     Ok(with_backend(campaign_text, &backend(twin, catalogue)?))
 }
 
-/// The block of the backend.
+/// The backend block.
 fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, TwinError> {
     let mut text = format!(
         "# The machine as found in {}; its covariance stands there.\nbackend:\n  virtual_lab:\n    start: settled\n",
         twin.source.display()
     );
-    // As the diagnosis takes them: P3 behind its declared lag, the valve at once.
+    // As in the diagnosis: P3 follows with its declared lag, the valve without lag.
     text += &format!(
         "    actuators:\n      turbine_inlet_pressure: {{lag: {} s, slew: 1000 bar/s}}\n      valve: {{lag: 0 s, slew: 1000 1/s}}\n",
         twin.p3_lag_s

@@ -1,4 +1,4 @@
-//! Files of the calibrated twin: what a diagnosis found, and a forecast under seal.
+//! Files of the calibrated model: a diagnosis, and a pre-registered prediction.
 
 use crate::SessionError;
 use crate::files::{json_text, read_at_most, write_new};
@@ -7,19 +7,19 @@ use mapper_planner::sha256_hex;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Largest diagnosis or forecast that is read, bytes.
+/// Maximum size of a diagnosis or prediction file, bytes.
 const FILE_MAX_BYTES: u64 = 64 << 20;
 
-/// What is read of a diagnosis.
+/// The fields read from a diagnosis.
 #[derive(Debug, Deserialize)]
 struct Diagnosis {
     found: Option<Found>,
 }
 
-/// What a diagnosis found, from the file that `mapper gap diagnose --json` prints.
+/// The identified machine, from the file that `mapper gap diagnose --json` prints.
 ///
 /// # Errors
-/// [`SessionError::File`] where it cannot be read, [`SessionError::TwinFile`] where it is no diagnosis.
+/// [`SessionError::File`] if it cannot be read, [`SessionError::TwinFile`] if it is not a diagnosis.
 pub fn found_in(path: &Path) -> Result<Found, SessionError> {
     let diagnosis: Diagnosis = serde_json::from_str(&text_of(path)?)
         .map_err(|error| wrong(path, format!("not a diagnosis: {error}")))?;
@@ -28,33 +28,33 @@ pub fn found_in(path: &Path) -> Result<Found, SessionError> {
     })
 }
 
-/// A forecast of the next recording, made before it is seen.
+/// A prediction of the next recording, made before that recording is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SealedForecast {
     /// Name of the campaign.
     pub campaign: String,
-    /// The machine as found, with its covariance.
+    /// The identified machine, with its covariance.
     pub found: Found,
-    /// The ends of the planned steps: value and half the width of the 95 % band.
+    /// Expected values at the ends of the planned steps, with the half-width of the 95 % interval.
     pub steps: Vec<Expected>,
 }
 
 impl SealedForecast {
-    /// Writes a new file; its SHA-256 is the seal.
+    /// Writes a new file and returns its SHA-256.
     ///
     /// # Errors
-    /// [`SessionError::File`] where the file exists or cannot be written.
+    /// [`SessionError::File`] if the file exists or cannot be written.
     pub fn write(&self, path: &Path) -> Result<String, SessionError> {
         let text = json_text(self)?;
         write_new(path, text.as_bytes())?;
         Ok(sha256_hex(&text))
     }
 
-    /// The forecast of a file, and its seal. `wanted`: the seal that it must have, in digits of either case.
+    /// Reads a prediction and its SHA-256. `wanted`: the required hash, in digits of either case.
     ///
     /// # Errors
-    /// [`SessionError::File`] where it cannot be read, [`SessionError::TwinFile`] where it has another seal or is no forecast.
+    /// [`SessionError::File`] if it cannot be read, [`SessionError::TwinFile`] if it has another hash or is not a prediction.
     pub fn read(path: &Path, wanted: Option<&str>) -> Result<(SealedForecast, String), SessionError> {
         let text = text_of(path)?;
         let seal = sha256_hex(&text);

@@ -1,4 +1,4 @@
-//! Machines of one kind that differ: what a nightly campaign runs one after the other instead of one nominal machine.
+//! Variants of a machine: a nightly campaign runs them in turn instead of the nominal machine.
 
 use mapper_campaign::Campaign;
 use serde::{Deserialize, Serialize};
@@ -6,26 +6,26 @@ use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Column with the name of the machine.
+/// Column of the serial number.
 const NAME: &str = "serial_number";
-/// Largest table of machines, bytes.
+/// Maximum size of a table of machines, bytes.
 const SIZE_LIMIT: u64 = 10_000_000;
-/// Most settings of one machine.
+/// Maximum number of settings of one machine.
 const COLUMNS_LIMIT: usize = 64;
-/// Seeds of drawn machines begin here, far from those of campaigns: a machine keeps its own whatever the night draws.
+/// First seed of drawn machines, far above those of campaigns. A machine keeps its own seed for any number of drawn machines.
 const FIRST_DRAWN_SEED: u64 = 1_000_000;
 
-/// One machine: where the simulated one differs from what the campaign declares.
+/// One machine, as differences between the simulated machine and the campaign's declarations.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variant {
-    /// Its serial number; results are kept by it.
+    /// Its serial number, the key of its results.
     pub serial_number: String,
-    /// Settings of the backend by their path, e.g. `deviations.compressor_efficiency`: `-2 %`.
+    /// Backend settings by path, e.g. `deviations.compressor_efficiency`: `-2 %`.
     pub settings: BTreeMap<String, String>,
 }
 
-/// Why there are no machines.
+/// Why the machines cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum VariantError {
     /// The table cannot be read.
@@ -33,10 +33,10 @@ pub enum VariantError {
     Read {
         /// The table.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// The table is larger than any production.
+    /// The table is too large.
     #[error("{} has {bytes} bytes; a table of machines has at most {SIZE_LIMIT}", .path.display())]
     TooLarge {
         /// The table.
@@ -44,23 +44,23 @@ pub enum VariantError {
         /// Its size.
         bytes: u64,
     },
-    /// A row has not the form of the others.
+    /// A row has the wrong form.
     #[error("{}: {source}", .path.display())]
     Form {
         /// The table.
         path: PathBuf,
-        /// Where and why.
+        /// Location and reason.
         source: csv::Error,
     },
-    /// The table as a whole is wrong.
+    /// The table as a whole is invalid.
     #[error("{}: {problem}", .path.display())]
     Table {
         /// The table.
         path: PathBuf,
-        /// What is wrong and what would be right.
+        /// The problem and its correction.
         problem: String,
     },
-    /// A setting goes into something that holds no settings.
+    /// The path of a setting leads into a plain value.
     #[error(
         "machine {serial_number}: the campaign has no settings at `{key}`, but `{there}`; leave the column out, or change the campaign"
     )]
@@ -69,14 +69,14 @@ pub enum VariantError {
         serial_number: String,
         /// The column.
         key: String,
-        /// What stands in its way.
+        /// The value at that path.
         there: String,
     },
 }
 
 impl Variant {
-    /// Reads a table: a header with `serial_number` and paths of settings below the campaign's backend, then a machine a row; comma or
-    /// semicolon between columns, an empty cell for what is as the campaign says. Lines that begin with `#` are remarks.
+    /// Reads a table: a header with `serial_number` and paths of settings below the campaign's backend, then one machine per row. Columns are
+    /// separated by comma or semicolon; an empty cell keeps the campaign's value. Lines that begin with `#` are comments.
     ///
     /// # Errors
     /// [`VariantError`] with the line.
@@ -98,7 +98,7 @@ impl Variant {
         let wrong_at = |line: u64, column: usize, problem: &str| {
             wrong(format!("{problem}\n{}", shown(text, line, column, delimiter)))
         };
-        // A row is too short or too long behind its last cell.
+        // A row with too few or too many cells is marked after its last cell.
         let form = |error: csv::Error| match error.kind() {
             csv::ErrorKind::UnequalLengths { pos: Some(at), expected_len, len } => wrong_at(
                 at.line(),
@@ -147,7 +147,7 @@ impl Variant {
         Ok(machines)
     }
 
-    /// Machines drawn from the tolerances that the campaign declares: the same ones whenever they are asked for.
+    /// Machines drawn from the campaign's declared tolerances. Repeated calls return the same machines.
     pub fn drawn(campaign: &Campaign, count: usize) -> Vec<Variant> {
         let kind = campaign.machine.serial_number.as_deref().unwrap_or(&campaign.machine.name);
         (0..count)
@@ -164,7 +164,7 @@ impl Variant {
     /// Puts the machine into a campaign.
     ///
     /// # Errors
-    /// [`VariantError::Occupied`]. Whether the backend knows a setting, the backend says.
+    /// [`VariantError::Occupied`]. The backend itself checks for unknown settings.
     pub fn put_into(&self, campaign: &mut Campaign) -> Result<(), VariantError> {
         campaign.machine.serial_number = Some(self.serial_number.clone());
         for (key, text) in &self.settings {
@@ -186,7 +186,7 @@ impl Variant {
     }
 }
 
-/// A line of the table with a caret below the begin of one of its cells, or behind the last.
+/// A line of the table with a caret below the start of a cell, or after the last cell.
 fn shown(text: &str, line: u64, column: usize, delimiter: char) -> String {
     let number = line.to_string();
     let index = usize::try_from(line.saturating_sub(1)).unwrap_or(usize::MAX);

@@ -1,15 +1,15 @@
-//! What the rest before a campaign will leave of the offsets, and what a longer one would.
+//! Forecast of the offset uncertainty after the soak of a campaign, and after a longer soak.
 
 use crate::declared::identification;
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, with_unit};
 use mapper_identify::{ZeroSettings, expected_after_zero};
 
-/// Channels whose offsets decide what efficiencies are worth.
+/// Channels whose offsets dominate the error of efficiency.
 const CHANNELS: [Channel; 5] = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
-/// How much longer the rest is that is held against the one that is planned.
+/// Duration ratio of the longer soak to the planned one.
 const LONGER_RATIO: f64 = 2.0;
-/// Share of an offset that a longer rest has to take away to be worth a word.
+/// Minimum relative reduction of an offset by a longer soak that is reported.
 const WORTH_IT_RATIO: f64 = 0.3;
 
 /// One sentence for a plan's remarks; `None` without a zero or without declared offsets.
@@ -62,7 +62,7 @@ mod tests {
         let mut campaign = shipped::campaign(&[]);
         let half_an_hour = sentence(&campaign).unwrap();
         assert!(half_an_hour.contains("the rest of 30 min leaves"), "{half_an_hour}");
-        // The housing alone is still on its way; the other sensors have averaged for as long as they will.
+        // Only the housing has not settled; averaging no longer improves the other sensors.
         assert!(half_an_hour.contains("60 min would leave Tc"), "{half_an_hour}");
         let soak = campaign.zero.as_mut().unwrap();
         soak.duration_s = 4.0 * 3600.0;

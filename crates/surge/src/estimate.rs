@@ -1,32 +1,32 @@
-//! The surge flow, as far as the looks so far tell.
+//! Estimates the surge flow from the readings so far.
 
 use crate::growth_law::{GrowthLaw, Read, excess, log_likelihood};
 use crate::smooth::Smoothed;
 use crate::surge_reading::{LOOKED_AT, SurgeReading};
 use mapper_numerics::statistics::mean;
 
-/// Exponents by which the variance grows with the inverse of the margin, with their weights before anything was read: theory
-/// says 1, rigs differ.
+/// Exponents of the growth of the variance with the inverse margin, with their prior probabilities: theory predicts 1, and rigs
+/// differ.
 const EXPONENTS: [(f64, f64); 5] = [(0.8, 0.1), (0.9, 0.2), (1.0, 0.4), (1.12, 0.2), (1.25, 0.1)];
-/// Margins at which the growth may begin, equally likely; the first is that of a growth without begin.
+/// Margins at which the growth may begin, with equal prior probability; the first one means growth everywhere.
 const ONSETS: [f64; 8] = [10.0, 0.5, 0.35, 0.28, 0.22, 0.17, 0.13, 0.1];
-/// Places of the surge flow below the smallest one seen: smallest and largest distance, ratio, and how many. All distances are
-/// equally likely before anything was read, each on the scale of its own size.
+/// Candidate surge flows below the smallest measured flow: smallest and largest relative distance, and their number. The prior
+/// is uniform in the logarithm of the distance.
 const DISTANCES: (f64, f64, usize) = (1e-3, 0.4, 90);
-/// Looks at the begin of an approach that are far from surge: they tell the level.
+/// Readings at the start of an approach that are far from surge: they define the quiet level.
 const QUIET: usize = 3;
-/// Fewest looks that stand out before the law is carried on.
+/// Minimum number of readings with significant growth before the law is extrapolated.
 const MIN_GROWN: usize = 3;
-/// Largest variance over the quiet level below which nothing is concluded: where growth begins, it looks like that before surge.
+/// Minimum ratio of the largest variance to the quiet level: the onset of growth alone resembles a distant surge.
 const WELL_GROWN_RATIO: f64 = 6.0;
-/// How much likelier a look must be with growth than at the quiet level, natural logarithm, before it stands out: by chance
-/// that happens once in some thousand looks.
-const STANDS_OUT: f64 = 7.0;
+/// Log-likelihood ratio of growth to the quiet level above which growth is significant: chance exceeds it once in some thousand
+/// readings.
+const MIN_EXCESS: f64 = 7.0;
 
-/// Standard error of the distance to surge that the law itself may make, ratio: no rig follows it quite.
+/// Standard error of the distance to surge due to the law itself, ratio: no rig follows it exactly.
 const LAW_ERROR_RATIO: f64 = 0.25;
 
-/// What is known of the surge flow of a line, at the speed of its last look.
+/// Estimate of the surge flow of a line, at the speed of its last reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurgeEstimate {
     /// Corrected flow at surge, kg/s.
@@ -37,14 +37,14 @@ pub struct SurgeEstimate {
     pub highest_flow_kg_s: f64,
     /// Smallest corrected flow so far, kg/s.
     pub closest_flow_kg_s: f64,
-    /// Whether the variation has grown enough, at enough looks; the other values have little meaning where it does not.
+    /// Whether the variation has grown enough, at enough readings; otherwise the other values have little meaning.
     pub seen: bool,
-    /// Whether the variation has begun to grow, by however few looks.
+    /// Whether the variation has begun to grow, at any number of readings.
     pub grows: bool,
 }
 
 impl SurgeEstimate {
-    /// The estimate from looks at ever smaller openings; `None` below four of them.
+    /// The estimate from readings at decreasing openings; `None` for fewer than four.
     pub fn of(looks: &[SurgeReading]) -> Option<Self> {
         if looks.len() < 4 {
             return None;
@@ -52,9 +52,9 @@ impl SurgeEstimate {
         let Smoothed { flows_kg_s, flow_error_ratio } = Smoothed::of(looks)?;
         let closest_flow_kg_s = flows_kg_s.iter().copied().fold(f64::INFINITY, f64::min);
         let levels: Vec<Option<f64>> = (0..LOOKED_AT.len()).map(|channel| level(looks, channel)).collect();
-        let stands_out = |look: &SurgeReading| {
+        let is_significant = |look: &SurgeReading| {
             let channels = look.variations.iter().zip(&levels);
-            channels.filter_map(|(read, level)| Some(excess((*read)?, (*level)?))).sum::<f64>() > STANDS_OUT
+            channels.filter_map(|(read, level)| Some(excess((*read)?, (*level)?))).sum::<f64>() > MIN_EXCESS
         };
         let well_grown = |look: &SurgeReading| {
             let mut channels = look.variations.iter().zip(&levels);
@@ -62,7 +62,7 @@ impl SurgeEstimate {
                 read.zip(*level).is_some_and(|(read, level)| read.variance >= WELL_GROWN_RATIO * level)
             })
         };
-        let grown = looks.iter().rev().take_while(|look| stands_out(look)).count();
+        let grown = looks.iter().rev().take_while(|look| is_significant(look)).count();
         let places = places(closest_flow_kg_s);
         let mut logs: Vec<(usize, f64)> = Vec::new();
         for (place, surge_kg_s) in places.iter().enumerate() {
@@ -93,7 +93,7 @@ impl SurgeEstimate {
         let middle = places.iter().zip(&weights).map(|(flow, w)| flow * w).sum::<f64>() / all;
         let variance =
             places.iter().zip(&weights).map(|(flow, w)| (flow - middle).powi(2) * w).sum::<f64>() / all;
-        // Places come from the nearest to the farthest: from the highest flow down.
+        // Candidates are ordered from the highest flow to the lowest.
         let mut above = 0.0;
         let highest = places.iter().zip(&weights).find(|(_, weight)| {
             above += **weight;
@@ -118,16 +118,16 @@ impl SurgeEstimate {
     }
 }
 
-/// The variance of a channel while surge is far.
+/// The variance of a channel far from surge.
 fn level(looks: &[SurgeReading], channel: usize) -> Option<f64> {
     let quiet: Vec<f64> =
         looks.iter().take(QUIET).filter_map(|look| Some(look.variations[channel]?.variance)).collect();
     mean(&quiet)
 }
 
-/// Surge flows to be weighed, from the highest down, kg/s.
+/// Candidate surge flows, from the highest down, kg/s.
 fn places(closest_flow_kg_s: f64) -> Vec<f64> {
-    let (least, most, count) = DISTANCES;
-    let step = (most / least).ln() / (count - 1) as f64;
-    (0..count).map(|i| closest_flow_kg_s * (1.0 - least * (step * i as f64).exp())).collect()
+    let (min, max, count) = DISTANCES;
+    let step = (max / min).ln() / (count - 1) as f64;
+    (0..count).map(|i| closest_flow_kg_s * (1.0 - min * (step * i as f64).exp())).collect()
 }

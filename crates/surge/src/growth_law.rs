@@ -1,37 +1,37 @@
-//! The law by which a variation grows, fitted to what was read: a level, and a part that has no bound at surge.
+//! The growth law of the variation, fitted to the readings: a constant level, and a part that diverges at surge.
 
 use crate::variation::Variation;
 
-/// How the growing part goes with the surge margin.
+/// Dependence of the growing part on the surge margin.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GrowthLaw {
-    /// The variance goes with the inverse of the margin to this power: 1 by theory.
+    /// The variance is proportional to the inverse of the margin to this power: 1 by theory.
     pub(crate) exponent: f64,
-    /// Margin at which it begins.
+    /// Margin at which the growth begins.
     pub(crate) onset_ratio: f64,
 }
 
 impl GrowthLaw {
-    /// The growing part at a margin, up to a factor.
+    /// The growing part at a margin, without its scale factor.
     pub(crate) fn part(self, margin_ratio: f64) -> f64 {
         let part = |margin: f64| margin.max(1e-6).powf(-self.exponent);
         (part(margin_ratio) - part(self.onset_ratio)).max(0.0)
     }
 }
 
-/// The growing part up to a factor, and the variation that was read there.
+/// The growing part without its scale factor, and the measured variation at that reading.
 pub(crate) type Read = (f64, Variation);
 
-/// Rounds of the reweighted fit; the variance moves by less than its own error from one to the next.
+/// Iterations of the reweighted fit; the variance then changes by less than its own error.
 const ROUNDS: usize = 5;
 
-/// Logarithm of the likelihood of a channel's variations for the most likely level and size, neither negative. A variance of
-/// so many degrees of freedom follows a chi-squared law.
+/// Log-likelihood of a channel's variations at the most likely non-negative level and size. A variance follows a chi-squared
+/// distribution with its degrees of freedom.
 pub(crate) fn log_likelihood(read: &[Read]) -> f64 {
-    let least = 0.2 * read.iter().map(|(_, v)| v.variance).fold(f64::INFINITY, f64::min);
+    let level_min = 0.2 * read.iter().map(|(_, v)| v.variance).fold(f64::INFINITY, f64::min);
     let mut expected: Vec<f64> = read.iter().map(|(_, variation)| variation.variance).collect();
     for _ in 0..ROUNDS {
-        // Weighted least squares; the weights are those of variances.
+        // Weighted least squares; the weights are inverse variances of the measured variances.
         let (mut s, mut sg, mut sgg, mut sv, mut sgv) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for ((part, variation), expected) in read.iter().zip(&expected) {
             let weight = variation.degrees_of_freedom / (expected * expected);
@@ -45,8 +45,8 @@ pub(crate) fn log_likelihood(read: &[Read]) -> f64 {
         let slope = if determinant > 1e-12 * s * sgg { (s * sgv - sg * sv) / determinant } else { 0.0 };
         let mut size = slope.max(0.0);
         let mut level = (sv - size * sg) / s;
-        if level < least {
-            level = least;
+        if level < level_min {
+            level = level_min;
             size = if sgg > 0.0 { ((sgv - level * sg) / sgg).max(0.0) } else { 0.0 };
         }
         for ((part, _), expected) in read.iter().zip(&mut expected) {
@@ -61,7 +61,7 @@ pub(crate) fn log_likelihood(read: &[Read]) -> f64 {
         .sum()
 }
 
-/// By how much likelier a variance is any than that of a known level, natural logarithm; 0 where it is smaller.
+/// Log-likelihood ratio of a free variance to one of known level; 0 if the variance is smaller.
 pub(crate) fn excess(read: Variation, level: f64) -> f64 {
     let ratio = read.variance / level;
     if ratio > 1.0 { 0.5 * read.degrees_of_freedom * (ratio - 1.0 - ratio.ln()) } else { 0.0 }

@@ -1,8 +1,8 @@
-//! The surge line, sought by what comes before it: pressures and flow vary ever more as the valve closes.
+//! Estimates the surge line from its precursors: the variation of pressures and flow grows as the valve closes.
 //!
-//! A [`SurgeReading`] is what was read at one opening. [`SurgeEstimate`] carries the growth of the variation on to the flow at which
-//! it would have no bound, [`next_move`] says how far the valve may be closed by it, and [`surge_marks`] finds the marks of a
-//! whole recording by the same rules. docs/maps.md describes them.
+//! A [`SurgeReading`] holds the readings at one opening. [`SurgeEstimate`] extrapolates the growth of the variation to the flow at
+//! which it would diverge. [`next_move`] limits the next closing of the valve, and [`surge_marks`] applies the same rules to a whole
+//! recording. docs/maps.md describes them.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

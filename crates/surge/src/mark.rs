@@ -1,4 +1,4 @@
-//! The surge marks of a recording: one for each line whose surge was sought.
+//! The surge marks of a recording: one for each line with a surge search.
 
 use crate::estimate::SurgeEstimate;
 use crate::surge_reading::SurgeReading;
@@ -8,7 +8,7 @@ use mapper_core::{
 };
 use std::collections::BTreeMap;
 
-/// Declared errors that a mark takes over.
+/// Declared sensor errors that enter a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SurgeErrors {
     /// Gain of the flow meter, one standard deviation, ratio.
@@ -20,7 +20,7 @@ pub struct SurgeErrors {
 }
 
 impl SurgeErrors {
-    /// What is declared of flow meter and pressures.
+    /// The declared errors of flow meter and pressures.
     pub fn of(declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Self {
         let of = |channel: Channel| declared.get(&channel).copied();
         SurgeErrors {
@@ -31,14 +31,14 @@ impl SurgeErrors {
     }
 }
 
-/// What the approaches of a recording give.
+/// Results of the approaches in a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SurgeMarks {
     /// Marks in order of speed.
     pub marks: Vec<SurgeMark>,
     /// Lines on which surge was not found, in words.
     pub remarks: Vec<String>,
-    /// How often the compressor went into surge on the way.
+    /// Number of surge events during the approaches.
     pub surges: usize,
 }
 
@@ -70,7 +70,7 @@ pub fn surge_marks(recording: &Recording, reference: ReferenceState, errors: Sur
     found
 }
 
-/// Steps of each approach: of one speed, the valve never opened from one to the next.
+/// Steps of each approach: one speed, and a valve that never opens.
 fn approaches(steps: &[StepMarker]) -> Vec<Vec<StepMarker>> {
     let mut approaches: Vec<Vec<StepMarker>> = Vec::new();
     let mut returned = false;
@@ -83,7 +83,7 @@ fn approaches(steps: &[StepMarker]) -> Vec<Vec<StepMarker>> {
             approaches.push(vec![*step]);
             returned = false;
         } else if opens || returned {
-            // The return from the line.
+            // The return from the end of the line.
             returned = true;
         } else if let Some(approach) = approaches.last_mut() {
             approach.push(*step);
@@ -105,7 +105,7 @@ fn mark(
         Some(surged_at_ratio) => {
             let high = last.flow_corrected_kg_s;
             let low = high * surged_at_ratio / last.valve_opening_ratio;
-            // Anywhere between the two with equal probability.
+            // Equal probability anywhere between the two.
             (0.5 * (low + high), (high - low) / 12.0f64.sqrt(), high)
         }
         None => {
@@ -133,7 +133,7 @@ fn mark(
     })
 }
 
-/// Pressure ratio carried on along the last looks as a straight line in flow, and what that may be off by.
+/// Pressure ratio extrapolated linearly in flow from the last readings, with its standard error.
 fn pressure_ratio_at(looks: &[SurgeReading], last: &SurgeReading, flow_kg_s: f64) -> (f64, f64) {
     const TAKEN: usize = 5;
     let taken = &looks[looks.len().saturating_sub(TAKEN)..];
@@ -153,7 +153,7 @@ fn pressure_ratio_at(looks: &[SurgeReading], last: &SurgeReading, flow_kg_s: f64
         slope += (x - flow) * (y - ratio);
     }
     let slope = if along > 0.0 { (slope / along).min(0.0) } else { 0.0 };
-    // The line flattens towards surge: between what was seen last and the straight line.
+    // The line flattens towards surge: the value lies between the last reading and the straight line.
     let highest = ratio + slope * (flow_kg_s - flow);
     let seen = last.pressure_ratio;
     (0.5 * (highest + seen), (highest - seen).abs() / 12.0f64.sqrt())

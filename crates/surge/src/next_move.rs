@@ -1,46 +1,46 @@
-//! How far the valve may be closed by what is known.
+//! Decides how far the valve may be closed in the next step.
 
 use crate::estimate::SurgeEstimate;
 use crate::surge_reading::SurgeReading;
 use mapper_core::SurgeSeek;
 
-/// What to do at the end of a look.
+/// Decision after a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Move {
-    /// Go to this opening, relative to the nominal area; where it is the one of the last look, look again.
+    /// Go to this opening, relative to the nominal area; if it is the opening of the last reading, repeat the reading.
     To(f64),
     /// The line is done.
     Done(Why),
 }
 
-/// Why a line is done.
+/// Why a line is finished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Why {
-    /// The surge flow is known as well as was asked for.
+    /// The surge flow is known with the required accuracy.
     Known,
-    /// Closing further would go nearer than was asked for, or than is safe by what is known.
+    /// Closing further would violate the required distance or the safe distance.
     NearEnough,
-    /// So many steps were made.
+    /// The maximum number of steps was reached.
     Steps,
 }
 
-/// Step of the opening while the nominal map says that surge is far, ratio.
+/// Step of the opening while surge is far by the nominal map, ratio.
 const FAR_STEP_RATIO: f64 = 0.08;
-/// Surge margin of the nominal map beyond which surge is far, ratio: its surge line is a guess.
+/// Surge margin of the nominal map beyond which surge is far, ratio: the nominal surge line is uncertain.
 const FAR_MARGIN_RATIO: f64 = 0.35;
-/// Step that may be made whatever the highest possible surge flow, ratio: what grows would have grown more at this opening if
-/// surge were as near as that, and only looks further on can tell.
+/// Step that is allowed whatever the highest possible surge flow, ratio. If surge were that near, the variation would already be
+/// larger at this opening, and only further readings can decide.
 const SMALL_STEP_RATIO: f64 = 0.007;
-/// The law is not carried on from farther than so many times the smallest margin: how it begins is any rig's own.
+/// Maximum extrapolation of the law, in multiples of the smallest margin: the start of the growth differs between rigs.
 const TRUSTED_MARGINS: f64 = 1.4;
-/// Distance that is kept from the highest surge flow that is possible, ratio.
+/// Minimum distance to the highest possible surge flow, ratio.
 const KEPT_RATIO: f64 = 0.005;
-/// Smallest step that is worth the time, ratio.
+/// Minimum useful step, ratio.
 const MIN_STEP_RATIO: f64 = 0.004;
-/// Looks at one opening at most.
+/// Maximum number of readings at one opening.
 const MAX_LOOKS: usize = 3;
 
-/// Looks that a line will take on a machine like the nominal one, from a surge margin on.
+/// Expected number of readings of a line on a machine like the nominal one, from a surge margin on.
 pub fn expected_looks(margin_ratio: f64, seek: &SurgeSeek) -> usize {
     let (mut flow, mut looks) = (1.0 + margin_ratio, 1);
     while flow > 1.0 + 1.3 * seek.closest_margin_ratio && looks < seek.most_steps {
@@ -48,12 +48,12 @@ pub fn expected_looks(margin_ratio: f64, seek: &SurgeSeek) -> usize {
         flow *= 1.0 - if far { FAR_STEP_RATIO.max(seek.step_ratio) } else { seek.step_ratio };
         looks += 1;
     }
-    // Some more where the line is nearest: there the steps get smaller.
+    // A few more near surge, where the steps get smaller.
     (looks + 3).min(seek.most_steps)
 }
 
-/// The next move after these looks, at least one. `nominal_margin_ratio`: surge margin that the nominal machine has at the
-/// last opening; `None` where it is not known.
+/// The next move after these readings, of which there is at least one. `nominal_margin_ratio`: surge margin of the nominal machine
+/// at the last opening; `None` if unknown.
 pub fn next_move(looks: &[SurgeReading], seek: &SurgeSeek, nominal_margin_ratio: Option<f64>) -> Move {
     let Some(last) = looks.last() else { return Move::Done(Why::Steps) };
     if looks.len() >= seek.most_steps {
@@ -64,7 +64,7 @@ pub fn next_move(looks: &[SurgeReading], seek: &SurgeSeek, nominal_margin_ratio:
     let Some(estimate) = estimate.filter(|estimate| estimate.seen) else {
         let far = nominal_margin_ratio.is_some_and(|margin| margin > FAR_MARGIN_RATIO);
         let step = match estimate {
-            // Something grows, but not at enough openings to tell how fast.
+            // The variation grows, but at too few openings to estimate how fast.
             Some(estimate) if estimate.grows => 0.5 * seek.step_ratio,
             _ if far => FAR_STEP_RATIO.max(seek.step_ratio),
             _ => seek.step_ratio,
@@ -76,7 +76,7 @@ pub fn next_move(looks: &[SurgeReading], seek: &SurgeSeek, nominal_margin_ratio:
     if near && estimate.standard_error_ratio() <= seek.wanted_standard_error_ratio {
         return Move::Done(Why::Known);
     }
-    // Near surge pressures hardly change with flow: the flow goes with the opening.
+    // Near surge, pressures hardly change with flow: the flow is proportional to the opening.
     let flow_kg_s = estimate.closest_flow_kg_s;
     let possible_kg_s = estimate.flow_corrected_kg_s + 2.0 * estimate.standard_error_kg_s;
     let safe_kg_s = possible_kg_s.max(estimate.highest_flow_kg_s) * (1.0 + KEPT_RATIO);

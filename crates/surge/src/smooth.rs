@@ -1,23 +1,23 @@
-//! Flows of the looks, freed of the noise that single means have: flow is a smooth function of the opening.
+//! Smoothed flows of the readings: the flow is a smooth function of the valve opening, which reduces the noise of single means.
 
 use crate::surge_reading::SurgeReading;
 use nalgebra::{Matrix3, Vector3};
 
-/// Flows and pressure ratios at one speed, in the order of the looks.
+/// Flows and pressure ratios at one speed, in the order of the readings.
 #[derive(Debug, Clone)]
 pub(crate) struct Smoothed {
-    /// Corrected flow at the speed of the last look, kg/s.
+    /// Corrected flow at the speed of the last reading, kg/s.
     pub(crate) flows_kg_s: Vec<f64>,
-    /// Standard error of such a flow, as the scatter about the curve shows it, ratio.
+    /// Relative standard error of the smoothed flow, from the scatter about the curve.
     pub(crate) flow_error_ratio: f64,
 }
 
-/// Openings within this of the smallest one take part: beyond, a parabola is no curve of a valve.
+/// Range of openings above the smallest one that is fitted: beyond it a parabola does not describe a valve.
 const REACH_RATIO: f64 = 1.7;
 
 impl Smoothed {
-    /// Flows brought to the speed of the last look by similarity, through which the logarithm of flow goes as a parabola of
-    /// that of the opening. As measured where there are fewer than five looks.
+    /// Flows converted to the speed of the last reading by similarity, then smoothed by a parabola of the logarithm of flow over
+    /// the logarithm of the opening. With fewer than five readings the flows are as measured.
     pub(crate) fn of(looks: &[SurgeReading]) -> Option<Self> {
         let last = looks.last()?;
         let to_speed = |look: &SurgeReading| {
@@ -39,8 +39,8 @@ impl Smoothed {
         let parabola = inverse * right;
         let flow = |look: &SurgeReading| row(place(look)).dot(&parabola);
         let pairs = || looks.iter().zip(&measured).filter(|(look, _)| taken(look));
-        let left: f64 = pairs().map(|(look, measured)| (measured.ln() - flow(look)).powi(2)).sum();
-        let sigma_ratio = (left / (count - 3).max(1) as f64).sqrt();
+        let residual: f64 = pairs().map(|(look, measured)| (measured.ln() - flow(look)).powi(2)).sum();
+        let sigma_ratio = (residual / (count - 3).max(1) as f64).sqrt();
         let at_last = row(0.0);
         let flows_kg_s = looks
             .iter()

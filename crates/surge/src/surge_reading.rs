@@ -1,10 +1,10 @@
-//! What was read at one opening of the valve on the way to surge.
+//! The readings at one opening of the valve during an approach to surge.
 
 use crate::variation::Variation;
 use mapper_core::{Channel, Recording, ReferenceState, StepMarker, SurgeSeek};
 use mapper_numerics::statistics::mean;
 
-/// Channels whose variation tells of surge.
+/// Channels whose variation indicates surge.
 pub const LOOKED_AT: [Channel; 3] = [Channel::P2, Channel::CompressorFlow, Channel::P1];
 
 /// Means and variation at one opening.
@@ -24,13 +24,13 @@ pub struct SurgeReading {
     pub pressure_ratio: f64,
     /// Total inlet pressure P1, Pa.
     pub p1_pa: f64,
-    /// Variation of [`LOOKED_AT`]; `None` where a channel was not read often enough.
+    /// Variation of [`LOOKED_AT`]; `None` if a channel has too few samples.
     pub variations: [Option<Variation>; LOOKED_AT.len()],
 }
 
 impl SurgeReading {
-    /// The look at a step, from [`SurgeSeek::SETTLE_S`] after its start on. `None` where a mean cannot be formed or nothing
-    /// is known of any variation: the step was too short, or a channel is missing.
+    /// The reading of a step, from [`SurgeSeek::SETTLE_S`] after its start on. `None` if a mean or every variation is unknown:
+    /// the step was too short, or a channel is missing.
     pub fn of(recording: &Recording, step: &StepMarker, reference: ReferenceState) -> Option<Self> {
         let samples = |channel: Channel| -> Option<(Vec<f64>, Vec<f64>)> {
             let series = recording.series.get(&channel)?;

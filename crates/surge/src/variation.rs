@@ -1,26 +1,26 @@
-//! How much a channel varies at one opening: fast, with the slow part taken out.
+//! The fast variation of a channel at one opening, without its slow drift.
 
-/// Length of the pieces in which a straight line is taken out, s: drift is none of surge's, and what is
-/// sampled too slowly may come out slow.
+/// Length of the segments that are detrended by a straight line, s. Drift is not due to surge, and slow sampling may fold fast
+/// oscillations to low frequencies.
 const PIECE_S: f64 = 5.0;
-/// Fewest samples of a piece that counts.
+/// Minimum number of samples in a segment.
 const MIN_SAMPLES: usize = 10;
-/// Lags over which samples may have something in common; fewer than the samples of a piece.
+/// Maximum lag of the autocorrelation, in samples; smaller than a segment.
 const LAGS: usize = 6;
-/// Fewest pieces.
+/// Minimum number of segments.
 const MIN_PIECES: usize = 1;
 
-/// A variance with how well it is known.
+/// A variance with its degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variation {
     /// Variance, square of the channel's unit.
     pub variance: f64,
-    /// Degrees of freedom of independent samples that would know it as well.
+    /// Number of independent degrees of freedom with the same accuracy.
     pub degrees_of_freedom: f64,
 }
 
 impl Variation {
-    /// The variation of samples; `None` where they are too few.
+    /// The variation of samples; `None` if there are too few.
     pub fn of(t_s: &[f64], values: &[f64]) -> Option<Self> {
         let first_s = *t_s.first()?;
         let mut pieces: Vec<Vec<f64>> = Vec::new();
@@ -43,8 +43,8 @@ impl Variation {
             pieces.iter().flat_map(|piece| piece.iter().zip(&piece[lag..]).map(|(a, b)| a * b)).sum()
         };
         let square = lagged(0);
-        // Bartlett: what a sample has in common with those before it says nothing new of the variance. Chance alone makes
-        // the square of a correlation 1/n.
+        // Bartlett: correlated samples add less information about the variance. Chance alone makes the square of a
+        // correlation 1/n.
         let memory: f64 =
             (1..=LAGS).map(|lag| ((lagged(lag) / square).powi(2) - 1.0 / samples).max(0.0)).sum();
         (square > 0.0).then_some(Variation {
@@ -54,7 +54,7 @@ impl Variation {
     }
 }
 
-/// What is left of the samples about the straight line through them.
+/// Residual of the samples about their regression line.
 fn about_a_line(t_s: &[f64], values: &[f64]) -> Vec<f64> {
     let count = t_s.len() as f64;
     let middle_s = t_s.iter().sum::<f64>() / count;
@@ -81,7 +81,7 @@ mod tests {
         let t_s: Vec<f64> = (0..4000).map(|i| f64::from(i) * 0.1).collect();
         let values: Vec<f64> = t_s.iter().map(|t| 100.0 + 0.05 * t + normal.sample(&mut random)).collect();
         let found = Variation::of(&t_s, &values).unwrap();
-        // 3840 degrees of freedom know a variance to 2.3 %.
+        // 3840 degrees of freedom determine a variance to 2.3 %.
         assert!((found.variance / 0.25 - 1.0).abs() < 0.08, "{found:?}");
         assert!((3500.0..=3840.0).contains(&found.degrees_of_freedom), "{found:?}");
         assert_eq!(Variation::of(&t_s[..9], &values[..9]), None);

@@ -1,17 +1,17 @@
-//! The words beside a bar.
+//! The text next to a progress bar.
 
-/// Where a run is: `step` from 1, 0 before the first one.
+/// Progress of a run: `step` counts from 1 and is 0 before the first step.
 pub(crate) fn run_words(step: usize, steps: usize, t_s: f64, duration_s: f64, left_s: f64) -> String {
     let place = match step {
         0 => "before step 1".to_owned(),
         step => format!("step {step} of {}", steps.max(step)),
     };
-    // What was inserted makes a run longer than it was planned.
+    // Inserted steps make a run longer than planned.
     let whole_s = duration_s.max(t_s);
     format!("{place}, {} of {} of rig time, {} left", short(t_s), short(whole_s), short(left_s))
 }
 
-/// A duration in few characters: 1.4 s, 43 s, 22 min, 2 h 04 min.
+/// A short form of a duration: 1.4 s, 43 s, 22 min, 2 h 04 min.
 pub(crate) fn short(duration_s: f64) -> String {
     let duration_s = duration_s.max(0.0);
     let minutes = (duration_s / 60.0).round() as u64;

@@ -1,18 +1,18 @@
-//! Whether something is coloured.
+//! When output is coloured.
 
-/// As it is written on the command line.
+/// As written on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ColourChoice {
-    /// On a terminal, unless `NO_COLOR` is set (no-color.org).
+    /// On a terminal only, unless `NO_COLOR` is set (no-color.org).
     #[default]
     Auto,
-    /// Everywhere.
+    /// Always.
     Always,
-    /// Nowhere.
+    /// Never.
     Never,
 }
 
-/// Whether what goes there is coloured. `no_color`: the environment's variable of that name.
+/// Whether the output is coloured. `no_color`: the environment variable of that name.
 pub fn is_coloured(choice: ColourChoice, to_terminal: bool, no_color: Option<&std::ffi::OsStr>) -> bool {
     match choice {
         ColourChoice::Always => true,

@@ -1,6 +1,6 @@
-//! What a terminal, a pipe or another program sees: progress while work goes on, and what a run has given when it is done.
+//! Output for a terminal, a pipe or another program: progress during the work, and the results of a run.
 //!
-//! Progress goes to standard error and never into results: a bar where somebody sits, a line per step in a pipe, JSON lines for
+//! Progress goes to standard error and never into results: a bar on a terminal, a line per step in a pipe, JSON lines for
 //! a program.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

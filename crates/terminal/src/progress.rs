@@ -11,36 +11,36 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 
-/// How often the clock of a bar is drawn.
+/// Interval at which the clock of a bar is redrawn.
 const TICK: Duration = Duration::from_millis(250);
-/// Columns that a warning may take.
+/// Maximum width of a warning, columns.
 const COLUMNS: usize = 80;
-/// A program is told the rig's time so often in a run.
+/// Number of times in a run that a program receives the rig's time.
 const RIG_TIMES: f64 = 200.0;
-/// Above the bar what is done now, below it how far that is.
+/// The current activity is above the bar, the progress below it.
 const RUN_BAR: &str = "{prefix}\n[{bar:14}] {msg}";
 const PIECES_BAR: &str = "[{bar:30}] {pos} of {len}, {elapsed} so far{msg}";
 const WORK_BAR: &str = "[{bar:30}] {percent:>3} %, {elapsed} so far  {wide_msg}";
 const SPINNER: &str = "{spinner} {wide_msg} {elapsed}";
 
-/// Who looks on.
+/// The consumer of the progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProgressManner {
-    /// Somebody at a terminal.
+    /// A user at a terminal.
     Bar,
-    /// Somebody who reads a file later: a line per step.
+    /// A file that is read later: one line per step.
     Lines,
     /// A program: JSON lines.
     Json,
-    /// Nobody.
+    /// None.
     Quiet,
 }
 
 impl ProgressManner {
-    /// As they are written on the command line.
+    /// As written on the command line.
     pub const NAMES: [&str; 4] = ["bar", "lines", "json", "off"];
 
-    /// The one of this name; nobody is told under any other.
+    /// The format of this name; an unknown name shows nothing.
     pub fn named(name: &str) -> Self {
         match name {
             "bar" => ProgressManner::Bar,
@@ -50,7 +50,7 @@ impl ProgressManner {
         }
     }
 
-    /// Whether anything is shown of an event.
+    /// Whether an event is shown.
     fn shows(self, event: &SessionEvent) -> bool {
         use SessionEvent as E;
         match self {
@@ -74,34 +74,34 @@ impl ProgressManner {
     }
 }
 
-/// Most of what is told and not yet shown.
+/// Maximum number of queued events.
 const QUEUE: usize = 4096;
-/// How long a session waits for somebody who reads slowly, once: then what is told is lost until there is room again.
+/// Longest wait of a session for a slow consumer. It waits once; after that, events are lost until the queue has room.
 const PATIENCE: Duration = Duration::from_millis(10);
-/// How long the end waits for what is still to be shown.
+/// Longest wait at the end for the queued events to be shown.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
-/// Shows what a session tells. It may be told from many threads, and none of them waits for a terminal or a pipe: it is shown on a
-/// thread of its own. A terminal that is held (Ctrl-S) or a pipe that nobody reads loses lines; a run and its guards go on.
+/// Shows the events of a session. Many threads may send them; a separate thread shows them, so no sender waits for a terminal
+/// or a pipe. A terminal on hold (Ctrl-S) or a pipe without a reader loses lines; the run and its guards continue.
 pub struct Progress {
     manner: ProgressManner,
-    to: SyncSender<Said>,
+    to: SyncSender<Queued>,
     stalled: AtomicBool,
 }
 
-enum Said {
+enum Queued {
     Event(Box<SessionEvent>),
-    /// Takes the bar away and answers.
+    /// Removes the bar and acknowledges.
     Clear(SyncSender<()>),
 }
 
 impl Progress {
-    /// Nothing is shown before the first event.
+    /// Shows nothing before the first event.
     pub fn new(manner: ProgressManner) -> Self {
-        let (to, said) = sync_channel(QUEUE);
-        // Without a thread nothing is shown, and everything works.
+        let (to, queued) = sync_channel(QUEUE);
+        // If the thread cannot be started, nothing is shown and the work continues.
         let started =
-            std::thread::Builder::new().name("progress".to_owned()).spawn(move || show_all(manner, &said));
+            std::thread::Builder::new().name("progress".to_owned()).spawn(move || show_all(manner, &queued));
         let manner = if started.is_ok() { manner } else { ProgressManner::Quiet };
         Progress { manner, to, stalled: AtomicBool::new(false) }
     }
@@ -111,56 +111,56 @@ impl Progress {
         if !self.manner.shows(event) {
             return;
         }
-        match self.to.try_send(Said::Event(Box::new(event.clone()))) {
+        match self.to.try_send(Queued::Event(Box::new(event.clone()))) {
             Ok(()) => self.stalled.store(false, Ordering::Relaxed),
-            Err(TrySendError::Full(said)) if !self.stalled.load(Ordering::Relaxed) => {
+            Err(TrySendError::Full(queued)) if !self.stalled.load(Ordering::Relaxed) => {
                 std::thread::sleep(PATIENCE);
-                self.stalled.store(self.to.try_send(said).is_err(), Ordering::Relaxed);
+                self.stalled.store(self.to.try_send(queued).is_err(), Ordering::Relaxed);
             }
             Err(_) => {}
         }
     }
 
-    /// Says what is begun before there is anything to count.
+    /// Shows the current activity before a total is known.
     pub fn begin(&self, what: &str) {
         self.show(&SessionEvent::Progress { done_ratio: 0.0, what: what.to_owned() });
     }
 
-    /// Shows how many of many pieces of work are done.
+    /// Shows how many of the pieces of work are done.
     pub fn pieces(&self, done: usize, of: usize) {
         self.show(&SessionEvent::PiecesDone { done, of });
     }
 
-    /// Takes the bar away, once everything is shown.
+    /// Removes the bar once all events are shown.
     pub fn clear(&self) {
         let (done, is_done) = sync_channel(1);
-        if self.to.try_send(Said::Clear(done)).is_ok() {
+        if self.to.try_send(Queued::Clear(done)).is_ok() {
             let _ = is_done.recv_timeout(LAST_WORDS);
         }
     }
 }
 
-/// What was told before an error is shown before it.
+/// Shows the queued events before an error.
 impl Drop for Progress {
     fn drop(&mut self) {
         self.clear();
     }
 }
 
-fn show_all(manner: ProgressManner, said: &Receiver<Said>) {
+fn show_all(manner: ProgressManner, queued: &Receiver<Queued>) {
     let target = match manner {
         ProgressManner::Bar => ProgressDrawTarget::stderr(),
         _ => ProgressDrawTarget::hidden(),
     };
     let shown = Shown { bar: ProgressBar::with_draw_target(None, target) };
     let mut state = State::default();
-    for said in said {
-        match (said, manner) {
-            (Said::Event(event), ProgressManner::Json) => tell_program(&event, &mut state),
-            (Said::Event(event), ProgressManner::Lines) => say_lines(&event, &mut state),
-            (Said::Event(event), ProgressManner::Bar) => shown.draw(&event, &mut state),
-            (Said::Event(_), ProgressManner::Quiet) => {}
-            (Said::Clear(done), _) => {
+    for queued in queued {
+        match (queued, manner) {
+            (Queued::Event(event), ProgressManner::Json) => print_json(&event, &mut state),
+            (Queued::Event(event), ProgressManner::Lines) => say_lines(&event, &mut state),
+            (Queued::Event(event), ProgressManner::Bar) => shown.draw(&event, &mut state),
+            (Queued::Event(_), ProgressManner::Quiet) => {}
+            (Queued::Clear(done), _) => {
                 shown.bar.finish_and_clear();
                 let _ = done.try_send(());
             }
@@ -170,18 +170,18 @@ fn show_all(manner: ProgressManner, said: &Receiver<Said>) {
 
 #[derive(Default)]
 struct State {
-    /// Look of the bar as it is.
+    /// Current style of the bar.
     look: Option<&'static str>,
-    /// What was said last, in a pipe.
-    said: String,
-    /// When the first piece of work was begun.
+    /// Last line written to a pipe.
+    last_line: String,
+    /// Start of the first piece of work.
     began: Option<Instant>,
     steps: usize,
-    /// Number of the step that is under way, from 1.
+    /// Number of the current step, from 1.
     step: usize,
     duration_s: f64,
-    /// The rig's time that a program was told last, s.
-    told_s: f64,
+    /// Rig time last sent to a program, s.
+    sent_s: f64,
 }
 
 /// The bar.
@@ -235,7 +235,7 @@ impl Shown {
         }
     }
 
-    /// Gives the bar its look and its length where they are not so yet; its clock shows that work goes on.
+    /// Sets the style and length of the bar if they changed; its clock shows that work continues.
     fn look(&self, state: &mut State, look: &'static str, length: Option<u64>) {
         if state.look == Some(look) {
             return;
@@ -255,7 +255,7 @@ impl Shown {
     }
 }
 
-/// Where a step goes: 110 krpm, opening 0.7.
+/// Target of a step: 110 krpm, opening 0.7.
 fn place(marker: &StepMarker) -> String {
     let shown = marker.to.map(|point| point.shown());
     shown.map_or_else(String::new, |(krpm, opening)| format!("{krpm} krpm, opening {opening}"))
@@ -282,10 +282,10 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             short(marker.end_s - marker.start_s)
         ),
         SessionEvent::Told(event) => event_line(event.t_s, &event.message),
-        SessionEvent::Progress { what, .. } if *what != state.said => what.clone(),
+        SessionEvent::Progress { what, .. } if *what != state.last_line => what.clone(),
         SessionEvent::PiecesDone { done, of } => {
             let began = *state.began.get_or_insert_with(Instant::now);
-            if !is_told(*done, *of) {
+            if !is_printed(*done, *of) {
                 return;
             }
             pieces_line(*done, *of, began.elapsed().as_secs_f64())
@@ -293,20 +293,20 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
         _ => return,
     };
     if let SessionEvent::Progress { what, .. } = event {
-        state.said.clone_from(what);
+        state.last_line.clone_from(what);
     }
     say(&line);
 }
 
-/// So many lines at most say how many pieces are done.
+/// Maximum number of lines about finished pieces.
 const PIECES_LINES: usize = 200;
 
-/// Whether a line says that so many pieces are done.
-fn is_told(done: usize, of: usize) -> bool {
+/// Whether this number of finished pieces is printed.
+fn is_printed(done: usize, of: usize) -> bool {
     done == of || done.is_multiple_of(of.div_ceil(PIECES_LINES).max(1))
 }
 
-/// How many pieces are done after how long, and what that says of the rest.
+/// Number of finished pieces, elapsed time, and the estimated time remaining.
 fn pieces_line(done: usize, of: usize, elapsed_s: f64) -> String {
     match done {
         0 => format!("0 of {of} done"),
@@ -318,15 +318,15 @@ fn pieces_line(done: usize, of: usize, elapsed_s: f64) -> String {
     }
 }
 
-/// One JSON object a line: the event as the session has it. Readings are for a live page, and the rig's time is told now and then.
-fn tell_program(event: &SessionEvent, state: &mut State) {
+/// One JSON object a line: the event as the session has it. Readings are for a live page and are omitted; the rig's time is thinned.
+fn print_json(event: &SessionEvent, state: &mut State) {
     match event {
         SessionEvent::RunStarted { duration_s, .. } => state.duration_s = *duration_s,
         SessionEvent::RigTime { t_s } => {
-            if *t_s < state.told_s + state.duration_s / RIG_TIMES {
+            if *t_s < state.sent_s + state.duration_s / RIG_TIMES {
                 return;
             }
-            state.told_s = *t_s;
+            state.sent_s = *t_s;
         }
         _ => {}
     }
@@ -334,25 +334,25 @@ fn tell_program(event: &SessionEvent, state: &mut State) {
     say(&value.unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() })).to_string());
 }
 
-/// A reader that has gone away, as `tee` on Ctrl-C, is no reason to panic.
+/// A closed pipe, as with `tee` on Ctrl-C, must not cause a panic.
 fn say(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{PIECES_LINES, is_told, pieces_line};
+    use super::{PIECES_LINES, is_printed, pieces_line};
 
     #[test]
     fn a_pipe_is_told_what_is_left_and_never_a_thousand_lines() {
         assert_eq!(pieces_line(0, 14, 0.0), "0 of 14 done");
-        // A third done in 20 s leaves two thirds: 40 s.
+        // A third done in 20 s: the other two thirds take 40 s.
         assert_eq!(pieces_line(5, 15, 20.0), "5 of 15 done in 20 s, 40 s left");
         assert_eq!(pieces_line(15, 15, 62.0), "15 of 15 done in 62 s");
         for of in [1, 14, 200, 10_007] {
-            let lines = (0..=of).filter(|done| is_told(*done, of)).count();
-            assert!(lines <= PIECES_LINES + 2 && is_told(of, of), "{of}: {lines}");
+            let lines = (0..=of).filter(|done| is_printed(*done, of)).count();
+            assert!(lines <= PIECES_LINES + 2 && is_printed(of, of), "{of}: {lines}");
         }
-        assert_eq!((0..=14).filter(|done| is_told(*done, 14)).count(), 15, "each of a few");
+        assert_eq!((0..=14).filter(|done| is_printed(*done, 14)).count(), 15, "each of a few");
     }
 }

@@ -1,4 +1,4 @@
-//! What a run or an identification has given, for a terminal.
+//! Results of a run or an identification, for a terminal.
 
 use mapper_assemble::RepeatedJump;
 use mapper_campaign::campaign::DisplayUnits;
@@ -13,21 +13,21 @@ use mapper_report::{
 use mapper_session::{Identified, Results, SoughtSurge};
 use std::fmt::Write;
 
-/// Columns of a terminal that nobody has made wider.
+/// Default width of a terminal, columns.
 const COLUMNS: usize = 80;
 
-/// How much is shown.
+/// Level of detail.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Shown {
-    /// All that is known, in tables as wide as they are.
+    /// Everything, in tables as wide as they need to be.
     pub full: bool,
-    /// The simulator's truth beside it.
+    /// The simulator's truth next to each value.
     pub truth: bool,
     /// Colours.
     pub paint: Paint,
 }
 
-/// What is shown of a run, or of recordings that were identified.
+/// Results of a run, or of identified recordings.
 struct Found<'a> {
     points: &'a [ScoredPoint],
     two_parameter: &'a [TwoParameter],
@@ -38,11 +38,11 @@ struct Found<'a> {
     zero: &'a ZeroOutcome,
     surge: Option<&'a SoughtSurge>,
     remarks: Vec<String>,
-    /// What shows the rest.
+    /// The command that shows the rest.
     more: &'a str,
 }
 
-/// What a run has left: a table with what to know below it, verdict and files last. `more`: the command that shows the rest, in words.
+/// The results of a run: a table, notes, verdict and files. `more`: the command that shows the rest, in words.
 pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: Shown) -> String {
     let mut text = found_text(
         units,
@@ -72,7 +72,7 @@ pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: 
     text
 }
 
-/// What was identified without leaving any files. `more`: the command that shows the rest, in words; `warnings`: what was wrong with
+/// The results of an identification that wrote no files. `more`: the command that shows the rest, in words; `warnings`: problems of
 /// the recordings.
 pub fn identified_text(
     units: &DisplayUnits,
@@ -122,7 +122,7 @@ fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
     if let Some(surge) = found.surge {
         text.push_str(&surge_columns_text(&surge.marks, &surge.remarks, surge.surges, units, shown.truth));
     }
-    // Sensors that all agree are no news.
+    // Omit sensors that all agree.
     for fused in found.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {
         text.push_str(&wrapped(&fused.to_string(), COLUMNS, 2));
     }

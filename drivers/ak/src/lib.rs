@@ -1,4 +1,4 @@
-//! Instruments of a test bed that speak the AK telegram over TCP: read, never controlled.
+//! Measuring instruments that speak the AK protocol over TCP. The driver reads them and never controls them.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,4 +1,4 @@
-//! `mapper-backend-ak`: instruments of a test bed that speak the AK telegram over TCP; docs/rig.md has its settings.
+//! `mapper-backend-ak`: measuring instruments that speak the AK protocol over TCP; docs/rig.md has its settings.
 
 mod rig;
 mod settings;

@@ -1,4 +1,4 @@
-//! An instrument as a source of readings. Nothing is ever written to it.
+//! An AK instrument as a read-only backend.
 
 use crate::settings::{NAME, Questions, Settings};
 use mapper_backend_ak::telegram::{Answer, Assembler, Code, TelegramError, answer, question};
@@ -12,7 +12,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Nothing is told to an instrument; a setpoint that means nothing is a mistake all the same.
+/// Setpoints are never sent to an instrument, but an implausible one is still an error.
 const PLAUSIBLE: SetpointRanges = SetpointRanges {
     p3_pa: SetpointRange { low: 50e3, high: 1e6 },
     t3_k: SetpointRange { low: 200.0, high: 1500.0 },
@@ -20,13 +20,13 @@ const PLAUSIBLE: SetpointRanges = SetpointRanges {
     oil_temperature_k: SetpointRange { low: 200.0, high: 500.0 },
 };
 
-/// Makes the source; nothing is connected.
+/// Creates the backend without connecting.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let (settings, questions) = Settings::read(value)?;
     Ok(Box::new(Instrument { settings, questions, stream: None, armed: None }))
 }
 
-/// Why there is no answer.
+/// Why a request failed.
 #[derive(Debug, thiserror::Error)]
 enum AskError {
     #[error("{0}")]
@@ -42,7 +42,7 @@ enum AskError {
 struct Armed {
     sequence: u64,
     last_s: f64,
-    /// The error status that was said last.
+    /// The last reported error status.
     error: u8,
 }
 
@@ -58,7 +58,7 @@ impl Instrument {
         self.armed.as_mut().ok_or(BackendError::OutOfOrder { call, state: "not armed", needed: "armed" })
     }
 
-    /// A question and its answer. After a failure the connection is a new one: a late answer would be taken for the next.
+    /// Sends a request and reads its answer. A failure closes the connection: a late answer would be taken for the next one.
     fn ask(&mut self, code: Code, channel: u8) -> Result<Answer, AskError> {
         let within = Duration::from_secs_f64(self.settings.timeout_s());
         let until = Instant::now() + within;
@@ -127,7 +127,7 @@ impl Backend for Instrument {
         Ok(())
     }
 
-    /// Nothing is told to an instrument.
+    /// An instrument takes no setpoints.
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
         PLAUSIBLE.check(setpoints)?;
         self.armed("set").map(drop)
@@ -142,7 +142,7 @@ impl Backend for Instrument {
         (armed.last_s, armed.sequence) = (until_s, first_sequence + 1);
         let (mut values, mut error) = (BTreeMap::<Channel, f64>::new(), before);
         for ((code, channel), places) in self.questions.clone() {
-            // An instrument that does not answer gives samples without readings: who uses them counts how long.
+            // If the instrument does not answer, the sample has no readings, and the guards count how long that lasts.
             let Ok(found) = self.ask(code, channel) else { continue };
             error = found.error;
             for (channel, place) in places {

@@ -10,35 +10,35 @@ use std::net::SocketAddr;
 
 /// Name of the driver.
 pub(crate) const NAME: &str = "ak";
-/// Most questions in a second that instruments answer.
+/// Maximum request rate that instruments support, Hz.
 const MAX_HZ: f64 = 10.0;
 
 /// Below `ak`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Settings {
-    /// Address and port of the instrument, in numbers: a name would have to be looked up, which may hang.
+    /// IP address and port of the instrument; a host name would need a look-up, which may hang.
     #[serde(deserialize_with = "mapper_driver::address")]
     pub(crate) address: SocketAddr,
-    /// How often it is asked; 2 Hz if not said.
+    /// Polling rate; default 2 Hz.
     rate: Option<Quantity<Frequency>>,
-    /// Time for each answer; 300 ms if not said.
+    /// Timeout of each answer; default 300 ms.
     timeout: Option<Quantity<Duration>>,
-    /// Where each channel stands.
+    /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, Place>,
 }
 
-/// A number in an answer: what stands there times `scale` plus `offset` is SI.
+/// A number in an answer; the SI value is the number times `scale` plus `offset`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Place {
-    /// What is asked: a code that begins with A, such as AKON.
+    /// Request code that begins with A, such as AKON.
     pub(crate) code: String,
-    /// Channel of the instrument; 0 is itself.
+    /// Channel of the instrument; 0 is the instrument as a whole.
     #[serde(default)]
     pub(crate) channel: u8,
-    /// Which number of the answer, from 1.
+    /// Position of the number in the answer, from 1.
     #[serde(default = "first")]
     pub(crate) value: usize,
     #[serde(default = "one")]
@@ -55,7 +55,7 @@ fn one() -> f64 {
     1.0
 }
 
-/// What is wrong with them.
+/// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
     #[error("{0}; docs/rig.md has an example of all settings")]
@@ -90,7 +90,7 @@ fn within(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Re
 }
 
 impl Settings {
-    /// Reads and checks them; each question once, with the channels in its answer.
+    /// Reads and checks the settings. Each request appears once, with the channels in its answer.
     pub(crate) fn read(value: &Value) -> Result<(Settings, Questions), BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
@@ -130,11 +130,11 @@ impl Settings {
         self.rate.as_ref().map_or(2.0, |rate| rate.inside)
     }
 
-    /// Time for an answer, s.
+    /// Timeout of an answer, s.
     pub(crate) fn timeout_s(&self) -> f64 {
         self.timeout.as_ref().map_or(0.3, |timeout| timeout.inside)
     }
 }
 
-/// Code and channel of each question, and where in its answer the channels stand.
+/// Code and channel of each request, and the position of each mapper channel in its answer.
 pub(crate) type Questions = BTreeMap<(Code, u8), Vec<(Channel, Place)>>;

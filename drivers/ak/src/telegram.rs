@@ -1,4 +1,4 @@
-//! The AK telegram, as manuals print it: STX, a byte that says nothing, four letters, a blank, the channel (`K0`) or the error status, data, ETX.
+//! The AK telegram as manuals print it: STX, a don't-care byte, four letters, a blank, the channel (`K0`) or the error status, data, ETX.
 //!
 //! Testo CU-2 and NanoMet3, CAI 600 and 700, Servomex ServoPro, Emerson NGA 2000 ("AK-Protocol", 90003752).
 
@@ -6,11 +6,11 @@ use std::str::FromStr;
 
 const STX: u8 = 0x02;
 const ETX: u8 = 0x03;
-/// What the byte after STX is where nobody says otherwise.
+/// Default of the don't-care byte after STX.
 const DONT_CARE: u8 = b' ';
-/// Longest telegram that is taken, bytes: some hundred numbers.
+/// Maximum length of a telegram, bytes: some hundred numbers.
 const LONGEST: usize = 4096;
-/// What an instrument answers to a code that it does not know.
+/// Answer of an instrument to an unknown code.
 const UNKNOWN: [u8; 4] = *b"????";
 
 /// Four capital letters, digits allowed: `AKON`, `ASTZ`.
@@ -18,7 +18,7 @@ const UNKNOWN: [u8; 4] = *b"????";
 pub struct Code([u8; 4]);
 
 impl Code {
-    /// Whether it asks for something: others control (`S`) or set (`E`) an instrument.
+    /// Whether the code is a read request. Other codes control (`S`) or configure (`E`) an instrument.
     pub fn asks(self) -> bool {
         self.0[0] == b'A'
     }
@@ -41,35 +41,35 @@ impl std::fmt::Display for Code {
     }
 }
 
-/// Why bytes are no telegram, or not the one that was waited for.
+/// Why bytes are not a valid telegram, or not the expected one.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TelegramError {
     /// Not a function code.
     #[error("`{0}` is not a code of four capital letters, such as AKON")]
     NoCode(String),
-    /// It ends too early, or a blank is not where it has to be.
+    /// It ends too early, or a required blank is missing.
     #[error("{0:?} is not an AK telegram")]
     Torn(String),
-    /// The instrument does not know the code.
+    /// The code is unknown to the instrument.
     #[error("the instrument does not know {0}")]
     Unknown(Code),
-    /// The answer to another question.
+    /// The answer belongs to another request.
     #[error("the answer is to {found}, not to {asked}")]
     Other {
-        /// What was asked.
+        /// The requested code.
         asked: Code,
-        /// What it answers.
+        /// The code in the answer.
         found: String,
     },
 }
 
-/// The question for a channel of the instrument, with parameters.
+/// The request for a channel of the instrument, with parameters.
 pub fn question(code: Code, channel: u8, parameters: &str) -> Vec<u8> {
     let mut telegram = vec![STX, DONT_CARE];
     telegram.extend(code.0);
     telegram.extend(format!(" K{channel}").bytes());
     if !parameters.is_empty() {
-        // What would end the telegram early is no parameter.
+        // Control characters would end the telegram early.
         let plain = parameters.bytes().filter(|byte| (b' '..=b'~').contains(byte));
         telegram.push(b' ');
         telegram.extend(plain);
@@ -78,29 +78,29 @@ pub fn question(code: Code, channel: u8, parameters: &str) -> Vec<u8> {
     telegram
 }
 
-/// An answer.
+/// An answer of an instrument.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
     /// 0: the instrument has no error; 1 to 9, which counts up with each change of its errors.
     pub error: u8,
-    /// What it says, as words.
+    /// The data fields.
     pub words: Vec<String>,
 }
 
 impl Answer {
-    /// The number at this place, from 1; `None` where there is none, or where it is marked as not valid by `#`.
+    /// The number at this position, from 1; `None` if it is missing or marked invalid by `#`.
     pub fn number(&self, place: usize) -> Option<f64> {
         let word = self.words.get(place.checked_sub(1)?)?;
-        // Rust reads "inf" and "nan" as numbers, instruments do not write them.
+        // Rust parses "inf" and "nan" as numbers, but instruments do not write them.
         let plain = word.bytes().all(|byte| byte.is_ascii_digit() || b"+-.eE".contains(&byte));
         word.parse::<f64>().ok().filter(|number| plain && number.is_finite())
     }
 }
 
-/// The answer to a question: what stands between STX and ETX.
+/// Parses the answer to a request; `body` is the text between STX and ETX.
 ///
 /// # Errors
-/// [`TelegramError`] for what is no answer, or that to another question.
+/// [`TelegramError`] if the body is not an answer, or answers another request.
 pub fn answer(body: &[u8], asked: Code) -> Result<Answer, TelegramError> {
     let torn = || TelegramError::Torn(String::from_utf8_lossy(body).into_owned());
     let (Some(code), Some(b' '), Some(status)) = (body.get(1..5), body.get(5), body.get(6)) else {
@@ -122,15 +122,15 @@ pub fn answer(body: &[u8], asked: Code) -> Result<Answer, TelegramError> {
     Ok(Answer { error: status - b'0', words })
 }
 
-/// Bytes as they come, in pieces, become telegrams.
+/// Assembles telegrams from a byte stream.
 #[derive(Debug, Default)]
 pub struct Assembler {
-    /// What has come since STX; `None` before it.
+    /// Bytes since STX; `None` before STX.
     body: Option<Vec<u8>>,
 }
 
 impl Assembler {
-    /// Takes the next byte; what stands between STX and ETX, when a telegram is complete. Each STX begins a new one.
+    /// Takes the next byte. Returns the text between STX and ETX once a telegram is complete. Each STX starts a new telegram.
     pub fn push(&mut self, byte: u8) -> Option<Vec<u8>> {
         match byte {
             STX => {
@@ -150,7 +150,7 @@ impl Assembler {
     }
 }
 
-/// The question that an instrument was asked: code, channel and parameters.
+/// Parses a request to an instrument: code, channel and parameters.
 ///
 /// # Errors
 /// [`TelegramError::Torn`]
@@ -163,7 +163,7 @@ pub fn asked(body: &[u8]) -> Result<(Code, u8, String), TelegramError> {
     Ok((code, channel.ok_or_else(torn)?, words.next().unwrap_or_default().to_owned()))
 }
 
-/// The answer of an instrument without error; `None`: it does not know the code.
+/// The answer of an instrument without errors; with `None`, the answer to an unknown code.
 pub fn reply(code: Option<Code>, words: &[String]) -> Vec<u8> {
     let mut telegram = vec![STX, DONT_CARE];
     telegram.extend(code.map_or(UNKNOWN, |code| code.0));
@@ -197,12 +197,12 @@ mod tests {
         let found = bodies(b"\x02 ASTZ 0 SREM STBY\x03");
         let answer = answer(&found[0], code("ASTZ")).unwrap();
         assert_eq!((answer.error, answer.words), (0, vec!["SREM".to_owned(), "STBY".to_owned()]));
-        // Testo: the byte that says nothing is 30H, an unknown code is echoed as ????.
+        // Testo: the don't-care byte is 30H, an unknown code is echoed as ????.
         let found = bodies(b"\x020???? 0\x03");
         assert_eq!(super::answer(&found[0], code("AXXX")), Err(TelegramError::Unknown(code("AXXX"))));
     }
 
-    /// Numbers in plain and E form, separated by blanks or by line ends; the error status counts beside them.
+    /// Numbers in plain and E notation, separated by blanks or by line ends; the error status is parsed too.
     #[test]
     fn numbers_stand_at_their_places() {
         let found = bodies(b"\x020AKON 3 12.5 -1.25E+02\r\n#7.0 0 inf\x03");
@@ -212,7 +212,7 @@ mod tests {
         assert_eq!(answer.error, 3);
     }
 
-    /// A telegram whose end is lost: the next STX begins a new one.
+    /// If the end of a telegram is lost, the next STX starts a new one.
     #[test]
     fn torn_telegrams_are_thrown_away() {
         assert_eq!(bodies(b"noise\x03\x02 AKON 0 1\x02 AKON 0 2\x03"), [b" AKON 0 2".to_vec()]);

@@ -1,4 +1,4 @@
-//! The driver against an instrument of the tests' own: nobody else publishes one. It answers as the manuals print it, in pieces, late and torn.
+//! The driver against a simulated instrument, since no public one exists. It answers as the manuals print it: in pieces, late and torn.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -9,7 +9,7 @@ use serde_json::json;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 
-/// Answers each question with the next of these, the last one again and again; gives its address.
+/// Answers each request with the next item and repeats the last one. Returns its address.
 fn instrument(answers: &'static [&'static [&'static [u8]]]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -36,14 +36,14 @@ fn instrument(answers: &'static [&'static [&'static [u8]]]) -> String {
 
 fn driver(address: &str, code: &str) -> Result<Driver, mapper_core::BackendError> {
     let settings = json!({
-        // Only the torn answer is waited for to its end: longer, so that a busy machine loses no other.
+        // Only the torn answer runs into this timeout. It is long, so that a busy machine loses no other answer.
         "address": address, "rate": "5 Hz", "timeout": "800 ms",
         "read": {"m_c": {"code": code, "value": 1, "scale": 0.001}, "T1": {"code": code, "value": 2, "offset": 273.15}},
     });
     Driver::of_program(env!("CARGO_BIN_EXE_mapper-backend-ak").as_ref(), "ak", &settings, PATIENCE)
 }
 
-/// In pieces, with the byte that says nothing as Testo has it, a torn one (the connection is a new one then), one that is not valid.
+/// An answer in pieces, one with Testo's don't-care byte, a torn one (which forces a new connection), and an invalid one.
 #[test]
 fn readings_come_and_torn_answers_are_none() {
     let address = instrument(&[
@@ -66,7 +66,7 @@ fn readings_come_and_torn_answers_are_none() {
     }
     let read =
         |values: &[f64]| -> Vec<f64> { values.iter().copied().filter(|value| value.is_finite()).collect() };
-    // By a unit in the last place: 51.5 times 0.001.
+    // Equal within a unit in the last place: 51.5 times 0.001.
     let equal = |found: &[f64], wanted: [f64; 2]| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-9);
     let (flows, temperatures) = (read(&flows), read(&temperatures));
     assert!(flows.len() == 2 && equal(&flows, [0.0515, 0.053]), "{flows:?}");

@@ -1,10 +1,10 @@
-//! A first look at what is read, before anything is written: an order of words, a unit or a scale that is wrong for the readings is wrong for the
-//! setpoints too.
+//! Plausibility check of the first readings, before anything is written. A wrong word order, unit or scale in the readings is also wrong in
+//! the setpoints.
 
 use crate::Controller;
 use mapper_core::{Channel, measurable};
 
-/// Readings that no sensor gives.
+/// Readings that no sensor can deliver.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{channel} reads {} {unit} from {place}; what a stand can read is {} to {} {unit}{}. {remedy}. No setpoint was written",
@@ -14,7 +14,7 @@ use mapper_core::{Channel, measurable};
     also(.others)
 )]
 pub(crate) struct Absurd {
-    /// The first of them.
+    /// The first implausible channel.
     pub(crate) channel: Channel,
     value: f64,
     unit: &'static str,
@@ -36,12 +36,12 @@ fn also(others: &[Channel]) -> String {
     }
 }
 
-/// Four digits; a power of ten where there would be many zeros.
+/// Four significant digits; a power of ten for very large or small values.
 pub fn short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
         size if (1e-3..1e7).contains(&size) => {
-            // Digits before the point stay, whatever they are.
+            // Digits before the decimal point are never rounded away.
             let behind = (3.0 - size.log10().floor()).max(0.0);
             let text = format!("{value:.0$}", behind as usize);
             match text.contains('.') {
@@ -53,12 +53,12 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// Whether a sensor can read this, SI. What is no number is judged by the guards, which count how long.
+/// Whether a sensor can read this value, SI. NaN passes: the guards count how long it lasts.
 pub fn can_be_read(channel: Channel, value: f64) -> bool {
     !value.is_finite() || measurable(channel.info().dimension).contains(&value)
 }
 
-/// Judges the first readings, SI.
+/// Checks the first readings, SI.
 pub(crate) fn check(
     controller: &impl Controller,
     readings: impl Iterator<Item = (Channel, f64)>,

@@ -1,7 +1,6 @@
-//! What drivers of a gas stand behind a controller share, whatever it speaks: an author implements [`Controller`], and [`rig`] makes a
-//! rig of it. It keeps the heartbeat, writes setpoints in the order that is safe, and gives a sample without readings where
-//! the controller does not answer, so that the guards count how long. Before it writes anything it looks at the readings: what no sensor can
-//! read is refused.
+//! Code shared by drivers of gas stands behind a controller, whatever the protocol. An author implements [`Controller`], and [`rig`] makes a
+//! rig of it. The rig keeps the heartbeat and writes setpoints in a safe order. If the controller does not answer, the rig returns a sample
+//! without readings, so that the guards count how long. Before the first write it checks the readings and refuses implausible ones.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -16,37 +15,37 @@ pub use rig::{Reading, Stand, rig};
 use mapper_core::Channel;
 use std::collections::BTreeMap;
 
-/// A connection to a controller. Every call comes back within a second or two, whatever the other side does.
+/// A connection to a controller. Every call returns within a second or two, even if the controller does not answer.
 pub trait Controller: Send {
     /// Why a call failed.
     type Error: std::error::Error + Send + Sync + 'static;
 
-    /// Connects, and reads everything once.
+    /// Connects, and reads every channel once.
     ///
     /// # Errors
-    /// Where it cannot be reached, or something cannot be read.
+    /// If the controller cannot be reached, or a channel cannot be read.
     fn open(&mut self) -> Result<(), Self::Error>;
 
-    /// Reads everything for the sample at `t_s`, s since arming. A channel that could not be read is left out.
+    /// Reads all channels for the sample at `t_s`, s since arming, and omits a channel that could not be read.
     fn read(&mut self, t_s: f64) -> BTreeMap<Channel, Reading>;
 
-    /// Writes these values, SI, in this order: each before the next.
+    /// Writes these values, SI, one after the other in this order.
     ///
     /// # Errors
-    /// Where one was not written.
+    /// If a value was not written.
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), Self::Error>;
 
-    /// Where a channel stands, and how its number is read there, for people.
+    /// Address and number format of a channel, for messages.
     fn place(&self, channel: Channel) -> String;
 
-    /// What to look at where what was read last cannot be, a sentence without its point.
+    /// Settings to check if the last readings are implausible; a sentence without its full stop.
     fn remedy(&self) -> String;
 
-    /// Something to be said to people since the last call.
+    /// A message for the user since the last call.
     fn remark(&mut self) -> Option<String> {
         None
     }
 
-    /// Gives the connection up.
+    /// Closes the connection.
     fn close(&mut self);
 }

@@ -1,14 +1,14 @@
-//! What a stand takes and how it becomes safe, as campaigns write it.
+//! Setpoint limits and safe state of a stand, as campaigns write them.
 
 use mapper_core::{Channel, GuardName, SafeTrajectory, SetpointRange, SetpointRanges};
 use mapper_yaml::units::{Duration, Pressure, PressureRate, Quantity, Temperature};
 use serde::Deserialize;
 
-/// Guards that no rig runs without, and what they look at.
+/// Guards that every rig requires, with their channels.
 pub const NEEDS: [(GuardName, Channel); 2] =
     [(GuardName::Overspeed, Channel::ShaftSpeed), (GuardName::TurbineInletPressure, Channel::P3)];
 
-/// Something that is written.
+/// A quantity that the driver writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Target {
     /// Turbine inlet total pressure, Pa.
@@ -21,7 +21,7 @@ pub enum Target {
     OilTemperature,
     /// 1: air on, 0: off.
     Air,
-    /// Counts up twice a second: the controller cuts the air by itself where it stands still.
+    /// Counts up twice a second; the controller cuts the air if it stops.
     Heartbeat,
 }
 
@@ -43,25 +43,25 @@ impl Target {
     }
 }
 
-/// Highest count of the heartbeat; 0 follows.
+/// Maximum count of the heartbeat; 0 follows.
 pub(crate) const HEARTBEAT_MAX: u16 = 9999;
 
-/// Setpoints that a rig takes.
+/// Setpoint ranges that a rig accepts.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Accepts {
-    /// Lowest and highest.
+    /// Minimum and maximum.
     pub p3: [Quantity<Pressure>; 2],
-    /// Lowest and highest.
+    /// Minimum and maximum.
     pub t3: [Quantity<Temperature>; 2],
-    /// Lowest and highest, ratio.
+    /// Minimum and maximum, ratio.
     pub valve: [f64; 2],
-    /// Lowest and highest.
+    /// Minimum and maximum.
     pub oil_temperature: [Quantity<Temperature>; 2],
 }
 
 impl Accepts {
-    /// What may be written there, SI.
+    /// The permitted range, SI.
     pub fn range(&self, target: Target) -> SetpointRange {
         let (low, high) = match target {
             Target::P3 => (self.p3[0].inside, self.p3[1].inside),
@@ -74,7 +74,7 @@ impl Accepts {
         SetpointRange { low, high }
     }
 
-    /// As a rig describes itself.
+    /// The ranges for the rig's description.
     pub fn ranges(&self) -> SetpointRanges {
         SetpointRanges {
             p3_pa: self.range(Target::P3),
@@ -85,20 +85,20 @@ impl Accepts {
     }
 }
 
-/// The way into the safe state.
+/// The safe trajectory.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Safe {
-    /// How fast P3 goes down; cut at once if not said.
+    /// Maximum rate of fall of P3; without it the air is cut at once.
     pub pressure_slew: Option<Quantity<PressureRate>>,
-    /// Opening of the valve on the way.
+    /// Valve opening during the run-down.
     pub opening: f64,
-    /// Longest time of the way.
+    /// Maximum duration of the run-down.
     pub within: Quantity<Duration>,
 }
 
 impl Safe {
-    /// As a rig describes itself.
+    /// The trajectory for the rig's description.
     pub fn trajectory(&self) -> SafeTrajectory {
         SafeTrajectory {
             p3_slew_pa_s: self.pressure_slew.as_ref().map(|slew| slew.inside),
@@ -108,46 +108,46 @@ impl Safe {
     }
 }
 
-/// A setting that no stand can have.
+/// A setting that is out of range.
 #[derive(Debug, thiserror::Error)]
 pub enum LimitError {
-    /// A number outside of what it may be.
+    /// A number outside its limits.
     #[error("{value} {unit} is outside {low} to {high} {unit}")]
     Outside {
         /// The number.
         value: f64,
         /// Its unit.
         unit: &'static str,
-        /// Lowest.
+        /// Minimum.
         low: f64,
-        /// Highest.
+        /// Maximum.
         high: f64,
     },
     /// A scale that loses the value.
     #[error("a scale of {0} loses the value; it is between 1e-12 and 1e12, or between -1e12 and -1e-12")]
     Scale(f64),
-    /// A setpoint that goes in coarse steps.
+    /// A setpoint with too coarse a resolution.
     #[error(
         "holds whole numbers, so that it goes in steps of {step} from {low} to {high} (SI): what lies between would be rounded without a word. Use a \
          type with a fraction there, or a finer `scale`"
     )]
     Coarse {
-        /// From one whole number to the next, SI.
+        /// Increment, SI.
         step: f64,
-        /// Lowest setpoint, SI.
+        /// Minimum setpoint, SI.
         low: f64,
-        /// Highest setpoint, SI.
+        /// Maximum setpoint, SI.
         high: f64,
     },
-    /// A channel that a guard looks at is not there.
+    /// A channel required by a guard is missing.
     #[error("the rig has to measure {0}: a guard needs it")]
     NotMeasured(Channel),
 }
 
-/// Largest step of a setpoint, of its range: 0.12 of a valve of 0.1 to 2.5, 15 kPa of 300 kPa.
+/// Maximum increment of a setpoint over its range: 0.12 of a valve of 0.1 to 2.5, 15 kPa of 300 kPa.
 const COARSE_RATIO: f64 = 0.05;
 
-/// The scale, where it keeps a value.
+/// Returns the scale if it is invertible.
 ///
 /// # Errors
 /// [`LimitError::Scale`], also for 0 and NaN.
@@ -158,7 +158,7 @@ pub fn scale(scale: f64) -> Result<f64, LimitError> {
     }
 }
 
-/// Whether a setpoint that is written as a whole number goes in steps that are fine enough; `step`: from one to the next, SI.
+/// Checks the resolution of a setpoint that is written as a whole number; `step` is its increment, SI.
 ///
 /// # Errors
 /// [`LimitError::Coarse`].
@@ -171,7 +171,7 @@ pub fn fine_enough(target: Target, step: f64, range: SetpointRange) -> Result<()
     }
 }
 
-/// The value, where it lies within bounds.
+/// Returns the value if it lies within bounds.
 ///
 /// # Errors
 /// [`LimitError::Outside`], also for NaN.

@@ -8,53 +8,53 @@ use mapper_core::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How often the heartbeat counts, s.
+/// Interval of the heartbeat count, s.
 const HEARTBEAT_S: f64 = 0.5;
-/// What was told, as channels.
+/// The commands, as channels.
 const COMMANDS: [Channel; 4] =
     [Channel::P3Command, Channel::T3Command, Channel::ValveCommand, Channel::TOilCommand];
 
 /// One reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// SI; NaN where there is none.
+    /// SI; NaN without a value.
     pub value: f64,
-    /// When the source took it, s since arming; `None`: when it arrived.
+    /// Time of the source, s since arming; `None`: the time of arrival.
     pub source_t_s: Option<f64>,
-    /// How good it is, by the controller's word.
+    /// Quality as reported by the controller.
     pub quality: Quality,
 }
 
 impl Reading {
-    /// A good one, taken when it arrived.
+    /// A good reading with its time of arrival.
     pub fn good(value: f64) -> Reading {
         Reading { value, source_t_s: None, quality: Quality::Good }
     }
 }
 
-/// What a stand is, beside its controller.
+/// Properties of a stand that do not depend on its controller's protocol.
 #[derive(Debug)]
 pub struct Stand {
     /// Name of the driver.
     pub backend: &'static str,
     /// Version of the driver.
     pub version: &'static str,
-    /// Name of the rig, of which there is one.
+    /// Unique name of the rig.
     pub rig: String,
-    /// Where its controller is reached: host and port.
+    /// Host and port of the controller.
     pub reached_at: String,
     /// Samples per second, Hz.
     pub rate_hz: f64,
-    /// What is read.
+    /// Channels to read.
     pub channels: Vec<Channel>,
-    /// Setpoints that it takes.
+    /// Accepted setpoints.
     pub accepts: Accepts,
-    /// Its way into the safe state.
+    /// The safe trajectory.
     pub safe: Safe,
 }
 
 impl Stand {
-    /// What no stand can do without.
+    /// Checks the settings that every stand needs.
     ///
     /// # Errors
     /// Key path and reason.
@@ -63,7 +63,7 @@ impl Stand {
             let path = path.to_owned();
             move |error| (path, error)
         };
-        // The heartbeat goes out with the samples.
+        // The heartbeat is sent with the samples.
         within(self.rate_hz, "Hz", 2.0, 50.0).map_err(at("rate"))?;
         within(self.safe.within.inside, "s", 0.1, 120.0).map_err(at("safe.within"))?;
         for (_, channel) in NEEDS {
@@ -81,7 +81,7 @@ impl Stand {
     }
 }
 
-/// The rig behind this controller. Nothing is connected before it is armed.
+/// Makes the rig behind this controller. It connects when it is armed.
 pub fn rig(stand: Stand, controller: impl Controller + 'static) -> Box<dyn Backend> {
     Box::new(Rig { stand, controller, armed: None })
 }
@@ -94,15 +94,15 @@ struct Rig<C> {
 
 struct Armed {
     told: Option<Setpoints>,
-    /// It was told to become safe since.
+    /// Whether it was made safe since the last setpoint.
     safe: bool,
     sequence: u64,
     last_s: f64,
     heartbeat: u16,
-    /// When it counted last, s.
+    /// Time of the last heartbeat, s.
     beaten_s: f64,
-    /// What was said of readings that are not good.
-    said: BTreeSet<(Channel, Quality)>,
+    /// Readings already reported as not good.
+    reported: BTreeSet<(Channel, Quality)>,
 }
 
 impl<C: Controller> Rig<C> {
@@ -126,17 +126,17 @@ impl<C: Controller> Rig<C> {
         armed.beaten_s = until_s;
         armed.heartbeat = (armed.heartbeat + 1) % (HEARTBEAT_MAX + 1);
         let count = f64::from(armed.heartbeat);
-        // Where it does not arrive the controller cuts the air by itself, which is what it is for.
+        // If it does not arrive, the controller cuts the air, as intended.
         let _ = self.write(&[(Target::Heartbeat, count)]);
     }
 
-    /// Names the channels whose readings are not good by the controller's word, each once for each quality.
+    /// Reports the channels that the controller does not mark as good, once for each quality.
     fn doubts(&mut self, readings: &BTreeMap<Channel, Reading>) -> Option<String> {
-        let said = &mut self.armed.as_mut()?.said;
+        let reported = &mut self.armed.as_mut()?.reported;
         let of = |(channel, reading): (&Channel, &Reading)| (*channel, reading.quality);
         let doubted = readings.iter().map(of).filter(|(_, quality)| *quality != Quality::Good);
         let new: Vec<String> = doubted
-            .filter(|doubt| said.insert(*doubt))
+            .filter(|doubt| reported.insert(*doubt))
             .map(|(channel, quality)| {
                 let word = if quality == Quality::Uncertain { "uncertain" } else { "bad" };
                 format!("{} {word}", channel.symbol())
@@ -150,7 +150,7 @@ impl<C: Controller> Rig<C> {
         })
     }
 
-    /// The lowest that the heater may be told, K.
+    /// Minimum heater setpoint, K.
     fn heater_off_k(&self) -> f64 {
         self.stand.accepts.range(Target::T3).low
     }
@@ -170,7 +170,7 @@ fn command(channel: Channel, told: Option<Setpoints>) -> f64 {
     }
 }
 
-/// Where readings come from, for those that are not simply good.
+/// Provenance of the readings that are not plain good ones.
 fn provenance(readings: &BTreeMap<Channel, Reading>, t_s: f64) -> Vec<Provenance> {
     let told = |reading: &Reading| reading.source_t_s.is_some() || reading.quality != Quality::Good;
     let of = |(channel, reading): (&Channel, &Reading)| Provenance {
@@ -210,7 +210,7 @@ impl<C: Controller> Backend for Rig<C> {
             self.controller.close();
             return Err(self.lost(error));
         }
-        // What is read wrongly would be written wrongly.
+        // A wrong word order or scale would also be wrong in every write.
         let readings = self.controller.read(0.0);
         let readings = readings.iter().map(|(channel, reading)| (*channel, reading.value));
         if let Err(absurd) = absurd::check(&self.controller, readings) {
@@ -219,7 +219,7 @@ impl<C: Controller> Backend for Rig<C> {
             return Err(BackendError::Settings { backend, path, source: absurd });
         }
         let heater_off_k = self.heater_off_k();
-        // A driver that was killed left the air on; a heartbeat must not bring it back.
+        // A killed driver may have left the air on, and a heartbeat must not restore it.
         let begun = self
             .controller
             .write(&[(Target::Air, 0.0), (Target::T3, heater_off_k)])
@@ -235,7 +235,7 @@ impl<C: Controller> Backend for Rig<C> {
             last_s: -1.0,
             heartbeat: 0,
             beaten_s: 0.0,
-            said: BTreeSet::new(),
+            reported: BTreeSet::new(),
         });
         Ok(())
     }
@@ -244,15 +244,15 @@ impl<C: Controller> Backend for Rig<C> {
         self.stand.accepts.ranges().check(setpoints)?;
         self.armed("set")?;
         let on = setpoints.mode == RigMode::Running;
-        // The valve first: less back pressure is never worse.
+        // The valve first: lower back pressure is always safe.
         let values = [
             (Target::Valve, setpoints.valve_opening_ratio),
             (Target::P3, setpoints.p3_pa),
-            // Without air nothing carries the heat away.
+            // Without air, no flow carries the heat away.
             (Target::T3, if on { setpoints.t3_k } else { self.heater_off_k() }),
             (Target::OilTemperature, setpoints.oil_temperature_k),
         ];
-        // Off before anything else, on after everything else.
+        // Air off goes first, air on last.
         let off = (!on).then_some((Target::Air, 0.0));
         let on = on.then_some((Target::Air, 1.0));
         let values: Vec<_> = off.into_iter().chain(values).chain(on).collect();
@@ -271,7 +271,7 @@ impl<C: Controller> Backend for Rig<C> {
         armed.last_s = until_s;
         armed.sequence += 1;
         self.beat(until_s);
-        // A controller that does not answer gives samples without readings: the guards count how long.
+        // If the controller does not answer, the sample has no readings, and the guards count how long that lasts.
         let readings = self.controller.read(until_s);
         let column = |channel: Channel| {
             let value = match COMMANDS.contains(&channel) {
@@ -296,7 +296,7 @@ impl<C: Controller> Backend for Rig<C> {
         let armed = self.armed("hold")?;
         match armed.told.filter(|_| !armed.safe) {
             Some(told) => self.set(&told),
-            // What was told before it was made safe would bring the air back.
+            // Setpoints from before the safe state would restore the air.
             None => Ok(()),
         }
     }
@@ -307,7 +307,7 @@ impl<C: Controller> Backend for Rig<C> {
         let open = armed.told.map_or(0.0, |told| told.valve_opening_ratio);
         let highest = self.stand.accepts.range(Target::Valve).high;
         let valve = open.max(self.stand.safe.opening).min(highest);
-        // The heater last: a controller that refuses it has opened its valve.
+        // The heater last: even if the controller refuses it, the valve is open.
         self.write(&[(Target::Air, 0.0), (Target::Valve, valve), (Target::T3, self.heater_off_k())])
     }
 

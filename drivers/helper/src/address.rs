@@ -3,11 +3,11 @@
 use serde::de::{Deserialize, Deserializer, Error};
 use std::net::SocketAddr;
 
-/// Reads `127.0.0.1:5020`, for `#[serde(deserialize_with = "mapper_driver::address")]`. Names are refused: looking one up may hang, and a call of
-/// a driver comes back in time whatever the network does.
+/// Reads `127.0.0.1:5020`, for `#[serde(deserialize_with = "mapper_driver::address")]`. Host names are refused: a look-up may hang, and
+/// every call of a driver must return in time.
 ///
 /// # Errors
-/// What is no address, in words that say how it is written.
+/// If it is not an address; the message shows the format.
 pub fn address<'de, D: Deserializer<'de>>(from: D) -> Result<SocketAddr, D::Error> {
     let text = String::deserialize(from)?;
     text.parse().map_err(|_| D::Error::custom(remedy(&text)))

@@ -1,32 +1,32 @@
-//! A rig that is held, and its way into the safe state.
+//! An armed rig and its safe trajectory.
 
 use crate::descent::{Descent, Flight, STEP_S};
 use mapper_core::{Backend, RigDescription, Setpoints};
 use mapper_protocol::LEASE_S;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// A rig that is held.
+/// An armed rig.
 pub(crate) struct Armed {
     /// On the driver's clock, s.
     pub(crate) at_s: f64,
-    /// Arming may take seconds: time and lease begin with the first word or tick after it.
+    /// Arming may take seconds: time and lease begin with the first message or tick after it.
     pub(crate) fresh: bool,
     pub(crate) told: Option<Setpoints>,
     /// Number of the next sample to poll for, in real time.
     pub(crate) ticks: u64,
     /// Run time of the last poll, s.
     pub(crate) polled_s: f64,
-    /// Without a word until then the rig is made safe, s on the driver's clock.
+    /// When the lease ends and the rig is made safe, s on the driver's clock.
     pub(crate) lease_s: f64,
     pub(crate) descent: Option<Descent>,
-    /// The lease had ended: nothing but giving back.
+    /// The lease has ended; only disarming is allowed.
     pub(crate) ended: bool,
-    /// The rig has not confirmed its safe state. It is not polled then, so that what watches the driver's heartbeat acts.
+    /// The rig has not confirmed its safe state. It is not polled then, so that the watchdog on the driver's heartbeat acts.
     pub(crate) in_doubt: bool,
 }
 
 impl Armed {
-    /// A rig that has just been armed, at this time of the driver's clock, s.
+    /// A newly armed rig, at this time of the driver's clock, s.
     pub(crate) fn new(now_s: f64) -> Armed {
         Armed {
             at_s: now_s,
@@ -41,7 +41,7 @@ impl Armed {
         }
     }
 
-    /// Goes on with the way into the safe state, where one has begun. Gives when something is due again, s from now, and why the rig is
+    /// Continues the safe trajectory, if one has begun. Returns when the next step is due, s from now, and once why the rig is
     /// in doubt, once.
     pub(crate) fn fly_on(
         &mut self,
@@ -59,7 +59,7 @@ impl Armed {
         if simulated && flight != Flight::Safe {
             self.polled_s += STEP_S;
             let until_s = self.polled_s;
-            // Samples of a way that nobody looks at.
+            // Samples of the safe trajectory, which are discarded.
             let _ = catch_unwind(AssertUnwindSafe(|| rig.poll(until_s)));
         }
         let due_s = if simulated && flight == Flight::GoesOn { 0.0 } else { STEP_S };

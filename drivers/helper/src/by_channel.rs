@@ -1,15 +1,15 @@
-//! Settings by channel, whose mistakes are told at their channel.
+//! Settings by channel, whose errors name their channel.
 
 use mapper_core::Channel;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
-/// Reads a map from channels, for `#[serde(deserialize_with = "mapper_driver::by_channel")]`. Its keys are read as text: `serde_path_to_error`
-/// names no other keys in its paths, so that a mistake would be told at `read.?.node`.
+/// Reads a map from channels, for `#[serde(deserialize_with = "mapper_driver::by_channel")]`. Its keys are read as text: otherwise
+/// `serde_path_to_error` would report an error at `read.?.node`.
 ///
 /// # Errors
-/// A key that is no channel or is written twice, or a value that is none.
+/// If a key is not a channel or is repeated, or if a value is invalid.
 pub fn by_channel<'de, T, D>(from: D) -> Result<BTreeMap<Channel, T>, D::Error>
 where
     T: Deserialize<'de>,
@@ -17,7 +17,7 @@ where
 {
     struct Channels<T>(PhantomData<T>);
 
-    /// A value at this key; a key that is no channel is told at itself too.
+    /// A value at this key. An invalid key is reported at the key itself too.
     struct At<T>(String, PhantomData<T>);
 
     impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for At<T> {

@@ -1,45 +1,45 @@
-//! The way into the safe state that a driver flies by itself.
+//! The safe trajectory, flown by the driver without its host.
 
 use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Time between two setpoints on the way, and between two tries to cut the air, s.
+/// Time between two setpoints of the trajectory, and between two attempts to cut the air, s.
 pub(crate) const STEP_S: f64 = 0.1;
-/// Below the pressure of the cell no gas flows, Pa.
+/// Pressure of the cell, below which no gas flows, Pa.
 const ATMOSPHERE_PA: f64 = 105e3;
-/// How long a driver that nobody listens to goes on trying behind the longest way, s.
+/// How long a driver without a host keeps trying after the longest trajectory, s.
 const PATIENCE_S: f64 = 20.0;
 
-/// A way that has begun.
+/// A safe trajectory in progress.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Descent {
     from: Option<Setpoints>,
     begun_s: f64,
-    /// When the rig is told again, s.
+    /// Time of the next command, s.
     due_s: f64,
     cut: bool,
 }
 
-/// How far it is.
+/// Progress of the trajectory.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Flight {
-    /// Nothing is due.
+    /// No command is due.
     Waits,
-    /// The rig was told what is due.
+    /// The due command was sent.
     GoesOn,
     /// The rig has confirmed its safe state.
     Safe,
-    /// The rig was told to become safe and does not confirm it: it is told again.
+    /// The rig does not confirm its safe state; the command is repeated.
     Doubt(String),
 }
 
 impl Descent {
-    /// Begins at the setpoints that hold, at this run time, s.
+    /// Begins at the current setpoints, at this run time, s.
     pub(crate) fn new(from: Option<Setpoints>, now_s: f64) -> Descent {
         Descent { from, begun_s: now_s, due_s: now_s, cut: false }
     }
 
-    /// Tells the rig what is due at this run time, s.
+    /// Sends the command that is due at this run time, s.
     pub(crate) fn fly(&mut self, rig: &mut dyn Backend, description: &RigDescription, now_s: f64) -> Flight {
         // Half a millionth of a step is rounding.
         if now_s < self.due_s - 5e-7 * STEP_S {
@@ -62,13 +62,13 @@ impl Descent {
         }
     }
 
-    /// Whether a driver that nobody listens to may end although the rig has confirmed nothing.
+    /// Whether a driver without a host may end although the rig has not confirmed its safe state.
     pub(crate) fn is_hopeless(&self, description: &RigDescription, now_s: f64) -> bool {
         now_s - self.begun_s > description.safe.within_s + PATIENCE_S
     }
 }
 
-/// Air off, once.
+/// Cuts the air, once.
 pub(crate) fn make_safe(rig: &mut dyn Backend) -> Result<(), String> {
     match catch_unwind(AssertUnwindSafe(|| rig.make_safe())) {
         Ok(answer) => answer.map_err(|error: BackendError| error.to_string()),

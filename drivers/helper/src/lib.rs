@@ -1,5 +1,5 @@
-//! What every driver needs: an author writes a [`Backend`] and calls [`About::serve`], or [`serve`] where nobody starts it by hand; frames, hello, lease and the
-//! safe trajectory when nobody is there any more are done here, over pipes or at a socket. docs/protocol.md says what goes over them.
+//! The common part of every driver. An author writes a [`Backend`] and calls [`About::serve`], or [`serve`] if it is never started by hand.
+//! Frames, hello, lease and the safe trajectory without a host are done here, over pipes or a socket; docs/protocol.md describes the messages.
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
@@ -14,8 +14,8 @@
 //! # fn my_rig(_: &serde_json::Value) -> Result<Box<dyn mapper_core::Backend>, mapper_core::BackendError> { unimplemented!() }
 //! ```
 //!
-//! A rig in real time is polled here at its own rate, each time for the newest sample that is due; one in simulated time when the host
-//! asks. A call that hangs keeps the rig from becoming safe: whatever a backend reads or writes needs a deadline of its own.
+//! A rig in real time is polled here at its own rate, each time for the newest due sample; a simulated rig is polled when the host
+//! asks. A call that hangs keeps the rig from becoming safe: every read or write of a backend needs its own deadline.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -43,8 +43,8 @@ pub use words::{About, SOCKET};
 
 use mapper_core::{Backend, BackendError};
 
-/// Makes the rig from the driver's settings in the campaign, `null` where there are none. The rig is not touched yet.
-/// A driver at a socket makes one for each host that comes.
+/// Makes the rig from the driver's settings in the campaign, `null` if there are none. It does not touch the rig yet.
+/// A driver at a socket makes one rig for each host that connects.
 pub trait Open: Fn(&serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {}
 
 impl<F: Fn(&serde_json::Value) -> Result<Box<dyn Backend>, BackendError>> Open for F {}

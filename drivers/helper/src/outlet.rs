@@ -1,4 +1,4 @@
-//! What goes out waits in a queue: a host that does not read must not stop the driver.
+//! The output queue: a host that does not read must not block the driver.
 
 use mapper_protocol::{Encoding, Message, encode, write_frame};
 use std::io::Write;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 
-/// Messages that wait for a host that does not read: some seconds of samples. Samples beyond are dropped, which the host sees.
+/// Queue for a host that does not read: some seconds of samples. Further samples are dropped, which the host detects.
 const WAITING: usize = 256;
-/// Places beyond those for answers and remarks alone, more than a host asks for at a time. A rig that was made safe is in doubt as long as
-/// its answer has not come.
+/// Extra places for answers and remarks, more than a host requests at a time. A rig that was made safe is in doubt until
+/// its answer arrives.
 const KEPT: usize = 64;
 
 /// The queue before the pipe to the host.
@@ -19,7 +19,7 @@ pub(crate) struct Outlet {
 }
 
 impl Outlet {
-    /// Writes into `pipe` by a thread of its own, which ends with it.
+    /// Writes to `pipe` on a thread of its own, which ends with the pipe.
     pub(crate) fn into_pipe(mut pipe: impl Write + Send + 'static) -> std::io::Result<Outlet> {
         let (to_write, bodies) = sync_channel::<Vec<u8>>(WAITING + KEPT);
         let waiting = Arc::new(AtomicUsize::new(0));
@@ -35,11 +35,11 @@ impl Outlet {
         Ok(Outlet { to_write, waiting })
     }
 
-    /// Sends without waiting: what finds no place, or fits into no frame of so many bytes, is dropped. It will be missed: by its number, or
-    /// by the deadline of who asked.
+    /// Sends without waiting. A message is dropped if the queue is full or the frame exceeds this limit. The loss shows as a
+    /// missing number, or as a timeout of the request.
     pub(crate) fn send(&self, message: &Message, limit_bytes: usize) {
         let comes_again = matches!(message.method.as_deref(), Some("samples" | "lost"));
-        // Nobody else adds to it: it can only become less meanwhile.
+        // No other thread adds to the queue, so it can only shrink meanwhile.
         if comes_again && self.waiting.load(Ordering::Relaxed) >= WAITING {
             return;
         }
@@ -47,7 +47,7 @@ impl Outlet {
         if body.len() > limit_bytes {
             return;
         }
-        // Counted first: who writes may be quicker.
+        // Counted before sending, since the writer may be faster.
         self.waiting.fetch_add(1, Ordering::Relaxed);
         if self.to_write.try_send(body).is_err() {
             self.waiting.fetch_sub(1, Ordering::Relaxed);

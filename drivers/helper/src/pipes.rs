@@ -8,7 +8,7 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::sync::mpsc::sync_channel;
 
-/// Serves one host on standard input and output, until it is gone and the rig is safe. `name`: the file name of the program is
+/// Serves one host on standard input and output, until it disconnects and the rig is safe. `name`: the file name of the program is
 /// `mapper-backend-NAME`.
 pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'static) -> ExitCode {
     let (tell, news) = sync_channel(WAITING);
@@ -20,8 +20,8 @@ pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'stati
     ExitCode::SUCCESS
 }
 
-/// Where frames go. Whatever else in this program writes to standard output, an author's own words or a library in C, goes to standard error
-/// from now on: it must not get between the frames.
+/// The pipe for frames. All other output to standard output, from an author's code or a C library, goes to standard error
+/// from now on, since it must not get between the frames.
 #[cfg(unix)]
 fn frames() -> std::io::Result<impl Write + Send> {
     use std::os::fd::AsFd;

@@ -1,4 +1,4 @@
-//! Why a request is refused, and calls of an author's code as answers.
+//! Refusals of requests, and results of an author's code as answers.
 
 use mapper_core::BackendError;
 use mapper_protocol::{Code, Failure, error_on_the_wire};
@@ -25,7 +25,7 @@ pub(crate) fn write(value: &impl serde::Serialize) -> Result<Value, Refusal> {
     serde_json::to_value(value).map_err(|error| refused(Code::Failed, error.to_string()))
 }
 
-/// A call of the author's code: its errors and panics as refusals.
+/// Calls the author's code and returns its errors and panics as refusals.
 pub(crate) fn guarded<T>(call: impl FnOnce() -> Result<T, BackendError>) -> Result<T, Refusal> {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(answer) => answer.map_err(|error| Box::new(error_on_the_wire(&error))),

@@ -1,11 +1,11 @@
-//! Secrets stand in the environment; settings name the variable.
+//! Secrets are read from the environment; settings name the variable.
 
 use serde_json::Value;
 
-/// Why there is no secret.
+/// Why a secret is unavailable.
 #[derive(Debug, thiserror::Error)]
 pub enum SecretError {
-    /// It stands in the settings.
+    /// It is written in the settings.
     #[error("write `{{env: NAME}}`, the name of an environment variable that holds it")]
     Form,
     /// The variable is not set.
@@ -13,16 +13,16 @@ pub enum SecretError {
     NotSet(String),
 }
 
-/// The secret that a setting `{env: NAME}` names; `None` for `null`.
+/// The secret named by a setting `{env: NAME}`; `None` for `null`.
 ///
 /// # Errors
-/// [`SecretError`], which never holds the secret.
+/// [`SecretError`], which never contains the secret.
 pub fn secret(setting: &Value) -> Result<Option<String>, SecretError> {
     if setting.is_null() {
         return Ok(None);
     }
     let name = setting.get("env").and_then(Value::as_str).ok_or(SecretError::Form)?;
-    // An empty one is one that somebody forgot.
+    // An empty variable counts as not set.
     let value = std::env::var(name).ok().filter(|value| !value.is_empty());
     value.map(Some).ok_or_else(|| SecretError::NotSet(name.to_owned()))
 }

@@ -1,4 +1,4 @@
-//! What a driver does at each message and at each tick; time is an argument.
+//! The driver's reaction to each message and each tick; time is an argument.
 
 use crate::armed::Armed;
 use crate::descent::{Descent, make_safe};
@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 /// Makes the rig.
 pub(crate) type Opened = Box<dyn FnOnce(&Value) -> Result<Box<dyn Backend>, BackendError>>;
 
-/// Latest run time that a simulated rig is polled for, s: beyond it the steps of a way down would be lost in rounding.
+/// Maximum run time of a simulated rig, s: beyond it the steps of a run-down would be lost to rounding.
 const LATEST_S: f64 = 1e9;
 
 /// A driver, from hello to the end.
@@ -27,9 +27,9 @@ pub(crate) struct Server {
     armed: Option<Armed>,
     greeted: bool,
     frame_limit_bytes: u32,
-    /// Nobody is there any more: end when the rig is safe.
+    /// The host has disconnected: end when the rig is safe.
     leaving: bool,
-    /// What goes out.
+    /// Messages to send.
     pub(crate) out: Vec<Message>,
 }
 
@@ -49,17 +49,17 @@ impl Server {
         }
     }
 
-    /// Largest frame that the other side takes, bytes.
+    /// Maximum frame size of the host, bytes.
     pub(crate) fn frame_limit_bytes(&self) -> u32 {
         self.frame_limit_bytes
     }
 
-    /// Whether it is over: nobody is there, and the rig is safe.
+    /// Whether serving is over: the host has disconnected, and the rig is safe.
     pub(crate) fn is_over(&self) -> bool {
         self.leaving && self.armed.is_none()
     }
 
-    /// A message has come at this time of the driver's clock, s.
+    /// Handles a message that arrived at this time of the driver's clock, s.
     pub(crate) fn take(&mut self, now_s: f64, message: Message) {
         let known = message.session.as_deref() == Some(&self.session);
         self.begin(now_s);
@@ -139,7 +139,7 @@ impl Server {
         Ok(json!({}))
     }
 
-    /// The rig, where it is held and nothing is wrong.
+    /// The rig, if it is armed.
     fn held(&mut self) -> Result<(&mut dyn Backend, &RigDescription, &mut Armed), Refusal> {
         let (Some((rig, description)), Some(armed)) = (&mut self.rig, &mut self.armed) else {
             return Err(refused(Code::OutOfOrder, "the rig is not armed"));
@@ -204,7 +204,7 @@ impl Server {
         Ok(json!({}))
     }
 
-    /// A rig that has not confirmed its safe state is not let go.
+    /// Disarms the rig, unless it has not confirmed its safe state.
     fn disarm(&mut self) -> Result<Value, Refusal> {
         let (.., armed) = self.held()?;
         if armed.told.is_some() || armed.descent.is_some() {
@@ -216,7 +216,7 @@ impl Server {
         Ok(json!({}))
     }
 
-    /// Nobody is there any more: the rig becomes safe, then it is over.
+    /// The host has disconnected: makes the rig safe, then ends.
     pub(crate) fn leave(&mut self, now_s: f64) {
         self.begin(now_s);
         if !self.leaving {
@@ -234,7 +234,7 @@ impl Server {
         }
     }
 
-    /// What is due at this time of the driver's clock, s. Returns when something is due next, s from now; `None`: nothing.
+    /// Does what is due at this time of the driver's clock, s. Returns the time to the next task, s; `None`: no task.
     pub(crate) fn tick(&mut self, now_s: f64) -> Option<f64> {
         self.begin(now_s);
         let Some(armed) = &self.armed else { return None };
@@ -251,11 +251,11 @@ impl Server {
         if polls {
             let period_s = 1.0 / description.sample_rate_hz;
             let run_s = now_s - armed.at_s;
-            // The newest that is due; half a millionth of a period is rounding.
+            // The newest due sample; half a millionth of a period is rounding.
             let due = (run_s / period_s + 5e-7).floor().max(0.0) as u64;
             if due >= armed.ticks {
                 armed.ticks = due + 1;
-                // A rig may measure nothing before it was told anything.
+                // A rig may measure nothing before its first setpoints.
                 let waits = armed.told.is_none() && !armed.ended;
                 match guarded(|| rig.poll(due as f64 * period_s)) {
                     Ok(batch) => {
@@ -291,7 +291,7 @@ impl Server {
     fn give_back_when_safe(&mut self) {
         let Ok((rig, _, armed)) = self.held() else { return };
         if armed.descent.is_none() {
-            // Whatever has become of it: nobody can be told.
+            // The result does not matter: no host is left to report it to.
             let _ = make_safe(rig);
             let _ = guarded(|| rig.disarm());
             self.armed = None;
@@ -313,25 +313,25 @@ mod tests {
 
     type Log = Arc<Mutex<Vec<String>>>;
 
-    /// Writes down what it is told.
-    struct Told {
+    /// Logs its commands.
+    struct LoggingRig {
         log: Log,
         simulated_time: bool,
         samples: u64,
-        /// So many setpoints are taken before it panics.
+        /// Number of setpoints that it accepts before it panics.
         takes: usize,
-        /// So often it refuses to become safe.
+        /// Number of times that it refuses to become safe.
         refuses: usize,
     }
 
-    impl Told {
+    impl LoggingRig {
         fn write(&self, words: String) -> Result<(), BackendError> {
             self.log.lock().unwrap().push(words);
             Ok(())
         }
     }
 
-    impl Backend for Told {
+    impl Backend for LoggingRig {
         fn describe(&self) -> RigDescription {
             RigDescription {
                 backend: "told".to_owned(),
@@ -379,20 +379,20 @@ mod tests {
         }
     }
 
-    /// A driver that is armed since 0 s and told 150 kPa; what its rig is told after that.
+    /// A driver armed at 0 s and set to 150 kPa, and the log of its rig after that.
     fn flying(simulated_time: bool, takes: usize) -> (Server, Log) {
         refusing(simulated_time, takes, 0)
     }
 
     fn refusing(simulated_time: bool, takes: usize, refuses: usize) -> (Server, Log) {
         let log = Log::default();
-        let rig = Told { log: log.clone(), simulated_time, samples: 0, takes, refuses };
+        let rig = LoggingRig { log: log.clone(), simulated_time, samples: 0, takes, refuses };
         let open: Opened = Box::new(|_| Ok(Box::new(rig)));
         let mut server = Server::new("told", "1", "s".to_owned(), open);
         let hello = json!({"magic": MAGIC, "protocol": VERSION, "name": "x", "version": "1", "frame_limit_bytes": 100_000});
-        let told = setpoints_on_the_wire();
+        let setpoints = setpoints_on_the_wire();
         for (method, params) in
-            [("hello", hello), ("configure", json!({})), ("arm", json!({})), ("set", told)]
+            [("hello", hello), ("configure", json!({})), ("arm", json!({})), ("set", setpoints)]
         {
             ask(&mut server, 0.0, method, params);
         }
@@ -402,14 +402,14 @@ mod tests {
     }
 
     fn setpoints_on_the_wire() -> Value {
-        let told = Setpoints {
+        let setpoints = Setpoints {
             mode: RigMode::Running,
             p3_pa: 150e3,
             t3_k: 773.15,
             valve_opening_ratio: 0.7,
             oil_temperature_k: 323.15,
         };
-        serde_json::to_value(mapper_protocol::setpoints_on_the_wire(&told)).unwrap()
+        serde_json::to_value(mapper_protocol::setpoints_on_the_wire(&setpoints)).unwrap()
     }
 
     fn ask(server: &mut Server, now_s: f64, method: &str, params: Value) -> Option<Failure> {
@@ -431,7 +431,7 @@ mod tests {
                 server.take(now_s, lease.clone());
             }
             server.tick(now_s);
-            // Renewed for the last time at 5.5 s.
+            // The last renewal is at 5.5 s.
             assert!(log.lock().unwrap().is_empty() || now_s >= 7.5, "at {now_s} s");
         }
         assert_eq!(*log.lock().unwrap(), WAY);
@@ -442,7 +442,7 @@ mod tests {
         assert!(ask(&mut server, 10.0, "set", setpoints_on_the_wire()).is_none());
     }
 
-    /// What was told before the rig was made safe, or before its lease ended, is not to be held: it would bring the air back.
+    /// Setpoints from before the safe state or the end of the lease must not be held: they would restore the air.
     #[test]
     fn what_is_held_is_what_was_told_last_and_nothing_from_before_it_was_made_safe() {
         let (mut server, log) = flying(false, 100);
@@ -456,7 +456,7 @@ mod tests {
         assert_eq!(log.lock().unwrap().iter().filter(|told| *told == "hold").count(), 1);
     }
 
-    /// By another session no lease is renewed, and nothing is set.
+    /// Another session can neither renew the lease nor set anything.
     #[test]
     fn a_stranger_is_refused() {
         let (mut server, log) = flying(false, 100);
@@ -484,7 +484,7 @@ mod tests {
         }
     }
 
-    /// A rig that panics at its second setpoint of the way: its air is cut at once.
+    /// If a rig panics at its second setpoint of the safe trajectory, its air is cut at once.
     #[test]
     fn a_way_that_fails_is_cut_short() {
         let (mut server, log) = flying(false, 2);
@@ -495,8 +495,8 @@ mod tests {
         assert!(server.is_over());
     }
 
-    /// A controller that is away when the lease ends: it is asked again each tenth of a second until it is back, and it is not polled
-    /// meanwhile, so that the heartbeat stands still. It is not let go before it has confirmed.
+    /// A controller is away when the lease ends. The driver retries every 0.1 s until it is back, and does not poll it
+    /// meanwhile, so that the heartbeat stops. It does not disarm the rig before the safe state is confirmed.
     #[test]
     fn a_rig_in_doubt_is_told_again_and_its_heartbeat_stops() {
         let (mut server, log) = refusing(false, 1, 30);
@@ -520,7 +520,7 @@ mod tests {
         assert!(after.contains(&"safe".to_owned()));
     }
 
-    /// Values that no host sends, beside those that it does.
+    /// Values that no host sends, in addition to those that it does.
     fn thing() -> impl Strategy<Value = Value> {
         prop_oneof![
             Just(Value::Null),
@@ -535,7 +535,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever comes in whatever order: one answer to each request, no panic, and a rig that nobody talks to any more becomes safe.
+        /// Any messages in any order: one answer to each request, no panic, and a rig without a host becomes safe.
         #[test]
         fn no_messages_keep_a_rig_from_becoming_safe(
             steps in prop::collection::vec((0usize..10, any::<bool>(), thing(), 0.0f64..3.0), 0..60), simulated: bool,

@@ -1,4 +1,4 @@
-//! One host, from its first word until it is gone and the rig is safe; signals, and the clock.
+//! Serves one host, from its first message until it disconnects and the rig is safe; signals, and the clock.
 
 use crate::outlet::Outlet;
 use crate::server::Server;
@@ -7,24 +7,24 @@ use std::io::Read;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 
-/// Messages of the host that wait for a rig that is busy; more wait in its pipe.
+/// Queue of the host's messages while the rig is busy; further messages wait in its pipe.
 pub(crate) const WAITING: usize = 256;
-/// Longest wait, s.
+/// Maximum wait, s.
 const LONGEST_S: f64 = 3600.0;
 
-/// What happens to a driver.
+/// An event of the driver.
 pub(crate) enum Came {
-    /// A host has come to the socket.
+    /// A host has connected to the socket.
     #[cfg(unix)]
     Connected(std::os::unix::net::UnixStream),
     Message(Box<Message>),
-    /// The host is gone, or talks what nobody understands.
+    /// The host has disconnected, or sent an invalid frame.
     Closed,
-    /// A signal asks it to end.
+    /// A signal requests termination.
     Terminate,
 }
 
-/// Serves this host. Whether a signal asked to end meanwhile.
+/// Serves this host. Returns whether a signal requested termination meanwhile.
 pub(crate) fn serve_one(mut server: Server, news: &Receiver<Came>, outlet: &Outlet) -> bool {
     let begun = Instant::now();
     let now_s = || begun.elapsed().as_secs_f64();
@@ -36,12 +36,12 @@ pub(crate) fn serve_one(mut server: Server, news: &Receiver<Came>, outlet: &Outl
             asked_to_end = true;
             server.leave(now_s);
         }
-        // Whoever comes while another is served is turned away at the door.
+        // The accept thread refuses a host while another one is served.
         #[cfg(unix)]
         Came::Connected(_) => {}
     };
     while !server.is_over() {
-        // What has come while the rig was busy has come in time.
+        // Messages that arrived while the rig was busy count as in time.
         while let Ok(came) = news.try_recv() {
             heed(&mut server, came, now_s());
         }
@@ -58,13 +58,13 @@ pub(crate) fn serve_one(mut server: Server, news: &Receiver<Came>, outlet: &Outl
     asked_to_end
 }
 
-/// A name that no other session of this driver has: its process and when it began.
+/// A unique name of a session of this driver: its process and start time.
 pub(crate) fn session() -> String {
     let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
     format!("{}-{}", std::process::id(), since.as_nanos())
 }
 
-/// What happens next, within so many seconds; `None`: nothing has.
+/// The next event, within this many seconds; `None`: there was none.
 pub(crate) fn wait(news: &Receiver<Came>, next_s: Option<f64>) -> Option<Came> {
     let within = Duration::from_secs_f64(next_s.unwrap_or(LONGEST_S).clamp(0.0, LONGEST_S));
     match news.recv_timeout(within) {
@@ -81,7 +81,7 @@ fn send(server: &mut Server, outlet: &Outlet) {
     }
 }
 
-/// Passes on what a host says, and at last that it is gone.
+/// Forwards the host's messages, and finally that it has disconnected.
 pub(crate) fn listen(mut host: impl Read + Send + 'static, tell: SyncSender<Came>) -> std::io::Result<()> {
     let read = move || {
         while let Ok(Some(body)) = read_frame(&mut host, FRAME_LIMIT_BYTES) {
@@ -90,7 +90,7 @@ pub(crate) fn listen(mut host: impl Read + Send + 'static, tell: SyncSender<Came
                 return;
             }
         }
-        // Nobody is left to be told where this fails.
+        // If this fails, the receiver is gone.
         let _ = tell.send(Came::Closed);
     };
     std::thread::Builder::new().name("from host".to_owned()).spawn(read).map(drop)

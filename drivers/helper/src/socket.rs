@@ -1,4 +1,4 @@
-//! A socket of this computer: the driver is there before a host comes and after it has gone, and serves one after the other.
+//! A local socket: the driver outlives its hosts and serves them one after the other.
 
 use crate::Open;
 use crate::outlet::Outlet;
@@ -19,11 +19,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::Duration;
 
-/// How long somebody who is turned away has for his first word, and to hear why.
+/// How long a refused host has for its first message and for reading the refusal.
 const AT_THE_DOOR: Duration = Duration::from_secs(1);
 
-/// Serves hosts that come to the socket at `path`, one after the other and each with a rig of its own, until a signal ends it. Who comes while
-/// another is served, or while its rig becomes safe, is told so. The socket is its user's alone.
+/// Serves hosts that connect to the socket at `path`, one after the other and each with its own rig, until a signal ends it. A host
+/// that connects while another is served, or while its rig becomes safe, is refused. Only the user can access the socket.
 pub fn serve_at(
     path: &Path,
     name: &'static str,
@@ -40,11 +40,11 @@ pub fn serve_at(
             .spawn(move || open_the_door(&listener, &tell, &busy))
             .map(|_| file)
     });
-    // The file goes with the driver.
+    // The socket file is removed when the driver ends.
     let _file = match begun {
         Ok(file) => file,
         Err(error) => {
-            // Where standard error is closed nobody is told.
+            // If standard error is closed, the message is lost.
             let _ = writeln!(std::io::stderr(), "error: {}: {error}", path.display());
             return ExitCode::FAILURE;
         }
@@ -59,7 +59,7 @@ pub fn serve_at(
         let open = open.clone();
         let server = Server::new(name, version, session(), Box::new(move |settings| open(settings)));
         let served = attend(server, &host, tell.clone(), &news);
-        // Whatever is still unread: nobody is there, or he said what nobody understands.
+        // Discards unread data: the host has disconnected or sent an invalid frame.
         let _ = host.shutdown(Shutdown::Both);
         busy.store(false, Ordering::SeqCst);
         if served.unwrap_or(false) {
@@ -88,13 +88,13 @@ fn open_the_door(listener: &UnixListener, tell: &SyncSender<Came>, busy: &Atomic
                     return;
                 }
             }
-            // No handles left, say: that passes.
+            // For example, no file handles left: a passing condition.
             Err(_) => std::thread::sleep(Duration::from_millis(100)),
         }
     }
 }
 
-/// Answers the first request with why there is no more.
+/// Answers the first request with a refusal.
 fn turn_away(mut host: UnixStream) {
     let timed =
         host.set_read_timeout(Some(AT_THE_DOOR)).and_then(|()| host.set_write_timeout(Some(AT_THE_DOOR)));
@@ -107,22 +107,22 @@ fn turn_away(mut host: UnixStream) {
         "this driver serves another host, or its rig is still being made safe; wait until that is over";
     let refusal = Message::answer(id, Err(Box::new(Failure::new(Code::Refused, words))));
     if let Ok(body) = encode(&refusal, Encoding::MessagePack) {
-        // He is gone where this fails.
+        // If this fails, the host has disconnected.
         let _ = write_frame(&mut host, &body, FIRST_FRAME_LIMIT_BYTES);
     }
 }
 
-/// The socket's file, which ends with the driver.
+/// The socket's file, removed when the driver ends.
 struct OwnFile(PathBuf);
 
 impl Drop for OwnFile {
     fn drop(&mut self) {
-        // Somebody else may have removed it.
+        // Another process may have removed it.
         let _ = std::fs::remove_file(&self.0);
     }
 }
 
-/// Listens at `path`. What a driver has left there that was killed is taken away; where one listens, or where something else is, nothing is.
+/// Listens at `path`. Removes the socket of a killed driver, but neither a socket in use nor another kind of file.
 fn bind(path: &Path) -> std::io::Result<(UnixListener, OwnFile)> {
     if let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) {
         std::fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
@@ -153,7 +153,7 @@ mod tests {
         let (listener, file) = bind(&path).unwrap();
         assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o600);
         assert!(bind(&path).err().unwrap().to_string().contains("another driver listens"));
-        // As a kill leaves it.
+        // As after a kill.
         std::mem::forget(file);
         drop(listener);
         let (_listener, file) = bind(&path).unwrap();

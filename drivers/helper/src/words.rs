@@ -1,35 +1,35 @@
-//! What a driver says to people who start it by hand.
+//! Messages for users who start a driver by hand.
 
 use crate::Open;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
-/// Who a driver is.
+/// Identity of a driver.
 #[derive(Debug, Clone, Copy)]
 pub struct About {
     /// Name in campaigns; the file name of the program is `mapper-backend-NAME`.
     pub name: &'static str,
     /// Version of the driver.
     pub version: &'static str,
-    /// What it is, in a sentence.
+    /// One sentence that describes the driver.
     pub summary: &'static str,
-    /// Where its settings are documented.
+    /// Location of the documentation of its settings.
     pub settings: &'static str,
 }
 
-/// Where a driver listens that somebody has started, docs/protocol.md.
+/// The option for the socket of a driver that was started in advance, docs/protocol.md.
 pub const SOCKET: &str = "--socket";
-/// Wrong arguments, as everywhere.
+/// Exit code of wrong arguments, as usual.
 const WRONG_ARGUMENTS: u8 = 2;
 
 impl About {
-    /// Serves a host as [`serve`](crate::serve), with `--socket PATH` those that come there, or says to people what this is: `mapper` starts
+    /// Serves a host as [`serve`](crate::serve), or with `--socket PATH` the hosts that connect there, or prints help. `mapper` starts
     /// drivers without arguments, with pipes.
     pub fn serve(self, open: impl Open + 'static) -> ExitCode {
         let Some(argument) = std::env::args_os().nth(1) else {
             if std::io::stdin().is_terminal() {
-                // A terminal speaks no protocol: this would wait in silence.
-                say(&mut std::io::stderr(), &self.help());
+                // A terminal does not speak the protocol, so serving would wait forever.
+                print(&mut std::io::stderr(), &self.help());
                 return ExitCode::from(WRONG_ARGUMENTS);
             }
             return crate::serve(self.name, self.version, open);
@@ -42,8 +42,8 @@ impl About {
             }
         }
         match argument.to_str() {
-            Some("--help" | "-h" | "help") => say(&mut std::io::stdout(), &self.help()),
-            Some("--version" | "-V") => say(&mut std::io::stdout(), &self.title()),
+            Some("--help" | "-h" | "help") => print(&mut std::io::stdout(), &self.help()),
+            Some("--version" | "-V") => print(&mut std::io::stdout(), &self.title()),
             _ => {
                 let words = format!(
                     "error: mapper-backend-{} takes no argument `{}`\n\n{}",
@@ -51,7 +51,7 @@ impl About {
                     argument.display(),
                     self.help()
                 );
-                say(&mut std::io::stderr(), &words);
+                print(&mut std::io::stderr(), &words);
                 return ExitCode::from(WRONG_ARGUMENTS);
             }
         }
@@ -80,7 +80,7 @@ impl About {
     }
 }
 
-/// Where nobody reads, nobody is told.
-fn say(out: &mut impl Write, words: &str) {
+/// Prints the text; if the stream is closed, it is lost.
+fn print(out: &mut impl Write, words: &str) {
     let _ = writeln!(out, "{words}");
 }

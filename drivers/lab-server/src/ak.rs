@@ -1,5 +1,5 @@
-//! The stand as an instrument that speaks the AK telegram: read, never controlled. `AKON K0` answers every reading in SI, in the order of the
-//! registers, `AKON Kn` the n-th; `ASTZ` whether it is remote, and whether it has tripped. What is no reading is marked by `#`.
+//! The stand as a read-only instrument with the AK protocol. `AKON K0` answers every reading in SI, in the order of the
+//! registers, `AKON Kn` the n-th; `ASTZ` reports whether it is remote and whether it has tripped. A missing reading is marked by `#`.
 
 use crate::stand::{Stand, measured};
 use mapper_backend_ak::telegram::{Assembler, asked, reply};
@@ -8,9 +8,9 @@ use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 
-/// Between two answers: instruments give some ten a second.
+/// Time between two answers: instruments give some ten a second.
 const PACE: Duration = Duration::from_millis(50);
-/// Connections that say nothing for so long are closed.
+/// Silent connections are closed after this time.
 const SILENCE: Duration = Duration::from_secs(60);
 const CONNECTIONS: usize = 16;
 
@@ -18,7 +18,7 @@ fn number(reading: Option<f64>) -> String {
     reading.map_or_else(|| "#0".to_owned(), |value| value.to_string())
 }
 
-/// The answer to what stood between STX and ETX.
+/// The answer to the text between STX and ETX.
 fn answer(stand: &Stand, body: &[u8]) -> Vec<u8> {
     let Ok((code, channel, _)) = asked(body) else { return reply(None, &[]) };
     let channels = measured();
@@ -59,7 +59,7 @@ async fn talk(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::io::Resul
 /// Serves until the listener fails.
 ///
 /// # Errors
-/// Those of the listener.
+/// An error of the listener.
 pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
     let places = Arc::new(tokio::sync::Semaphore::new(CONNECTIONS));
     loop {
@@ -67,7 +67,7 @@ pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::
         let Ok(place) = places.clone().try_acquire_owned() else { continue };
         let stand = stand.clone();
         tokio::spawn(async move {
-            // Who went away is told nothing.
+            // A failure means that the client has disconnected.
             let _ = talk(stream, stand).await;
             drop(place);
         });

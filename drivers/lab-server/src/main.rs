@@ -1,5 +1,5 @@
-//! `mapper-lab-server`: the virtual lab of a campaign behind a real server, in real or scaled time. A stand to rehearse a night on, interlocks and
-//! effects included; docs/rig.md has the addresses.
+//! `mapper-lab-server`: the virtual lab of a campaign behind a real server, in real or scaled time. It serves to rehearse a night, including
+//! interlocks and effects; docs/rig.md has the addresses.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -24,38 +24,38 @@ use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
 
-/// How often the lab goes on.
+/// Interval between two steps of the lab.
 const STEP: Duration = Duration::from_millis(20);
 
-/// The virtual lab of a campaign behind a real server, to rehearse a night on. As a PLC has to, it cuts the air without a heartbeat for 2 s and
-/// above 1.05 times the campaign's limit of speed, and holds it off until somebody acknowledges that. One stand may be behind several servers.
+/// Serve the virtual lab of a campaign like a real gas stand, to rehearse a night. As a PLC must, it cuts the air after 2 s without a heartbeat
+/// and above 1.05 times the campaign's speed limit, until the trip is acknowledged. Several servers may share one stand.
 #[derive(Parser)]
 #[command(name = "mapper-lab-server", version)]
 #[command(group(clap::ArgGroup::new("servers").required(true).multiple(true).args(["modbus", "opcua", "ak"])))]
 struct Arguments {
-    /// Campaign whose machine stands there; its virtual lab, or one without settings where it names another backend
+    /// Campaign of the simulated machine; if it names another backend, the virtual lab runs with default settings
     campaign: PathBuf,
-    /// Serve Modbus TCP there, e.g. 127.0.0.1:5020; port 0: any that is free
+    /// Serve Modbus TCP at this address, e.g. 127.0.0.1:5020; port 0 picks a free one
     #[arg(long, value_name = "ADDRESS")]
     modbus: Option<SocketAddr>,
-    /// Serve OPC UA there, e.g. 127.0.0.1:4840: signed and encrypted, for the user $PLC_USER with the password $PLC_PASSWORD, or without a name
-    /// where they are not set
+    /// Serve OPC UA at this address, e.g. 127.0.0.1:4840: signed and encrypted, for the user $PLC_USER with the password $PLC_PASSWORD, or
+    /// anonymous if they are not set
     #[arg(long, value_name = "ADDRESS")]
     opcua: Option<SocketAddr>,
-    /// OPC UA in the clear instead, for anybody
+    /// Serve OPC UA without encryption, for any client
     #[arg(long, requires = "opcua")]
     clear: bool,
-    /// Serve readings as AK telegrams there, e.g. 127.0.0.1:8888; they control nothing
+    /// Serve readings as AK telegrams at this address, e.g. 127.0.0.1:8888 (read only)
     #[arg(long, value_name = "ADDRESS")]
     ak: Option<SocketAddr>,
-    /// A line for each speed that OPC UA hands out and each set-point that it takes: `SECONDS read RPM`, `SECONDS told NAME`, on the clock of this
-    /// computer that nobody sets; behind its decryption, so that latency can be measured where a session is encrypted
+    /// Print a line for each speed read and each set-point written over OPC UA: `SECONDS read RPM`, `SECONDS told NAME`. Times are on this
+    /// computer's monotonic clock, after decryption, so that latency can be measured in an encrypted session
     #[arg(long, requires = "opcua")]
     stamps: bool,
-    /// Seconds of the lab in one second on the wall, 0.1 to 100
+    /// Seconds of the lab per second of wall time, 0.1 to 100
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
-    /// Serve other computers too: over Modbus whoever reaches this one may write, without a password
+    /// Serve other computers too; over Modbus, any of them may write without a password
     #[arg(long)]
     public: bool,
 }
@@ -86,7 +86,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Where standard error is closed nobody is told.
+            // If standard error is closed, the message is lost.
             let _ = writeln!(std::io::stderr(), "error: {error}");
             ExitCode::FAILURE
         }
@@ -101,7 +101,7 @@ fn make(arguments: &Arguments) -> Result<Stand, LabError> {
         let name = mapper_backends::virtual_lab::NAME.to_owned();
         campaign.backend = BackendChoice { name, settings: serde_json::json!({}) };
     }
-    // Read by others at their own pace: a lab that measured no oftener than they ask would give them readings up to a sample old.
+    // Clients poll at their own rate: a slower sampling rate would give them readings up to one sample old.
     if let Some(settings) = campaign.backend.settings.as_object_mut() {
         let rate_hz = (1.0 / STEP.as_secs_f64() / arguments.speed).clamp(10.0, 50.0);
         settings.entry("sample_rate").or_insert_with(|| format!("{rate_hz} Hz").into());
@@ -113,7 +113,7 @@ fn make(arguments: &Arguments) -> Result<Stand, LabError> {
     Ok(Stand::new(lab, campaign.limits.speed_max_rpm, arguments.speed)?)
 }
 
-/// Where somebody listens, once it does.
+/// Starts listening and returns the address.
 fn listen(
     runtime: &Runtime,
     arguments: &Arguments,
@@ -127,7 +127,7 @@ fn listen(
     Ok((listener, at))
 }
 
-/// Everything that was asked for; a line for each on standard output says where it is.
+/// Starts every requested server; a line for each on standard output gives its address.
 fn serve(
     runtime: &Runtime,
     arguments: &Arguments,
@@ -135,7 +135,7 @@ fn serve(
 ) -> Result<Vec<JoinHandle<Result<(), LabError>>>, LabError> {
     let mut serving = Vec::new();
     let mut out = std::io::stdout();
-    // Programs read the places from the first lines; what people have to know comes after all of them.
+    // Programs read the addresses from the first lines, so notes for the user follow all of them.
     let mut notes = Vec::new();
     if let Some(at) = arguments.modbus {
         let (listener, at) = listen(runtime, arguments, at)?;
@@ -173,7 +173,7 @@ fn run(arguments: &Arguments) -> Result<(), LabError> {
         return Err(LabError::Speed(arguments.speed));
     }
     let stand = Arc::new(Mutex::new(make(arguments)?));
-    // One for the commands of whoever drives, one for who looks on.
+    // One thread for the controlling client, one for observers.
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let shared = Shared { stand: stand.clone(), begun: Instant::now(), stamps: arguments.stamps };
     let serving = serve(&runtime, arguments, &shared)?;

@@ -1,6 +1,6 @@
-//! The stand as holding registers, as the example of docs/rig.md has them: readings from 0 and setpoints from 100 as singles of two registers,
-//! air 110, heartbeat 111, tripped 112, acknowledge 113. As a device of its own it answers as unit 255 or 0 (Modbus Messaging on TCP/IP 1.0b, 4.4.1.2);
-//! behind it there is no other unit, and it says so as a gateway does.
+//! The stand as holding registers, as in the example of docs/rig.md: readings from 0 and setpoints from 100 as singles of two registers,
+//! air 110, heartbeat 111, tripped 112, acknowledge 113. As a device of its own it answers as unit 255 or 0 (Modbus Messaging on TCP/IP 1.0b,
+//! 4.4.1.2). Other units do not exist behind it; it reports that as a gateway does.
 
 use crate::stand::{SETPOINTS as SETPOINTS_IN_ORDER, Stand, Target, measured};
 use std::future::{Ready, ready};
@@ -16,7 +16,7 @@ const HEARTBEAT: u16 = 111;
 const TRIPPED: u16 = 112;
 const ACKNOWLEDGE: u16 = 113;
 const END: u16 = 200;
-/// The units that it answers as.
+/// Unit numbers of the stand.
 pub const UNITS: [u8; 2] = [255, 0];
 
 #[derive(Clone)]
@@ -108,7 +108,7 @@ impl Service for Registers {
 /// Serves until the listener fails.
 ///
 /// # Errors
-/// Those of the listener.
+/// An error of the listener.
 pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {
     let server = Server::new(listener);
     let registers = |_| Ok(Some(Registers(stand.clone())));
@@ -120,7 +120,7 @@ pub async fn serve(listener: TcpListener, stand: Arc<Mutex<Stand>>) -> std::io::
 mod tests {
     use super::*;
 
-    /// 123456.0 as a single is 0x47F12000 (IEEE 754), the more significant word first.
+    /// 123456.0 as a single is 0x47F12000 (IEEE 754), with the high word first.
     #[test]
     fn a_single_is_two_registers() {
         assert_eq!(words(123_456.0), [0x47f1, 0x2000]);

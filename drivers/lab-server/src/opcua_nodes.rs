@@ -1,4 +1,4 @@
-//! The stand as nodes, as the example of docs/rig.md has them: `ns=2;s=NAME` in SI, `air`, `heartbeat`, `tripped`, `acknowledge`.
+//! The stand as nodes, as in the example of docs/rig.md: `ns=2;s=NAME` in SI, `air`, `heartbeat`, `tripped`, `acknowledge`.
 
 use crate::stand::{SETPOINTS, Stand, Target, measured};
 use mapper_core::Channel;
@@ -19,14 +19,14 @@ use std::time::Instant;
 
 const NAMESPACE: &str = "urn:mapper:lab:stand";
 const APPLICATION: &str = "urn:mapper:lab:server";
-/// Where the guide expects the nodes.
+/// Namespace index of the nodes in docs/rig.md.
 const INDEX: u16 = 2;
-/// What OPC UA counts time in.
+/// OPC UA time ticks per second.
 const TICKS_HZ: f64 = 1e7;
-/// Who is let in: the variables that the example of docs/rig.md names, so that server and driver are told once.
+/// Environment variables of user and password, as in the example of docs/rig.md, so that server and driver share them.
 const USER: (&str, &str) = ("PLC_USER", "PLC_PASSWORD");
 
-/// Why there is no server.
+/// Why the server cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     #[error("{} is set and {} is not: set both, or neither for anonymous sessions", .0, .1)]
@@ -39,19 +39,19 @@ pub enum ServeError {
     Made(String),
 }
 
-/// The stand and the clock that its readings are told by.
+/// The stand and the clock of its readings.
 #[derive(Clone)]
 pub struct Shared {
     /// The stand.
     pub stand: Arc<Mutex<Stand>>,
-    /// When its time began.
+    /// Start of its time.
     pub begun: Instant,
-    /// Whether reads of the speed and set-points are told on standard output, with their times.
+    /// Whether speed reads and set-point writes are printed on standard output, with their times.
     pub stamps: bool,
 }
 
 impl Shared {
-    /// A value of the stand with the moment at which it was taken.
+    /// A value of the stand with its timestamp.
     fn value(&self, of: impl Fn(&Stand) -> Option<Variant>) -> Result<DataValue, StatusCode> {
         let stand = self.stand.lock().map_err(|_| StatusCode::BadInternalError)?;
         let age_s = (self.begun.elapsed().as_secs_f64() - stand.wall_s()).clamp(0.0, 60.0);
@@ -66,12 +66,12 @@ impl Shared {
         })
     }
 
-    /// A line that says when something passed.
+    /// Prints a timestamped line.
     fn stamp(&self, words: impl std::fmt::Display) {
         if self.stamps {
             let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
             let seconds = now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9;
-            // Where nobody reads, nobody is told.
+            // If standard output is closed, the line is lost.
             let _ = writeln!(std::io::stdout(), "{seconds:.6} {words}");
         }
     }
@@ -111,7 +111,7 @@ fn directory() -> Result<PathBuf, ServeError> {
     Ok(path)
 }
 
-/// Who may come in; `None`: anybody, without a name.
+/// The permitted user; `None`: anonymous.
 fn user() -> Result<Option<(String, String)>, ServeError> {
     let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
     match (variable(USER.0), variable(USER.1)) {
@@ -122,16 +122,16 @@ fn user() -> Result<Option<(String, String)>, ServeError> {
     }
 }
 
-/// How sessions are protected.
+/// Security of sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Protection {
-    /// Signed and encrypted alone.
+    /// Signed and encrypted only.
     Encrypted,
-    /// In the clear alone, for anybody.
+    /// Without encryption only, anonymous.
     Clear,
 }
 
-/// Who is let in, for people; no name and no password.
+/// Describes the permitted users, without name or password.
 ///
 /// # Errors
 /// [`ServeError::HalfAUser`]
@@ -170,7 +170,7 @@ fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerB
         .product_uri(APPLICATION)
         .pki_dir(pki)
         .create_sample_keypair(protection == Protection::Encrypted)
-        // Whoever reaches this computer's own address may rehearse; a PLC asks for a certificate that it knows.
+        // Any client at this computer's own address may rehearse; a PLC asks for a known certificate.
         .trust_client_certs(true)
         .host(at.ip().to_string())
         .port(at.port())
@@ -197,7 +197,7 @@ fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerB
     Ok(builder)
 }
 
-/// A name, its type, and what is written there; `None`: only read.
+/// Name, type, and target of a write; `None`: read only.
 fn writable() -> Vec<(&'static str, DataTypeId, Target)> {
     let [p3, t3, valve, oil] = SETPOINTS;
     vec![
@@ -264,7 +264,7 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
     Ok(())
 }
 
-/// A server for this address; it listens once it is run.
+/// Makes a server for this address; it listens once it is run.
 ///
 /// # Errors
 /// [`ServeError`]

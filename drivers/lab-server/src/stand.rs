@@ -1,16 +1,16 @@
-//! The lab as a PLC sees it: readings, setpoints, a heartbeat, and interlocks that nothing from outside passes. Time is an argument.
+//! The lab as a PLC sees it: readings, setpoints, a heartbeat, and interlocks that no client can bypass. Time is an argument.
 
 use mapper_core::{
     Backend, BackendError, CHANNELS, Channel, EventKind, RigMode, SetpointRange, SetpointRanges, Setpoints,
 };
 use std::collections::BTreeMap;
 
-/// Without another heartbeat for so long the air is cut, s on the wall.
+/// Without a heartbeat for this time the air is cut, s of wall time.
 const WATCHDOG_S: f64 = 2.0;
-/// Above the campaign's limit of speed by this factor the air is cut.
+/// Factor on the campaign's speed limit above which the air is cut.
 const OVERSPEED: f64 = 1.05;
 
-/// What the stand measures, in the order of registers.
+/// Measured channels, in the order of registers.
 pub fn measured() -> Vec<Channel> {
     let is_command = |channel: Channel| channel.symbol().ends_with("_command");
     CHANNELS.iter().map(|row| row.channel).filter(|channel| !is_command(*channel)).collect()
@@ -19,7 +19,7 @@ pub fn measured() -> Vec<Channel> {
 /// The setpoints, in the order of registers.
 pub const SETPOINTS: [Target; 4] = [Target::P3, Target::T3, Target::Valve, Target::OilTemperature];
 
-/// Something that is written.
+/// A quantity that clients write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
     /// Pa.
@@ -32,13 +32,13 @@ pub enum Target {
     OilTemperature,
     /// 1 on, 0 off.
     Air,
-    /// Any number, another one at least each 2 s.
+    /// Any number; it must change at least every 2 s.
     Heartbeat,
-    /// 1: somebody has looked at the stand; only without air.
+    /// 1: acknowledges a trip; only without air.
     Acknowledge,
 }
 
-/// A value that the stand does not take.
+/// A value that the stand refuses.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{value} is outside {low} to {high}")]
 pub struct Refused {
@@ -52,10 +52,10 @@ pub struct Stand {
     lab: Box<dyn Backend>,
     accepts: SetpointRanges,
     trip_rpm: f64,
-    told: Setpoints,
+    setpoints: Setpoints,
     sent: Option<Setpoints>,
     heartbeat: f64,
-    /// When it changed last, s on the wall.
+    /// Time of its last change, s of wall time.
     beaten_s: f64,
     tripped: Option<String>,
     readings: BTreeMap<Channel, f64>,
@@ -64,16 +64,16 @@ pub struct Stand {
 }
 
 impl Stand {
-    /// A stand at rest. `speed`: how many seconds of the lab pass in one on the wall.
+    /// A stand at rest. `speed`: seconds of the lab per second of wall time.
     ///
     /// # Errors
-    /// What the lab says.
+    /// An error of the lab.
     pub fn new(mut lab: Box<dyn Backend>, speed_max_rpm: f64, speed: f64) -> Result<Stand, BackendError> {
         let any = SetpointRange { low: f64::MIN, high: f64::MAX };
         let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
         let accepts = lab.describe().accepts.unwrap_or(all);
         lab.arm()?;
-        let told = Setpoints {
+        let setpoints = Setpoints {
             mode: RigMode::Standstill,
             p3_pa: 110e3,
             t3_k: 298.15,
@@ -84,7 +84,7 @@ impl Stand {
             lab,
             accepts,
             trip_rpm: OVERSPEED * speed_max_rpm,
-            told,
+            setpoints,
             sent: None,
             heartbeat: 0.0,
             beaten_s: 0.0,
@@ -95,10 +95,10 @@ impl Stand {
         })
     }
 
-    /// Somebody writes.
+    /// Writes a value.
     ///
     /// # Errors
-    /// [`Refused`] for what the stand does not take; nothing is changed.
+    /// [`Refused`] if the stand refuses the value; its state is unchanged then.
     pub fn tell(&mut self, target: Target, value: f64) -> Result<(), Refused> {
         let switch = SetpointRange { low: 0.0, high: 1.0 };
         let range = match target {
@@ -113,21 +113,21 @@ impl Stand {
             return Err(Refused { value, low: range.low, high: range.high });
         }
         match target {
-            Target::P3 => self.told.p3_pa = value,
-            Target::T3 => self.told.t3_k = value,
-            Target::Valve => self.told.valve_opening_ratio = value,
-            Target::OilTemperature => self.told.oil_temperature_k = value,
-            // A tripped stand takes no air.
+            Target::P3 => self.setpoints.p3_pa = value,
+            Target::T3 => self.setpoints.t3_k = value,
+            Target::Valve => self.setpoints.valve_opening_ratio = value,
+            Target::OilTemperature => self.setpoints.oil_temperature_k = value,
+            // A tripped stand refuses air.
             Target::Air if value >= 0.5 && self.tripped.is_none() => {
-                self.told.mode = RigMode::Running;
+                self.setpoints.mode = RigMode::Running;
                 self.beaten_s = self.wall_s;
             }
-            Target::Air => self.told.mode = RigMode::Standstill,
+            Target::Air => self.setpoints.mode = RigMode::Standstill,
             Target::Heartbeat if value != self.heartbeat => {
                 (self.heartbeat, self.beaten_s) = (value, self.wall_s);
             }
             Target::Heartbeat => {}
-            Target::Acknowledge if value >= 0.5 && self.told.mode == RigMode::Standstill => {
+            Target::Acknowledge if value >= 0.5 && self.setpoints.mode == RigMode::Standstill => {
                 self.tripped = None
             }
             Target::Acknowledge => {}
@@ -135,52 +135,52 @@ impl Stand {
         Ok(())
     }
 
-    /// What stands where somebody writes.
+    /// The last written value.
     pub fn told(&self, target: Target) -> f64 {
         match target {
-            Target::P3 => self.told.p3_pa,
-            Target::T3 => self.told.t3_k,
-            Target::Valve => self.told.valve_opening_ratio,
-            Target::OilTemperature => self.told.oil_temperature_k,
-            Target::Air => f64::from(u8::from(self.told.mode == RigMode::Running)),
+            Target::P3 => self.setpoints.p3_pa,
+            Target::T3 => self.setpoints.t3_k,
+            Target::Valve => self.setpoints.valve_opening_ratio,
+            Target::OilTemperature => self.setpoints.oil_temperature_k,
+            Target::Air => f64::from(u8::from(self.setpoints.mode == RigMode::Running)),
             Target::Heartbeat => self.heartbeat,
             Target::Acknowledge => 0.0,
         }
     }
 
-    /// SI; `None` where nothing was measured yet, or the sensor gave nothing.
+    /// SI; `None` before the first measurement or if the sensor has no value.
     pub fn reading(&self, channel: Channel) -> Option<f64> {
         self.readings.get(&channel).copied().filter(|value| value.is_finite())
     }
 
-    /// The moment of the readings, s on the wall since the beginning.
+    /// Time of the readings, s of wall time since the beginning.
     pub fn wall_s(&self) -> f64 {
         self.wall_s
     }
 
-    /// Why the air is held off, until somebody acknowledges it.
+    /// The reason of the trip, until it is acknowledged.
     pub fn tripped(&self) -> Option<&str> {
         self.tripped.as_deref()
     }
 
     fn trip(&mut self, why: String) {
-        self.told.mode = RigMode::Standstill;
+        self.setpoints.mode = RigMode::Standstill;
         self.tripped.get_or_insert(why);
     }
 
-    /// Lets time go on until this moment on the wall, s since the beginning.
+    /// Advances the lab to this wall time, s since the beginning.
     ///
     /// # Errors
-    /// What the lab says.
+    /// An error of the lab.
     pub fn advance(&mut self, wall_s: f64) -> Result<(), BackendError> {
         self.wall_s = wall_s;
         let silent_s = wall_s - self.beaten_s;
-        if self.told.mode == RigMode::Running && silent_s > WATCHDOG_S {
+        if self.setpoints.mode == RigMode::Running && silent_s > WATCHDOG_S {
             self.trip(format!("no heartbeat for {silent_s:.1} s"));
         }
-        if self.sent != Some(self.told) {
-            self.lab.set(&self.told)?;
-            self.sent = Some(self.told);
+        if self.sent != Some(self.setpoints) {
+            self.lab.set(&self.setpoints)?;
+            self.sent = Some(self.setpoints);
         }
         let batch = self.lab.poll(wall_s * self.speed)?;
         for column in &batch.columns {
@@ -193,7 +193,7 @@ impl Stand {
             self.trip(event.message.clone());
         }
         let rpm = self.reading(Channel::ShaftSpeed).unwrap_or(0.0);
-        if rpm > self.trip_rpm && self.told.mode == RigMode::Running {
+        if rpm > self.trip_rpm && self.setpoints.mode == RigMode::Running {
             self.trip(format!("overspeed: {rpm:.0} rpm"));
         }
         Ok(())
@@ -214,7 +214,7 @@ mod tests {
         Stand::new(lab, 120_000.0, 10.0).unwrap()
     }
 
-    /// Ten seconds of the lab in one on the wall.
+    /// Ten seconds of the lab per second of wall time.
     fn run(stand: &mut Stand, from_s: f64, to_s: f64, beats: bool) {
         let tenths = ((to_s - from_s) * 10.0).round() as u32;
         for tenth in 1..=tenths {

@@ -1,10 +1,10 @@
-//! A rig that writes down what it is told: after a rehearsal one can see what reached it.
+//! A rig that logs its commands: after a rehearsal the file shows what reached it.
 
 use mapper_core::{Backend, BackendError, RigDescription, RigMode, SampleBatch, Setpoints};
 use std::fs::File;
 use std::io::Write;
 
-/// Another backend, with a file.
+/// Another backend, with a log file.
 pub(crate) struct CommandLog {
     inner: Box<dyn Backend>,
     file: File,
@@ -12,13 +12,13 @@ pub(crate) struct CommandLog {
 }
 
 impl CommandLog {
-    /// Writes what `inner` is told into `file`.
+    /// Logs the commands of `inner` into `file`.
     pub(crate) fn new(inner: Box<dyn Backend>, file: File) -> Self {
         CommandLog { inner, file, now_s: 0.0 }
     }
 
     fn write(&mut self, words: &str) {
-        // A full disk must not keep the rig from its setpoints.
+        // A full disk must not block the rig's setpoints.
         let _ = writeln!(self.file, "{:.1} s: {words}", self.now_s);
     }
 }

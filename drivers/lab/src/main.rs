@@ -1,5 +1,5 @@
-//! `mapper-backend-lab`: the virtual lab behind the protocol of drivers. It is the example of a driver in Rust, and with `real_time` a
-//! rig to rehearse a night on: what was told to it stands in a file afterwards.
+//! `mapper-backend-lab`: the virtual lab behind the driver protocol. It is the example of a driver in Rust. With `real_time` it also serves
+//! to rehearse a night; its commands are logged in a file.
 
 mod command_log;
 mod real_time;

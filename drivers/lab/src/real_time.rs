@@ -1,4 +1,4 @@
-//! A simulated rig that passes for one of steel: its samples come by themselves, as fast as time on the wall.
+//! A simulated rig that behaves like a physical one: its samples arrive unrequested, in wall time.
 
 use mapper_core::{Backend, BackendError, RigDescription, SampleBatch, Setpoints};
 

@@ -1,4 +1,4 @@
-//! The settings of the driver, and the rig that they ask for.
+//! The settings of the driver, and the rig made from them.
 
 use crate::command_log::CommandLog;
 use crate::real_time::RealTime;
@@ -12,20 +12,20 @@ use std::path::PathBuf;
 /// Name of the driver.
 pub(crate) const NAME: &str = "lab";
 
-/// What a campaign writes below `lab`.
+/// The settings below `lab` in a campaign.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Settings {
-    /// The campaign whose machine, sensors and built-in backend this is.
+    /// The campaign that defines machine, sensors and built-in backend.
     campaign: PathBuf,
-    /// Whether time passes as on the wall.
+    /// Whether the lab runs in wall time.
     #[serde(default)]
     real_time: bool,
-    /// A file that gets a line for each thing that the rig is told.
+    /// A file that gets a line for each command.
     told: Option<PathBuf>,
 }
 
-/// Why there is no lab.
+/// Why the lab cannot be made.
 #[derive(Debug, thiserror::Error)]
 enum LabError {
     #[error(
@@ -47,7 +47,7 @@ pub(crate) fn open(settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     };
     let settings = Settings::deserialize(settings).map_err(|error| wrong("", LabError::Form(error)))?;
     let of_campaign = |words: String| wrong("campaign", LabError::Campaign(words));
-    // A driver at a socket stands in another directory than whoever writes a campaign: the mistake says where was looked.
+    // A driver at a socket may run in another directory than the campaign, so the error shows the absolute path.
     let path = std::path::absolute(&settings.campaign).unwrap_or(settings.campaign);
     let campaign = mapper_campaign::load(&path).map_err(|error| of_campaign(error.to_string()))?;
     let registry =

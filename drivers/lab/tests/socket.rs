@@ -1,4 +1,4 @@
-//! A driver at a socket of this computer, in real time: hosts come one after the other, and one that is gone leaves a rig that becomes safe.
+//! A driver at a local socket, in real time: hosts come one after the other, and when one disconnects the rig becomes safe.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +20,7 @@ const SETPOINTS: Setpoints = Setpoints {
     oil_temperature_k: 323.15,
 };
 
-/// A directory whose files are looked at when something is written there.
+/// A directory of files that the tests poll.
 struct Scratch {
     directory: tempfile::TempDir,
     news: Receiver<notify::Result<notify::Event>>,
@@ -46,7 +46,7 @@ impl Scratch {
         }
     }
 
-    /// What a rig was told, as soon as these words are among it.
+    /// The commands of a rig, as soon as they contain these words.
     fn told(&self, name: &str, words: &str) -> String {
         let text = || std::fs::read_to_string(self.file(name)).unwrap_or_default();
         self.until(|| text().contains(words));
@@ -59,7 +59,7 @@ impl Scratch {
     }
 }
 
-/// Ends with the test.
+/// A driver process that ends with the test.
 struct Listening(Child);
 
 impl Drop for Listening {
@@ -77,7 +77,7 @@ impl Listening {
     }
 }
 
-/// A host that comes once the one before it has quite gone.
+/// A host that connects as soon as the previous one has disconnected completely.
 fn come(places: &Places, settings: &Value) -> Driver {
     loop {
         match Driver::find(places, "lab", settings, "", "") {
@@ -100,10 +100,10 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
     first.set(&SETPOINTS).unwrap();
     first.hold().unwrap();
     assert!(!first.poll(1.0).unwrap().t_s.is_empty());
-    // Whoever comes now is told so, as a mistake before there is a rig.
+    // A second host is refused before a rig exists.
     let refused = Driver::at_socket(&socket, "lab", &scratch.settings("second"), PATIENCE).err().unwrap();
     assert!(refused.to_string().contains("this driver serves another host"), "{refused}");
-    // As it is where a runner is killed: nobody says a word. The rig is flown down and let go, and the next host is served.
+    // As if a runner is killed: the connection ends without a message. The rig runs down and is disarmed, and the next host is served.
     drop(first);
     let told = scratch.told("first", "disarm");
     let way: Vec<&str> = told.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
@@ -114,7 +114,7 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
     second.set(&SETPOINTS).unwrap();
     assert!(!second.poll(1.0).unwrap().t_s.is_empty());
 
-    // A signal ends it with the rig that it has, and nothing is left at its place.
+    // A signal ends the driver with its rig, and removes the socket.
     let pid = listening.0.id().to_string();
     assert!(Command::new("kill").args(["-s", "TERM", &pid]).status().unwrap().success());
     assert!(listening.0.wait().unwrap().success());
@@ -123,7 +123,7 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
     assert!(second.make_safe().is_err(), "nobody can say that");
 }
 
-/// What a driver that was killed has left: said as that, and the next one takes its place.
+/// The socket of a killed driver is reported as such, and the next driver replaces it.
 #[test]
 fn a_socket_at_which_nobody_listens_is_said_and_can_be_taken_again() {
     let scratch = Scratch::new();

@@ -1,5 +1,5 @@
-//! A host that reads nothing: neither the pipe nor the queue before it may hold up the rig. A real driver, at a rate that fills both
-//! within a second, and real pipes.
+//! A host that reads nothing: neither the pipe nor the queue before it may block the rig. The driver and the pipes are real, at a rate that
+//! fills both within a second.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -17,9 +17,9 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_mapper-backend-lab");
-/// What waits at most before the pipe, docs/protocol.md.
+/// Maximum length of the queue before the pipe, docs/protocol.md.
 const QUEUE: usize = 256;
-/// What a pipe takes on Linux, bytes. Elsewhere less.
+/// Capacity of a pipe on Linux, bytes. It is smaller elsewhere.
 const PIPE_BYTES: usize = 65_536;
 
 const SETPOINTS: Setpoints = Setpoints {
@@ -30,7 +30,7 @@ const SETPOINTS: Setpoints = Setpoints {
     oil_temperature_k: 323.15,
 };
 
-/// The lab of the shipped campaign a hundred times as fast, and the file that says what it was told.
+/// The lab of the shipped campaign at a hundred times its speed, and the log of its commands.
 struct Lab {
     settings: Value,
     told: PathBuf,
@@ -56,7 +56,7 @@ impl Lab {
         Lab { settings, told, news, _watcher: watcher, _scratch: scratch }
     }
 
-    /// What the rig was told, as soon as these words are among it.
+    /// The commands of the rig, as soon as they contain these words.
     fn told(&self, words: &str) -> String {
         loop {
             let text = std::fs::read_to_string(&self.told).unwrap_or_default();
@@ -77,7 +77,7 @@ impl Lab {
         assert!(way.len() > 3 && way[..way.len() - 1].iter().all(|line| line.contains("T3 293 K")), "{text}");
         assert!(way.last().unwrap().contains("make safe"), "{text}");
         let steps_s: Vec<f64> = way.windows(2).map(|pair| at_s(pair[1]) - at_s(pair[0])).collect();
-        // A tenth of a second each; the file has tenths, and a machine that is busy makes some of them longer.
+        // A tenth of a second each. The file resolves tenths, and a busy machine makes some steps longer.
         let mut sorted_s = steps_s.clone();
         sorted_s.sort_by(f64::total_cmp);
         assert!(sorted_s[0] >= 0.0 && sorted_s[sorted_s.len() / 2] < 0.45, "{text}");
@@ -110,7 +110,7 @@ impl Pipes {
         pipes
     }
 
-    /// Asks, and reads nothing.
+    /// Sends a request without reading the answer.
     fn tell(&mut self, method: &str, params: Value) -> u64 {
         self.asked += 1;
         let (id, method, session) = (Some(self.asked), Some(method.to_owned()), self.session.clone());
@@ -124,7 +124,7 @@ impl Pipes {
         (decode(&body).unwrap(), body.len() + 4)
     }
 
-    /// What came until this answer, and until two batches of samples after it: the first was on its way.
+    /// Messages up to this answer, and up to two batches of samples after it: the first was already on its way.
     fn read_until(&mut self, id: u64) -> Read {
         let (mut read, mut after) = (Read::default(), 0);
         while after < 3 {
@@ -156,10 +156,10 @@ impl Drop for Pipes {
     }
 }
 
-/// What came out of a driver, from the first message on.
+/// Messages of a driver, from the first one on.
 #[derive(Default)]
 struct Read {
-    /// Samples that are missing between those that came.
+    /// Gaps in the sample numbers.
     missing: u64,
     /// Messages and bytes before the first gap.
     messages_before: usize,
@@ -189,8 +189,8 @@ impl Read {
     }
 }
 
-/// Nothing is read and nothing said: the lease ends and the way is flown on time, what goes beyond the queue is dropped, and its
-/// numbers are missing. What the host asks then is done and answered, however full the queue is.
+/// The host neither reads nor writes. The lease ends and the run-down is on time; messages beyond the queue are dropped, and their
+/// numbers are missing. Later requests are executed and answered even if the queue is full.
 #[test]
 fn a_pipe_that_nobody_reads_holds_up_no_rig() {
     let lab = Lab::new();
@@ -200,10 +200,10 @@ fn a_pipe_that_nobody_reads_holds_up_no_rig() {
     let last_word = Instant::now();
     lab.told("T3 293 K");
     let began_s = last_word.elapsed().as_secs_f64();
-    // docs/safety.md promises 2.5 s of a computer that has nothing else to do; here the lab of 1000 Hz and other tests want it too.
+    // docs/safety.md promises 2.5 s on an idle computer; here the lab at 1000 Hz and other tests compete for it.
     assert!((LEASE_S - 0.1..10.0).contains(&began_s), "{began_s} s");
     lab.flew_its_way();
-    // Refused, since the lease has ended; what follows is done.
+    // Refused, since the lease has ended; the next requests are executed.
     let again = pipes.tell("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
     let (mut answers, mut notes, mut unread) = (vec![set, again], Vec::new(), Duration::ZERO);
     let read = loop {
@@ -215,21 +215,21 @@ fn a_pipe_that_nobody_reads_holds_up_no_rig() {
         if read.missing > 0 {
             break read;
         }
-        // A machine that is too busy to have filled the queue by now.
+        // The machine was too busy to fill the queue by now.
         answers.clear();
         unread = unread * 2 + Duration::from_secs(1);
         assert!(unread < Duration::from_secs(30), "nothing is dropped");
         std::thread::sleep(unread);
     };
     assert!(notes.iter().any(|words| words.contains("nothing was heard")), "{notes:?}");
-    // Queue, pipe, one in the hand of who writes, and what has no other place: three answers and the note.
+    // Queue, pipe, one in the writer's hands, and the extra places: three answers and the note.
     let per_message = read.bytes_before / read.messages_before;
     let most = QUEUE + PIPE_BYTES / per_message + 1 + 4;
     assert!((QUEUE..=most).contains(&read.messages_before), "{} of {most}", read.messages_before);
     pipes.ask("disarm", json!({}));
 }
 
-/// The host goes while its pipe is full: the driver makes the rig safe, and ends.
+/// The host disconnects while its pipe is full: the driver makes the rig safe, and ends.
 #[test]
 fn a_driver_that_is_left_with_a_full_pipe_ends() {
     let lab = Lab::new();
@@ -245,7 +245,7 @@ fn a_driver_that_is_left_with_a_full_pipe_ends() {
     assert!(pipes.child.wait().unwrap().success());
 }
 
-/// The same through the host: what it missed is the loss of the rig, in words that say how much, and the rig can still be let go.
+/// The same through the host: the missed samples count as loss of the rig, the message gives their extent, and the rig can be disarmed.
 #[test]
 fn a_host_that_reads_nothing_is_told_what_it_missed() {
     let lab = Lab::new();
@@ -254,7 +254,7 @@ fn a_host_that_reads_nothing_is_told_what_it_missed() {
     driver.arm().unwrap();
     driver.set(&SETPOINTS).unwrap();
     lab.flew_its_way();
-    // The first thing that it does is to make sure, with everything unread before the answer.
+    // The first request makes the rig safe; everything unread precedes its answer.
     driver.make_safe().unwrap();
     let mut unread = Duration::ZERO;
     let words = loop {
@@ -262,7 +262,7 @@ fn a_host_that_reads_nothing_is_told_what_it_missed() {
             Err(BackendError::Lost { source, .. }) => break source.to_string(),
             other => assert!(other.is_ok(), "{other:?}"),
         }
-        // A machine that is too busy to have filled the queue by now.
+        // The machine was too busy to fill the queue by now.
         unread = unread * 2 + Duration::from_secs(1);
         assert!(unread < Duration::from_secs(30), "nothing is missed");
         std::thread::sleep(unread);

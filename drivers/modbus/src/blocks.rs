@@ -1,8 +1,8 @@
-//! Which registers are read together: fewer requests, each with its round trip.
+//! Groups registers into few read requests, since each request costs a round trip.
 
-/// Most registers that one request may read.
+/// Maximum registers per read request.
 const MAX: u16 = 125;
-/// Registers that are read along with others though nobody wants them: cheaper than another request.
+/// Maximum gap of unused registers that is read along: cheaper than another request.
 const GAP: u16 = 8;
 
 /// Neighbouring registers.
@@ -10,11 +10,11 @@ const GAP: u16 = 8;
 pub(crate) struct Block {
     /// Address of the first one.
     pub(crate) start: u16,
-    /// How many.
+    /// Number of registers.
     pub(crate) count: u16,
 }
 
-/// Blocks that cover all of these pieces, none of which is cut. A piece is at most 4 registers.
+/// Blocks that cover all these pieces without splitting one. A piece is at most 4 registers.
 pub(crate) fn blocks(pieces: &[Block]) -> Vec<Block> {
     let mut pieces = pieces.to_vec();
     pieces.sort_by_key(|piece| (piece.start, piece.count));
@@ -40,7 +40,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Each piece lies whole in a block, no block is longer than a request may be, and no register beyond the last is asked for.
+        /// Each piece lies in one block, no block exceeds the limit of a request, and no register beyond the last is requested.
         #[test]
         fn blocks_cover_all_pieces(starts in prop::collection::vec((0u16..65_532, 1u16..=4), 1..40)) {
             let pieces: Vec<Block> = starts.iter().map(|(start, count)| Block { start: *start, count: *count }).collect();

@@ -1,5 +1,5 @@
-//! The connection to the controller. Every call has a deadline, and after a call that failed the connection is a new one: the answer
-//! to a request that timed out may still come, and this library would take it for the answer to the next
+//! The connection to the controller. Every call has a deadline, and a failed call closes the connection: the answer
+//! to a request that timed out may still arrive, and this library would take it for the answer to the next
 //! (slowtec/tokio-modbus issue 324).
 
 use crate::blocks::Block;
@@ -14,7 +14,7 @@ use tokio_modbus::prelude::{ExceptionCode, Reader, Request, Response, Slave};
 /// Why a call failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LinkError {
-    /// Too late.
+    /// The answer is late.
     #[error("{address} did not answer within {} ms (`timeout`, at most 800 ms: a controller that needs longer cannot be driven from here)", within.as_millis())]
     Late { address: SocketAddr, within: Duration },
     /// The connection failed.
@@ -26,7 +26,7 @@ pub(crate) enum LinkError {
 }
 
 impl LinkError {
-    /// Whether the controller asks to be asked again (Modbus Application Protocol 1.1b3, sect. 7: acknowledge, server device busy).
+    /// Whether the controller asks for a retry (Modbus Application Protocol 1.1b3, sect. 7: acknowledge, server device busy).
     fn asks_for_patience(&self) -> bool {
         matches!(
             self,
@@ -35,44 +35,44 @@ impl LinkError {
     }
 }
 
-/// A controller that is busy is asked again so soon.
+/// Delay before a busy controller is asked for a second time.
 const AGAIN: Duration = Duration::from_millis(40);
 
-/// Which registers.
+/// A table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Table {
-    /// Holding registers, that can be written.
+    /// Holding registers (read and write).
     Holding,
     /// Input registers.
     Input,
 }
 
-/// A connection that is made when it is needed.
+/// A connection that is opened on demand.
 pub(crate) struct Link {
     runtime: Runtime,
     address: SocketAddr,
     unit: u8,
     within: Duration,
-    /// When the writes that belong together have to be through.
+    /// Deadline of the current group of writes.
     until: Option<Instant>,
     connection: Option<Context>,
 }
 
 impl Link {
-    /// No connection is made yet.
+    /// Does not connect yet.
     pub(crate) fn new(address: SocketAddr, unit: u8, within: Duration) -> std::io::Result<Link> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         Ok(Link { runtime, address, unit, within, until: None, connection: None })
     }
 
-    /// Forgets the connection.
+    /// Drops the connection.
     pub(crate) fn close(&mut self) {
         self.connection = None;
     }
 
-    /// Makes writes that belong together: second tries and new connections included they end within so long, since whoever asked for
-    /// them waits no longer.
+    /// Makes a group of writes with one deadline, retries and new connections included, since the caller of the
+    /// group waits no longer.
     pub(crate) fn together<T>(&mut self, within: Duration, writes: impl FnOnce(&mut Link) -> T) -> T {
         self.until = Instant::now().checked_add(within);
         let done = writes(self);
@@ -80,13 +80,13 @@ impl Link {
         done
     }
 
-    /// What a request has left, at most its own time.
+    /// Time left for a request, at most its own timeout.
     fn left(&self) -> Duration {
         let left = self.until.map(|until| until.saturating_duration_since(Instant::now()));
         left.map_or(self.within, |left| left.min(self.within))
     }
 
-    /// Reads registers; once more where the controller had closed a connection that was kept, or is busy.
+    /// Reads registers; retries once if the controller had closed a kept connection or is busy.
     pub(crate) fn read(&mut self, table: Table, block: Block) -> Result<Vec<u16>, LinkError> {
         let was_kept = self.connection.is_some();
         match self.read_once(table, block) {
@@ -114,8 +114,8 @@ impl Link {
         Err(LinkError::Failed { address: self.address, words })
     }
 
-    /// Writes registers; tried once more, on a new connection where that failed, since writing the same twice does no harm. A controller
-    /// that is busy is asked for as long as a request may take.
+    /// Writes registers; retries once, if necessary on a new connection, since writing the same value twice does no harm. A busy
+    /// controller is retried until the timeout of the request.
     pub(crate) fn write(&mut self, start: u16, registers: &[u16]) -> Result<(), LinkError> {
         let until = Instant::now() + self.left();
         let mut answer = self.write_once(start, registers);
@@ -129,7 +129,7 @@ impl Link {
         }
     }
 
-    /// What is acknowledged has to be what was written: a gateway that mixes up its answers has not written it, or somewhere else.
+    /// The acknowledgement must match the write: a gateway that mixes up its answers has written nothing, or somewhere else.
     fn write_once(&mut self, start: u16, registers: &[u16]) -> Result<(), LinkError> {
         let request = || Request::WriteMultipleRegisters(start, registers.into());
         let answer =
@@ -150,13 +150,13 @@ impl Link {
         Err(LinkError::Failed { address: self.address, words })
     }
 
-    /// A moment for a controller that is busy.
+    /// A short delay for a busy controller.
     fn pause(&self) {
         let pause = AGAIN.min(self.left());
         self.runtime.block_on(async { tokio::time::sleep(pause).await });
     }
 
-    /// What an exception says, with its number, which is what manuals list, and where it is about the unit.
+    /// Describes an exception with its number, as manuals list it, and with the unit if that is the cause.
     fn words(&self, code: ExceptionCode) -> String {
         let number = u8::from(code);
         match code {
@@ -195,7 +195,7 @@ impl Link {
     }
 }
 
-/// `None` where it is too late. The timer begins inside of the runtime.
+/// `None` on timeout. The timer must be created inside the runtime.
 async fn in_time<T>(within: Duration, work: impl Future<Output = T>) -> Option<T> {
     timeout(within, work).await.ok()
 }
@@ -205,7 +205,7 @@ async fn in_time<T>(within: Duration, work: impl Future<Output = T>) -> Option<T
 mod tests {
     use super::*;
 
-    /// A controller that takes connections and says nothing, at the longest time that a request may have: the writes of a safe state
+    /// A controller that accepts connections and stays silent, at the maximum timeout: the writes of the safe state
     /// end before their host stops waiting, at 2 s.
     #[test]
     fn writes_that_belong_together_end_in_their_time_whatever_the_controller_does() {
@@ -217,11 +217,11 @@ mod tests {
         });
         assert_eq!(failed, 3);
         let took_s = begun.elapsed().as_secs_f64();
-        // Six tries by themselves would be 4.8 s; the rest is for a machine that is busy.
+        // Six separate attempts would take 4.8 s; the rest is for a busy machine.
         assert!((1.4..4.0).contains(&took_s), "{took_s} s");
-        // Another request has its own time again.
+        // The next request has its full timeout.
         assert_eq!(link.left(), Duration::from_millis(800));
-        // One that is always too slow: said with what may be set.
+        // One that is always too slow: the message gives the range of the setting.
         let mut quick = Link::new(mute.local_addr().unwrap(), 255, Duration::from_millis(20)).unwrap();
         let said = quick.read(Table::Holding, Block { start: 0, count: 1 }).unwrap_err().to_string();
         assert!(said.contains("within 20 ms (`timeout`, at most 800 ms"), "{said}");

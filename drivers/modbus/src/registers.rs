@@ -1,8 +1,8 @@
-//! Numbers in registers of 16 bits.
+//! Numbers in 16-bit registers.
 
 use serde::Deserialize;
 
-/// How a number stands in its registers.
+/// Number format in registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Form {
@@ -15,14 +15,14 @@ pub(crate) enum Form {
     F64,
 }
 
-/// Which word, or which byte of a word, comes first.
+/// Order of words, or of bytes in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Order {
-    /// The most significant one, as Modbus itself has it.
+    /// Most significant first, the Modbus default.
     #[default]
     Big,
-    /// The least significant one.
+    /// Least significant first.
     Little,
 }
 
@@ -49,12 +49,12 @@ impl Form {
         }
     }
 
-    /// Whether it holds whole numbers alone.
+    /// Whether it is an integer format.
     pub(crate) fn is_whole(self) -> bool {
         !matches!(self, Form::F32 | Form::F64)
     }
 
-    /// How many registers.
+    /// Number of registers.
     pub(crate) fn count(self) -> u16 {
         match self {
             Form::U16 | Form::I16 => 1,
@@ -63,7 +63,7 @@ impl Form {
         }
     }
 
-    /// The number in these registers; `None` where there are not so many. NaN where they hold no number.
+    /// The number in these registers; `None` for too few registers, NaN if they hold no number.
     pub(crate) fn number(self, registers: &[u16], words: Order, bytes: Order) -> Option<f64> {
         let mut registers = registers.get(..usize::from(self.count()))?.to_vec();
         if words == Order::Little {
@@ -73,7 +73,7 @@ impl Form {
             let register = if bytes == Order::Little { register.swap_bytes() } else { *register };
             bits << 16 | u64::from(register)
         });
-        // Each cast keeps the bits that there are.
+        // Each cast reinterprets the same bits.
         Some(match self {
             Form::U16 | Form::U32 => bits as f64,
             Form::I16 => f64::from(bits as u16 as i16),
@@ -83,7 +83,7 @@ impl Form {
         })
     }
 
-    /// Registers that hold a number; `None` for one that does not fit.
+    /// The registers for a number; `None` if it does not fit.
     pub(crate) fn registers(self, number: f64, words: Order, bytes: Order) -> Option<Vec<u16>> {
         let whole = number.round();
         let within = |low: f64, high: f64| (low..=high).contains(&whole);

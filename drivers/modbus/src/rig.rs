@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Makes the rig; nothing is connected.
+/// Makes the rig without connecting.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let settings = Settings::read(value)?;
     let within = Duration::from_secs_f64(settings.timeout_s());
@@ -33,11 +33,11 @@ struct Registers {
     settings: Settings,
     link: Link,
     blocks: Vec<(Table, Block)>,
-    /// What stood in the registers when they were read last.
+    /// Register contents of the last read.
     last: BTreeMap<(Table, u16), u16>,
-    /// Why registers cannot be read, and how many samples have lacked them; `None` while all are.
+    /// Why registers cannot be read, and the number of affected samples; `None` while all can be read.
     failing: Option<(String, usize)>,
-    /// What is to be said of that.
+    /// The message about it that is still to be sent.
     remark: Option<String>,
 }
 
@@ -48,7 +48,7 @@ impl Registers {
             .collect()
     }
 
-    /// Says once why registers cannot be read, and how many samples that cost once they can.
+    /// Reports once why registers cannot be read, and once they can, how many samples were affected.
     fn note(&mut self, failed: Option<LinkError>) {
         match (failed.map(|error| error.to_string()), &mut self.failing) {
             (None, None) => {}
@@ -66,7 +66,7 @@ impl Registers {
         }
     }
 
-    /// An order in which everything that was read last could be.
+    /// An order that makes all readings of the last read plausible.
     fn order_that_fits(&self) -> Option<(Order, Order)> {
         let both = [Order::Big, Order::Little];
         let orders = both.into_iter().flat_map(|words| both.map(|bytes| (words, bytes)));
@@ -80,7 +80,7 @@ impl Registers {
     }
 }
 
-/// Time for the values of one call, second tries included: the host waits for 2 s.
+/// Time for the writes of one call, retries included: the host waits for 2 s.
 const WRITES_WITHIN: std::time::Duration = std::time::Duration::from_millis(1700);
 
 /// Why the rig was lost.
@@ -98,7 +98,7 @@ enum RegisterError {
 }
 
 impl RegisterError {
-    /// A controller that refuses a value may be right to: what was written may not be what was meant.
+    /// A controller may rightly refuse a value, so the error shows what was written.
     fn of_write(source: LinkError, target: Target, value: f64, registers: &[u16]) -> RegisterError {
         if !matches!(source, LinkError::Refused { .. }) {
             return source.into();
@@ -132,7 +132,7 @@ impl Controller for Registers {
                     all.extend((block.start..).zip(registers).map(|(at, value)| ((table, at), value)));
                 }
                 Err(refused @ LinkError::Refused { .. }) => failed = Some(refused),
-                // The others are not asked for: each would wait for its own deadline.
+                // The remaining registers are skipped: each would run into its own timeout.
                 Err(error) => {
                     failed = Some(error);
                     break;

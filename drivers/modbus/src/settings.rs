@@ -17,32 +17,32 @@ pub(crate) const NAME: &str = "modbus";
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Settings {
-    /// Address and port of the controller, in numbers: a name would have to be looked up, which may hang.
+    /// IP address and port of the controller; a host name would need a look-up, which may hang.
     #[serde(deserialize_with = "mapper_driver::address")]
     pub(crate) address: SocketAddr,
-    /// Number of the unit behind it; 255 for the controller itself.
+    /// Unit number behind the address; 255 for the controller itself.
     #[serde(default = "own_unit")]
     pub(crate) unit: u8,
-    /// Name of the rig, of which there is one; its address if not said.
+    /// Unique name of the rig; default: its address.
     pub(crate) rig: Option<String>,
-    /// How often it is read; 10 Hz if not said.
+    /// Polling rate; default 10 Hz.
     pub(crate) rate: Option<Quantity<Frequency>>,
-    /// Time for each request; 200 ms if not said.
+    /// Timeout of each request; default 200 ms.
     pub(crate) timeout: Option<Quantity<Duration>>,
-    /// Which word of a number comes first.
+    /// Word order of a number.
     #[serde(default)]
     pub(crate) words: Order,
-    /// Which byte of a word comes first.
+    /// Byte order of a word.
     #[serde(default)]
     pub(crate) bytes: Order,
-    /// Where each channel stands.
+    /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, Place>,
-    /// Where each setpoint goes.
+    /// Location of each setpoint.
     pub(crate) write: Writes,
-    /// Setpoints that the rig takes.
+    /// Accepted setpoints.
     pub(crate) accepts: Accepts,
-    /// Its way into the safe state.
+    /// The safe trajectory.
     pub(crate) safe: Safe,
 }
 
@@ -50,11 +50,11 @@ fn own_unit() -> u8 {
     255
 }
 
-/// A number in registers: what stands there times `scale` plus `offset` is SI.
+/// A number in registers; the SI value is the number times `scale` plus `offset`.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Place {
-    /// Address of the first register, from 0 as it goes over the wire: 40001 of a manual is holding register 0.
+    /// Address of the first register, from 0 as on the wire: 40001 of a manual is holding register 0.
     pub(crate) register: u16,
     #[serde(default, rename = "type")]
     pub(crate) form: Form,
@@ -83,11 +83,11 @@ pub(crate) struct Writes {
     pub(crate) oil_temperature: Place,
     /// 1: air on, 0: off.
     pub(crate) air: Place,
-    /// Counts up twice a second: the controller cuts the air by itself where it stands still.
+    /// Counts up twice a second; the controller cuts the air if it stops.
     pub(crate) heartbeat: Place,
 }
 
-/// What is wrong with them.
+/// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
     #[error("{0}; docs/rig.md has an example of all settings")]
@@ -134,7 +134,7 @@ impl Settings {
         self.timeout.as_ref().map_or(0.2, |timeout| timeout.inside)
     }
 
-    /// Where a value is written.
+    /// Location of a target.
     pub(crate) fn place(&self, target: Target) -> Place {
         match target {
             Target::P3 => self.write.p3,
@@ -146,13 +146,13 @@ impl Settings {
         }
     }
 
-    /// The stand that they describe.
+    /// The stand for these settings.
     pub(crate) fn stand(&self) -> Stand {
         Stand {
             backend: NAME,
             version: env!("CARGO_PKG_VERSION"),
             rig: self.rig.clone().unwrap_or_else(|| format!("modbus {}", self.address)),
-            // Behind a gateway each unit is a stand of its own.
+            // Behind a gateway each unit is a separate stand.
             reached_at: format!("{} unit {}", self.address, self.unit),
             rate_hz: self.rate.as_ref().map_or(10.0, |rate| rate.inside),
             channels: self.read.keys().copied().collect(),
@@ -194,7 +194,7 @@ impl Settings {
         Ok(())
     }
 
-    /// No two channels come from one register, and none from one that is written.
+    /// Each channel has its own register, which is not a written one.
     fn check_what_is_read(&self) -> Result<(), BackendError> {
         let mut taken: BTreeMap<(Table, u16), Channel> = BTreeMap::new();
         for (channel, place) in &self.read {
@@ -222,24 +222,24 @@ impl Settings {
             .map(drop)
     }
 
-    /// What goes into the registers of a value, SI.
+    /// The register contents for a value, SI.
     pub(crate) fn registers(&self, place: &Place, value: f64) -> Option<Vec<u16>> {
         place.form.registers((value - place.offset) / place.scale, self.words, self.bytes)
     }
 
-    /// The value in registers, SI; NaN where there is none.
+    /// The value in registers, SI; NaN without a value.
     pub(crate) fn value(&self, place: &Place, registers: &[u16]) -> f64 {
         place.value(registers, self.words, self.bytes)
     }
 }
 
 impl Place {
-    /// All that it takes.
+    /// Its registers.
     pub(crate) fn registers(&self) -> std::ops::Range<u16> {
         self.register..self.register.saturating_add(self.form.count())
     }
 
-    /// The value in registers of this order, SI; NaN where there is none.
+    /// The value in registers of this order, SI; NaN without a value.
     pub(crate) fn value(&self, registers: &[u16], words: Order, bytes: Order) -> f64 {
         let number = self.form.number(registers, words, bytes).unwrap_or(f64::NAN);
         let value = number * self.scale + self.offset;
@@ -265,7 +265,7 @@ mod tests {
         })
     }
 
-    /// Path and words of what is wrong.
+    /// Path and message of the error.
     fn refused(at: [&str; 2], value: Value) -> (String, String) {
         let mut settings = settings();
         settings[at[0]][at[1]] = value;
@@ -275,12 +275,12 @@ mod tests {
         }
     }
 
-    /// What would be read or written wrongly without a word.
+    /// Settings that would silently cause wrong reads or writes.
     #[test]
     fn what_cannot_be_meant_is_refused_at_its_place() {
         assert!(Settings::read(&settings()).is_ok());
         for (at, value, path, words) in [
-            // The same register, one of its two words, and one that is written.
+            // The same register, one of its two words, and a written one.
             (
                 ["read", "T2"],
                 json!({"register": 16}),
@@ -314,7 +314,7 @@ mod tests {
             let (found, said) = refused(at, value);
             assert!(found == path && said.contains(words), "{found}: {said}");
         }
-        // The same number in the other table, and whole numbers that are fine enough.
+        // The same address in the other table, and integers that are fine enough.
         let mut fine = settings();
         fine["read"]["P3"] = json!({"register": 10, "table": "input"});
         fine["write"]["valve"] = json!({"register": 104, "type": "u16", "scale": 0.01});

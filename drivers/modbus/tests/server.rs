@@ -1,4 +1,4 @@
-//! The driver against pymodbus, a server that shares no code with it: restarted, paused, and gone for good, in real time.
+//! The driver against pymodbus, an independent server: restarted, paused, and stopped, in real time.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -24,7 +24,7 @@ impl Drop for Stand {
 }
 
 impl Stand {
-    /// On this port, or on any; the server is there when this returns.
+    /// On this port, or on a free one; the server is ready when this returns.
     fn new(port: &str) -> Stand {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/python/modbus_rig.py");
         let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
@@ -67,7 +67,7 @@ impl Stand {
         Driver::of_program(program, "modbus", settings, PATIENT).unwrap()
     }
 
-    /// Holding registers as they go over the wire (Modbus Application Protocol 1.1b3, 6.3), asked for without the driver.
+    /// Holding registers on the wire (Modbus Application Protocol 1.1b3, 6.3), read without the driver.
     fn registers(&self, start: u16, count: u16) -> Vec<u16> {
         let mut stream = TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap();
         let [[a, b], [c, d]] = [start, count].map(u16::to_be_bytes);
@@ -77,7 +77,7 @@ impl Stand {
         answer[9..].chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
     }
 
-    /// How the server misbehaves from now on (MISDEEDS of modbus_rig.py), by function 6.
+    /// Fault of the server from now on (MISDEEDS of modbus_rig.py), for function 6.
     fn misbehave(&self, how: u8) {
         let mut stream = TcpStream::connect(format!("127.0.0.1:{}", self.port)).unwrap();
         let request = [0, 1, 0, 0, 0, 6, 255, 6, 0, 150, 0, how];
@@ -107,7 +107,7 @@ const SETPOINTS: Setpoints = Setpoints {
     oil_temperature_k: 323.15,
 };
 
-/// Polls each half second until `reached`; how long that took.
+/// Polls every half second until `reached`; returns the duration.
 fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
     let begun = Instant::now();
     loop {
@@ -120,10 +120,10 @@ fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool
     }
 }
 
-/// Within this a server that is back is read again, s: 3 s are promised and measured on a computer that does nothing else (docs/rig-tried.md); other tests
-/// run beside these. Without what is done for it it would be half a minute, or never.
+/// Maximum time until a restarted server is read, s. The documented 3 s hold on an idle computer (docs/rig-tried.md); other tests run in
+/// parallel here. Without the driver's own reconnection it would take half a minute, or fail.
 const AGAIN_S: f64 = 10.0;
-/// For a driver whose own deadlines are looked at: on a computer that does nothing else they end within 2 s.
+/// For tests of the driver's own deadlines: on an idle computer they end within 2 s.
 const PATIENT: Patience = Patience { call: Duration::from_secs(20), ..PATIENCE };
 
 fn reads(batch: &SampleBatch) -> bool {
@@ -142,7 +142,7 @@ fn a_server_that_restarts_or_stands_still_is_read_again_soon() {
     until(&mut rig, &mut t_s, reads);
     stand.kill();
     until(&mut rig, &mut t_s, reads_nothing);
-    // Starting takes the server some seconds; the lease is renewed by polls alone.
+    // The server starts in some seconds; polls alone renew the lease.
     let port = stand.port.clone();
     let starting = std::thread::spawn(move || Stand::new(&port));
     until(&mut rig, &mut t_s, |_| starting.is_finished());
@@ -161,7 +161,7 @@ fn a_server_that_restarts_or_stands_still_is_read_again_soon() {
     rig.disarm().unwrap();
 }
 
-/// What cannot be done is said in time: the runner knows then that the rig is in doubt.
+/// A failure is reported in time, so that the runner knows that the rig is in doubt.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_that_is_gone_for_good_is_said_in_time() {
@@ -169,18 +169,18 @@ fn a_server_that_is_gone_for_good_is_said_in_time() {
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
     until(&mut rig, &mut t_s, reads);
     stand.kill();
-    // The driver says it by itself: the host would wait longer here.
+    // The driver reports it: the host's deadline is longer here.
     let begun = Instant::now();
     let lost = rig.make_safe().unwrap_err();
     assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
     assert!(begun.elapsed() < PATIENT.call / 2, "{:?}", begun.elapsed());
     until(&mut rig, &mut t_s, reads_nothing);
-    // What has not confirmed its safe state is not let go.
+    // A rig is not disarmed until its safe state is confirmed.
     assert!(matches!(rig.disarm(), Err(BackendError::Lost { .. })));
 }
 
-/// Words the wrong way round, or kPa where there are Pa: nothing that could be meant is read, so that nothing is written either. The registers of the
-/// setpoints keep what was in them, to the bit.
+/// Swapped words, or kPa in place of Pa: the readings are implausible, so nothing is written. The setpoint
+/// registers stay unchanged, to the bit.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn readings_that_cannot_be_are_refused_before_anything_is_written() {
@@ -196,7 +196,7 @@ fn readings_that_cannot_be_are_refused_before_anything_is_written() {
     };
     let words = refused(&|settings| settings["words"] = json!("little"));
     assert!(words.contains("With `words: big` and `bytes: big` every channel could be"), "{words}");
-    // The speed at rest is noise: the wrong way round it is now and then the first that cannot be.
+    // The speed at rest is noise: with swapped words it is sometimes the first implausible reading.
     for part in
         ["at `read.", " reads ", " from register ", "(0x", "`words: little`", "T2", "; nor can ", "P3 be as"]
     {
@@ -212,7 +212,7 @@ fn readings_that_cannot_be_are_refused_before_anything_is_written() {
     ] {
         assert!(scaled.contains(part), "{part}: {scaled}");
     }
-    // What is right is armed, and writes.
+    // With correct settings the rig is armed, and writes.
     let mut rig = stand.armed();
     assert_ne!(stand.registers(100, 12), before);
     rig.make_safe().unwrap();
@@ -227,8 +227,8 @@ const BUSY_ONCE: u8 = 3;
 const DEVICE_FAILURE: u8 = 4;
 const CLOSES: u8 = 5;
 
-/// An answer that acknowledges something else is none, for setpoints and for the safe state alike; a controller that is busy once is asked
-/// again; the number of an exception is said.
+/// A wrong acknowledgement is an error, for setpoints and for the safe state; a controller that is busy once is retried;
+/// the message gives the number of an exception.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn only_what_was_written_counts_as_acknowledged() {
@@ -252,7 +252,7 @@ fn only_what_was_written_counts_as_acknowledged() {
     rig.disarm().unwrap();
 }
 
-/// Some controllers close a connection after each answer: every sample has its readings all the same.
+/// Some controllers close the connection after each answer; every sample still has its readings.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_that_closes_after_each_answer_costs_no_sample() {

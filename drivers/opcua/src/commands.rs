@@ -1,4 +1,4 @@
-//! What the program does for people.
+//! The command line for users.
 
 use crate::link::{LinkError, endpoints};
 use crate::settings::{SettingError, is_endpoint};
@@ -8,9 +8,9 @@ use opcua::crypto::X509;
 use std::io::Write;
 use std::process::ExitCode;
 
-/// A gas stand behind a PLC or another controller that speaks OPC UA. This is a driver: `mapper` starts it by itself, without arguments, where a
-/// campaign says `backend: {opcua: ...}`; docs/rig.md, "Over OPC UA", has its settings. With `--socket PATH` it serves the hosts that come there,
-/// docs/protocol.md. The commands below are for people.
+/// Drive a gas stand behind a PLC or another controller that speaks OPC UA. `mapper` starts this driver without arguments for a campaign with
+/// `backend: {opcua: ...}`; docs/rig.md, "Over OPC UA", has its settings. With `--socket PATH` it serves the hosts that connect there,
+/// docs/protocol.md. The commands below are for manual use.
 #[derive(Parser)]
 #[command(name = "mapper-backend-opcua", version)]
 struct Arguments {
@@ -20,20 +20,20 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Pins the certificate that a server has now: from then on no other is talked to there.
+    /// Pin the server's current certificate; any other certificate is refused from then on.
     ///
     /// Compare the fingerprint with the one that the server itself shows.
     Trust {
         /// As in the campaign: opc.tcp://HOST:PORT
         endpoint: String,
-        /// Pins it only if this is its SHA-256.
+        /// Pin it only if this is its SHA-256.
         #[arg(long, value_name = "SHA256")]
         fingerprint: Option<String>,
-        /// Pins it though another one was pinned.
+        /// Replace a different pinned certificate.
         #[arg(long)]
         replace: bool,
     },
-    /// Says where this program's own certificate is, which the server has to trust; makes it if there is none.
+    /// Print the path of this program's own certificate, which the server must trust; create it if missing.
     Certificate,
 }
 
@@ -57,7 +57,7 @@ pub(crate) fn run() -> ExitCode {
     match Arguments::parse().command.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Where standard error is closed nobody is told.
+            // If standard error is closed, the message is lost.
             let _ = writeln!(std::io::stderr(), "error: {error}");
             ExitCode::FAILURE
         }
@@ -68,7 +68,7 @@ impl Command {
     fn run(self) -> Result<(), CommandError> {
         let store = Store::of_environment()?;
         match self {
-            Command::Certificate => say(&store.own()?.display().to_string()),
+            Command::Certificate => print(&store.own()?.display().to_string()),
             Command::Trust { endpoint, fingerprint, replace } => {
                 trust(&store, &endpoint, fingerprint, replace)
             }
@@ -76,7 +76,7 @@ impl Command {
     }
 }
 
-fn say(words: &str) -> Result<(), CommandError> {
+fn print(words: &str) -> Result<(), CommandError> {
     Ok(writeln!(std::io::stdout(), "{words}")?)
 }
 
@@ -90,11 +90,11 @@ fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -
     let der = der.ok_or_else(|| CommandError::NoCertificate(endpoint.to_owned()))?;
     let certificate = X509::from_der(der).map_err(|_| CommandError::NoCertificate(endpoint.to_owned()))?;
     let found = fingerprint(der);
-    say(&format!("{endpoint}\nsubject      {}", certificate.subject_name()))?;
+    print(&format!("{endpoint}\nsubject      {}", certificate.subject_name()))?;
     if let (Ok(from), Ok(to)) = (certificate.not_before(), certificate.not_after()) {
-        say(&format!("valid        {} to {}", from.format("%Y-%m-%d"), to.format("%Y-%m-%d")))?;
+        print(&format!("valid        {} to {}", from.format("%Y-%m-%d"), to.format("%Y-%m-%d")))?;
     }
-    say(&format!("fingerprint  SHA-256 {found}"))?;
+    print(&format!("fingerprint  SHA-256 {found}"))?;
     valid(endpoint, &certificate)?;
     let plain = |text: &str| text.replace([':', ' '], "").to_ascii_uppercase();
     if let Some(wanted) = wanted.filter(|wanted| plain(wanted) != plain(&found)) {
@@ -107,6 +107,6 @@ fn trust(store: &Store, endpoint: &str, wanted: Option<String>, replace: bool) -
         }
     }
     let file = store.trust(endpoint, der)?;
-    say(&format!("trusted from now on: {}", file.display()))?;
-    say(&format!("our own certificate, for the server to trust: {}", store.own()?.display()))
+    print(&format!("trusted from now on: {}", file.display()))?;
+    print(&format!("our own certificate, for the server to trust: {}", store.own()?.display()))
 }

@@ -1,4 +1,4 @@
-//! The session with a server. It is polled with Read; the library connects again by itself, within a second of the server's return.
+//! The session with a server. It is polled with Read; the library reconnects by itself, within a second of the server's return.
 
 use crate::login::{reach, try_login};
 use crate::settings::{Security, User};
@@ -21,13 +21,13 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
-/// For the list of endpoints, for the first login and for the session, each.
+/// Time for each of endpoint list, first login and session.
 const CONNECTING: Duration = Duration::from_secs(4);
-/// For all of them: less than the 10 s that a host waits for arming.
+/// Total time for opening: shorter than the 10 s that a host waits for arming.
 const OPENING: Duration = Duration::from_secs(9);
-/// For values to be written, a connection that comes back included: less than the 2 s that a host waits.
+/// Time for a write, including a reconnection: shorter than the 2 s that a host waits.
 const WRITING: Duration = Duration::from_millis(1500);
-/// First and longest pause between two tries to connect.
+/// Initial and maximum pause between two attempts to connect.
 const RETRY: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(1));
 /// A server that is silent for this many seconds gets a new connection.
 const SILENT_S: u64 = 4;
@@ -71,7 +71,7 @@ pub(crate) enum LinkError {
     Store(#[from] StoreError),
 }
 
-/// What has happened to the connection.
+/// An event of the connection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum State {
     Connecting,
@@ -79,11 +79,11 @@ enum State {
     Failed(StatusCode),
 }
 
-/// What was read.
+/// The answer to a read.
 pub(crate) struct Answer {
-    /// As many as nodes were asked for.
+    /// One value for each requested node.
     pub(crate) values: Vec<DataValue>,
-    /// When the server sent them, by its own clock.
+    /// Time of sending, by the server's own clock.
     pub(crate) sent: DateTime,
 }
 
@@ -93,7 +93,7 @@ struct Open {
     task: JoinHandle<()>,
 }
 
-/// A session that is made when the rig is armed.
+/// A session that is opened when the rig is armed.
 pub(crate) struct Link {
     runtime: Runtime,
     endpoint: String,
@@ -101,7 +101,7 @@ pub(crate) struct Link {
     user: Option<User>,
     within: Duration,
     open: Option<Open>,
-    /// Since when there is no connection.
+    /// Time at which the connection was lost.
     away: Option<Instant>,
     remark: Option<String>,
 }
@@ -115,7 +115,7 @@ pub(crate) fn policy(security: Security) -> SecurityPolicy {
     }
 }
 
-/// A client that tries to connect once, or again and again.
+/// A client that does not retry a failed connection, or retries forever.
 fn client(store: &Store, tries: i32) -> Result<Client, String> {
     let built = ClientBuilder::new()
         .application_name("mapper")
@@ -124,7 +124,7 @@ fn client(store: &Store, tries: i32) -> Result<Client, String> {
         .session_name("mapper")
         .pki_dir(store.root())
         .create_sample_keypair(false)
-        // The certificate is compared with the pinned one, to the byte, before a session is made; names in it say nothing more.
+        // The certificate is compared with the pinned one, byte by byte, before a session is made; names in it add nothing.
         .trust_server_certs(true)
         .verify_server_certs(false)
         .session_retry_limit(tries)
@@ -137,7 +137,7 @@ fn client(store: &Store, tries: i32) -> Result<Client, String> {
     built.client().map_err(|errors| errors.join("; "))
 }
 
-/// What a server offers.
+/// The endpoints of a server.
 pub(crate) async fn endpoints(store: &Store, endpoint: &str) -> Result<Vec<EndpointDescription>, LinkError> {
     let failed = |words: String| LinkError::Failed { server: server(endpoint).to_owned(), words };
     let client = client(store, 0).map_err(failed)?;
@@ -148,7 +148,7 @@ pub(crate) async fn endpoints(store: &Store, endpoint: &str) -> Result<Vec<Endpo
     asked.await.map_err(|_| late())?.map_err(|error| failed(error.to_string()))
 }
 
-/// Codes by which a server says that it will not have us: to ask again would lock an account.
+/// Status codes for a refused login: a retry could lock the account.
 fn is_refusal(status: StatusCode) -> bool {
     [
         StatusCode::BadUserAccessDenied,
@@ -166,14 +166,14 @@ fn is_refusal(status: StatusCode) -> bool {
 }
 
 impl Link {
-    /// Nothing is connected yet.
+    /// Does not connect yet.
     pub(crate) fn new(
         endpoint: String,
         security: Security,
         user: Option<User>,
         within: Duration,
     ) -> std::io::Result<Link> {
-        // The session lives on a thread of its own: keep-alives and new connections do not wait for the next sample.
+        // The session has its own thread: keep-alives and reconnections do not wait for the next sample.
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
         Ok(Link { runtime, endpoint, security, user, within, open: None, away: None, remark: None })
     }
@@ -186,7 +186,7 @@ impl Link {
         LinkError::Failed { server: self.server(), words: words.into() }
     }
 
-    /// The endpoint with the security that was asked for, and with the pinned certificate.
+    /// The endpoint with the requested security and the pinned certificate.
     fn choose(
         &self,
         store: &Store,
@@ -218,7 +218,7 @@ impl Link {
                 return Err(StoreError::Changed { server: self.endpoint.clone(), found, pinned }.into());
             }
         }
-        // Servers name themselves as they like; the way to them is the one that was given.
+        // A server may report any host name, so the given address is used.
         found.endpoint_url = self.endpoint.as_str().into();
         Ok(found)
     }
@@ -279,7 +279,7 @@ impl Link {
         })
     }
 
-    /// Why there is no session.
+    /// Why the session was refused.
     fn not_let_in(&self, status: StatusCode, own: Option<PathBuf>) -> LinkError {
         let (server, words) = (self.server(), words(status));
         match status {
@@ -292,7 +292,7 @@ impl Link {
         }
     }
 
-    /// Waits for the connection; what was wrong last, where it does not come.
+    /// Waits for the connection. On timeout, returns the last error.
     fn wait(&mut self, within: Duration) -> Result<(), Option<StatusCode>> {
         let Some(open) = &mut self.open else { return Err(None) };
         let connected = async {
@@ -330,7 +330,7 @@ impl Link {
         let within = self.within;
         let Some(open) = &self.open else { return Err(self.failed("there is no session")) };
         let session = open.session.clone();
-        // 0: no older than now.
+        // A maximum age of 0 requests a new value.
         let read = Read::new(&session)
             .nodes_to_read(wanted)
             .timestamps_to_return(TimestampsToReturn::Source)
@@ -369,12 +369,12 @@ impl Link {
         }
     }
 
-    /// What has become of the connection, once.
+    /// A message about a change of the connection, once.
     pub(crate) fn remark(&mut self) -> Option<String> {
         self.remark.take()
     }
 
-    /// Writes values, of which none waits for another. Waits for a connection that is coming back, and tries again.
+    /// Writes values in one request, so in no defined order. Waits for a connection that is coming back, and retries.
     pub(crate) fn write(
         &mut self,
         values: &[(NodeId, Variant, f64)],
@@ -401,7 +401,7 @@ impl Link {
             let answer = self.runtime.block_on(async { timeout(left, session.write(&write)).await });
             match answer {
                 Err(_) => return Err(LinkError::Late { server: self.server(), within: WRITING }),
-                // Writing the same twice does no harm. The state says a moment later that the connection is gone.
+                // Writing the same value twice does no harm. The state reports a lost connection a moment later.
                 Ok(Err(error)) if is_passing(&error) && !left.is_zero() => {
                     self.runtime.block_on(async { tokio::time::sleep(Duration::from_millis(20)).await });
                 }
@@ -430,12 +430,12 @@ impl Link {
         }
     }
 
-    /// Until when values that are written now have to be there. A heartbeat does not wait: the next one comes soon, and samples wait for it.
+    /// Deadline of a write that starts now. A heartbeat does not wait: the next one comes soon, and samples would be delayed.
     pub(crate) fn deadline(&self, is_heartbeat: bool) -> Instant {
         Instant::now() + if is_heartbeat { self.within } else { WRITING }
     }
 
-    /// Gives the session up.
+    /// Closes the session.
     pub(crate) fn close(&mut self) {
         if let Some(open) = self.open.take() {
             let _ = self
@@ -453,7 +453,7 @@ impl Drop for Link {
     }
 }
 
-/// Whether a new connection may do what this one could not.
+/// Whether a new connection may succeed.
 fn is_passing(error: &Error) -> bool {
     [
         StatusCode::BadNotConnected,
@@ -467,7 +467,7 @@ fn is_passing(error: &Error) -> bool {
     .contains(&error.status())
 }
 
-/// A certificate as it goes over the wire.
+/// A certificate in DER form.
 pub(crate) fn der(certificate: &X509) -> Vec<u8> {
     certificate.as_byte_string().as_ref().to_vec()
 }

@@ -1,5 +1,5 @@
-//! A first login that is given back. The library's own session leaves a failed login to the server, which keeps it until it times out: some
-//! wrong passwords, and the server has no sessions left. This one closes what it opened, whatever came of it.
+//! A first login that is closed properly. The library leaves a failed login to the server, which keeps the session until it times out: a few
+//! wrong passwords, and the server has no sessions left. This login closes whatever it opened, even after a failure.
 
 use crate::store::APPLICATION_URI;
 use opcua::client::services::{ActivateSession, CloseSession, CreateSession};
@@ -13,25 +13,25 @@ use tokio::net::TcpStream;
 
 /// For each request.
 const REQUEST: Duration = Duration::from_secs(1);
-/// How long a server may keep the session where it never hears that it is closed, ms.
+/// Session timeout on the server, if the close request is lost, ms.
 const KEPT_MS: f64 = 10_000.0;
-/// Where a server listens if its endpoint does not say (IANA).
+/// Default port of an OPC UA server (IANA).
 const PORT: u16 = 4840;
 
-/// Whether anybody listens there, `HOST` or `HOST:PORT`, by what the system says: the library's words for it are a status code.
+/// Checks by a plain connection that a server listens at `HOST` or `HOST:PORT`: the library reports only a status code.
 ///
 /// # Errors
-/// Those of the connection.
+/// An error of the connection.
 pub(crate) async fn reach(server: &str) -> std::io::Result<()> {
     let has_port = server.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
     let place = if has_port { server.to_owned() } else { format!("{server}:{PORT}") };
     TcpStream::connect(place).await.map(drop)
 }
 
-/// Logs in and out again.
+/// Logs in and out immediately.
 ///
 /// # Errors
-/// Why nobody is let in.
+/// Why the login was refused.
 pub(crate) async fn try_login(
     client: &Client,
     endpoint: &EndpointDescription,
@@ -68,13 +68,13 @@ pub(crate) async fn try_login(
             let mut activate =
                 ActivateSession::new_manual(endpoint.clone(), 0, REQUEST, token.clone(), handle)
                     .identity_token(identity);
-            // Without encryption there is no key, and none is needed.
+            // Without encryption no key is needed.
             if let Ok(key) = store.read().read_own_pkey() {
                 activate = activate.private_key(key);
             }
             let activated = meanwhile(&mut events, activate.send(&channel)).await;
             let close = CloseSession::new_manual(0, REQUEST, token, channel.request_handle());
-            // What it answers changes nothing: the channel goes too.
+            // The answer does not matter: the channel is closed too.
             let _ = meanwhile(&mut events, close.send(&channel)).await;
             activated.map(drop)
         }
@@ -84,7 +84,7 @@ pub(crate) async fn try_login(
     done
 }
 
-/// Waits for an answer; somebody has to carry what goes and comes on the channel meanwhile.
+/// Waits for an answer while the channel's events are processed.
 async fn meanwhile<T: Transport + Send + Sync + 'static, A>(
     events: &mut SecureChannelEventLoop<T>,
     request: impl Future<Output = Result<A, Error>>,

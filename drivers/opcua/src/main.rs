@@ -1,6 +1,6 @@
 //! `mapper-backend-opcua`: a gas stand behind a PLC or another controller that speaks OPC UA; docs/rig.md has its settings.
 //!
-//! Without arguments, or with `--socket PATH`, it is a driver and speaks docs/protocol.md; with `trust ENDPOINT` it pins the certificate of a server.
+//! Without arguments, or with `--socket PATH`, it is a driver and speaks docs/protocol.md; with `trust ENDPOINT` it pins a server's certificate.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

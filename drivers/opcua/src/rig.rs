@@ -10,12 +10,12 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A clock that is off by more is said, s.
+/// Clock difference above which a message is given, s.
 const CLOCK_SAID_S: f64 = 1.0;
-/// The bit of an access level that lets values be written.
+/// Write bit of an access level.
 const WRITABLE: u8 = 2;
 
-/// Makes the rig; nothing is connected.
+/// Makes the rig without connecting.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let mut checked = Settings::read(value)?;
     let within = Duration::from_secs_f64(checked.settings.timeout_s());
@@ -29,15 +29,15 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
 struct Nodes {
     checked: Checked,
     link: Link,
-    /// What is read, in the order of `checked.reads`.
+    /// Nodes to read, in the order of `checked.reads`.
     nodes: Vec<NodeId>,
-    /// What stands at the nodes that are written.
+    /// Types of the written nodes.
     types: BTreeMap<Target, Variant>,
     remark: Option<String>,
 }
 
-/// A source timestamp may be ahead of the answer by so much, s: clocks of controllers on one net are kept within milliseconds to some tenths
-/// (NTP), and a reading has to be no older than 3 s.
+/// Maximum lead of a source timestamp over the answer, s: clocks of controllers on one network agree within milliseconds to some tenths
+/// (NTP), and a reading must not be older than 3 s.
 const FUTURE_S: f64 = 1.0;
 
 fn between_s(earlier: &DateTime, later: &DateTime) -> f64 {
@@ -45,7 +45,7 @@ fn between_s(earlier: &DateTime, later: &DateTime) -> f64 {
     (later.ticks() - earlier.ticks()) as f64 * 1e-7
 }
 
-/// A status with which a node will not be there later either.
+/// Whether the status means that the node is missing permanently.
 fn is_for_good(status: StatusCode) -> bool {
     [
         StatusCode::BadNodeIdUnknown,
@@ -58,7 +58,7 @@ fn is_for_good(status: StatusCode) -> bool {
 }
 
 impl Nodes {
-    /// Says where the server's clock is another time of day.
+    /// Reports a difference of the server's clock.
     fn compare_clocks(&mut self, sent: &DateTime) {
         let off_s = between_s(&DateTime::now(), sent);
         if off_s.abs() > CLOCK_SAID_S && !sent.is_null() {
@@ -68,19 +68,19 @@ impl Nodes {
         }
     }
 
-    /// When the source took a value, s since arming, for a sample at `t_s`: as long before it as the server says, by the server's own clock.
+    /// When the source took a value, s since arming, for a sample at `t_s`. The age of the value is taken by the server's own clock.
     fn source_t_s(&self, value: &DataValue, sent: &DateTime, t_s: f64) -> Option<f64> {
         let taken = value.source_timestamp.as_ref().filter(|taken| !taken.is_null() && !sent.is_null())?;
         (self.checked.settings.timestamps == Timestamps::Source).then(|| t_s - between_s(taken, sent))
     }
 
-    /// Whether a value is stamped later than the server's own answer: nobody can say how old it is.
+    /// Whether a value is stamped later than the server's own answer; its age is unknown then.
     fn is_from_the_future(&self, value: &DataValue, sent: &DateTime) -> bool {
         let age_s = self.source_t_s(value, sent, 0.0).map_or(0.0, |source_t_s| -source_t_s);
         age_s < -FUTURE_S
     }
 
-    /// What stands at a node that is written: values of another type would be refused.
+    /// The type of a node that is written: values of another type would be refused.
     fn type_of(&mut self, node: &NodeId, value: &DataValue) -> Result<Variant, LinkError> {
         if let Some(status) = value.status.filter(|status| is_for_good(*status)) {
             return Err(LinkError::Node {
@@ -102,7 +102,7 @@ impl Nodes {
             }
             _ => {}
         }
-        // Nobody has written there yet.
+        // Without a value yet, the declared data type counts.
         let answer = self.link.read(std::slice::from_ref(node), AttributeId::DataType)?;
         let data_type = answer.values.into_iter().next().and_then(|answer| answer.value);
         let built_in = match data_type {
@@ -126,7 +126,7 @@ impl Nodes {
         })
     }
 
-    /// Whether every setpoint that the rig is said to take can be written as this type.
+    /// Whether this type can hold every accepted setpoint.
     fn holds_what_is_accepted(
         &self,
         target: Target,
@@ -138,7 +138,7 @@ impl Nodes {
         let range = self.checked.settings.accepts.range(target);
         let key = target.key();
         let name = kind(there);
-        // A truth value is what air is, and nothing else.
+        // Only air may be a Boolean.
         let is_bool = matches!(there, Variant::Boolean(_)) && target != Target::Air;
         if let Some(value) = [range.high, range.low]
             .into_iter()
@@ -155,7 +155,7 @@ impl Nodes {
         }
     }
 
-    /// Types and access of what is written.
+    /// Learns types and access of the written nodes.
     fn learn_types(&mut self) -> Result<(), LinkError> {
         let written: Vec<(Target, NodeId)> =
             self.checked.written().map(|(target, node)| (target, node.clone())).collect();
@@ -181,7 +181,7 @@ impl Nodes {
     }
 }
 
-/// What may go out in one request: the valve before pressures, the air after everything.
+/// Targets of equal rank go into one request: the valve before pressures, the air last.
 fn rank(target: Target) -> u8 {
     match target {
         Target::Valve => 0,
@@ -216,7 +216,7 @@ impl Controller for Nodes {
         let reading =
             |((channel, _, scale), value): (&(Channel, NodeId, crate::settings::Scale), DataValue)| {
                 let mut quality = quality(&value);
-                // A node may become another one while it runs: a truth value is no reading.
+                // A node may change its type at run time: a Boolean is not a reading.
                 let there = value.value.as_ref().filter(|there| is_number(there));
                 let inside = there.map_or(f64::NAN, |there| scale.inside(number(there)));
                 if inside.is_nan() || self.is_from_the_future(&value, &answer.sent) {
@@ -241,7 +241,7 @@ impl Controller for Nodes {
             for (target, value) in together {
                 let Some(((node, scale), there)) = self.checked.write(*target).zip(self.types.get(target))
                 else {
-                    // Every target has its place, and a type once the rig is armed.
+                    // Every target has a node, and a type once the rig is armed.
                     return Err(LinkError::Unknown(*target));
                 };
                 let outside = scale.outside(*value);

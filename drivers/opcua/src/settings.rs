@@ -19,41 +19,41 @@ pub(crate) const NAME: &str = "opcua";
 pub(crate) struct Settings {
     /// Address of the server, `opc.tcp://HOST:PORT/...`.
     pub(crate) endpoint: String,
-    /// How what goes over the wire is protected.
+    /// Security of the connection.
     #[serde(default)]
     pub(crate) security: Security,
-    /// Name of the user: `{env: NAME}`. Anonymous if not said.
+    /// User name: `{env: NAME}`. Default: anonymous.
     #[serde(default)]
     user: Value,
     /// Password of the user: `{env: NAME}`.
     #[serde(default)]
     password: Value,
-    /// Name of the rig, of which there is one; its endpoint if not said.
+    /// Unique name of the rig; default: its endpoint.
     pub(crate) rig: Option<String>,
-    /// How often it is read; 10 Hz if not said.
+    /// Polling rate; default 10 Hz.
     pub(crate) rate: Option<Quantity<Frequency>>,
-    /// Time for each read; 300 ms if not said.
+    /// Timeout of each read; default 300 ms.
     pub(crate) timeout: Option<Quantity<Duration>>,
-    /// Which time of a reading counts for its age.
+    /// The time that defines the age of a reading.
     #[serde(default)]
     pub(crate) timestamps: Timestamps,
-    /// Where each channel stands.
+    /// Location of each channel.
     #[serde(deserialize_with = "mapper_driver::by_channel")]
     pub(crate) read: BTreeMap<Channel, Place>,
-    /// Where each setpoint goes.
+    /// Location of each setpoint.
     pub(crate) write: Writes,
-    /// Setpoints that the rig takes.
+    /// Accepted setpoints.
     pub(crate) accepts: Accepts,
-    /// Its way into the safe state.
+    /// The safe trajectory.
     pub(crate) safe: Safe,
 }
 
-/// Whether this can be the address of a server.
+/// Whether this is a valid server address.
 pub(crate) fn is_endpoint(text: &str) -> bool {
     text.strip_prefix("opc.tcp://").is_some_and(|server| !server.is_empty())
 }
 
-/// Signed and encrypted, or by name in the clear.
+/// Signed and encrypted, or, if stated, without security.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Security {
@@ -64,29 +64,29 @@ pub(crate) enum Security {
     Aes128Sha256RsaOaep,
     /// Aes256-Sha256-RsaPss, signed and encrypted.
     Aes256Sha256RsaPss,
-    /// Nothing: whoever is on the network can read and write.
+    /// None: anyone on the network can read and write.
     None,
 }
 
-/// Which time of a reading counts.
+/// The time that defines the age of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Timestamps {
     /// The server's source timestamp.
     #[default]
     Source,
-    /// When it arrived: for servers that stamp a value only when it changes.
+    /// Time of arrival: for servers that stamp a value only when it changes.
     Arrival,
 }
 
-/// A node; its value times `scale` plus `offset` is SI, or it is in `unit`.
+/// A node; its SI value is its value times `scale` plus `offset`, or it is in `unit`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Place {
     /// As `ns=2;s=Stand.P3` or `ns=3;i=1001`.
     #[serde(deserialize_with = "node_id")]
     pub(crate) node: NodeId,
-    /// Unit of the value there.
+    /// Unit of the node's value.
     unit: Option<String>,
     scale: Option<f64>,
     offset: Option<f64>,
@@ -109,11 +109,11 @@ pub(crate) struct Writes {
     oil_temperature: Place,
     /// 1 or true: air on.
     air: Place,
-    /// Counts up twice a second: the controller cuts the air by itself where it stands still.
+    /// Counts up twice a second; the controller cuts the air if it stops.
     heartbeat: Place,
 }
 
-/// What is wrong with them.
+/// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
     #[error("{0}; docs/rig.md has an example of all settings")]
@@ -150,7 +150,7 @@ pub(crate) fn wrong(path: impl Into<String>, error: impl Into<SettingError>) -> 
     BackendError::Settings { backend: NAME.to_owned(), path: path.into(), source: Box::new(error.into()) }
 }
 
-/// How a number at a node becomes SI.
+/// Conversion of a node's number to SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scale {
     scale: f64,
@@ -163,7 +163,7 @@ impl Scale {
         if value.is_finite() { value } else { f64::NAN }
     }
 
-    /// From one whole number to the next, SI.
+    /// Increment of a whole number, SI.
     pub(crate) fn step(self) -> f64 {
         self.scale
     }
@@ -184,7 +184,7 @@ fn kind(channel: Channel) -> Option<Kind> {
 }
 
 impl Place {
-    /// How the number there becomes the value of a channel.
+    /// Conversion of a node's number to the value of a channel.
     fn scale(&self, channel: Channel) -> Result<Scale, SettingError> {
         let Some(unit) = &self.unit else {
             let scale = scale(self.scale.unwrap_or(1.0))?;
@@ -204,13 +204,13 @@ impl Place {
     }
 }
 
-/// A user, and the password. It is printed nowhere.
+/// A user with password. It is never printed.
 pub(crate) struct User {
     pub(crate) name: String,
     pub(crate) password: String,
 }
 
-/// Settings that have been looked at.
+/// Checked settings.
 pub(crate) struct Checked {
     pub(crate) settings: Settings,
     pub(crate) user: Option<User>,
@@ -277,7 +277,7 @@ impl Settings {
         self.timeout.as_ref().map_or(0.3, |timeout| timeout.inside)
     }
 
-    /// The stand that they describe.
+    /// The stand for these settings.
     pub(crate) fn stand(&self) -> Stand {
         Stand {
             backend: NAME,
@@ -293,7 +293,7 @@ impl Settings {
 }
 
 impl Writes {
-    /// Where a value goes, and the channel that has the units it may be in.
+    /// Location of a target, and the channel that defines its permitted units.
     fn place(&self, target: Target) -> (&Place, Channel) {
         match target {
             Target::P3 => (&self.p3, Channel::P3),
@@ -307,7 +307,7 @@ impl Writes {
 }
 
 impl Checked {
-    /// How the number of a channel is read, as the campaign says it.
+    /// Unit of a channel, as written in the campaign.
     pub(crate) fn unit(&self, channel: Channel) -> String {
         let Some(place) = self.settings.read.get(&channel) else { return String::new() };
         match &place.unit {
@@ -318,12 +318,12 @@ impl Checked {
         }
     }
 
-    /// Where a value goes, and how it becomes the number there. All targets are there.
+    /// Node and scale of a target. All targets have an entry.
     pub(crate) fn write(&self, target: Target) -> Option<&(NodeId, Scale)> {
         self.writes.get(&target)
     }
 
-    /// Every node that is written.
+    /// Every written node.
     pub(crate) fn written(&self) -> impl Iterator<Item = (Target, &NodeId)> {
         self.writes.iter().map(|(target, (node, _))| (*target, node))
     }
@@ -347,7 +347,7 @@ mod tests {
         })
     }
 
-    /// 300 kPa are 300 000 Pa, 26.85 degC are 300 K; what is written goes the other way.
+    /// 300 kPa are 300 000 Pa, 26.85 degC are 300 K; writes use the inverse conversion.
     #[test]
     fn units_and_scales_lead_to_si_and_back() {
         let checked = Settings::read(&settings()).ok().unwrap();

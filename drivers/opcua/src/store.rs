@@ -1,16 +1,16 @@
-//! Certificates on disk: our own, and the one that each server had when somebody said that it is to be trusted.
+//! Certificates on disk: our own, and the pinned one of each server.
 
 use opcua::crypto::{CertificateStore, X509, X509Data};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// Our name in the world of OPC UA; it stands in our certificate.
+/// Our application URI in OPC UA, which our certificate contains.
 pub(crate) const APPLICATION_URI: &str = "urn:mapper:backend:opcua";
-/// How long our own certificate holds, days.
+/// Validity of our own certificate, days.
 const VALID_DAYS: u32 = 10 * 365;
 const KEY_BITS: u32 = 2048;
 
-/// Why a certificate is not there.
+/// Why a certificate is unavailable.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StoreError {
     #[error("set MAPPER_STATE_DIR or HOME: the certificates have no directory")]
@@ -32,7 +32,7 @@ pub(crate) enum StoreError {
     Expired { server: String, words: String },
 }
 
-/// Its name below the state of its user.
+/// Its directory name below the user's state.
 const DIRECTORY: &str = "opcua";
 
 /// The directory of certificates.
@@ -42,7 +42,7 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    /// In `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`, as locks and latches.
+    /// In `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`, as for locks.
     pub(crate) fn of_environment() -> Result<Store, StoreError> {
         let variable =
             |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
@@ -52,12 +52,12 @@ impl Store {
         Ok(Store { root: state.ok_or(StoreError::NoPlace)?.join(DIRECTORY) })
     }
 
-    /// Where it is.
+    /// Its directory.
     pub(crate) fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Our own certificate, which is made where there is none.
+    /// Our own certificate; it is created if missing.
     pub(crate) fn own(&self) -> Result<PathBuf, StoreError> {
         let store = CertificateStore::new(&self.root);
         let (certificate, key) = (store.own_certificate_path(), store.own_private_key_path());
@@ -78,7 +78,7 @@ impl Store {
         Ok(certificate)
     }
 
-    /// Makes a directory that nobody else looks into: a key is written there.
+    /// Makes a directory with access for the user only, since it holds a key.
     fn directory(&self, path: &Path) -> Result<(), StoreError> {
         let mut made = std::fs::DirBuilder::new();
         made.recursive(true);
@@ -93,7 +93,7 @@ impl Store {
         self.root.join("servers").join(format!("{name}.der"))
     }
 
-    /// The certificate that a server had when it was trusted, still valid.
+    /// The pinned certificate of a server, still valid.
     pub(crate) fn pinned(&self, endpoint: &str) -> Result<X509, StoreError> {
         let Some(certificate) = self.trusted(endpoint)? else {
             return Err(StoreError::NotTrusted(endpoint.to_owned()));
@@ -102,7 +102,7 @@ impl Store {
         Ok(certificate)
     }
 
-    /// The certificate that is trusted; `None` where there is none.
+    /// The trusted certificate; `None` if there is none.
     pub(crate) fn trusted(&self, endpoint: &str) -> Result<Option<X509>, StoreError> {
         let path = self.pin(endpoint);
         if !path.exists() {
@@ -112,7 +112,7 @@ impl Store {
         X509::from_der(&der).map(Some).map_err(|_| StoreError::Garbage(path))
     }
 
-    /// Trusts this certificate from now on. Gives the file.
+    /// Trusts this certificate from now on. Returns its file.
     pub(crate) fn trust(&self, endpoint: &str, der: &[u8]) -> Result<PathBuf, StoreError> {
         let path = self.pin(endpoint);
         self.directory(path.parent().unwrap_or(&self.root))?;
@@ -121,7 +121,7 @@ impl Store {
     }
 }
 
-/// That this certificate holds today.
+/// Checks that this certificate is valid today.
 pub(crate) fn valid(endpoint: &str, certificate: &X509) -> Result<(), StoreError> {
     let refused = |error: opcua::types::Error| StoreError::Expired {
         server: server(endpoint).to_owned(),
@@ -133,7 +133,7 @@ pub(crate) fn valid(endpoint: &str, certificate: &X509) -> Result<(), StoreError
     certificate.is_time_valid(&opcua::types::DateTime::now().as_chrono()).map_err(refused).map(|_| ())
 }
 
-/// What stands in a certificate of ours.
+/// Contents of our own certificate.
 fn about(valid_days: u32) -> X509Data {
     let text = || "mapper".to_owned();
     X509Data {
@@ -154,7 +154,7 @@ pub(crate) fn server(endpoint: &str) -> &str {
     after.split('/').next().unwrap_or(after)
 }
 
-/// SHA-256 of a certificate, as other programs show it.
+/// SHA-256 of a certificate in the usual notation.
 pub(crate) fn fingerprint(der: &[u8]) -> String {
     let bytes: Vec<String> = Sha256::digest(der).iter().map(|byte| format!("{byte:02X}")).collect();
     bytes.join(":")
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(store.pin("opc.tcp://../x:1"), PathBuf::from("/state/servers/...der"));
     }
 
-    /// One that holds for no day at all, and ours.
+    /// One that is never valid, and ours.
     #[test]
     fn a_certificate_that_has_expired_is_not_talked_to() {
         let scratch = tempfile::tempdir().unwrap();

@@ -1,9 +1,9 @@
-//! Numbers in values of OPC UA.
+//! Numbers in OPC UA values.
 
 use mapper_core::Quality;
 use opcua::types::{DataValue, StatusCode, Variant, VariantTypeId};
 
-/// The number that a value holds; NaN where it holds none. A truth value is 1 or 0.
+/// The number in a value; NaN if it is not a number. A Boolean is 1 or 0.
 pub(crate) fn number(value: &Variant) -> f64 {
     match value {
         Variant::Boolean(value) => f64::from(u8::from(*value)),
@@ -21,7 +21,7 @@ pub(crate) fn number(value: &Variant) -> f64 {
     }
 }
 
-/// The type of a value, as the specification calls it.
+/// The specification's name of a value's type.
 pub(crate) fn kind(value: &Variant) -> String {
     match value.type_id() {
         VariantTypeId::Empty => "empty".to_owned(),
@@ -30,22 +30,22 @@ pub(crate) fn kind(value: &Variant) -> String {
     }
 }
 
-/// Whether a value of this type is a number; a truth value is none.
+/// Whether the type is numeric, which excludes Boolean.
 pub(crate) fn is_number(value: &Variant) -> bool {
     !matches!(value, Variant::Boolean(_))
         && (matches!(value, Variant::Float(_) | Variant::Double(_)) || !number(value).is_nan())
 }
 
-/// Whether a value of this type has no fraction.
+/// Whether the type is an integer type.
 pub(crate) fn is_whole(value: &Variant) -> bool {
     !matches!(value, Variant::Float(_) | Variant::Double(_))
 }
 
-/// The number as a value of the type that stands there; `None` where it does not fit.
+/// The number as a value of the same type as `there`; `None` if it does not fit.
 pub(crate) fn like(there: &Variant, number: f64) -> Option<Variant> {
     let whole = number.round();
     let within = |low: f64, high: f64| (low..=high).contains(&whole).then_some(whole);
-    // Each cast is of a whole number within the bounds of its type.
+    // Each cast is of a whole number within the range of its type.
     Some(match there {
         Variant::Boolean(_) => Variant::Boolean(within(0.0, 1.0)? == 1.0),
         Variant::SByte(_) => Variant::SByte(within(f64::from(i8::MIN), f64::from(i8::MAX))? as i8),
@@ -54,7 +54,7 @@ pub(crate) fn like(there: &Variant, number: f64) -> Option<Variant> {
         Variant::UInt16(_) => Variant::UInt16(within(0.0, f64::from(u16::MAX))? as u16),
         Variant::Int32(_) => Variant::Int32(within(f64::from(i32::MIN), f64::from(i32::MAX))? as i32),
         Variant::UInt32(_) => Variant::UInt32(within(0.0, f64::from(u32::MAX))? as u32),
-        // Beyond 2^53 a double has no units.
+        // Beyond 2^53 a double cannot represent every integer.
         Variant::Int64(_) => Variant::Int64(within(-9.0e15, 9.0e15)? as i64),
         Variant::UInt64(_) => Variant::UInt64(within(0.0, 9.0e15)? as u64),
         Variant::Float(_) if (number as f32).is_finite() => Variant::Float(number as f32),
@@ -63,13 +63,13 @@ pub(crate) fn like(there: &Variant, number: f64) -> Option<Variant> {
     })
 }
 
-/// Without the bits that say more than the code (Part 4 of the specification, 7.39).
+/// The code without its additional bits (Part 4 of the specification, 7.39).
 fn code(status: StatusCode) -> u32 {
     status.bits() & 0xFFFF_0000
 }
 
-/// How good a value is, by its status: an absent status is a good one. A value that was entered by hand or cut off at a limit is a number,
-/// and not the sensor's (Part 8, 6.3).
+/// Quality of a value, from its status: an absent status means good. A value entered by hand or clipped at a limit is a number,
+/// but not the sensor's (Part 8, 6.3).
 pub(crate) fn quality(value: &DataValue) -> Quality {
     let by_hand = [StatusCode::GoodLocalOverride, StatusCode::GoodClamped].map(code);
     match value.status {
@@ -81,13 +81,13 @@ pub(crate) fn quality(value: &DataValue) -> Quality {
     }
 }
 
-/// Whether a value that was written stands there now, as it was written: `Good` alone says so. `GoodClamped` says that another value does, and
-/// `GoodCompletesAsynchronously` that nobody knows yet.
+/// Whether a value was written exactly: only `Good` confirms that. `GoodClamped` means that another value was written, and
+/// `GoodCompletesAsynchronously` that the result is still open.
 pub(crate) fn is_written(status: StatusCode) -> bool {
     code(status) == StatusCode::Good.bits()
 }
 
-/// A status as people look it up: `BadOutOfRange (0x803C0000)`.
+/// A status with its code, for look-up: `BadOutOfRange (0x803C0000)`.
 pub(crate) fn words(status: StatusCode) -> String {
     format!("{status} (0x{:08X})", status.bits())
 }
@@ -96,7 +96,7 @@ pub(crate) fn words(status: StatusCode) -> String {
 mod tests {
     use super::*;
 
-    /// What goes out comes back, in each type; what does not fit does not go out.
+    /// Round trip of each type; a value that does not fit is not written.
     #[test]
     fn numbers_keep_the_type_that_stands_there() {
         for there in [

@@ -1,5 +1,5 @@
-//! The driver against asyncua, a server that shares no code with it: signed and encrypted, in real time. Deadlines are what a rig needs; the
-//! machine of the tests may be slow, so that waiting for a server to start is not bounded by them.
+//! The driver against asyncua, an independent server: signed and encrypted, in real time. The driver's deadlines are those of a rig. The
+//! test machine may be slow, so waiting for a server to start is not limited by them.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -31,7 +31,7 @@ impl Stand {
         Stand::with(&[])
     }
 
-    /// One whose server is told more.
+    /// One with additional options for the server.
     fn with(more: &[&str]) -> Stand {
         let scratch = tempfile::tempdir().unwrap();
         let more = [&["--days", "365"], more].concat();
@@ -39,12 +39,12 @@ impl Stand {
         Stand { server, port, scratch }
     }
 
-    /// The same stand, whose server has stopped and begun again, with the certificate of this directory.
+    /// Restarts the server, with the certificate of this directory.
     fn restart(&mut self, certificate: &str) {
         self.restart_valid(certificate, "365");
     }
 
-    /// The same, with one that is valid for so many days if it has to be made.
+    /// The same; a certificate that must be created is valid for this many days.
     fn restart_valid(&mut self, certificate: &str, days: &str) {
         self.kill();
         (self.server, self.port) = serve(&self.port, &self.scratch.path().join(certificate), days);
@@ -64,7 +64,7 @@ impl Stand {
         format!("opc.tcp://127.0.0.1:{}", self.port)
     }
 
-    /// The program with an environment of its own.
+    /// The program with its own environment.
     fn program(&self, password: &str) -> PathBuf {
         let (state, real) = (self.scratch.path().join("state"), env!("CARGO_BIN_EXE_mapper-backend-opcua"));
         let script = format!(
@@ -94,14 +94,14 @@ impl Stand {
             .collect();
         json!({
             "endpoint": self.endpoint(), "user": {"env": "PLC_USER"}, "password": {"env": "PLC_PASSWORD"},
-            // Slower than a rig's: the tests share their machine.
+            // Slower than on a rig, since the tests share their machine.
             "timeout": "800 ms",
             "read": read,
             "write": {
                 "p3": node("p3"), "t3": node("t3"), "valve": node("valve"), "oil_temperature": node("oil_temperature"),
                 "air": node("air"), "heartbeat": node("heartbeat"),
             },
-            // More than the stand itself takes.
+            // More than the stand itself accepts.
             "accepts": {"p3": ["105 kPa", "900 kPa"], "t3": ["280 K", "900 K"], "valve": [0.1, 2.5], "oil_temperature": ["280 K", "400 K"]},
             "safe": {"pressure_slew": "100 kPa/s", "opening": 1.0, "within": "20 s"},
         })
@@ -126,7 +126,7 @@ impl Drop for Stand {
     }
 }
 
-/// A server on this port, or on any; it is there when this returns.
+/// A server on this port, or on a free one; it is ready when this returns.
 fn serve(port: &str, certificate: &Path, days: &str) -> (Child, String) {
     serve_with(port, certificate, &["--days", days])
 }
@@ -157,7 +157,7 @@ fn setpoints(p3_pa: f64) -> Setpoints {
     }
 }
 
-/// Polls each half second until `reached`; how long that took.
+/// Polls every half second until `reached`; returns the duration.
 fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
     let begun = Instant::now();
     loop {
@@ -170,10 +170,10 @@ fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool
     }
 }
 
-/// Within this a server that is back is read again, s: 3 s are promised and measured on a computer that does nothing else (docs/rig-tried.md); other tests
-/// run beside these. Without what is done for it it would be half a minute, or never.
+/// Maximum time until a restarted server is read, s. The documented 3 s hold on an idle computer (docs/rig-tried.md); other tests run in
+/// parallel here. Without the driver's own reconnection it would take half a minute, or fail.
 const AGAIN_S: f64 = 10.0;
-/// For a driver whose own deadlines are looked at: on a computer that does nothing else they end within 2 s.
+/// For tests of the driver's own deadlines: on an idle computer they end within 2 s.
 const PATIENT: Patience = Patience { call: Duration::from_secs(20), ..PATIENCE };
 
 fn reads(batch: &SampleBatch) -> bool {
@@ -190,7 +190,7 @@ fn words(error: BackendError) -> String {
     words
 }
 
-/// Nobody is talked to whose certificate nobody has looked at; then values come with the source's time, and setpoints arrive.
+/// A server is refused until its certificate is pinned; then values come with the source's time, and setpoints arrive.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_trusted_server_is_read_and_written() {
@@ -207,13 +207,13 @@ fn a_trusted_server_is_read_and_written() {
     let from = batch.provenance_of(Channel::T2).unwrap();
     assert!(from.quality.iter().all(|quality| *quality == Quality::Good), "{from:?}");
     for (source_s, t_s) in from.source_t_s.iter().zip(&batch.t_s) {
-        // Taken each 20 ms, on one machine; the rest is for a machine that does not keep up. Of another clock it would be of another day.
+        // The source samples every 20 ms on the same machine; the rest is for a slow machine. Another clock would differ by a day.
         assert!((-10.0..=0.0).contains(&(source_s - t_s)), "{source_s} for {t_s}");
     }
     rig.make_safe().unwrap();
     rig.disarm().unwrap();
 
-    // Another one answers there.
+    // The server returns with another certificate.
     stand.restart("other");
     let changed = words(rig.arm().unwrap_err());
     assert!(changed.contains("another certificate than the trusted one"), "{changed}");
@@ -221,7 +221,7 @@ fn a_trusted_server_is_read_and_written() {
     assert!(!kept.status.success() && String::from_utf8_lossy(&kept.stderr).contains("--replace"));
 }
 
-/// Neither to be trusted nor talked to, even where it was pinned when it still held; the day is said.
+/// An expired certificate is neither pinned nor accepted, even if pinned while valid; the message gives the day.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_whose_certificate_has_expired_is_not_talked_to() {
@@ -259,7 +259,7 @@ fn a_wrong_password_and_a_refused_setpoint_are_said_with_their_codes() {
     rig.disarm().unwrap();
 }
 
-/// A restart costs its own time and 3 s; while nobody answers there are samples without readings, which the guards count.
+/// A restart costs its own time and 3 s; meanwhile there are samples without readings, which the guards count.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_that_restarts_is_read_again_soon() {
@@ -269,7 +269,7 @@ fn a_server_that_restarts_is_read_again_soon() {
     until(&mut rig, &mut t_s, reads);
     stand.kill();
     until(&mut rig, &mut t_s, reads_nothing);
-    // Starting takes the server some seconds; the lease is renewed by polls alone.
+    // The server starts in some seconds; polls alone renew the lease.
     let (certificate, port) = (stand.scratch.path().join("pki"), stand.port.clone());
     let starting = std::thread::spawn(move || serve(&port, &certificate, "365"));
     until(&mut rig, &mut t_s, |_| starting.is_finished());
@@ -281,7 +281,7 @@ fn a_server_that_restarts_is_read_again_soon() {
     rig.disarm().unwrap();
 }
 
-/// It hangs with its connection alive, for longer than the client waits before it makes a new one.
+/// The server hangs with its connection alive, for longer than the client waits before it reconnects.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_that_stands_still_is_read_again_soon() {
@@ -305,7 +305,7 @@ fn a_server_that_stands_still_is_read_again_soon() {
     rig.disarm().unwrap();
 }
 
-/// What cannot be done is said in time: the runner knows then that the rig is in doubt.
+/// A failure is reported in time, so that the runner knows that the rig is in doubt.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_that_is_gone_for_good_is_said_in_time() {
@@ -314,17 +314,17 @@ fn a_server_that_is_gone_for_good_is_said_in_time() {
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
     until(&mut rig, &mut t_s, reads);
     stand.kill();
-    // The driver says it by itself: the host would wait longer here.
+    // The driver reports it: the host's deadline is longer here.
     let begun = Instant::now();
     let lost = rig.make_safe().unwrap_err();
     assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
     assert!(begun.elapsed() < PATIENT.call / 2, "{:?}", begun.elapsed());
     until(&mut rig, &mut t_s, reads_nothing);
-    // What has not confirmed its safe state is not let go.
+    // A rig is not disarmed until its safe state is confirmed.
     assert!(matches!(rig.disarm(), Err(BackendError::Lost { .. })));
 }
 
-/// A wrong unit shows before anything is written.
+/// A wrong unit is detected before any write.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn readings_that_cannot_be_are_refused_with_their_node_and_unit() {
@@ -334,7 +334,7 @@ fn readings_that_cannot_be_are_refused_with_their_node_and_unit() {
     settings["read"]["P2"]["unit"] = json!("kPa");
     let mut rig = Driver::of_program(&stand.program(PASSWORD), "opcua", &settings, PATIENCE).unwrap();
     let refused = words(rig.arm().unwrap_err());
-    // 1 bar within its noise, a thousand times: few digits, and what could be.
+    // 1 bar within its noise, a thousand times: few digits, and the plausible range.
     let (_, said) = refused.split_once("at `read.P2`: P2 reads ").unwrap();
     let (number, rest) = said.split_once(" Pa from the node ns=2;s=P2 (with `unit: kPa`)").unwrap();
     assert!((9e7..1.1e8).contains(&number.parse::<f64>().unwrap()) && number.len() < 9, "{refused}");
@@ -342,7 +342,7 @@ fn readings_that_cannot_be_are_refused_with_their_node_and_unit() {
     stand.armed().disarm().unwrap();
 }
 
-/// A node of another type than is needed is named at arming, before anything is written: the setpoints at the server stay as they were.
+/// A node of the wrong type is reported at arming, before any write: the setpoints at the server do not change.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn nodes_of_another_type_are_refused_before_anything_is_written() {
@@ -369,7 +369,7 @@ fn nodes_of_another_type_are_refused_before_anything_is_written() {
         let refused = words(rig.arm().unwrap_err());
         assert!(parts.iter().all(|part| refused.contains(part)), "{node}: {refused}");
     }
-    // Whole numbers do where they are fine enough.
+    // Integers are accepted if they are fine enough.
     let mut settings = stand.settings();
     settings["write"]["valve"] = json!({"node": "ns=2;s=whole", "scale": 0.01});
     let mut rig = Driver::of_program(&stand.program(PASSWORD), "opcua", &settings, PATIENCE).unwrap();
@@ -380,7 +380,7 @@ fn nodes_of_another_type_are_refused_before_anything_is_written() {
     rig.disarm().unwrap();
 }
 
-/// A server for two sessions: seven wrong passwords leave none behind, so that the right one is let in. One that has none left says so.
+/// A server with two sessions: seven wrong passwords leave none behind, so that the right one succeeds. A full server is reported.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn wrong_passwords_use_up_no_sessions() {
@@ -404,7 +404,7 @@ fn wrong_passwords_use_up_no_sessions() {
     stand.armed().disarm().unwrap();
 }
 
-/// What people type first, and a server that is off: no status code and no error of a program is shown to them.
+/// Typical first mistakes of users, and a server that is off: the messages contain no status code and no internal error.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_is_trusted_by_its_whole_address_and_only_where_it_is() {
@@ -423,7 +423,7 @@ fn a_server_is_trusted_by_its_whole_address_and_only_where_it_is() {
     assert!(!words.contains("Os {") && words.contains("Is the server on"), "{words}");
 }
 
-/// Only `Good` says that a value stands there as it was written.
+/// Only `Good` confirms a write.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_write_that_is_not_simply_good_is_lost() {
@@ -435,7 +435,7 @@ fn a_write_that_is_not_simply_good_is_lost() {
     }
 }
 
-/// What a node becomes while the rig runs: a truth value, and readings from the future, are none; uncertain ones are readings, and are said to be.
+/// Changes of a node at run time: a Boolean and readings from the future are missing; uncertain ones are readings, marked as uncertain.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn readings_that_turn_bad_are_none_and_uncertain_ones_are_said() {
@@ -448,7 +448,7 @@ fn readings_that_turn_bad_are_none_and_uncertain_ones_are_said() {
         let expected = if misdeed == "uncertain" { Quality::Uncertain } else { Quality::Bad };
         let (noted, marked) = (std::cell::Cell::new(false), std::cell::Cell::new(false));
         let seen = |batch: &SampleBatch| {
-            // 1 is what a truth value would be as a number.
+            // 1 is what a Boolean would be as a number.
             assert_ne!(batch.last(Channel::T2), Some(1.0));
             let of_t2 = batch.provenance.iter().find(|one| one.channel == Channel::T2);
             marked.set(marked.get() || of_t2.is_some_and(|of_t2| of_t2.quality.last() == Some(&expected)));

@@ -1,4 +1,4 @@
-//! Backends that come with `mapper`, one module each. To add one, write its module with a constant `PLUGIN`, and its line
+//! Backends included in `mapper`, one module each. To add one, write its module with a constant `PLUGIN`, and its line
 //! below.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
@@ -12,7 +12,7 @@ macro_rules! backends {
     ($($name:ident),+ $(,)?) => {
         $(pub mod $name;)+
 
-        /// Every backend, in the order of lists for people.
+        /// Every backend, in display order.
         pub const BACKENDS: &[BackendPlugin] = &[$($name::PLUGIN),+];
     };
 }

@@ -1,4 +1,4 @@
-//! A recording played back as if it were a rig.
+//! Plays a recording back as a rig.
 
 use crate::setpoint_limits;
 use mapper_core::{
@@ -13,14 +13,14 @@ use std::path::Path;
 /// Name of the backend, in campaigns and descriptions.
 pub const NAME: &str = "replay";
 
-/// Replay as campaigns ask for it.
+/// Replay as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin = BackendPlugin {
     name: NAME,
     summary: "plays a recording back: {recording: FILE, channels: MAP.yaml}, the latter for a log of another program",
     make,
 };
 
-/// Why a recording cannot be played, or why the play is over.
+/// Why a recording cannot be played further.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The settings name no file.
@@ -32,7 +32,7 @@ pub enum ReplayError {
     /// The channel map cannot be read, or has mistakes.
     #[error(transparent)]
     ChannelMap(#[from] ChannelMapError),
-    /// More was asked for than was recorded.
+    /// A poll beyond the end of the recording.
     #[error("the recording being replayed has ended")]
     Over,
 }
@@ -52,15 +52,15 @@ fn make(_: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>
     Ok(Box::new(ReplayBackend::new(&report.recording)))
 }
 
-/// Relative difference up to which a setpoint counts as the recorded command: what a file keeps of a value in kPa
-/// with three decimals.
+/// Maximum relative difference between a setpoint and the recorded command: the resolution of a file with values in kPa
+/// and three decimals.
 const SETPOINT_TOLERANCE_RATIO: f64 = 1e-4;
 
-/// Plays a [`Recording`] back. What was commanded then cannot be changed now: setpoints are taken and compared with
+/// Plays a [`Recording`] back. Recorded commands cannot be changed: setpoints are accepted and compared with
 /// the recorded commands, and a difference becomes a note among the events.
 ///
-/// Samples stand at all times at which anything was measured; a command holds between its own samples, and another
-/// channel is NaN where it has none. The end of the recording is the loss of the rig.
+/// There is a sample at every time of a measurement. A command holds between its own samples; any other
+/// channel is NaN without a sample. The end of the recording is the loss of the rig.
 #[derive(Debug)]
 pub struct ReplayBackend {
     t_s: Vec<f64>,
@@ -129,7 +129,7 @@ impl ReplayBackend {
         }
     }
 
-    /// Notes on setpoints that differ from what was commanded at a sample.
+    /// Notes on setpoints that differ from the recorded commands at a sample.
     fn compare(&self, setpoints: &Setpoints, sample: usize) -> Vec<Event> {
         let Some(t_s) = self.t_s.get(sample).copied() else { return Vec::new() };
         let told = [
@@ -201,7 +201,7 @@ impl Backend for ReplayBackend {
         if start < end
             && let Some(setpoints) = self.pending.take().filter(|told| told.mode == RigMode::Running)
         {
-            // Setpoints hold from the last poll on: the first sample after it is the first to show them.
+            // Setpoints apply from the last poll on, so the first sample after it shows them.
             events.extend(self.compare(&setpoints, start));
             events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         }
@@ -246,7 +246,7 @@ impl Backend for ReplayBackend {
     }
 }
 
-/// Values at these times, NaN where the series has no sample. Both are strictly increasing.
+/// Values at these times, NaN if the series has no sample. Both are strictly increasing.
 fn at_own_times(series: &Series, t_s: &[f64]) -> Vec<f64> {
     let mut own = series.t_s.iter().zip(&series.values).peekable();
     t_s.iter()
@@ -261,7 +261,7 @@ fn held(series: &Series, t_s: &[f64]) -> Vec<f64> {
     t_s.iter().map(|t| series.held(*t).unwrap_or(f64::NAN)).collect()
 }
 
-/// From the median distance of samples, which pauses do not move; 0 below two samples.
+/// From the median interval of samples, which pauses do not affect; 0 below two samples.
 fn sample_rate_hz(t_s: &[f64]) -> f64 {
     let mut distances_s: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     distances_s.sort_by(f64::total_cmp);
@@ -362,7 +362,7 @@ mod tests {
         assert!(rig.arm().is_err());
         let description = rig.describe();
         assert_eq!(description.channels, [Channel::T2, Channel::P3Command]);
-        // Differences of tenths round in the last digits.
+        // Differences of tenths have rounding errors.
         assert!((description.sample_rate_hz - 10.0).abs() < 1e-9);
         let mut empty = ReplayBackend::new(&Recording::default());
         empty.arm().unwrap();

@@ -1,8 +1,8 @@
-//! Setpoints that mean something on a gas stand of turbochargers: what lies outside is a mistake of whoever sends it.
+//! Plausible setpoints of a turbocharger gas stand; others are errors of the client.
 
 use mapper_core::{SetpointRange, SetpointRanges};
 
-/// What the backends here accept.
+/// Setpoints accepted by the backends here.
 pub(crate) const ACCEPTED: SetpointRanges = SetpointRanges {
     p3_pa: SetpointRange { low: 50e3, high: 2e6 },
     t3_k: SetpointRange { low: 250.0, high: 1400.0 },

@@ -1,4 +1,4 @@
-//! The lab of other equations: where they become the lumped model's, and whether its energy closes.
+//! The lab with other equations: its limit is the lumped model, and its energy balance closes.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_backends::other_lab::{OtherStructure, turn_into};
@@ -41,8 +41,8 @@ fn column(batch: &SampleBatch, channel: Channel) -> &[f64] {
     &batch.columns.iter().find(|column| column.channel == channel).unwrap().values
 }
 
-/// With nodes tied together, even h, mixed gas, next to no duct and fast sensors only the gas in the first volume is left,
-/// which is under way for a millisecond: a hundredth of the noise that campaigns declare of one sample.
+/// With tightly coupled nodes, even h, mixed gas, almost no duct and fast sensors only the gas in the first volume remains,
+/// with a residence time of a millisecond: a hundredth of the declared noise of one sample.
 #[test]
 fn tied_together_it_is_the_virtual_lab() {
     let (lumped, other) = (recorded(None), recorded(Some(OtherStructure::lumped_limit())));
@@ -61,7 +61,7 @@ fn tied_together_it_is_the_virtual_lab() {
     }
 }
 
-/// As it is it is another machine: by more than the noise of the declared rig in what the structure changes.
+/// With its default structure it is another machine: the affected readings differ by more than the declared noise.
 #[test]
 fn as_it_is_it_is_another_machine() {
     let (lumped, other) = (recorded(None), recorded(Some(OtherStructure::default())));

@@ -1,4 +1,4 @@
-//! The virtual lab as a rig: what it delivers when it is set, polled, tripped and stopped.
+//! The virtual lab as a rig: its response to setpoints, polls, trips and stops.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_backends::virtual_lab::{
@@ -90,7 +90,7 @@ fn session(settings: LabSettings) -> Vec<SampleBatch> {
     vec![first, lab.poll(7.25).unwrap(), lab.poll(12.0).unwrap()]
 }
 
-/// Four T2 sensors; the second is off by 3 K, the third stuck after 5 s, the fourth has a tip of 4 mm.
+/// Four T2 sensors; the second has an offset of 3 K, the third sticks after 5 s, the fourth has a tip of 4 mm.
 fn with_four() -> LabSettings {
     let each = DeclaredUncertainty { noise_sigma: 0.1, offset_sigma: 0.25, gain_sigma_ratio: 0.0 };
     let declared = RedundantSensors::alike(Channel::T2, 4, each);
@@ -130,7 +130,7 @@ fn each_of_several_sensors_reads_by_itself_and_the_other_channels_as_without_the
     assert!(stuck[50..].iter().all(|value| *value == stuck[49]) && stuck[48] != stuck[49]);
     // From 3 s on the machine speeds up, and a tip of 4 mm needs some 9 s to follow.
     assert!(sound[45] - slow[45] > 1.0, "{} {}", sound[45], slow[45]);
-    // The channel is read by those that agree: 3 K are more than eight standard deviations.
+    // The channel is the mean of the consistent sensors: 3 K are more than eight standard deviations.
     let together: Vec<f64> =
         batches.iter().flat_map(|batch| batch.column(Channel::T2).unwrap().to_vec()).collect();
     let first = mean(&together[..30]);
@@ -168,7 +168,7 @@ fn from_standstill_it_runs_up_to_the_speed_that_was_asked_for_and_back_to_rest()
     lab.set(&rest).unwrap();
     let stop = lab.poll(2100.0).unwrap();
     assert_eq!(last(&stop, Channel::ShaftSpeed), 0.0);
-    // The housing is still warm: it was above ambient and has nowhere quick to go.
+    // The housing is still warm: it was above ambient and cannot cool quickly.
     assert!(last(&stop, Channel::Tc) > 305.0);
 }
 
@@ -203,7 +203,7 @@ fn calls_out_of_order_and_impossible_setpoints_are_refused() {
     lab.disarm().unwrap();
 }
 
-/// What a wall tap reads, brought back to total pressure, is what a total probe reads.
+/// A wall-tap reading, converted to total pressure, equals the reading of a total-pressure probe.
 #[test]
 fn static_taps_read_less_by_the_dynamic_pressure() {
     let taps = [(Channel::P1, 0.040), (Channel::P2, 0.035)];

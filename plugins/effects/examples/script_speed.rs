@@ -1,4 +1,4 @@
-//! How much slower a scripted effect is than the same one built in:
+//! Measures how much slower a scripted effect is than the same built-in effect:
 //! `cargo run --release -p mapper-effects --example script_speed`
 #![allow(clippy::print_stdout)]
 

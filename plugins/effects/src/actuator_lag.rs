@@ -10,7 +10,7 @@ effect_parameters! {
     /// P3 follows its command more slowly.
     #[derive(Debug)]
     pub(crate) struct ActuatorLag {
-        /// Time constant of P3 behind its command, s.
+        /// Time constant of P3 after its command, s.
         lag_s = "actuator_lag" ["s"] 0.0 .. 10.0, neutral 0.3, step 0.7;
     }
 }

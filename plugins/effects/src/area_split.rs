@@ -1,4 +1,4 @@
-//! Part of the heat goes to the gas before the wheel.
+//! Part of the heat enters the gas before the wheel.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// Part of the heat goes to the gas before the wheel.
+    /// Part of the heat enters the gas before the wheel.
     #[derive(Debug)]
     pub(crate) struct AreaSplit {
         /// Share alpha_A of the internal area that meets the gas before compression.

@@ -1,4 +1,4 @@
-//! Bearings take power.
+//! Additional friction power in the bearings.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// Bearings take power.
+    /// Additional friction power in the bearings.
     #[derive(Debug)]
     pub(crate) struct BearingFriction {
         /// Friction c of c omega^2, W s^2/rad^2.

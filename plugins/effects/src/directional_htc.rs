@@ -1,4 +1,4 @@
-//! Convection depends on the direction of the heat.
+//! Convection depends on the direction of the heat flow.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,10 +6,10 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// Convection depends on the direction of the heat.
+    /// Convection depends on the direction of the heat flow.
     #[derive(Debug)]
     pub(crate) struct DirectionalHtc {
-        /// Factor f of h where the metal is hotter than its gas.
+        /// Factor f of h if the metal is hotter than its gas.
         hot_metal_ratio = "directional_htc" ["1"] 0.2 .. 3.0, neutral 1.0, step -0.3;
     }
 }

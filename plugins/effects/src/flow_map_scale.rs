@@ -1,4 +1,4 @@
-//! The compressor moves more or less.
+//! The compressor delivers more or less flow.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// The compressor moves more or less.
+    /// The compressor delivers more or less flow.
     #[derive(Debug)]
     pub(crate) struct FlowMapScale {
         /// Corrected flow over the map's.
@@ -39,8 +39,8 @@ mod tests {
     use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
     use mapper_physics::closed_form_map::ClosedFormMap;
 
-    /// At 110 krpm the best flow lies below what the point delivers: more flow is less efficient, by the closed form's own
-    /// parabola, and a map that only knows its speed lines says the same to first order.
+    /// At 110 krpm the flow of best efficiency is below the flow of the point: more flow is less efficient, by the closed form's own
+    /// parabola. A map with only speed lines gives the same to first order.
     #[test]
     fn flow_is_multiplied_and_the_efficiency_is_that_of_the_flow() {
         let (nominal, other) =
@@ -50,7 +50,7 @@ mod tests {
         for (speed_rpm, pressure_ratio) in [(60e3, 1.15), (110e3, 1.6), (140e3, 2.4)] {
             let here = map.evaluate(speed_rpm, pressure_ratio);
             let scaled = map.evaluate_scaled(speed_rpm, pressure_ratio, 1.01);
-            // Where the same speed line has that flow by itself.
+            // The point on the same speed line with that flow.
             let at = |pr: f64| map.evaluate(speed_rpm, pr).flow_corrected_kg_s - scaled.flow_corrected_kg_s;
             let (mut low, mut high) = (1.0, pressure_ratio);
             for _ in 0..60 {
@@ -65,7 +65,7 @@ mod tests {
         }
     }
 
-    /// A map that knows its speed lines alone.
+    /// A map with only speed lines.
     #[derive(Debug)]
     struct OnlyLines(ClosedFormMap);
 

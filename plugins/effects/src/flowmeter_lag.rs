@@ -38,7 +38,7 @@ mod tests {
     use crate::testing::Instant;
     use mapper_physics::instruments::ChannelFollower;
 
-    /// A flow that rises by 1 g/s each second is read 2 g/s low by a meter of 2 s, once it has settled.
+    /// For a flow that rises by 1 g/s each second, a meter with 2 s reads 2 g/s low once it has settled.
     #[test]
     fn a_rising_flow_is_read_late() {
         let at = Instant::with(FlowmeterLag { lag_s: 2.0 });

@@ -1,4 +1,4 @@
-//! The compressor breathes moist air.
+//! The compressor takes in moist air.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// The compressor breathes moist air.
+    /// The compressor takes in moist air.
     #[derive(Debug)]
     pub(crate) struct Humidity {
         /// Water per dry air, kg/kg.

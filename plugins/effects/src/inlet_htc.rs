@@ -1,4 +1,4 @@
-//! Convection before the wheel is not that behind it.
+//! The heat transfer coefficient before the wheel differs from the one behind it.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,10 +6,10 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// Convection before the wheel is not that behind it.
+    /// The heat transfer coefficient before the wheel differs from the one behind it.
     #[derive(Debug)]
     pub(crate) struct InletHtc {
-        /// h before the wheel over the nominal model's there; 0.75 is what Appendix A's 40 mm before 35 mm give.
+        /// h before the wheel over that of the nominal model; Appendix A's 40 mm before 35 mm give 0.75.
         inlet_ratio = "inlet_htc" ["1"] 0.2 .. 3.0, neutral 1.0, step -0.25;
     }
 }
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
     use crate::testing::{Instant, T1_K};
 
-    /// Eq. 1: the gas before the wheel warms up by as much less as h there is smaller; without area there it has no say.
+    /// Eq. 1: the temperature rise before the wheel is proportional to h there; without area there it has no effect.
     #[test]
     fn heat_before_the_wheel_is_multiplied_where_area_lies_there() {
         let at = |alpha_area_ratio: f64, inlet_ratio: f64| {

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
     use crate::testing::{CP1_J_KGK, Instant, T1_K};
 
-    /// 2 W/K between 340 K and the inlet: the housing gives 2 (340 - 298.15) = 83.7 W to the gas.
+    /// 2 W/K between 340 K and the inlet: the gas takes 2 (340 - 298.15) = 83.7 W from the housing.
     #[test]
     fn the_housing_gives_what_the_gas_takes() {
         let (nominal, warm) = (Instant::nominal(), Instant::with(InletPreheat { conductance_w_k: 2.0 }));

@@ -8,13 +8,13 @@ use mapper_physics::hooks::TooManyExtraStates;
 effect_parameters! {
     /// The inner wall of the compressor housing has its own temperature.
     ///
-    /// At a fixed G the effect does not vanish as phi goes to 0 (the wall keeps the resistance 1/G): it vanishes as 1/G does.
+    /// At a fixed G the effect does not vanish as phi goes to 0 (the resistance 1/G of the wall remains): it vanishes as 1/G does.
     /// phi = 0 itself is one node.
     #[derive(Debug)]
     pub(crate) struct InnerNode {
-        /// Share phi of the housing's heat capacity that the inner wall has.
+        /// Share phi of the inner wall in the housing's heat capacity.
         share_ratio = "phi" ["1"] 0.0 .. 0.9, neutral 0.0, step 0.3;
-        /// Conductance G between inner wall and the rest, W/K.
+        /// Conductance G between the inner wall and the outer part, W/K.
         conductance_w_k = "G" ["W/K"] 1.0 .. 500.0, neutral 500.0, step -480.0;
     }
 }

@@ -1,6 +1,6 @@
-//! The catalogue of effects: what a rig may have and the nominal model has not, one file each.
+//! The effect library: deviations of a rig from the nominal model, one file each.
 //!
-//! To add one, write its file (a struct of its numbers, what is said of it, what it changes), and its line below.
+//! To add one, write its file (a struct of its parameters, its description, its changes to the model), and its line below.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -19,7 +19,7 @@ macro_rules! effects {
     ($($name:ident::$kind:ident),* $(,)?) => {
         $(mod $name;)*
 
-        /// Every effect of the catalogue, in the order of reports.
+        /// Every effect of the library, in the order of reports.
         pub fn catalogue() -> Vec<Arc<dyn Effect>> {
             vec![$(effect_of::<$name::$kind>()),*]
         }
@@ -55,7 +55,7 @@ effects! {
     inlet_preheat::InletPreheat,
 }
 
-/// The effect of an id, if there is one.
+/// Finds an effect by its id.
 pub fn find(id: &str) -> Option<Arc<dyn Effect>> {
     catalogue().into_iter().find(|effect| effect.info().id == id)
 }

@@ -1,4 +1,4 @@
-//! Oil takes more or less heat from the bearing housing.
+//! The oil removes more or less heat from the bearing housing.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// Oil takes more or less heat from the bearing housing.
+    /// The oil removes more or less heat from the bearing housing.
     #[derive(Debug)]
     pub(crate) struct OilScale {
         /// Conductance to the oil over the nominal one.
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
     use crate::testing::Instant;
 
-    /// What flows to the bearing node from both housings goes to the oil.
+    /// The heat from both housings into the bearing node goes to the oil.
     #[test]
     fn the_bearing_node_balances_with_the_scaled_oil() {
         let at = Instant::with(OilScale { scale_ratio: 1.5 });

@@ -1,4 +1,4 @@
-//! Gas goes in a circle through the wheel.
+//! Part of the gas recirculates through the wheel.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,10 +6,10 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// Gas goes in a circle through the wheel.
+    /// Part of the gas recirculates through the wheel.
     #[derive(Debug)]
     pub(crate) struct Recirculation {
-        /// Part r of the delivered flow that comes back.
+        /// Recirculated share r of the delivered flow.
         back_ratio = "recirculation" ["1"] 0.0 .. 0.3, neutral 0.0, step 0.03;
     }
 }

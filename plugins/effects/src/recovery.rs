@@ -1,4 +1,4 @@
-//! The T2 probe does not feel the whole total temperature.
+//! The T2 probe does not recover the whole total temperature.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// The T2 probe does not feel the whole total temperature.
+    /// The T2 probe does not recover the whole total temperature.
     #[derive(Debug)]
     pub(crate) struct Recovery {
         /// Recovery factor r of the probe.
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
     use crate::testing::Instant;
 
-    /// Without recovery the probe reads v^2/(2 cp) less, v from the continuity of an ideal gas in a pipe of 35 mm.
+    /// Without recovery the probe reads v^2/(2 cp) too low, v from the continuity of an ideal gas in a pipe of 35 mm.
     #[test]
     fn a_probe_without_recovery_reads_the_static_temperature() {
         let at = Instant::with(Recovery { recovery_ratio: 0.0 });

@@ -1,7 +1,7 @@
-//! A suspected effect written in rhai: a header that names it, and functions for the places where it takes part.
+//! A candidate effect written in rhai: a header that names it, and functions for the hooks that it uses.
 //!
-//! A script computes with numbers: it has arithmetic, comparison and mathematics, no arrays, maps, files or clock, and a
-//! bound on its work, so that it does the same on every machine and ends.
+//! A script computes with numbers only: arithmetic, comparison and mathematics, but no arrays, maps, files or clock. Its work
+//! is limited, so that it ends, with the same result on every machine.
 
 mod engine;
 mod error;
@@ -23,17 +23,17 @@ use std::sync::Arc;
 /// Longest script, bytes.
 const SCRIPT_LIMIT: usize = 64 << 10;
 
-/// An effect made of a script.
+/// An effect defined by a script.
 #[derive(Debug, Clone)]
 pub struct ScriptEffect {
     info: EffectInfo,
-    /// Sensors that follow late, each by the parameter that holds its time constant, s.
+    /// Sensor lags, each with the parameter that holds its time constant, s.
     lags: Vec<(Channel, String)>,
     program: Arc<Program>,
 }
 
 impl ScriptEffect {
-    /// Reads a script; `path` stands for it in messages.
+    /// Reads a script; `path` names it in messages.
     ///
     /// # Errors
     /// [`ScriptEffectError`] with the line: a header without id, submodel or parameter, a mistake in the script, or a script
@@ -57,7 +57,7 @@ impl Effect for ScriptEffect {
     }
 
     fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
-        // At neutral it is not there, however the script rounds.
+        // At neutral the effect is absent, regardless of rounding in the script.
         if values.is_neutral() {
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! One instant of the machine with an effect, for the effects' known answers.
+//! One instant of the machine with an effect, for tests with known results.
 
 use mapper_core::Channel;
 use mapper_physics::effect::Rig;
@@ -38,12 +38,12 @@ impl Instant {
         Instant { rig, boundary, state, outputs }
     }
 
-    /// Evaluates again after a change of the state.
+    /// Evaluates once more after a change of the state.
     pub(crate) fn evaluate(&mut self) {
         self.outputs = self.rig.model.prepare(&self.boundary).evaluate(&self.state);
     }
 
-    /// What the sensor of a channel shows at once.
+    /// The instantaneous reading of a channel's sensor.
     pub(crate) fn reading(&self, channel: Channel) -> f64 {
         let prepared = self.rig.model.prepare(&self.boundary);
         let value = true_value(channel, &prepared, &self.state, &self.outputs).unwrap();

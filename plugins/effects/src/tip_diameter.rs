@@ -1,4 +1,4 @@
-//! The T2 probe has a tip of its own mass.
+//! The tip of the T2 probe has its own thermal mass.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// The T2 probe has a tip of its own mass.
+    /// The tip of the T2 probe has its own thermal mass.
     #[derive(Debug)]
     pub(crate) struct TipDiameter {
         /// Diameter of the tip, m.
@@ -39,7 +39,7 @@ mod tests {
     use mapper_physics::simulate::{Simulator, Watch};
     use mapper_physics::steady;
 
-    /// A tip that is 10 K off is off by 10/e K after its own time constant: nothing in the machine depends on it.
+    /// A deviation of the tip by 10 K is 10/e K after its own time constant: nothing in the machine depends on it.
     #[test]
     fn the_tip_forgets_within_its_time_constant() {
         let mut at = Instant::with(TipDiameter { diameter_m: 3e-3 });
@@ -49,7 +49,7 @@ mod tests {
         let mut simulator = Simulator::new(&at.rig.model, 0.0, at.state, 1e-9, Watch::default());
         simulator.run_to(tau_s, &rest.boundary, [], |_, _, _| {}, |_| {}).unwrap();
         let off_k = simulator.state().t2_tip_k - rest.outputs.t2_k;
-        // The integration keeps 1e-9 of 300 K.
+        // The integration is accurate to 1e-9 of 300 K.
         assert!((off_k - 10.0 / std::f64::consts::E).abs() < 1e-4, "{off_k} K after {tau_s} s");
         assert!(tau_s > 1.0 && tau_s < 12.0);
     }

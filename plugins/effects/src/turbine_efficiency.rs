@@ -1,4 +1,4 @@
-//! The turbine gives more or less of its power.
+//! The turbine delivers more or less power.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// The turbine gives more or less of its power.
+    /// The turbine delivers more or less power.
     #[derive(Debug)]
     pub(crate) struct TurbineEfficiency {
         /// Turbine efficiency over the nominal one.

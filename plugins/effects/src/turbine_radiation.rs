@@ -1,4 +1,4 @@
-//! The turbine housing shines on the compressor housing.
+//! The turbine housing radiates to the compressor housing.
 
 use mapper_physics::effect::{Rig, Submodel};
 use mapper_physics::effect_kind::{About, EffectKind};
@@ -6,7 +6,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 
 effect_parameters! {
-    /// The turbine housing shines on the compressor housing.
+    /// The turbine housing radiates to the compressor housing.
     #[derive(Debug)]
     pub(crate) struct TurbineRadiation {
         /// View factor times area FA, m2.

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
     use crate::testing::Instant;
 
-    /// By hand: 1.25 A |dT|^(4/3) more for each housing at twice the convection; radiation stays.
+    /// By hand: 1.25 A |dT|^(4/3) more for each housing at twice the convection; radiation does not change.
     #[test]
     fn convection_to_the_cell_is_multiplied_and_radiation_is_not() {
         let (nominal, windy) = (Instant::nominal(), Instant::with(Ventilation { convection_ratio: 2.0 }));

@@ -1,4 +1,4 @@
-//! What every effect must hold to, alone and with others.
+//! Requirements on every effect, alone and with others.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{CHANNELS, Channel};
@@ -11,14 +11,14 @@ use mapper_physics::steady;
 use proptest::prelude::*;
 use std::sync::Arc;
 
-/// The nominal machine with some area before the wheel: without it what happens there would not show.
+/// The nominal machine with some area before the wheel: without it, effects there would not show.
 fn nominal() -> Rig {
     let mut model = Model::nominal();
     model.params.compressor.alpha_area_ratio = 0.1;
     Rig::new(model)
 }
 
-/// 110 -> 70 krpm at opening 0.7, P3 behind its command: every channel's readings, each second for a minute.
+/// 110 -> 70 krpm at opening 0.7, P3 behind its command: all readings every second for a minute.
 fn readings(rig: &Rig) -> Vec<f64> {
     let at = |speed_rpm: f64| {
         let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..Default::default() };
@@ -26,7 +26,7 @@ fn readings(rig: &Rig) -> Vec<f64> {
     };
     let (from, to) = (at(110e3), at(70e3));
     let start = steady::settle_under(&rig.model, &from).unwrap().state;
-    // The actuator as a table fine enough for its lag.
+    // The actuator as a table that resolves its lag.
     let times: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.05).collect();
     let p3_pa = |t_s: f64| {
         to.p3_pa
@@ -109,13 +109,13 @@ fn at_neutral_nothing_changes_and_away_from_it_something_does() {
         let id = &effect.info().id;
         // To the bit: effects only multiply by 1 or add 0.
         assert_eq!(readings(&with(&[(&effect, neutral(effect.as_ref()))])), without, "{id}");
-        // No sensor sees a change of a ten thousandth.
+        // A sensor cannot detect a change of a ten thousandth.
         let change = apart(&readings(&with(&[(&effect, stepped(effect.as_ref(), 1.0))])), &without);
         assert!(change > 1e-4, "{id} moves readings by {change:e} only");
     }
 }
 
-/// Diagnosis differentiates by differences around neutral: half the step must give half the change.
+/// Diagnosis uses finite differences around neutral: half the step must give half the change.
 #[test]
 fn changes_are_smooth_in_every_parameter_around_neutral() {
     let without = readings(&nominal());
@@ -126,7 +126,7 @@ fn changes_are_smooth_in_every_parameter_around_neutral() {
             differences.iter().map(|difference| difference * difference).sum::<f64>().sqrt()
         };
         let ratio = change(0.01) / change(0.005);
-        // One percent of a plain step: what is left of the next order is of that size. The probe's time constant goes with
+        // At one percent of a typical step, the error of the next order has that size. The probe's time constant goes with
         // d^2 over a Nusselt number of 2 and a part with sqrt(d): its order lies between 1.5 and 2.
         let right = if effect.info().id == "tip_diameter" { 2.8..4.0 } else { 1.9..2.1 };
         assert!(right.contains(&ratio), "{}: {ratio}", effect.info().id);
@@ -159,7 +159,7 @@ fn values_that_mean_nothing_are_refused_and_leave_the_rig_alone() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// The order in which two effects are put in does not matter.
+    /// The order of two effects does not matter.
     #[test]
     fn two_effects_commute(first in any::<prop::sample::Index>(), second in any::<prop::sample::Index>()) {
         let catalogue = mapper_effects::catalogue();
@@ -168,7 +168,7 @@ proptest! {
         let values = |effect: &Arc<dyn Effect>| stepped(effect.as_ref(), 0.5);
         let one = with(&[(a, values(a)), (b, values(b))]);
         let other = with(&[(b, values(b)), (a, values(a))]);
-        // Roundings of a product apart.
+        // Except for rounding of a product.
         prop_assert!(apart(&readings(&one), &readings(&other)) < 1e-9);
     }
 }

@@ -1,5 +1,5 @@
 //! The effects against an independent implementation: recordings of a rig with one or two known effects, its tolerances,
-//! offsets, noise and wandering boundary conditions. With its effect the model must follow, without it must not.
+//! offsets, noise and wandering boundary conditions. The model must follow only with the effect.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_physics::effect::{self, Effect, Rig};
@@ -10,14 +10,14 @@ use mapper_physics::simulate::{Simulator, Watch};
 use mapper_physics::steady;
 use std::sync::Arc;
 
-/// Rows of numbers behind a line of heads.
+/// Rows of numbers below a header line.
 fn table(name: &str) -> Vec<Vec<f64>> {
     let path = format!("{}/tests/recordings/{name}.csv", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
     text.lines().skip(1).map(|line| line.split(',').map(|value| value.parse().unwrap()).collect()).collect()
 }
 
-/// What drove the machine: means of 10 s between their middles, P3 behind its command with the declared 0.3 s.
+/// Inputs of the machine: means of 10 s between their middles, P3 behind its command with the declared 0.3 s.
 fn inputs(means: &[Vec<f64>], commands: &[Vec<f64>]) -> InterpolatedInputs {
     let slow = |t_s: f64, column: usize| {
         let after = means.partition_point(|row| row[0] < t_s).clamp(1, means.len() - 1);
@@ -29,7 +29,7 @@ fn inputs(means: &[Vec<f64>], commands: &[Vec<f64>]) -> InterpolatedInputs {
     let (mut times, mut rows) = (Vec::new(), Vec::new());
     let (mut t_s, mut p3_pa, mut before_s) = (0.0, commands[0][1], 0.0);
     while t_s <= end_s {
-        // The valve and P3 move at the command; a table cannot jump, so a row stands just before.
+        // The valve and P3 change at the command; a table cannot jump, so there is a row just before.
         p3_pa = {
             let target_pa = held((t_s - 1e-6f64).max(0.0))[1];
             target_pa + (p3_pa - target_pa) * (-(t_s - before_s) / 0.3f64).exp()
@@ -54,7 +54,7 @@ fn inputs(means: &[Vec<f64>], commands: &[Vec<f64>]) -> InterpolatedInputs {
     InterpolatedInputs::new(times, rows).unwrap()
 }
 
-/// Scatter of recorded minus simulated means of 10 s, after their mean (an offset), of speed, P2, T2 and Tc.
+/// Scatter of recorded minus simulated means of 10 s, after removal of its mean (an offset), of speed, P2, T2 and Tc.
 fn scatter(rig: &Rig, means: &[Vec<f64>], inputs: &InterpolatedInputs) -> [f64; 4] {
     use mapper_physics::inputs::Inputs;
     let start = steady::settle_under(&rig.model, &inputs.at(0.0)).unwrap();
@@ -83,17 +83,17 @@ fn scatter(rig: &Rig, means: &[Vec<f64>], inputs: &InterpolatedInputs) -> [f64; 
     })
 }
 
-/// Three standard deviations of what the rig declares: 0.5 % of efficiency (0.35 K of a rise of 70 K, and as much of speed and
-/// pressure as it costs), 3 % of convection. What the effect moves lies far above.
+/// Three declared standard deviations of the rig: 0.5 % of efficiency (0.35 K of a rise of 70 K, and the corresponding speed
+/// and pressure), 3 % of convection. The change by the effect is far larger.
 const DECLARED: [f64; 4] = [400.0, 1200.0, 1.0, 1.0];
 
-/// Name, effects with their values, channel that they move most.
+/// Name, effects with their values, most affected channel.
 type Case = (&'static str, &'static [(&'static str, &'static [f64])], usize);
 
 #[test]
 fn with_its_effect_the_model_follows_the_recording_and_without_it_does_not() {
     let cases: [Case; 5] = [
-        // Name, effects, channel that the effect moves most: 0 speed, 1 P2, 2 T2, 3 Tc.
+        // Name, effects, most affected channel: 0 speed, 1 P2, 2 T2, 3 Tc.
         ("area_split", &[("area_split", &[0.12])], 3),
         ("tip_diameter", &[("tip_diameter", &[1.5e-3])], 2),
         ("directional_htc", &[("directional_htc", &[0.65])], 3),

@@ -1,4 +1,4 @@
-//! Effects written in rhai: the same physics as built-in ones, and no way out of the sandbox.
+//! Effects written in rhai: the same physics as built-in ones, and a closed sandbox.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::Channel;
@@ -78,7 +78,7 @@ fn every_example_reads_and_at_neutral_changes_nothing() {
     assert!(count >= 2);
 }
 
-/// A steady state with a conductance to water: the heat that the water brings goes where all heat goes.
+/// A steady state with a conductance to water: the heat from the water follows the energy balance.
 #[test]
 fn heat_of_a_script_is_balanced_at_rest() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/effects/coolant_passage.rhai");
@@ -129,7 +129,7 @@ fn mistakes_are_named_with_their_line() {
     }
 }
 
-/// What fails while it runs gives NaN, which stops the simulation, and keeps its reason.
+/// An error at run time gives NaN, which stops the simulation, and is stored.
 #[test]
 fn a_script_that_fails_or_never_ends_stops_the_simulation_and_says_why() {
     for (body, expected) in [

@@ -1,4 +1,4 @@
-//! CSV: one row a point. Lines that begin with `#` say what the numbers refer to. Tables of others are read by the
+//! CSV: one row per point. Lines that begin with `#` give the reference of the numbers. Tables from other programs are read by the
 //! names of the four columns that a map needs.
 
 mod read;

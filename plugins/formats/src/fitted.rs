@@ -1,4 +1,4 @@
-//! The fitted surface as CSV: one row a node, errors beside it, extrapolation marked.
+//! The fitted surface as CSV: one row per node with its errors, extrapolation marked.
 
 use crate::heading::heading;
 use mapper_core::{CompressorMap, ExportError, FittedLine, FittedMap, FittedNode, MapFormat};

@@ -1,4 +1,4 @@
-//! The fitted surface in the picture: lines, contours, surge and choke, and grey where it is extrapolated.
+//! The fitted surface in the picture: lines, contours, surge and choke, and grey for extrapolation.
 
 use crate::labels::{percent, speed};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, palette};
@@ -9,7 +9,7 @@ use mapper_mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
 
 const SURGE: palette::Colour = palette::VERMILLION;
 const CHOKE: palette::Colour = palette::PURPLE;
-/// Everything below the points of the panel pressure ratio over flow.
+/// All items below the points in the panel of pressure ratio over flow.
 pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap, units: &MapUnits) {
     add_shade(panel, fitted);
     if let Some(grid) = fitted_surface(fitted) {
@@ -22,12 +22,12 @@ pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap, units: &MapUnits) {
         panel.add(Line::new(runs(all(), true), palette::GREY).width_px(1.0).dash(Dash::Dashed));
         panel.add(Line::new(runs(all(), false), colour).width_px(1.3));
     }
-    // Where two speeds would be written upon each other the first stays: that of a measured line.
+    // If two speed labels overlap, the first one is kept, so measured lines come first.
     let (measured, others): (Vec<&FittedLine>, Vec<&FittedLine>) =
         fitted.lines.iter().partition(|line| line.measured);
     for line in measured.into_iter().chain(others) {
         let colour = if line.measured { palette::INK } else { palette::GREY };
-        // An invisible line of the last visible node carries the speed.
+        // An invisible line at the last visible node carries the speed label.
         let end = line.nodes.iter().find(|n| !n.extrapolated).or_else(|| middle(line)).map(place);
         panel.add(
             Line::new(end.into_iter().collect(), colour)
@@ -42,8 +42,8 @@ pub(crate) fn add_map(panel: &mut Panel, fitted: &FittedMap, units: &MapUnits) {
     panel.add(Line::new(Vec::new(), palette::GREY).width_px(1.0).dash(Dash::Dashed).label("extrapolated"));
 }
 
-/// Fitted efficiency of the measured lines over flow, with its 95 % band, as far as each line was measured: beyond, towards
-/// pressure ratio 1, it falls to 0 and would press what was measured into the upper rim.
+/// Fitted efficiency of the measured lines over flow, with its 95 % band, within each line's measured range. Beyond, towards
+/// pressure ratio 1, it falls to 0 and would compress the measured range into the top of the picture.
 pub(crate) fn add_eta(panel: &mut Panel, map: &CompressorMap, fitted: &FittedMap) {
     let measured: Vec<&FittedLine> = fitted.lines.iter().filter(|line| line.measured).collect();
     let last = measured.len().saturating_sub(1).max(1) as f64;
@@ -64,11 +64,11 @@ pub(crate) fn add_eta(panel: &mut Panel, map: &CompressorMap, fitted: &FittedMap
     }
 }
 
-/// A place on a line's curve: flow, efficiency and its standard error.
+/// A point on a line's curve: flow, efficiency and its standard error.
 type OnCurve = (f64, f64, f64);
 
-/// The curve of a line between its largest and its smallest measured flow, where it ends between two nodes, and above its lowest
-/// efficiency: at choke the flow no longer tells how far it was measured.
+/// The curve of a line between its largest and its smallest measured flow, interpolated at its ends, and above its lowest
+/// efficiency: at choke the flow no longer shows the end of the measured range.
 fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<OnCurve> {
     let points = || own.points.iter().filter(|point| point.eta.is_some());
     let flows = || points().map(|point| point.flow_corrected_kg_s);
@@ -97,10 +97,10 @@ fn between_points(line: &FittedLine, own: &SpeedLine) -> Vec<OnCurve> {
     drawn
 }
 
-/// Where a line is choked its flow differs by less than this from one measured point to the next.
+/// A line is choked if its flow changes by less than this factor from one measured point to the next.
 const CHOKED_RATIO: f64 = 1.01;
 
-/// The curve between two nodes at a flow between theirs.
+/// The curve between two nodes, interpolated in flow.
 fn at_flow(a: OnCurve, b: OnCurve, flow_kg_s: f64) -> OnCurve {
     let share = (a.0 - flow_kg_s) / (a.0 - b.0);
     let at = |a: f64, b: f64| a + share * (b - a);
@@ -115,7 +115,7 @@ fn middle(line: &FittedLine) -> Option<&FittedNode> {
     line.nodes.get(line.nodes.len() / 2)
 }
 
-/// Points of one kind; NaN breaks the line where the kind changes. A dashed line reaches to its solid neighbours.
+/// Points of one kind; NaN breaks the line at a change of kind. A dashed line extends to its solid neighbours.
 fn runs(points: impl Iterator<Item = ((f64, f64), bool)>, extrapolated: bool) -> Vec<(f64, f64)> {
     let all: Vec<((f64, f64), bool)> = points.collect();
     let belongs = |i: usize| {
@@ -125,8 +125,8 @@ fn runs(points: impl Iterator<Item = ((f64, f64), bool)>, extrapolated: bool) ->
     (0..all.len()).map(|i| if belongs(i) { all[i].0 } else { (f64::NAN, f64::NAN) }).collect()
 }
 
-/// Grey between neighbouring lines wherever a corner is extrapolated, one polygon for each run of nodes. From line to line
-/// it is bounded by the curves that bound the contours, so that nothing stays white between the two.
+/// Grey between neighbouring lines if a corner is extrapolated, one polygon for each run of nodes. From line to line
+/// it has the same boundary curves as the contours, so that no white gap remains.
 fn add_shade(panel: &mut Panel, fitted: &FittedMap) {
     let speeds: Vec<f64> = fitted.lines.iter().map(|line| line.speed_corrected_rpm).collect();
     if speeds.len() < 2 || !speeds.windows(2).all(|w| w[1] > w[0]) {

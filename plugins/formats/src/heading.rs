@@ -1,4 +1,4 @@
-//! What every text format says first: machine, reference state.
+//! The header of every text format: machine, reference state.
 
 use mapper_core::{CompressorMap, Method, one_line};
 
@@ -12,7 +12,7 @@ pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
     )
 }
 
-/// What the efficiency of a method is called.
+/// Name of a method's efficiency.
 pub(crate) fn efficiency_name(method: Method) -> &'static str {
     match method {
         Method::Steady => "apparent: heat transfer not removed",

@@ -1,4 +1,4 @@
-//! JSON: the map as it is. Keys carry units, efficiencies are fractions, what is undefined is null.
+//! JSON: the unchanged map. Keys carry units, efficiencies are fractions, undefined values are null.
 
 use crate::lines::POINT_LIMIT;
 use crate::reference;

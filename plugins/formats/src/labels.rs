@@ -1,8 +1,8 @@
-//! Numbers as they stand in the picture.
+//! Numbers as text labels of the picture.
 
 use mapper_core::MapUnits;
 
-/// A speed in the unit that is shown, without needless digits.
+/// A speed in the displayed unit, without needless digits.
 pub(crate) fn speed(speed_rpm: f64, units: &MapUnits) -> String {
     let text = format!("{:.1}", speed_rpm * units.speed_of_one_rpm);
     text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)

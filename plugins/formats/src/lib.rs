@@ -1,4 +1,4 @@
-//! The file formats of compressor maps, one file each: its writer and, where maps are read from it, its reader.
+//! The file formats of compressor maps, one file each: its writer and, if maps can be read from it, its reader.
 //!
 //! To add one, write its file with a constant `FORMAT`, and its line below.
 
@@ -24,7 +24,7 @@ macro_rules! formats {
     ($($name:ident),* $(,)?) => {
         $(mod $name;)*
 
-        /// Every format, in the order of lists for people.
+        /// Every format, in display order.
         pub const FORMATS: MapFormats = MapFormats(&[$($name::FORMAT),*]);
     };
 }

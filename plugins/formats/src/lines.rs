@@ -8,13 +8,13 @@ use mapper_core::{
 use mapper_physics::inlet_limit::{SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
 use mapper_physics::similarity::at_speed;
 
-/// Largest number of points that are read.
+/// Maximum number of points.
 pub const POINT_LIMIT: usize = 100_000;
 
-/// Speeds closer than this share are one line: lines of maps are 5 % or more apart, a measured line holds 1 %.
+/// Maximum relative speed difference within a line: lines of maps are 5 % or more apart, speed within a line is steady to 1 %.
 const SAME_LINE_RATIO: f64 = 0.015;
 
-/// The four numbers that every map has.
+/// The four numbers of a row, common to all maps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
     /// Line of the file, from 1.
@@ -70,7 +70,7 @@ impl Row {
         Ok(())
     }
 
-    /// A point that knows no more than its row. Physical values are those at the reference state.
+    /// A point with only the numbers of its row. Physical values are those at the reference state.
     pub(crate) fn point(&self, reference: ReferenceState, step: usize) -> IdentifiedPoint {
         IdentifiedPoint {
             step,
@@ -104,7 +104,7 @@ impl Row {
     }
 }
 
-/// A map of rows that know no more than four numbers.
+/// A map of rows with only four numbers.
 pub(crate) fn map_of_rows(
     machine: String,
     rows: &[Row],
@@ -127,7 +127,7 @@ pub(crate) fn map_of_rows(
         .map(|members| {
             let speeds = || members.iter().map(|point| point.speed_corrected_rpm);
             let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
-            // The mean of equal numbers may round away from them.
+            // Rounding may move the mean of equal numbers away from them.
             let mean = if low == high { low } else { speeds().sum::<f64>() / members.len() as f64 };
             line(mean, members.iter().map(|point| on_line(point, mean)).collect())
         })
@@ -135,7 +135,7 @@ pub(crate) fn map_of_rows(
     Ok(CompressorMap { machine, reference, method: Method::Imported, lines, surge: Vec::new(), fitted: None })
 }
 
-/// A line of points in order of flow.
+/// A line of points by rising flow.
 pub(crate) fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
     let speeds = || points.iter().map(|point| point.identified.speed_corrected_rpm);
     let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
@@ -146,7 +146,7 @@ pub(crate) fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> Speed
     SpeedLine { speed_corrected_rpm, speed_spread_rpm: high - low, target_speed_rpm: None, points }
 }
 
-/// A point brought to the speed of its line by similarity.
+/// A point converted to the speed of its line by similarity.
 fn on_line(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
     let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
     let (flow, ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
@@ -166,7 +166,7 @@ fn on_line(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
     }
 }
 
-/// Refuses one row more than any map has.
+/// Refuses a file with too many rows.
 pub(crate) fn room_for_one_more(count: usize, at: usize) -> Result<(), ImportError> {
     if count >= POINT_LIMIT {
         return Err(ImportError::TooMany { line: at, limit: POINT_LIMIT });

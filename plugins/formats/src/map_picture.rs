@@ -1,7 +1,7 @@
 //! The map as a picture: (a) pressure ratio over flow with efficiency contours, (b) efficiency over flow.
 //!
-//! How sure a point is shows in (a) by the size of its marker, in classes of its 95 % interval (text beside it would
-//! bury the map), and in (b) by the interval itself as a bar. Shape and colour tell good from doubtful; points without
+//! The marker size in (a) shows the uncertainty of a point, in classes of its 95 % interval (text would cover the
+//! map), and (b) shows the interval itself as a bar. Shape and colour distinguish good from doubtful; points without
 //! an efficiency are hollow.
 
 use crate::fitted_items;
@@ -37,7 +37,7 @@ pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {
         .panel_size_px(560.0, 460.0)
 }
 
-/// Corrected flow as it is shown; items of a panel are in kg/s.
+/// Corrected flow in display units; items of a panel are in kg/s.
 fn flow_axis(units: &MapUnits) -> Axis {
     Axis::new(format!("corrected mass flow, {}", units.flow)).written_times(units.flow_of_one_kg_s)
 }
@@ -66,7 +66,7 @@ fn map_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     panel
 }
 
-/// Surge-side ends that were sought, with their 95 % intervals.
+/// Measured surge-side ends, with their 95 % intervals.
 fn surge_marks(map: &CompressorMap) -> Scatter {
     let mark = |mark: &SurgeMark| {
         let (flow, ratio) = (mark.flow_corrected_kg_s, mark.pressure_ratio);
@@ -81,7 +81,7 @@ fn surge_marks(map: &CompressorMap) -> Scatter {
     Scatter::new(marks, palette::VERMILLION).marker(Marker::Square).label("surge, sought")
 }
 
-/// Lines and contours without a fit: through the points.
+/// Lines and contours through the points, without a fit.
 fn add_measured_lines(panel: &mut Panel, map: &CompressorMap, units: &MapUnits) {
     if let Some(grid) = efficiency_surface(map) {
         let levels = contour_levels(grid.value_range());
@@ -128,7 +128,7 @@ fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
         for (verdict, marker) in [(Verdict::Good, Marker::Circle), (Verdict::Doubtful, Marker::Diamond)] {
             let members: Vec<ScatterPoint> = points.iter().filter(|p| p.1 == verdict).map(|p| p.0).collect();
             let scatter = Scatter::new(members, colour).marker(marker);
-            // One entry a line; that a diamond is doubtful stands in the other panel's legend too.
+            // One entry per line; the other panel's legend also explains the diamond for doubtful points.
             panel.add(if verdict == Verdict::Good { scatter.label(&label) } else { scatter.size_px(8.0) });
         }
     }
@@ -145,7 +145,7 @@ fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     panel
 }
 
-/// Points drawn alike: a verdict and a range of the half width of the 95 % interval, fraction.
+/// Points with the same marker: a verdict and a range of the half width of the 95 % interval, fraction.
 struct Class {
     verdict: Verdict,
     above: f64,
@@ -160,7 +160,7 @@ const fn class(verdict: Verdict, above: f64, up_to: f64, size_px: f64, label: &'
 
 const NO_INTERVAL: f64 = -1.0;
 
-/// The larger the marker, the less sure the point. An absent interval has a class of its own.
+/// A larger marker means a larger uncertainty. A missing interval has its own class.
 const CLASSES: [Class; 9] = [
     class(Verdict::Good, f64::NEG_INFINITY, NO_INTERVAL, 4.0, "good, error unknown"),
     class(Verdict::Good, NO_INTERVAL, 0.005, 6.5, "good, 95 % within ±0.5 points"),

@@ -3,7 +3,7 @@
 use crate::map_picture::map_figure;
 use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits};
 
-/// Pixels for each unit of the picture: sharp on paper and on dense screens.
+/// Pixels per unit of the picture: sharp on paper and on high-resolution screens.
 const SCALE: f32 = 2.0;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {

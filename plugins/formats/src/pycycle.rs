@@ -1,7 +1,7 @@
-//! pyCycle: a module with a map as `pycycle.maps` has them, `[alpha][Nc][Rline]`.
+//! pyCycle: a module with a map in the layout of `pycycle.maps`, `[alpha][Nc][Rline]`.
 //!
-//! Rline runs from 1 at surge (`RlineStall`) to 3 at choke. pyCycle scales a map to its design point: any units do, as
-//! long as they are said (`units`).
+//! Rline runs from 1 at surge (`RlineStall`) to 3 at choke. pyCycle scales a map to its design point: any units are valid
+//! if they are declared (`units`).
 
 use crate::heading::heading;
 use crate::simulation_table::{SimulationTable, joined};
@@ -51,14 +51,14 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
             let reversed: Vec<f64> = row.iter().rev().copied().collect();
             let _ = writeln!(text, "    [{}],", joined(&reversed, ", "));
         }
-        // The same at both vane angles: the machine has none.
+        // The same at both vane angles: the machine has no vanes.
         text.push_str("]] * 2)\n");
     }
     text.push_str(LISTS);
     Ok(text.into_bytes())
 }
 
-/// What pyCycle 4's `CompressorMap` makes its interpolator from.
+/// Inputs of the interpolator in pyCycle 4's `CompressorMap`.
 const LISTS: &str = "\
 compressor.Npts = compressor.NcMap.size
 compressor.units = {'NcMap': 'rpm', 'WcMap': 'kg/s'}
@@ -74,7 +74,7 @@ compressor.output_data = [
 ]
 ";
 
-/// Speed and column of the best efficiency: the design point that pyCycle starts from.
+/// Speed and column of the best efficiency, as pyCycle's initial design point.
 fn best(table: &SimulationTable) -> (usize, usize) {
     let mut best = (0, 0);
     for (i, row) in table.eta.iter().enumerate() {

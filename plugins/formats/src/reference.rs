@@ -1,4 +1,4 @@
-//! The reference state: from a word, from the user, from a comment of the file.
+//! The reference state: from a keyword, from the user, from a comment of the file.
 
 use mapper_core::{ImportError, ReferenceState};
 
@@ -32,7 +32,7 @@ const PRESSURES: Units = &[
     ("psia", PSI_PA, 0.0),
     ("psi", PSI_PA, 0.0),
 ];
-/// Pound-force over square inch, exactly, as [`ReferenceState::GARRETT`] has it.
+/// Pound-force per square inch, exactly as in [`ReferenceState::GARRETT`].
 const PSI_PA: f64 = 4.448_221_615_260_5 / 0.000_645_16;
 
 fn quantity(text: &str, units: Units) -> Option<f64> {
@@ -42,11 +42,11 @@ fn quantity(text: &str, units: Units) -> Option<f64> {
     let unit = text[digits..].trim();
     let (_, factor, offset) = units.iter().find(|(name, ..)| *name == unit)?;
     let value: f64 = text[..digits].trim().parse().ok()?;
-    // Exact where nothing is to be done, so that what was written is read back to the bit.
+    // Exact without a conversion, so that written values are read back to the bit.
     Some(if *factor == 1.0 && *offset == 0.0 { value } else { (value + offset) * factor })
 }
 
-/// The reference state that a comment names behind the word "reference" and a colon.
+/// The reference state in a comment after the word "reference" and a colon.
 pub(crate) fn in_comment(comment: &str) -> Option<ReferenceState> {
     let lower = comment.to_ascii_lowercase();
     let at = lower.find("reference")?;
@@ -54,7 +54,7 @@ pub(crate) fn in_comment(comment: &str) -> Option<ReferenceState> {
     parse_reference(behind.trim().trim_end_matches('.')).ok()
 }
 
-/// What the corrected quantities refer to, from the file and the user.
+/// The reference state of the corrected quantities, from the file and the user.
 pub(crate) fn settle(
     found: Option<ReferenceState>,
     given: Option<ReferenceState>,
@@ -69,7 +69,7 @@ pub(crate) fn settle(
     }
 }
 
-/// Equal but for how many digits someone printed.
+/// Equal within the rounding of printed digits.
 fn same(a: ReferenceState, b: ReferenceState) -> bool {
     (a.t_ref_k - b.t_ref_k).abs() < 0.05 && (a.p_ref_pa - b.p_ref_pa).abs() < 20.0
 }

@@ -1,8 +1,8 @@
 //! SAE text, compressor (J1826, J922): `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a
 //! row, from choke to surge within a line.
 //!
-//! Manufacturers' files may begin with a title, a row of two wheel diameters and column names; those are passed over,
-//! but for the units that the names give.
+//! Manufacturers' files may begin with a title, a row of two wheel diameters and column names. These are skipped,
+//! except for the units in the names.
 
 mod columns;
 
@@ -24,7 +24,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     read: Some(read),
 };
 
-/// What a row is.
+/// The form of a row.
 const ROW_FORM: &str = "four numbers: corrected rpm, corrected kg/s, pressure ratio, efficiency";
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
@@ -39,7 +39,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     }
     text.push_str("# N(rpm) mdot(kg/s) PR Eff\n");
     for line in &map.lines {
-        // Points stand in order of rising flow; the format goes from choke to surge.
+        // Points are stored by rising flow; the format goes from choke to surge.
         for point in line.points.iter().rev() {
             let Some(eta) = point.eta else { continue };
             // Shortest text that reads back to the same number.
@@ -96,7 +96,7 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
     map_of_rows(machine, &rows, found, given)
 }
 
-/// Words, or two numbers as the wheel's diameters; three numbers or five are a broken row.
+/// Text, or two numbers as the wheel's diameters; three numbers or five are a broken row.
 fn is_heading(content: &str) -> bool {
     let numbers = content.split_whitespace().filter(|field| field.parse::<f64>().is_ok()).count();
     numbers < content.split_whitespace().count() || numbers == 2

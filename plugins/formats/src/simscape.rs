@@ -61,12 +61,12 @@ fn matrix(text: &mut String, name: &str, rows: &[Vec<f64>]) {
     text.push_str("];\n");
 }
 
-/// A value at a pressure ratio, on the falling side of the line; held beyond both ends.
+/// A value at a pressure ratio, on the falling side of the line; constant beyond both ends.
 fn over_ratio(ratios: &[f64], values: &[f64], wanted: f64) -> f64 {
     let mut last = values[0];
     for i in 1..ratios.len() {
         if ratios[i] <= ratios[i - 1] {
-            // Beyond the highest pressure ratio flow is not a function of it.
+            // Beyond the maximum pressure ratio, flow is not a function of it.
             break;
         }
         if wanted <= ratios[i] {

@@ -1,8 +1,8 @@
-//! A rectangular table as simulation programs want it: flow, pressure ratio and efficiency over corrected speed and
+//! A rectangular table for simulation programs: flow, pressure ratio and efficiency over corrected speed and
 //! beta, positive and finite everywhere.
 //!
-//! The fitted surface goes to pressure ratios below 1, where efficiency is 0 or negative; such programs divide by it. The
-//! table therefore ends on the choke side where efficiency falls to [`MIN_ETA`]. Between the fit's nodes the table is
+//! The fitted surface extends to pressure ratios below 1, with efficiency 0 or negative; such programs divide by it. The
+//! table therefore ends on the choke side at the efficiency [`MIN_ETA`]. Between the fit's nodes the table is
 //! linear in distance along the line.
 
 use mapper_core::{CompressorMap, ExportError, FittedLine, FittedMap};
@@ -20,7 +20,7 @@ pub(crate) struct SimulationTable {
     pub flow_kg_s: Vec<Vec<f64>>,
     pub pressure_ratio: Vec<Vec<f64>>,
     pub eta: Vec<Vec<f64>>,
-    /// Lines at speeds beyond the measured ones, rpm.
+    /// Speeds of the extrapolated lines, rpm.
     pub extrapolated_rpm: Vec<f64>,
 }
 
@@ -49,7 +49,7 @@ impl SimulationTable {
         })
     }
 
-    /// What the table leaves out and where it is extrapolated, as comment lines that begin with `mark`.
+    /// The table's limits and extrapolated range, as comment lines that begin with `mark`.
     pub(crate) fn remarks(&self, mark: &str) -> String {
         let mut text = format!(
             "{mark} total to total; efficiency is isentropic, a fraction; the table ends on the choke side where it falls to {MIN_ETA}\n"
@@ -65,7 +65,7 @@ impl SimulationTable {
     }
 }
 
-/// First node from the choke side from which on efficiency is large enough and the machine compresses.
+/// First node from the choke side with the minimum efficiency and a pressure ratio above 1.
 fn first_node(line: &FittedLine) -> Option<usize> {
     let good = |i: &usize| line.nodes[*i].eta >= MIN_ETA && line.nodes[*i].pressure_ratio > 1.0;
     let last = (0..line.nodes.len()).rev().take_while(good).last()?;
@@ -88,7 +88,7 @@ fn beyond(fitted: &FittedMap) -> Vec<f64> {
     fitted.lines.iter().map(|line| line.speed_corrected_rpm).filter(outside).collect()
 }
 
-/// Numbers in a row, nine significant digits at least: the shortest text that reads back to the same number.
+/// Numbers in a row, each as the shortest text that reads back to the same number, with at least nine significant digits.
 pub(crate) fn joined(values: &[f64], separator: &str) -> String {
     values.iter().map(f64::to_string).collect::<Vec<_>>().join(separator)
 }

@@ -1,4 +1,4 @@
-//! The surge-side ends that were sought, as CSV: one row a speed line.
+//! The measured surge-side ends as CSV: one row per speed line.
 
 use crate::heading::heading;
 use mapper_core::{CompressorMap, ExportError, MapFormat, SurgeFoundBy, SurgeMark};

@@ -1,4 +1,4 @@
-//! What a format writes can be read back, and says what the map says.
+//! Written files can be read back, and agree with the map.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -98,7 +98,7 @@ fn json_reads_back_to_the_same_map() {
     assert_eq!((&back.machine, back.reference, back.method), (&map.machine, map.reference, map.method));
     assert_eq!(back.lines.len(), map.lines.len());
     for (a, b) in points(&back).iter().zip(points(&map)) {
-        // The writer is exact; serde_json's fast reader may be off by one unit in the last place.
+        // The writer is exact; serde_json's fast reader may differ by one unit in the last place.
         let same = |a: f64, b: f64| assert!((a - b).abs() <= 2.0 * f64::EPSILON * b.abs());
         same(a.flow_corrected_kg_s, b.flow_corrected_kg_s);
         same(a.pressure_ratio, b.pressure_ratio);
@@ -111,7 +111,7 @@ fn json_reads_back_to_the_same_map() {
     assert!(value["lines"][0]["points"][0]["eta"].is_null(), "undefined is null");
 }
 
-/// Files of version 0.1.0 count steps from 0, and do not say so.
+/// Files of version 0.1.0 count steps from 0 without a note.
 #[test]
 fn maps_of_older_versions_keep_their_steps() {
     let map = support::turbo_a();
@@ -140,7 +140,7 @@ fn maps_of_older_versions_keep_their_steps() {
     now.sort_unstable();
     before.sort_unstable();
     assert_eq!(now, written);
-    // What stands there is taken as counted from 0.
+    // Its step numbers are read as counted from 0.
     assert_eq!(before, written.iter().map(|step| step + 1).collect::<Vec<_>>());
 }
 
@@ -205,7 +205,7 @@ fn the_picture_is_written_in_the_units_that_are_wanted() {
     assert!(tick(&usual_texts, 0.05) && tick(&wanted_texts, 50.0), "{usual_texts:?} {wanted_texts:?}");
     let circles = |svg: &str| svg.matches("<circle").count();
     assert_eq!(circles(&usual), circles(&wanted));
-    // A table of numbers stays in SI.
+    // A table of numbers remains in SI.
     let csv = FORMATS.find("csv").unwrap();
     assert_eq!(csv.write(&map).unwrap(), csv.write_in(&map, &units).unwrap());
 }

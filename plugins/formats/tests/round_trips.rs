@@ -1,4 +1,4 @@
-//! What is written is read back; what is not a map is refused with its line.
+//! Round trips of written maps; an invalid map is refused with its line.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -43,7 +43,7 @@ prop_compose! {
         for (i, (flow, ratio, eta)) in points.iter().enumerate() {
             if i % 6 == 0 { speed *= 1.0 + steps[(i / 6) % steps.len()]; }
             let own = speed * (1.0 + drift * (i % 3) as f64);
-            // No more than an inlet passes, at any of the reference states.
+            // Below the maximum flow of an inlet, at all reference states.
             let flow = flow.min(0.4 * mapper_physics::inlet_limit::largest_flow_kg_s(own));
             let _ = writeln!(text, "{own},{flow},{ratio},{}", eta.map_or(String::new(), |eta| eta.to_string()));
         }
@@ -60,13 +60,13 @@ proptest! {
             let back = FORMATS.find(format).unwrap().read(&bytes, None).unwrap();
             prop_assert_eq!(numbers(&back).len(), numbers(&map).len());
             for (a, b) in numbers(&back).iter().flatten().zip(numbers(&map).iter().flatten()) {
-                // The text is exact; serde_json's fast reader may be off by one unit in the last place.
+                // The text is exact; serde_json's fast reader may differ by one unit in the last place.
                 prop_assert!(a.is_some() == b.is_some());
                 let (a, b) = (a.unwrap_or(0.0), b.unwrap_or(0.0));
                 prop_assert!((a - b).abs() <= 2.0 * f64::EPSILON * b.abs(), "{} {}", a, b);
             }
             prop_assert!((back.reference.t_ref_k - map.reference.t_ref_k).abs() < 1e-12 * 300.0);
-            // What was measured before a point was brought to its line is there too.
+            // The values measured before the correction to a line's speed are included.
             let measured = |map: &CompressorMap| -> Vec<f64> {
                 map.lines.iter().flat_map(|l| &l.points).map(|p| p.identified.flow_corrected_kg_s).collect()
             };
@@ -74,7 +74,7 @@ proptest! {
                 prop_assert!((a - b).abs() <= 2.0 * f64::EPSILON * b);
             }
             if format == "csv" {
-                // A second time: the very same bytes.
+                // A second round gives identical bytes.
                 prop_assert_eq!(export(format, &back), bytes);
             }
         }
@@ -97,7 +97,7 @@ proptest! {
         }
     }
 
-    /// No text and no bytes make it panic; what it takes for a map is one.
+    /// No text and no bytes cause a panic; an accepted file is a valid map.
     #[test]
     fn nonsense_is_refused_or_read(bytes in proptest::collection::vec(any::<u8>(), 0..400), text in "[0-9eE+., ;#\t\n\"a-zKP:-]{0,300}") {
         for entry in FORMATS.iter() {
@@ -133,7 +133,7 @@ fn a_map_without_reference_is_refused_with_the_usual_choices() {
     ));
 }
 
-/// Units in the heading count, wherever the column stands; what no compressor does is refused where there are none.
+/// Units in the heading count in any column order; without units, values impossible for a compressor are refused.
 #[test]
 fn units_of_columns_are_read() {
     let reference = Some(ReferenceState::SAE);
@@ -156,7 +156,7 @@ fn units_of_columns_are_read() {
             .collect()
     };
     for (a, b) in numbers(plain).iter().flatten().zip(numbers(named).iter().flatten()) {
-        // Through another unit: rounding alone.
+        // After a conversion of units: rounding error only.
         assert!((a / b - 1.0).abs() < 1e-14, "{a} and {b}");
     }
     let refused = |text: &str| import("csv", text, reference).unwrap_err();
@@ -208,11 +208,11 @@ fn tables_of_others_are_read_by_their_column_names() {
     assert_eq!(map.lines[0].points[0].flow_corrected_kg_s, 0.04);
     let bare = "\u{feff}50000,0.05,1.3,0.6\n";
     assert_eq!(import("csv", bare, Some(ReferenceState::SAE)).unwrap().lines.len(), 1);
-    // Title and wheel diameters, as manufacturers' files begin, and points from surge to choke.
+    // Title and wheel diameters at the start, as in manufacturers' files, and points from surge to choke.
     let heading = "ABC   T12\n0.638     0.435\n\n 6000.5 8.2 1.48 0.78\n 6000.5 9.4 1.46 0.80\n";
     let map = import("sae", heading, Some(ReferenceState::SAE)).unwrap();
     assert_eq!((map.lines.len(), map.lines[0].points.len()), (1, 2));
-    // Units in the heading count, and one that is none of its column is refused.
+    // Units in the heading count, and a unit that does not fit its column is refused.
     for (heading, speed_rpm, flow_kg_s) in [
         ("N(1/min) mdot(lb/s) PR Eff\n60000 0.2", 6e4, 0.2 * 0.453_592_37),
         ("N(krpm) mdot(g/s)\n60 90", 6e4, 0.09),

@@ -1,4 +1,4 @@
-//! The efficiency between points: right at the points, near the truth between them, silent outside.
+//! The fitted efficiency: exact at the points, near the truth between them, absent outside.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

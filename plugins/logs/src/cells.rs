@@ -1,11 +1,11 @@
-//! One row of a table, whatever it is stored in.
+//! One row of a table, independent of its storage.
 
 use crate::instant::Instant;
 use mapper_logs::{DateOrder, LogError};
 
 /// The cells of a row.
 pub(crate) trait Cells {
-    /// The number in a cell; NaN where there is none.
+    /// The number in a cell; NaN without a number.
     fn number(&self, column: usize) -> f64;
 
     /// The date or time of day in a cell.
@@ -17,6 +17,6 @@ pub(crate) trait Rows: Cells {
     /// Goes to the next row; `false` after the last one.
     ///
     /// # Errors
-    /// [`LogError`] where the file cannot be read on.
+    /// [`LogError`] if the file cannot be read further.
     fn advance(&mut self) -> Result<bool, LogError>;
 }

@@ -4,31 +4,31 @@ use crate::cells::Cells;
 use crate::instant::NS_PER_DAY;
 use mapper_logs::DateOrder;
 
-/// Where a group's time stands.
+/// The source of a group's time.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Clock {
-    /// A number that counts.
+    /// A counter.
     Count { column: usize, unit_s: f64 },
     /// Date and time of day, in one column or in two.
     Instant { date: Option<usize>, time: usize, order: DateOrder },
-    /// None: rows come at a rate.
+    /// No clock: rows have a fixed rate.
     Rate { interval_s: f64 },
 }
 
-/// A clock, where it starts, and how fine it is.
+/// A clock, its start, and its resolution.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GroupClock {
     pub(crate) clock: Clock,
-    /// What counts as time 0, s.
+    /// Clock reading at time 0, s.
     pub(crate) zero_s: f64,
-    /// The same of dates, ns.
+    /// The same for dates, ns.
     pub(crate) zero_ns: i64,
-    /// Where several rows share one reading: seconds between them, and how many share it.
+    /// If several rows share one reading: seconds between them, and their number.
     pub(crate) spread: Option<(f64, usize)>,
 }
 
 impl Clock {
-    /// Seconds of a count.
+    /// Seconds of a counter.
     pub(crate) fn count_s(&self, cells: &dyn Cells) -> Option<f64> {
         match self {
             Clock::Count { column, unit_s } => Some(cells.number(*column))
@@ -48,7 +48,7 @@ impl Clock {
         Some(instant.ns())
     }
 
-    /// Whether dates stand beside the time of day.
+    /// Columns of the clock; a date may have its own column next to the time of day.
     pub(crate) fn columns(&self) -> Vec<usize> {
         match self {
             Clock::Count { column, .. } => vec![*column],
@@ -63,7 +63,7 @@ fn scaled(value: f64, unit_s: f64) -> f64 {
     if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s }
 }
 
-/// Follows a clock through the rows.
+/// Reads a clock row by row.
 #[derive(Debug)]
 pub(crate) struct ClockHand {
     clock: GroupClock,
@@ -79,7 +79,7 @@ impl ClockHand {
         ClockHand { clock, rows: 0, days_ns: 0, last_ns: None, last_s: f64::NAN, shared: 0 }
     }
 
-    /// The row's time, s; `None` where the group has no sample in it.
+    /// The row's time, s; `None` if the group has no sample in it.
     pub(crate) fn time_s(&mut self, cells: &dyn Cells) -> Option<f64> {
         let read_s = match &self.clock.clock {
             Clock::Rate { interval_s } => {
@@ -89,7 +89,7 @@ impl ClockHand {
             Clock::Count { .. } => self.clock.clock.count_s(cells)? - self.clock.zero_s,
             Clock::Instant { .. } => {
                 let ns = self.clock.clock.instant_ns(cells)?;
-                // A time of day without a date goes on behind midnight.
+                // A time of day without a date continues after midnight.
                 if self.last_ns.is_some_and(|last| ns < last.saturating_sub(NS_PER_DAY / 2))
                     && ns.unsigned_abs() < 2 * NS_PER_DAY.unsigned_abs()
                 {

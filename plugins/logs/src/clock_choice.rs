@@ -1,4 +1,4 @@
-//! Which columns of a table are clocks, which of them is read, and which columns belong to each.
+//! Finds the clocks of a table, selects the ones to read, and assigns columns to them.
 
 use crate::cells::Cells;
 use crate::clock::{Clock, GroupClock};
@@ -14,14 +14,14 @@ pub(crate) struct Clocks {
     /// Group of each column; `None` for clocks.
     pub(crate) group_of: Vec<Option<usize>>,
     pub(crate) findings: Vec<String>,
-    /// Time 0 in nanoseconds since 1970, where there is a date.
+    /// Time 0 in nanoseconds since 1970, if there is a date.
     pub(crate) start_time_ns: Option<u64>,
 }
 
-/// Counts above this since some epoch are dates in disguise, s: eleven days.
+/// Counters above this since some epoch are actually dates, s: eleven days.
 const LONGEST_COUNT_S: f64 = 1e6;
 
-/// Most clocks of a table; what is named like further ones is data.
+/// Maximum number of clocks in a table; further columns with clock names are data.
 const CLOCK_LIMIT: usize = 100;
 
 /// The first rows of data.
@@ -43,7 +43,7 @@ impl Cells for SampleRow<'_> {
     }
 }
 
-/// A clock that a table may have, and what it reads in the first rows, s.
+/// A candidate clock, and its readings in the first rows, s.
 #[derive(Debug, Clone)]
 struct Candidate {
     clock: Clock,
@@ -67,16 +67,16 @@ impl Candidate {
         readings.len()
     }
 
-    /// Whether it never goes back and moves on at all.
+    /// Whether it never decreases and does increase.
     fn runs(&self) -> bool {
         let readings: Vec<f64> = self.present().collect();
         let back = readings.windows(2).filter(|pair| pair[1] < pair[0]).count();
-        // A clock that shows seconds may stand still over the rows that were looked at; a number that does is none.
+        // A clock with a resolution of seconds may be constant over these rows; a constant number is not a clock.
         let moves = readings.len() < 2 || readings.first() < readings.last();
         20 * back <= readings.len() && (moves || matches!(self.clock, Clock::Instant { .. }))
     }
 
-    /// Least step between two readings, s.
+    /// Minimum step between two readings, s.
     fn resolution_s(&self) -> f64 {
         let readings: Vec<f64> = self.present().collect();
         readings
@@ -86,7 +86,7 @@ impl Candidate {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether the other shows the same rows at the same pace.
+    /// Whether the other has readings in the same rows at the same pace.
     fn runs_with(&self, other: &Candidate) -> bool {
         let tolerance_s = 1.01 * self.resolution_s().max(other.resolution_s()).min(60.0);
         self.readings_s.iter().zip(&other.readings_s).all(|pair| match pair {
@@ -119,7 +119,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             names.join(", ")
         ));
     };
-    // Clocks of the same pace belong together; another pace begins another group.
+    // Clocks with the same pace belong together; another pace begins another group.
     let mut groups: Vec<Vec<&Candidate>> = vec![vec![first]];
     for candidate in &candidates[1..] {
         match groups.iter_mut().find(|group| group[0].runs_with(candidate)) {
@@ -135,7 +135,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         clocks.group_of[clock] = None;
     }
     let chosen: Vec<&Candidate> = groups.iter().map(|group| finest(group)).collect();
-    // Groups whose clocks count from different epochs have nothing in common but their first rows.
+    // Groups with clocks of different epochs are aligned at their first rows.
     let is_epoch = |candidate: &Candidate| candidate.first_s().abs() > LONGEST_COUNT_S || candidate.dated;
     let mixed = chosen.iter().any(|candidate| is_epoch(candidate) != is_epoch(chosen[0]));
     let common_s = chosen.iter().map(|candidate| candidate.first_s()).fold(f64::INFINITY, f64::min);
@@ -209,7 +209,7 @@ fn exact_zero_ns(candidate: &Candidate, sample: &Sample<'_>, near_ns: f64) -> i6
     first.filter(|ns| (*ns as f64 - near_ns).abs() < 1e6).unwrap_or(near_ns as i64)
 }
 
-/// The clock with the most readings; of equals one that counts, then the first.
+/// The clock with the most distinct readings; among equals a counter, then the first.
 fn finest<'a>(group: &[&'a Candidate]) -> &'a Candidate {
     let rank = |candidate: &Candidate| (candidate.distinct(), matches!(candidate.clock, Clock::Count { .. }));
     let mut best = group[0];
@@ -221,11 +221,11 @@ fn finest<'a>(group: &[&'a Candidate]) -> &'a Candidate {
     best
 }
 
-/// Where rows share a reading: the time between them, and how many share one.
+/// If rows share a reading: the time between them, and the number of rows that share one.
 fn spread(candidate: &Candidate) -> Option<(f64, usize)> {
     let readings: Vec<f64> = candidate.present().collect();
     let runs: Vec<&[f64]> = readings.chunk_by(|a, b| a == b).collect();
-    // The first and the last may be cut.
+    // The first and the last may be truncated.
     let whole = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
     let mut lengths: Vec<usize> = whole.iter().map(|run| run.len()).collect();
     lengths.sort_unstable();
@@ -258,7 +258,7 @@ fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candi
     Candidate { clock, at, readings_s, dated }
 }
 
-/// Times of day go on behind midnight.
+/// Times of day continue after midnight.
 fn past_midnight(readings_s: &mut [Option<f64>]) {
     let (mut days_s, mut last_s) = (0.0, f64::NEG_INFINITY);
     for reading in readings_s.iter_mut().flatten() {
@@ -270,7 +270,7 @@ fn past_midnight(readings_s: &mut [Option<f64>]) {
     }
 }
 
-/// The clock that a user names.
+/// The clock named by the user.
 fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<Candidate, String> {
     let find = |name: &String| {
         let is = |column: &HeadColumn| column.name == *name || column.header == *name;
@@ -356,7 +356,7 @@ fn order_of(column: usize, sample: &Sample<'_>) -> (DateOrder, bool) {
     guess_order(cells(column, sample))
 }
 
-/// Share of the cells that are dates or times.
+/// Share of cells with dates or times.
 fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
     let (mut instants, mut all) = (0.0, 0.0);
     for cell in cells(column, sample) {
@@ -368,13 +368,13 @@ fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
     if all > 0.0 { instants / all } else { 0.0 }
 }
 
-/// Whether its cells have a date, and a time of day.
+/// Whether its cells contain a date, and a time of day.
 fn shows(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
     let first = cells(column, sample).find_map(|cell| parse_instant(cell, order)).unwrap_or_default();
     (first.day.is_some(), first.ns_of_day.is_some())
 }
 
-/// Whether a column of numbers says that it is a clock: by its name, unless its unit says otherwise, or by its unit.
+/// Whether a column of numbers is labelled as a clock: by its name, unless its unit contradicts, or by its unit.
 fn is_clock_name(column: &HeadColumn) -> bool {
     const NAMES: [&str; 22] = [
         "t",
@@ -410,7 +410,7 @@ fn is_clock_name(column: &HeadColumn) -> bool {
     duration || named && column.unit.is_none()
 }
 
-/// Seconds of one count: by its unit, its name, or, of epochs, its size.
+/// Seconds per count: by its unit, its name, or, for epochs, its magnitude.
 fn count_unit_s(column: usize, sample: &Sample<'_>) -> f64 {
     let Some(head) = sample.columns.get(column) else { return 1.0 };
     let unit = head.unit.as_deref().and_then(header_unit).filter(|unit| unit.kind == Kind::Duration);

@@ -1,4 +1,4 @@
-//! Columns that are stored one after the other, as the rows of a table.
+//! Columns stored one after the other, presented as rows of a table.
 
 use crate::cells::{Cells, Rows};
 use crate::instant::{Instant, parse_instant};
@@ -6,7 +6,7 @@ use crate::number::parse_number;
 use crate::value::Value;
 use mapper_logs::{DateOrder, LogError};
 
-/// Some rows of a column. What lies behind its end is empty.
+/// Some rows of a column. Rows after its end are empty.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Chunk {
     Numbers(Vec<f64>),
@@ -27,12 +27,12 @@ impl Chunk {
     }
 }
 
-/// What gives the columns, some rows at a time.
+/// A source of columns, some rows at a time.
 pub(crate) trait Chunks {
-    /// The next rows of each column, and how many there are; `None` behind the last.
+    /// The next rows of each column, and their number; `None` at the end.
     ///
     /// # Errors
-    /// [`LogError`] where the file cannot be read on.
+    /// [`LogError`] if the file cannot be read further.
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError>;
 }
 
@@ -40,21 +40,21 @@ pub(crate) trait Chunks {
 pub(crate) struct ColumnRows<C> {
     chunks: C,
     head: Vec<Vec<String>>,
-    /// Rows of the header that were given, the present one included.
+    /// Header rows returned so far, including the present one.
     head_at: usize,
     chunk: Vec<Chunk>,
     count: usize,
-    /// The present row of the chunk, from 1; 0 before the first.
+    /// The current row of the chunk, from 1; 0 before the first.
     at: usize,
 }
 
 impl<C: Chunks> ColumnRows<C> {
-    /// Names, and units where any is known, above the columns.
+    /// Names, and units if any is known, above the columns.
     pub(crate) fn new(head: Vec<Vec<String>>, chunks: C) -> Self {
         ColumnRows { chunks, head, head_at: 0, chunk: Vec::new(), count: 0, at: 0 }
     }
 
-    /// At most so many rows as text, from here on.
+    /// Up to this many rows as text, from here on.
     pub(crate) fn texts(&mut self, rows: usize) -> Result<Vec<Vec<String>>, LogError> {
         let mut found = Vec::new();
         while found.len() < rows && self.advance()? {

@@ -1,4 +1,4 @@
-//! CSV and its relatives: cells with a separator between them.
+//! CSV and similar: cells with a separator between them.
 
 use crate::cells::Rows;
 use crate::encoding;
@@ -13,13 +13,13 @@ pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "CSV";
 
-/// How much of a file is looked at, bytes.
+/// Size of the sample of a file, bytes.
 const HEAD_BYTES: usize = 1 << 18;
 
-/// How many rows of it are looked at.
+/// Maximum number of rows in the sample.
 const HEAD_ROWS: usize = 400;
 
-/// Text, and more than one word of it.
+/// Text of more than one word.
 fn recognises(head: &[u8]) -> bool {
     let (encoding, _) = encoding::guess(head);
     let utf16 = matches!(encoding, Encoding::Utf16Le | Encoding::Utf16Be);
@@ -46,7 +46,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         while rows.len() < HEAD_ROWS && stream.advance()? {
             rows.push(stream.texts());
         }
-        // The last line of what was looked at may be cut.
+        // The last line of the sample may be truncated.
         if !whole && rows.len() < HEAD_ROWS && rows.len() > 1 {
             rows.pop();
         }

@@ -1,9 +1,9 @@
-//! The letters of a text file.
+//! Character encodings of a text file.
 
 use mapper_logs::Encoding;
 use std::io::{self, Read};
 
-/// The encoding of a file that starts with these bytes, and how many of them are its byte order mark.
+/// The encoding of a file that starts with these bytes, and the length of its byte order mark.
 pub(crate) fn guess(head: &[u8]) -> (Encoding, usize) {
     match head {
         [0xEF, 0xBB, 0xBF, ..] => (Encoding::Utf8, 3),
@@ -13,14 +13,14 @@ pub(crate) fn guess(head: &[u8]) -> (Encoding, usize) {
         _ if looks_like_utf16(head, 0) => (Encoding::Utf16Be, 0),
         _ => match std::str::from_utf8(head) {
             Ok(_) => (Encoding::Utf8, 0),
-            // Cut in the middle of a letter.
+            // Truncated in the middle of a character.
             Err(error) if error.error_len().is_none() => (Encoding::Utf8, 0),
             Err(_) => (Encoding::Latin1, 0),
         },
     }
 }
 
-/// Whether the bytes are UTF-16 without a byte order mark: of most letters the high byte, the first or the second, is 0 and the
+/// Whether the bytes are UTF-16 without a byte order mark: in most letters the high byte, the first or the second, is 0 and the
 /// other is not.
 fn looks_like_utf16(head: &[u8], high: usize) -> bool {
     let pairs = head.len() / 2;
@@ -36,7 +36,7 @@ pub(crate) fn text(cell: &[u8], encoding: Encoding) -> String {
     }
 }
 
-/// UTF-16 read as UTF-8; a half pair becomes the replacement character.
+/// UTF-16 converted to UTF-8; an unpaired surrogate becomes the replacement character.
 pub(crate) struct Utf16Reader<R> {
     inner: R,
     big_endian: bool,
@@ -65,7 +65,7 @@ impl<R: Read> Utf16Reader<R> {
             }))
             .collect();
         self.half.drain(..whole);
-        // The first half of a pair waits for the second, unless there is no more.
+        // The first half of a pair waits for the second, unless the input has ended.
         let waits = count > 0 && units.last().is_some_and(|unit| (0xD800..0xDC00).contains(unit));
         self.surrogate = units.last().copied().filter(|_| waits);
         let ready = units.len() - usize::from(waits);

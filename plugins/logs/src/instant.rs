@@ -1,13 +1,13 @@
-//! Dates and times of day as logs write them.
+//! Dates and times of day in the notations of logs.
 
 use jiff::civil::Date;
 use mapper_logs::DateOrder;
 
-/// Years of a date: what 64 bits hold as nanoseconds, and no log is older.
+/// Permitted years: the range of 64 bits in nanoseconds, and no log is older.
 const YEARS: std::ops::RangeInclusive<i64> = 1970..=2200;
 
 const NS_PER_S: i64 = 1_000_000_000;
-/// Nanoseconds of a day.
+/// Nanoseconds per day.
 pub(crate) const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
 
 /// A date, a time of day, or both.
@@ -15,12 +15,12 @@ pub(crate) const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
 pub(crate) struct Instant {
     /// Days since 1970-01-01.
     pub(crate) day: Option<i64>,
-    /// Nanoseconds since midnight; those of another zone than UTC are made to fit its day.
+    /// Nanoseconds since midnight; times of another zone are shifted to UTC relative to `day`.
     pub(crate) ns_of_day: Option<i64>,
 }
 
 impl Instant {
-    /// Nanoseconds since 1970-01-01, or since midnight where there is no date.
+    /// Nanoseconds since 1970-01-01, or since midnight without a date.
     pub(crate) fn ns(self) -> i64 {
         self.day.unwrap_or(0).saturating_mul(NS_PER_DAY).saturating_add(self.ns_of_day.unwrap_or(0))
     }
@@ -45,7 +45,7 @@ pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     }
 }
 
-/// The order of the parts of some dates: what their separators and numbers above 12 say.
+/// The order of day, month and year in some dates, from their separators and numbers above 12.
 pub(crate) fn guess_order<'a>(dates: impl Iterator<Item = &'a str>) -> (DateOrder, bool) {
     let mut doubtful = None;
     for text in dates {
@@ -139,7 +139,7 @@ fn without_zone(text: &str) -> (&str, i64) {
     }
 }
 
-/// Digits behind a decimal sign, as nanoseconds.
+/// Digits after a decimal sign, as nanoseconds.
 fn nanoseconds(digits: &str) -> Option<i64> {
     if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
         return None;

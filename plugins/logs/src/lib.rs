@@ -1,7 +1,7 @@
-//! The formats of foreign logs, one file each.
+//! The formats of imported logs, one file each.
 //!
-//! To add one, write its file with a constant `FORMAT`, and its line below. A format that is known by few bytes alone
-//! stands before one that takes any text.
+//! To add one, write its file with a constant `FORMAT`, and its line below. A format with a short signature
+//! comes before one that accepts any text.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -29,7 +29,7 @@ macro_rules! logs {
     ($($(#[$feature:meta])? $name:ident),* $(,)?) => {
         $($(#[$feature])? mod $name;)*
 
-        /// Every format, in the order in which they are asked.
+        /// Every format, in the order of recognition.
         pub const LOG_FORMATS: LogFormats = LogFormats(&[$($(#[$feature])? $name::FORMAT),*]);
     };
 }

@@ -11,13 +11,13 @@ pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "MDF4";
 
-/// Rows that are decoded at once.
+/// Rows decoded at once.
 const CHUNK: usize = 4096;
 
-/// Most channels of a file.
+/// Maximum number of channels in a file.
 const CHANNEL_LIMIT: usize = 10_000;
 
-/// Largest compressed block, unpacked, bytes: writers make them of 4 MiB, as the standard has it.
+/// Maximum unpacked size of a compressed block, bytes: writers make blocks of 4 MiB, as in the standard.
 const BLOCK_LIMIT: u64 = 256 << 20;
 
 fn recognises(head: &[u8]) -> bool {
@@ -32,7 +32,7 @@ struct Mdf4 {
     masters: Vec<(Channel, f64)>,
     /// The channel of each column.
     channels: Vec<Channel>,
-    /// Values that stand for none.
+    /// Values that mark a missing sample.
     missing: Vec<f64>,
 }
 
@@ -104,7 +104,7 @@ fn name_of(group: &ChannelGroup, index: usize) -> String {
     [Some(group.acquisition_name.clone()), source].into_iter().flatten().find(|name| !name.trim().is_empty()).unwrap_or_else(|| format!("group {}", index + 1))
 }
 
-/// The unit of a clock in seconds; `None` where it names none that is known. The standard has seconds.
+/// The unit of a clock in seconds; `None` if its unit is unknown. The standard prescribes seconds.
 fn unit_s(clock: &Channel) -> Option<f64> {
     Some(Kind::Duration.unit(clock.unit.trim())?.to_inside(1.0))
 }
@@ -114,7 +114,7 @@ fn clock_words(clock: &Channel) -> String {
     if unit.is_empty() { format!("`{}`", clock.name) } else { format!("`{}`, counts {unit}", clock.name) }
 }
 
-/// The name of a channel, numbered where the group has it already.
+/// The name of a channel, numbered if the group already has it.
 fn distinct(names: &mut BTreeSet<String>, name: &str) -> String {
     let mut distinct = name.to_owned();
     let mut number = 1usize;
@@ -125,7 +125,7 @@ fn distinct(names: &mut BTreeSet<String>, name: &str) -> String {
     distinct
 }
 
-/// Groups have distinct names, and one alone needs none.
+/// Gives groups distinct names; a single group needs none.
 fn distinct_names(layout: &mut Layout) {
     if let [only] = layout.groups.as_mut_slice() {
         only.name = String::new();
@@ -170,7 +170,7 @@ impl Log for Mdf4 {
     }
 }
 
-/// Values with NaN for those that the file declares invalid.
+/// Values, with NaN for those declared invalid in the file.
 fn valid_values(signal: &Signal) -> Result<Vec<f64>, falcon_mdf::error::Mf4Error> {
     let mut values = signal.values_f64()?;
     if let Some(validity) = signal.validity() {

@@ -1,12 +1,12 @@
-//! Numbers as logs write them.
+//! Numbers in the notations of logs.
 
-/// Longest text of a number, bytes.
+/// Maximum length of a number's text, bytes.
 const LIMIT: usize = 48;
 
-/// Digits before the first sign between thousands.
+/// Digits before the first thousands separator.
 const FIRST_GROUP: std::ops::RangeInclusive<usize> = 1..=3;
 
-/// The number in a cell; `None` for what is none, words for infinity and not-a-number included.
+/// The number in a cell; `None` for anything else, including words for infinity and not-a-number.
 pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     let cell = cell.trim_ascii();
     let starts = cell.iter().find(|byte| !matches!(byte, b'+' | b'-'))?;
@@ -18,7 +18,7 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     if decimal == b'.' && !cell.contains(&b',') {
         return plain(cell);
     }
-    // The other of the two stands between thousands.
+    // The other of the two separates thousands.
     let thousands = if decimal == b',' { b'.' } else { b',' };
     let mut text = [0u8; LIMIT];
     let mut length = 0;
@@ -28,7 +28,7 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
         if *byte == thousands {
             let well_placed = match digits_in_group {
                 Some(count) => count == 3,
-                // Of `0.100` or `1234.567` the sign is a decimal one.
+                // In `0.100` or `1234.567` the sign is a decimal sign.
                 None => starts_as_thousands(text.get(..length)?),
             };
             if fraction || !well_placed {
@@ -51,7 +51,7 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     plain(text.get(..length)?)
 }
 
-/// Whether what stands before the first sign between thousands is one to three digits of a number that is not 0.
+/// Whether the text before the first thousands separator is one to three digits of a number that is not 0.
 fn starts_as_thousands(text: &[u8]) -> bool {
     let digits = text.strip_prefix(b"-").or_else(|| text.strip_prefix(b"+")).unwrap_or(text);
     FIRST_GROUP.contains(&digits.len())
@@ -59,7 +59,7 @@ fn starts_as_thousands(text: &[u8]) -> bool {
         && digits.first() != Some(&b'0')
 }
 
-/// Whether a cell says that there is no value.
+/// Whether a cell marks a missing value.
 pub(crate) fn is_missing(cell: &[u8]) -> bool {
     let cell = cell.trim_ascii();
     let words: [&[u8]; 14] = [

@@ -12,7 +12,7 @@ pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "Parquet";
 
-/// Rows that are decoded at once.
+/// Rows decoded at once.
 const BATCH_ROWS: usize = 8192;
 
 fn recognises(head: &[u8]) -> bool {

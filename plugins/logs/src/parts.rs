@@ -10,12 +10,12 @@ pub(crate) struct Part {
     pub(crate) table: Table,
     first_group: usize,
     first_column: usize,
-    /// How much later than the earliest table its time 0 is, s.
+    /// Delay of its time 0 after the earliest table, s.
     later_s: f64,
 }
 
 impl Part {
-    /// The columns of the table among those of the log.
+    /// The table's columns among the wanted columns of the log, as indices of the table.
     pub(crate) fn own(&self, wanted: &[usize]) -> Vec<usize> {
         let columns = self.first_column..self.first_column + self.table.layout.columns.len();
         wanted
@@ -25,14 +25,14 @@ impl Part {
             .collect()
     }
 
-    /// A row of the table as one of the log.
+    /// Passes a row of the table on as a row of the log.
     pub(crate) fn give(&self, row: Row<'_>, sink: &mut RowSink<'_>) -> Result<(), LogError> {
         sink(Row { group: row.group + self.first_group, t_s: row.t_s + self.later_s, ..row })
     }
 }
 
-/// Puts tables side by side; `word` is what the format calls one. Returns what the log holds and its parts, the tables in the order
-/// in which they came, or what is wrong where there is none.
+/// Puts tables side by side; `word` is the format's term for a table. Returns the layout of the log and its parts, the tables in their
+/// original order, or the errors if no table is left.
 pub(crate) fn side_by_side(
     word: &str,
     found: Vec<(String, Table)>,
@@ -64,7 +64,7 @@ pub(crate) fn side_by_side(
         }));
         let findings = table.layout.findings.drain(..);
         layout.findings.extend(findings.map(|finding| format!("{word} `{name}`: {finding}")));
-        // Tables of which one alone has no date begin together, as well as anybody knows.
+        // If one table has no date, all are assumed to begin together.
         let start = starts.as_ref().and_then(|starts| starts.get(index)).copied();
         let later_s = start.zip(layout.start_time_ns).map_or(0.0, |(own, first)| (own - first) as f64 / 1e9);
         parts.push(Part { name, table, first_group, first_column, later_s });

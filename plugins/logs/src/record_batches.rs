@@ -1,4 +1,4 @@
-//! Record batches, as Arrow and Parquet have them, as the rows of one table.
+//! Record batches of Arrow and Parquet, as the rows of one table.
 
 use crate::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::instant::{Instant, NS_PER_DAY};
@@ -18,7 +18,7 @@ use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
 use mapper_logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// How many rows are looked at.
+/// Number of rows in the sample.
 const HEAD_ROWS: usize = 400;
 
 /// The batches of a file.
@@ -52,7 +52,7 @@ pub(crate) fn open_log(
     let chunks = BatchChunks { file, name, batches };
     let rows = ColumnRows::new(head(&schema), chunks).texts(HEAD_ROWS)?;
     let mut table = Table::look(&rows, b'.', options).map_err(|why| file.content(name, why))?;
-    // Where a header stands in rows says nothing of a file without rows.
+    // Header rows have no meaning in a file of columns.
     table.layout.findings.retain(|finding| !finding.starts_with("header: "));
     let unread = schema.fields().iter().filter(|field| !is_read(field.data_type())).count();
     if unread > 0 {
@@ -63,7 +63,7 @@ pub(crate) fn open_log(
     Ok(Box::new(BatchLog { file: file.clone(), name, open, table }))
 }
 
-/// Names, and units where the metadata of any column has one.
+/// Names, and units if the metadata of any column has one.
 fn head(schema: &Schema) -> Vec<Vec<String>> {
     let unit = |field: &Field| field.metadata().get("unit").cloned().unwrap_or_default();
     let names = schema.fields().iter().map(|field| field.name().clone()).collect();
@@ -103,8 +103,8 @@ impl Chunks for BatchChunks<'_> {
     }
 }
 
-/// Arrow's libraries check sizes and offsets by panicking (one damaged file in a hundred, found by flipping bytes): that is an
-/// error of the file here. What was under way is dropped, never used again.
+/// Arrow's libraries check sizes and offsets by panicking (one damaged file in a hundred, found by flipping bytes). A panic is
+/// reported as an error of the file. Its intermediate state is dropped, never reused.
 fn contained<T>(
     name: &'static str,
     file: &LogFile,
@@ -115,7 +115,7 @@ fn contained<T>(
     catch_unwind(AssertUnwindSafe(reading)).unwrap_or_else(|_| Err(damaged()))
 }
 
-/// Whether a column holds numbers, times or texts.
+/// Whether a column contains numbers, times or texts.
 fn is_read(data_type: &DataType) -> bool {
     use DataType as T;
     let number = data_type.is_integer() || matches!(data_type, T::Float32 | T::Float64 | T::Boolean);
@@ -126,7 +126,7 @@ fn is_read(data_type: &DataType) -> bool {
     number || time || matches!(data_type, T::Utf8 | T::LargeUtf8 | T::Utf8View)
 }
 
-/// The values of a column; what is null or of another type is empty.
+/// The values of a column; null values and other types are empty.
 fn chunk(array: &dyn Array) -> Chunk {
     use DataType as T;
     use TimeUnit::{Microsecond, Millisecond, Nanosecond, Second};
@@ -142,7 +142,7 @@ fn chunk(array: &dyn Array) -> Chunk {
         T::UInt16 => numbers::<UInt16Type>(array, f64::from),
         T::UInt32 => numbers::<UInt32Type>(array, f64::from),
         T::UInt64 => numbers::<UInt64Type>(array, |value| value as f64),
-        // A time that counts from the start, in seconds.
+        // Seconds since the start.
         T::Duration(Second) => numbers::<DurationSecondType>(array, |value| value as f64),
         T::Duration(Millisecond) => numbers::<DurationMillisecondType>(array, |value| value as f64 / 1e3),
         T::Duration(Microsecond) => numbers::<DurationMicrosecondType>(array, |value| value as f64 / 1e6),
@@ -177,7 +177,7 @@ fn numbers<T: ArrowPrimitiveType>(array: &dyn Array, number: fn(T::Native) -> f6
     Chunk::Numbers(array.as_primitive::<T>().iter().map(|value| value.map_or(f64::NAN, number)).collect())
 }
 
-/// Dates and times, in units of so many nanoseconds since 1970 or since midnight.
+/// Dates and times, in units of this many nanoseconds since 1970 or since midnight.
 fn instants<T: ArrowPrimitiveType>(array: &dyn Array, unit_ns: i64, dated: bool) -> Chunk
 where
     i64: From<T::Native>,
@@ -185,7 +185,7 @@ where
     let instant = |value: T::Native| {
         let ns = i64::from(value).checked_mul(unit_ns)?;
         let day = dated.then(|| ns.div_euclid(NS_PER_DAY));
-        // Before 1970 no log was written.
+        // There are no logs from before 1970.
         (ns >= 0).then_some(Instant { day, ns_of_day: Some(ns.rem_euclid(NS_PER_DAY)) })
     };
     Chunk::Instants(array.as_primitive::<T>().iter().map(|value| value.and_then(instant)).collect())

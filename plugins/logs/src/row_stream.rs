@@ -9,10 +9,10 @@ use std::cell::Cell;
 use std::io::{self, Read};
 use std::rc::Rc;
 
-/// Longest line, bytes: a quote that is never closed would swallow the file.
+/// Maximum length of a line, bytes: an unclosed quote would otherwise extend to the end of the file.
 const LINE_LIMIT: usize = 1 << 20;
 
-/// How a delimited file is written.
+/// Notation of a delimited file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Dialect {
     pub(crate) encoding: Encoding,
@@ -22,7 +22,7 @@ pub(crate) struct Dialect {
     pub(crate) decimal: u8,
 }
 
-/// Counts what is read since the last whole line.
+/// Counts bytes since the last complete line.
 struct Limited<R> {
     inner: R,
     left: Rc<Cell<usize>>,
@@ -46,7 +46,7 @@ pub(crate) struct RowStream {
     left: Rc<Cell<usize>>,
     dialect: Dialect,
     record: csv::ByteRecord,
-    /// Where blanks separate, the cells that are not empty.
+    /// With blanks as separators, the cells that are not empty.
     filled: Vec<usize>,
 }
 
@@ -55,11 +55,11 @@ impl RowStream {
         Ok(Self::over(file, Box::new(file.open()?), dialect))
     }
 
-    /// The rows of some bytes of the file.
+    /// The rows in a range of the file.
     pub(crate) fn over(file: &LogFile, mut bytes: Box<dyn Read>, dialect: Dialect) -> Self {
         let left = Rc::new(Cell::new(LINE_LIMIT));
         let mark = u64::try_from(dialect.mark).unwrap_or(0);
-        // What is wrong with the mark shows at the first line.
+        // An error in the mark shows at the first line.
         drop(io::copy(&mut bytes.by_ref().take(mark), &mut io::sink()));
         let text: Box<dyn Read> = match dialect.encoding {
             Encoding::Utf16Le => Box::new(Utf16Reader::new(bytes, false)),
@@ -108,7 +108,7 @@ impl Cells for RowStream {
 }
 
 impl Rows for RowStream {
-    /// Rows without any cell do not count.
+    /// Skips rows without any cell.
     fn advance(&mut self) -> Result<bool, LogError> {
         loop {
             self.left.set(LINE_LIMIT);

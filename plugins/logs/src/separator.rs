@@ -1,13 +1,13 @@
-//! The separator and the decimal sign of a text, found by trying.
+//! Separator and decimal sign of a text, found by trial.
 
 use crate::instant::parse_instant;
 use crate::number::{is_missing, parse_number};
 use mapper_logs::DateOrder;
 
-/// Separators that are tried, in the order in which they win a draw.
+/// Candidate separators, in order of preference for equal scores.
 pub(crate) const SEPARATORS: [u8; 5] = [b'\t', b';', b',', b'|', b' '];
 
-/// How well rows look as a table: cells that are numbers or times in a typical row, times the share of rows of that length.
+/// Score of rows as a table: cells with numbers or times in a typical row, times the share of rows of that length.
 pub(crate) fn score(rows: &[Vec<String>], separator: u8) -> f64 {
     let length = typical_length(rows);
     if length == 0 || rows.is_empty() {
@@ -22,7 +22,7 @@ pub(crate) fn score(rows: &[Vec<String>], separator: u8) -> f64 {
     typical * (typical / length as f64) * share * share
 }
 
-/// The most frequent number of cells of a row.
+/// The most frequent number of cells in a row.
 pub(crate) fn typical_length(rows: &[Vec<String>]) -> usize {
     let mut lengths: Vec<usize> = rows.iter().map(Vec::len).collect();
     lengths.sort_unstable();
@@ -38,7 +38,7 @@ fn is_value(cell: &str, separator: u8) -> bool {
         || parse_instant(cell, DateOrder::MonthFirst).is_some()
 }
 
-/// The decimal sign of the cells; the second value is whether any cell shows it.
+/// The decimal sign of the cells; the second value is whether any cell contains it.
 pub(crate) fn decimal(rows: &[Vec<String>]) -> (u8, bool) {
     let (mut points, mut commas) = (0usize, 0usize);
     for cell in rows.iter().flatten() {

@@ -1,4 +1,4 @@
-//! Names, units and the first row of data of a table, found by looking at its first rows.
+//! Names, units and the first row of data of a table, found from its first rows.
 
 use crate::instant::parse_instant;
 use crate::number::{is_missing, parse_number};
@@ -6,7 +6,7 @@ use crate::separator::typical_length;
 use mapper_logs::{DateOrder, LogOptions, header_unit, split_unit};
 use std::collections::BTreeMap;
 
-/// Most columns of a table.
+/// Maximum number of columns in a table.
 pub(crate) const COLUMN_LIMIT: usize = 10_000;
 
 /// The head of a table.
@@ -27,7 +27,7 @@ pub(crate) struct HeadColumn {
     pub(crate) description: String,
 }
 
-/// Looks at the first rows of a table.
+/// Analyses the first rows of a table.
 pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<TableHead, String> {
     let length = typical_length(rows);
     let given_row = options.data_row.map(|row| row - 1);
@@ -45,7 +45,7 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
     };
     let others = || header.iter().copied().filter(|row| Some(*row) != units_row);
     let filled = |row: &usize| distinct(rows.get(*row));
-    // The first of those with the most names: behind it stand long names.
+    // The first of the rows with the most names: rows after it hold long names.
     let most = others().map(|row| filled(&row)).max().unwrap_or(0);
     let names_row = options
         .names_row
@@ -67,7 +67,7 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
         let own_unit = cell(units_row, column).trim_matches(['[', ']', '(', ')', ' ']);
         let (mut name, mut unit) = split_unit(&header);
         if units_row.is_some() {
-            // `T2 (upper)` is a name where the units have a row of their own.
+            // `T2 (upper)` is a name if the units have their own row.
             (name, unit) =
                 if own_unit.is_empty() && unit.is_some() { (name, unit) } else { (header.clone(), None) };
             unit = unit.or(Some(own_unit.to_owned()).filter(|unit| !unit.is_empty()));

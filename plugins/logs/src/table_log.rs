@@ -1,4 +1,4 @@
-//! A table as a log: its clocks, its columns, and its rows as they come.
+//! A table as a log: its clocks, its columns, and its stream of rows.
 
 use crate::cells::Rows;
 use crate::clock::ClockHand;
@@ -6,19 +6,19 @@ use crate::clock_choice::{Clocks, Sample, choose};
 use crate::table_head::{TableHead, look};
 use mapper_logs::{Column, Layout, LogError, LogOptions, Row, RowSink};
 
-/// What was found out about a table.
+/// The analysis of a table.
 #[derive(Debug)]
 pub(crate) struct Table {
     pub(crate) layout: Layout,
     clocks: Clocks,
-    /// Column of the table of each column of the layout.
+    /// Column of the table for each column of the layout.
     sources: Vec<usize>,
     data_row: usize,
     missing: Vec<f64>,
 }
 
 impl Table {
-    /// Looks at the first rows of a table.
+    /// Analyses the first rows of a table.
     pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<Table, String> {
         let TableHead { columns, data_row, mut findings } = look(rows, decimal, options)?;
         let sample = Sample { columns: &columns, rows: rows.get(data_row..).unwrap_or_default(), decimal };
@@ -45,7 +45,7 @@ impl Table {
         Ok(Table { layout, clocks, sources, data_row, missing: options.missing.clone() })
     }
 
-    /// Gives the rows of the wanted columns; `rows` stands before the first row of the table.
+    /// Returns the rows of the wanted columns; `rows` must be before the first row of the table.
     pub(crate) fn rows(
         &self,
         rows: &mut dyn Rows,

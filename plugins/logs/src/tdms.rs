@@ -1,4 +1,4 @@
-//! TDMS: the files of LabVIEW and of National Instruments' loggers. Each group is a table; channels of a waveform have a rate of their own.
+//! TDMS: the files of LabVIEW and of National Instruments' loggers. Each group is a table; waveform channels have their own rate.
 
 use crate::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::instant::Instant;
@@ -14,26 +14,26 @@ pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "TDMS";
 
-/// How many rows of a group are looked at.
+/// Number of rows of a group in the sample.
 const HEAD_ROWS: usize = 400;
 
-/// Values that are held in memory at once: 32 MiB of them.
+/// Maximum number of values in memory: 32 MiB.
 const VALUES_AT_ONCE: usize = 1 << 22;
 
 /// Days from LabVIEW's origin, 1904-01-01, to 1970-01-01.
 const EPOCH_DAYS: i64 = 24_107;
 
-/// Days of a date that 64 bits hold as nanoseconds: 1970 to 2200.
+/// Permitted days, which 64 bits hold as nanoseconds: 1970 to 2200.
 const DAYS: std::ops::Range<i64> = 0..84_000;
 
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"TDSm")
 }
 
-/// A date and time of day as the file has it: seconds since 1904 and a fraction of one in 2^-64.
+/// Date and time of day from the file's form: seconds since 1904 and a fraction of one in 2^-64.
 fn instant((seconds, fraction): (i64, u64)) -> Option<Instant> {
     let day = seconds.div_euclid(86_400).checked_sub(EPOCH_DAYS)?;
-    // The fraction to the nanosecond: what is below is lost in every f64 of a date.
+    // The fraction in nanoseconds: smaller parts are lost in every f64 of a date.
     let ns = (u128::from(fraction) * 1_000_000_000) >> 64;
     let ns_of_day = seconds.rem_euclid(86_400) * 1_000_000_000 + i64::try_from(ns).ok()?;
     DAYS.contains(&day).then_some(Instant { day: Some(day), ns_of_day: Some(ns_of_day) })
@@ -41,7 +41,7 @@ fn instant((seconds, fraction): (i64, u64)) -> Option<Instant> {
 
 type Source = TdmsFile<Box<dyn ReadSeek>>;
 
-/// Reads values of a channel from one on.
+/// Reads values of a channel from an index on.
 type ReadValues = fn(&mut Source, &ChannelPath, u64, usize) -> Result<Chunk, TdmsError>;
 
 fn numbers<T: TdmsStorageType + Copy + Default>(
@@ -56,7 +56,7 @@ fn numbers<T: TdmsStorageType + Copy + Default>(
     Ok(Chunk::Numbers(values.into_iter().map(number).collect()))
 }
 
-/// One for each type that is read, with the bytes of a value.
+/// One for each supported type, with the bytes of a value.
 const READERS: [(u64, ReadValues); 11] = [
     (8, |s, p, from, n| numbers::<f64>(s, p, from, n, |v| v)),
     (4, |s, p, from, n| numbers::<f32>(s, p, from, n, f64::from)),
@@ -72,7 +72,7 @@ const READERS: [(u64, ReadValues); 11] = [
     (1, |s, p, from, n| numbers::<bool>(s, p, from, n, |v| f64::from(u8::from(v)))),
 ];
 
-/// A channel that is read.
+/// A supported channel.
 struct Channel {
     path: ChannelPath,
     unit: String,
@@ -81,7 +81,7 @@ struct Channel {
     waveform: Option<Waveform>,
 }
 
-/// The time axis of a channel that has one of its own.
+/// The time axis of a waveform channel.
 #[derive(Clone, Copy, PartialEq)]
 struct Waveform {
     interval_s: f64,
@@ -146,20 +146,20 @@ fn failed(file: &LogFile, error: &TdmsError) -> LogError {
     file.content(NAME, error.to_string())
 }
 
-/// A name as people write it; the file doubles the quotes in it.
+/// A name without the file's doubled quotes.
 fn plain(name: &str) -> String {
     name.trim_matches('\'').replace("''", "'")
 }
 
-/// The channel, if it holds any numbers; why the file cannot be read where it holds something else: the library takes a date for half as
-/// long as it is, and would read the channels behind it at the wrong places.
+/// The channel if it holds numbers, or an error if it holds an unsupported type. The library assumes half the true length of a
+/// date, and would read the following channels at wrong positions.
 fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Result<Option<Channel>, String> {
     let Some(length) = source.channel_length(&path).filter(|length| *length > 0) else { return Ok(None) };
     let Some((value_bytes, read)) = READERS.into_iter().find(|(_, read)| read(source, &path, 0, 1).is_ok()) else {
         let name = path.channel_name();
         return Err(format!("channel `{name}` holds no plain numbers (dates, say): leave it out of the file, or export it as CSV or MDF 4"));
     };
-    // A damaged file declares more values than it has bytes; what is not there would be read as zeros.
+    // A damaged file declares more values than it has bytes; missing ones would be read as zeros.
     if length > file_bytes / value_bytes {
         return Err(format!("channel `{}` has {length} values in a file of {file_bytes} bytes", path.channel_name()));
     }
@@ -186,7 +186,7 @@ fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Result<Op
     Ok(Some(Channel { path, unit: unit.unwrap_or_default(), length, read, waveform }))
 }
 
-/// Channels that share a clock: those of one waveform, and all that have none. A clock or a rate that a user names counts more.
+/// Channels by clock: those of the same waveform, and all those without one. A clock or rate named by the user takes precedence.
 fn by_clock(channels: Vec<Channel>, options: &LogOptions) -> Vec<Vec<Channel>> {
     let named = options.rate_hz.is_some() || channels.iter().any(|channel| options.time.iter().any(|name| name == channel.path.channel_name()));
     let mut groups: Vec<Vec<Channel>> = Vec::new();
@@ -200,7 +200,7 @@ fn by_clock(channels: Vec<Channel>, options: &LogOptions) -> Vec<Vec<Channel>> {
     groups
 }
 
-/// The table of some channels, or why there is none.
+/// The table of some channels, or why it cannot be made.
 fn look(
     file: &LogFile,
     source: &mut Source,
@@ -219,7 +219,7 @@ fn look(
         Err(problem) => return Ok(Err(problem)),
     };
     let findings = &mut table.layout.findings;
-    // Where a header stands in rows says nothing of a file without rows.
+    // Header rows have no meaning in a file of columns.
     findings.retain(|finding| !finding.starts_with("header: ") && (waveform.is_none() || !finding.starts_with("clock: ")));
     if let Some(waveform) = waveform {
         findings.push(format!("clock: a waveform with a value every {} s (time, rate)", waveform.interval_s));
@@ -229,7 +229,7 @@ fn look(
     Ok(Ok(table))
 }
 
-/// Names, and units where any is known.
+/// Names, and units if any is known.
 fn head(channels: &[Channel]) -> Vec<Vec<String>> {
     let names = channels.iter().map(|channel| channel.path.channel_name().to_owned()).collect();
     if channels.iter().all(|channel| channel.unit.is_empty()) {
@@ -258,7 +258,7 @@ impl Log for Tdms {
     }
 }
 
-/// The channels of a group, some rows at a time; shorter ones are empty behind their end.
+/// The channels of a group, some rows at a time; shorter ones are empty after their end.
 struct GroupChunks<'a> {
     file: &'a LogFile,
     source: &'a mut Source,

@@ -1,4 +1,4 @@
-//! A cell of a table whose cells have types.
+//! A cell in a table with typed cells.
 
 use crate::instant::{Instant, NS_PER_DAY, parse_instant};
 use crate::number::parse_number;
@@ -6,7 +6,7 @@ use jiff::ToSpan;
 use jiff::civil::{Date, Time};
 use mapper_logs::DateOrder;
 
-/// What a cell holds.
+/// The contents of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Value {
     Empty,
@@ -24,7 +24,7 @@ impl Value {
         }
     }
 
-    /// The number in it; NaN where there is none.
+    /// The number in it; NaN without a number.
     pub(crate) fn number(&self) -> f64 {
         match self {
             Value::Number(value) => *value,
@@ -42,7 +42,7 @@ impl Value {
         }
     }
 
-    /// As a cell of a text file would have it.
+    /// Its text as in a cell of a text file.
     pub(crate) fn text(&self) -> String {
         match self {
             Value::Empty => String::new(),

@@ -1,4 +1,4 @@
-//! Workbooks of Excel: a table on each sheet.
+//! Excel workbooks: a table on each sheet.
 
 mod check;
 
@@ -16,22 +16,22 @@ pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 const NAME: &str = "Excel";
 
-/// How many rows of a sheet are looked at.
+/// Number of rows of a sheet in the sample.
 const HEAD_ROWS: usize = 400;
 
-/// How much text of its first rows is looked at, bytes.
+/// Maximum text in its first rows, bytes.
 const HEAD_BYTES: usize = 1 << 24;
 
-/// Longest text of a cell that is kept, bytes: a name, a unit or a date is shorter.
+/// Maximum stored length of a cell's text, bytes: a name, a unit or a date is shorter.
 const TEXT_LIMIT: usize = 1 << 10;
 
 /// Days from the origin of Excel's dates to 1970-01-01.
 const EXCEL_EPOCH_DAYS: i64 = 25_569;
 
-/// Days since Excel's origin that are no dates of a log any more: the year 2200.
+/// Maximum date of a log in days since Excel's origin: the year 2200.
 const LAST_DAY: f64 = 109_940.0;
 
-/// A zip file with the parts of a workbook; what they are shows when it is opened.
+/// A zip file with the parts of a workbook; their contents are checked when it is opened.
 fn recognises(head: &[u8]) -> bool {
     let holds = |part: &[u8]| head.windows(part.len()).any(|window| window == part);
     head.starts_with(b"PK\x03\x04") && (holds(b"[Content_Types]") || holds(b"xl/") || holds(b"docProps/"))
@@ -114,30 +114,30 @@ fn value_of(data: &DataRef<'_>) -> Value {
     }
 }
 
-/// What is kept of a text.
+/// The stored start of a text.
 fn start(text: &str) -> String {
     let text = text.trim();
     text.get(..text.floor_char_boundary(TEXT_LIMIT)).unwrap_or_default().to_owned()
 }
 
-/// Excel's days since its origin; below one a time of day.
+/// Excel's days since its origin; a value below one is a time of day.
 fn instant_of(days: f64) -> Option<Instant> {
     if !(0.0..LAST_DAY).contains(&days) {
         return None;
     }
-    // To the microsecond: the days of now hold no more.
+    // To the microsecond: present-day dates have no finer resolution.
     let ns_of_day = ((days.fract() * NS_PER_DAY as f64) / 1e3).round() as i64 * 1000;
     let day = (days >= 1.0).then_some(days.trunc() as i64 - EXCEL_EPOCH_DAYS);
     Some(Instant { day, ns_of_day: Some(ns_of_day) })
 }
 
-/// The rows of a sheet; those without any cell do not count.
+/// The rows of a sheet; rows without any cell are skipped.
 struct SheetRows<'a> {
     file: LogFile,
     reader: XlsxCellReader<'a, Box<dyn ReadSeek>>,
     /// The first cell of the next row.
     next: Option<(u32, usize, Value)>,
-    /// Whether the last cell was read: behind it the reader complains.
+    /// Whether the last cell was read: the reader fails after it.
     ended: bool,
     row: Vec<Value>,
 }

@@ -1,4 +1,4 @@
-//! Texts as test stands write them, and what is found in them.
+//! Text logs as test stands write them, and the findings about them.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_log_formats::LOG_FORMATS;
@@ -32,7 +32,7 @@ fn names(layout: &Layout) -> Vec<(&str, Option<&str>)> {
     layout.columns.iter().map(|column| (column.name.as_str(), column.unit.as_deref())).collect()
 }
 
-/// The same three rows, however they are written.
+/// The same three rows in any notation.
 const ROWS: [(f64, [f64; 2]); 3] = [(0.0, [1.5, 20.25]), (0.1, [2.5, 20.5]), (0.2, [3.5, 20.75])];
 
 fn assert_rows(rows: &[(f64, Vec<f64>)], what: &str) {

@@ -1,4 +1,4 @@
-//! Damaged, foreign and hostile logs: no panic, no hang, no allocation beyond what the file itself has.
+//! Damaged, foreign and hostile logs: no panic, no hang, no allocation larger than the file justifies.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_log_formats::LOG_FORMATS;
@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Everything that `mapper log inspect` does with a file.
+/// Does everything that `mapper log inspect` does with a file.
 fn look(bytes: &[u8]) {
     let file = LogFile::of_bytes(Path::new("log"), bytes);
     let Ok((_, mut log)) = LOG_FORMATS.open(&file, &LogOptions::default()) else { return };
@@ -44,12 +44,12 @@ fn mdf4() -> Vec<u8> {
     bytes
 }
 
-/// The least workbook, stored without compression so that a flipped byte reaches the XML.
+/// A minimal workbook, stored without compression so that a flipped byte reaches the XML.
 fn xlsx() -> Vec<u8> {
     workbook(&parts(HEADER, SHARED_STRINGS))
 }
 
-/// The cells of the first row: one holds its text, the other names a shared one.
+/// The cells of the first row: one holds its text, the other refers to a shared one.
 const HEADER: &str =
     "<c r=\"A1\" t=\"inlineStr\"><is><t>time [s]</t></is></c><c r=\"B1\" t=\"s\"><v>0</v></c>";
 
@@ -206,7 +206,7 @@ fn a_line_of_cells_alone_is_refused() {
     let file = LogFile::of_bytes(Path::new("log"), many.as_bytes());
     let error = LOG_FORMATS.open(&file, &LogOptions::default()).err().unwrap().to_string();
     assert!(error.contains("at most 10000"), "{error}");
-    // Names by the thousand, each of which could be a clock.
+    // Thousands of names, each a possible clock.
     look(["time;".repeat(9_000), "1;".repeat(9_000), "2;".repeat(9_000)].join("\n").as_bytes());
 }
 

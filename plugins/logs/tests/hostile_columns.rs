@@ -1,4 +1,4 @@
-//! Damaged and hostile TDMS, Parquet and Arrow: no panic, no hang, no allocation beyond what the file itself has.
+//! Damaged and hostile TDMS, Parquet and Arrow: no panic, no hang, no allocation larger than the file justifies.
 #![cfg(all(feature = "parquet", feature = "tdms"))]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 

@@ -1,4 +1,4 @@
-//! What may be said about an MDF 4 file, and channels of one name.
+//! Options for an MDF 4 file, and channels with equal names.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_log_formats::LOG_FORMATS;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A backend by its name, with settings that only it understands.
+/// A backend by its name, with settings that only it interprets.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BackendChoice {
     /// Name, e.g. `virtual_lab`.

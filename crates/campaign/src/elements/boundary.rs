@@ -7,7 +7,7 @@ use mapper_physics::params::BoundaryConditions;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// What the rig and the cell hold constant.
+/// Conditions that the rig and the cell hold constant.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BoundaryFile {
@@ -29,7 +29,7 @@ pub(crate) struct BoundaryFile {
     /// Oil inlet temperature.
     #[schemars(extend("x-min" = "230 K", "x-max" = "450 K"), example = &"50 degC")]
     oil_temperature: Quantity<Temperature>,
-    /// What is held at the compressor's outlet temperature instead, at each point at that of the nominal machine settled there: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. Nothing if none is given.
+    /// Conditions that follow the compressor's outlet temperature instead, at each point that of the nominal machine in steady state: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. None if it is left out.
     #[serde(default)]
     #[schemars(extend("uniqueItems" = true, "examples" = [["turbine_inlet_temperature", "oil_temperature"]]))]
     follow_outlet: Vec<FollowerName>,
@@ -44,7 +44,7 @@ pub(crate) enum FollowerName {
 }
 
 impl BoundaryFile {
-    /// The boundary conditions; P3 and valve are the plan's, and without flow and at 1 until it sets them.
+    /// The boundary conditions; P3 and valve come from the plan, and are set to no flow and to 1 until then.
     pub(crate) fn conditions(&self) -> BoundaryConditions {
         BoundaryConditions {
             t1_k: self.inlet_temperature.inside,
@@ -58,7 +58,7 @@ impl BoundaryFile {
         }
     }
 
-    /// What is held at the outlet temperature instead.
+    /// Conditions that follow the outlet temperature instead.
     pub(crate) fn follow_outlet(&self) -> FollowOutlet {
         FollowOutlet {
             turbine_inlet: self.follow_outlet.contains(&FollowerName::TurbineInletTemperature),

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-/// Units in which people are shown results, by their symbols; convert with [`crate::units::Kind::unit`].
+/// Display units, by their symbols; convert with [`crate::units::Kind::unit`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DisplayUnits {

@@ -1,4 +1,4 @@
-//! `machine.geometry:`, overwriting what Burke et al., Appendix A, have.
+//! `machine.geometry:`, which overrides the values of Burke et al., Appendix A.
 
 use crate::si::set;
 use crate::units::{Area, Conductance, Conductivity, Inertia, Length, Mass, MassFlow, Quantity, Volume};
@@ -25,7 +25,7 @@ pub(crate) struct GeometryFile {
 }
 
 impl GeometryFile {
-    /// Overwrites what the file says.
+    /// Overrides the defaults with the values of the file.
     pub(crate) fn apply(self, params: &mut Params) {
         self.compressor.unwrap_or_default().apply(params);
         self.turbine.unwrap_or_default().apply(params);
@@ -35,7 +35,7 @@ impl GeometryFile {
     }
 }
 
-/// Overwrites a default with a plain number.
+/// Overrides a default with a plain number.
 fn set_number(target: &mut f64, number: Option<f64>) {
     *target = number.unwrap_or(*target);
 }
@@ -72,7 +72,7 @@ pub(crate) struct CompressorFile {
     /// Diameter of the inlet pipe.
     #[schemars(extend("x-above" = "0 mm"))]
     inlet_diameter: Option<Quantity<Length>>,
-    /// Heat-transfer coefficient before the wheel: `shared`, the default, is that after it; `own` follows the same Nusselt law at the inlet's diameter and temperature. It matters where `alpha_area` is above 0.
+    /// Heat-transfer coefficient before the wheel: `shared`, the default, equals that after the wheel; `own` follows the same Nusselt law at the inlet's diameter and temperature. It only matters if `alpha_area` is above 0.
     inlet_convection: Option<InletConvection>,
     /// Diameter of the outlet pipe.
     #[schemars(extend("x-above" = "0 mm"))]

@@ -14,7 +14,7 @@ use std::collections::HashSet;
 
 /// Maximum number of points a grid may have: four weeks of two-minute steps.
 const POINT_LIMIT: usize = 20_000;
-/// Ways to write a grid.
+/// Forms of a grid.
 const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{speed: 50 krpm, opening: 0.5}`, or `lines`, \
                      a list of `{speed_corrected: 50 krpm, points: 6}`";
 
@@ -22,13 +22,13 @@ const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{spe
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GridFile {
-    /// Speed lines; each is visited at each of `openings`.
+    /// Shaft speeds; each is visited at each of `openings`.
     #[schemars(length(min = 1, max = 1000), extend("examples" = [["50 krpm", "80 krpm"]]))]
     speeds: Option<Vec<SpeedFile>>,
     /// Openings of the back-pressure valve relative to its nominal area, plain numbers above 0, at most 2.5.
     #[schemars(length(min = 1, max = 1000), extend("examples" = [[0.5, 1.0, 2.5]]))]
     openings: Option<Vec<Opening>>,
-    /// Points of `speeds` x `openings` that are left out.
+    /// Points of `speeds` x `openings` to leave out.
     #[schemars(length(min = 1, max = 20000))]
     skip: Option<Vec<PointFile>>,
     /// The points one by one.
@@ -37,7 +37,7 @@ pub(crate) struct GridFile {
     /// Speed lines by their corrected speeds, each with points from choke to surge; the openings are found on the nominal machine.
     #[schemars(length(min = 1, max = 200))]
     lines: Option<Vec<LineFile>>,
-    /// Surge margin of the last point of each of `lines`: corrected flow over the nominal map's surge flow at equal corrected speed, minus one. 10 % if none is given, or `limits.surge_margin` where that is more.
+    /// Surge margin of the last point of each of `lines`: corrected flow over the nominal map's surge flow at equal corrected speed, minus one. 10 % if none is given, or `limits.surge_margin` if that is larger.
     #[schemars(extend("x-min" = "-50 %", "x-max" = "200 %"), example = &"10 %")]
     surge_margin: Option<Quantity<Fraction>>,
     /// Opening of the first point of each of `lines`; 2.5 if none is given.
@@ -73,9 +73,9 @@ impl GridFile {
         self.lines.iter().flatten().map(|line| line.request(defaults, reference, limits)).collect()
     }
 
-    /// The points and where each stands: its entry in `points`, or its speed in `speeds`.
+    /// The points and the place of each in the file: its entry in `points`, or its speed in `speeds`.
     ///
-    /// Of `lines`, whose openings are not known yet, the first point of each.
+    /// Returns only the first point of each of `lines`, since their openings are not known yet.
     pub(crate) fn points(&self, lines: &[LineRequest], t1_k: f64) -> (Vec<OperatingPoint>, Vec<Vec<Step>>) {
         if !lines.is_empty() {
             let first = |(index, line): (usize, &LineRequest)| {
@@ -113,7 +113,7 @@ fn rounded(rpm: f64, opening: f64) -> (i64, i64) {
     ((rpm * 1e3).round() as i64, (opening * 1e6).round() as i64)
 }
 
-/// The grid is written in one of its forms, without duplicates, within the limits.
+/// Checks that the grid has one of its forms, without duplicates and within the limits.
 pub(crate) fn check(check: &mut Check<'_>) {
     let Some(grid) = check.get(&steps!["grid"]) else { return };
     if grid.entries().is_empty() && !matches!(&grid.content, Content::Mapping(_)) {

@@ -16,33 +16,33 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// What ends a run, or a step, before harm is done. Each guard is there without being named, at the limit of the same name; what is written here makes it tighter or changes what it does. None can be switched off.
+/// Guards that end a run, or a step, before damage is done. Each guard is active by default, at the limit of the same name; an entry here tightens it or changes its reaction. None can be switched off.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GuardsFile {
-    /// Shaft speed; trips above `limits.speed` if nothing else is said, and latches.
+    /// Shaft speed; by default trips above `limits.speed` and locks the rig.
     #[serde(default)]
     overspeed: OverspeedFile,
-    /// T2; above `limits.compressor_outlet_temperature` if nothing else is said.
+    /// T2; by default trips above `limits.compressor_outlet_temperature`.
     #[serde(default)]
     compressor_outlet_temperature: TemperatureFile,
-    /// T3; above `limits.turbine_inlet_temperature` if nothing else is said.
+    /// T3; by default trips above `limits.turbine_inlet_temperature`.
     #[serde(default)]
     turbine_inlet_temperature: TemperatureFile,
-    /// P3; above the highest `limits.turbine_inlet_pressure` if nothing else is said.
+    /// P3; by default trips above the highest `limits.turbine_inlet_pressure`.
     #[serde(default)]
     turbine_inlet_pressure: PressureFile,
-    /// Oil inlet temperature; not guarded if nothing is said.
+    /// Oil inlet temperature; not guarded by default.
     oil_temperature: Option<OilFile>,
-    /// Change of the compressor housing; noted beyond `limits.housing_gradient` within a dwell if nothing else is said.
+    /// Change of the compressor housing; by default noted beyond `limits.housing_gradient` within a dwell.
     housing_gradient: Option<HousingFile>,
     /// Variation of flow and pressure from one tenth of a second to the next.
     #[serde(default)]
     surge: SurgeFile,
-    /// The speed that a step asks for.
+    /// The target speed of a step.
     #[serde(default)]
     speed: SpeedFile,
-    /// What holds for every guarded signal.
+    /// Settings of every guarded signal.
     #[serde(default)]
     signals: SignalsFile,
 }
@@ -54,13 +54,13 @@ struct OverspeedFile {
     /// Trips above this speed, at most `limits.speed`.
     #[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"180 krpm")]
     above: Option<Quantity<Speed>>,
-    /// Counts as beyond until it is so far below; 0 rpm if none is given.
+    /// Hysteresis: the trip ends when the speed is this far below; 0 rpm if none is given.
     #[schemars(extend("x-min" = "0 rpm", "x-max" = "100 krpm"), example = &"500 rpm")]
     hysteresis: Option<Quantity<Speed>>,
-    /// Trips after so long; 0.2 s if none is given, so that one noisy sample does not.
+    /// Trips after this time; 0.2 s if none is given, so that one noisy sample does not.
     #[schemars(extend("x-min" = "0 s", "x-max" = "10 s"), example = &"0.2 s")]
     dwell: Option<Quantity<Duration>>,
-    /// What is done; `latch` if none is given.
+    /// Reaction; `latch` if none is given.
     #[schemars(example = &"latch")]
     reaction: Option<Reaction>,
 }
@@ -72,19 +72,19 @@ struct TemperatureFile {
     /// Trips above this temperature, at most the limit of the same name.
     #[schemars(extend("x-min" = "250 K", "x-max" = "1400 K"), example = &"250 degC")]
     above: Option<Quantity<Temperature>>,
-    /// Trips where it changes by more than this within `within`.
+    /// Trips if it changes by more than this within `within`.
     #[schemars(extend("x-above" = "0 K", "x-max" = "1000 K"), example = &"60 K")]
     change: Option<Quantity<TemperatureDifference>>,
     /// Time of `change`; 10 s if none is given.
     #[schemars(extend("x-above" = "0 s", "x-max" = "10 min"), example = &"10 s")]
     within: Option<Quantity<Duration>>,
-    /// Counts as beyond until it is so far below; 0 K if none is given.
+    /// Hysteresis: the trip ends when the temperature is this far below; 0 K if none is given.
     #[schemars(extend("x-min" = "0 K", "x-max" = "200 K"), example = &"2 K")]
     hysteresis: Option<Quantity<TemperatureDifference>>,
-    /// Trips after so long; 0.2 s if none is given.
+    /// Trips after this time; 0.2 s if none is given.
     #[schemars(extend("x-min" = "0 s", "x-max" = "10 min"), example = &"0.2 s")]
     dwell: Option<Quantity<Duration>>,
-    /// What is done; `safe` if none is given.
+    /// Reaction; `safe` if none is given.
     #[schemars(example = &"safe")]
     reaction: Option<Reaction>,
 }
@@ -96,13 +96,13 @@ struct PressureFile {
     /// Trips above this pressure, at most the highest of `limits.turbine_inlet_pressure`.
     #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
     above: Option<Quantity<Pressure>>,
-    /// Counts as beyond until it is so far below; 0 Pa if none is given.
+    /// Hysteresis: the trip ends when the pressure is this far below; 0 Pa if none is given.
     #[schemars(extend("x-min" = "0 Pa", "x-max" = "200 kPa"), example = &"1 kPa")]
     hysteresis: Option<Quantity<PressureDifference>>,
-    /// Trips after so long; 0.2 s if none is given.
+    /// Trips after this time; 0.2 s if none is given.
     #[schemars(extend("x-min" = "0 s", "x-max" = "10 min"), example = &"0.2 s")]
     dwell: Option<Quantity<Duration>>,
-    /// What is done; `safe` if none is given.
+    /// Reaction; `safe` if none is given.
     #[schemars(example = &"safe")]
     reaction: Option<Reaction>,
 }
@@ -117,13 +117,13 @@ struct OilFile {
     /// Trips below this temperature while gas flows.
     #[schemars(extend("x-min" = "250 K", "x-max" = "500 K"), example = &"20 degC")]
     below: Option<Quantity<Temperature>>,
-    /// Counts as beyond until it is so far back; 0 K if none is given.
+    /// Hysteresis: the trip ends when the temperature is this far inside; 0 K if none is given.
     #[schemars(extend("x-min" = "0 K", "x-max" = "200 K"), example = &"2 K")]
     hysteresis: Option<Quantity<TemperatureDifference>>,
-    /// Trips after so long; 1 s if none is given.
+    /// Trips after this time; 1 s if none is given.
     #[schemars(extend("x-min" = "0 s", "x-max" = "10 min"), example = &"1 s")]
     dwell: Option<Quantity<Duration>>,
-    /// What is done; `safe` if none is given.
+    /// Reaction; `safe` if none is given.
     #[schemars(example = &"safe")]
     reaction: Option<Reaction>,
 }
@@ -132,13 +132,13 @@ struct OilFile {
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct HousingFile {
-    /// Trips where the housing changes by more than this within `within`.
+    /// Trips if the housing changes by more than this within `within`.
     #[schemars(extend("x-above" = "0 K", "x-max" = "500 K"), example = &"30 K")]
     change: Quantity<TemperatureDifference>,
     /// Time of `change`; the dwell if none is given.
     #[schemars(extend("x-above" = "0 s", "x-max" = "1 h"), example = &"120 s")]
     within: Option<Quantity<Duration>>,
-    /// What is done; `note` if none is given.
+    /// Reaction; `note` if none is given.
     #[schemars(example = &"note")]
     reaction: Option<Reaction>,
 }
@@ -147,16 +147,16 @@ struct HousingFile {
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SurgeFile {
-    /// Variation of the flow that counts, one standard deviation; 5 % if none is given.
+    /// Variation of the flow from which surge is suspected, one standard deviation; 5 % if none is given.
     #[schemars(extend("x-above" = "0 %", "x-max" = "50 %"), example = &"5 %")]
     flow: Option<Quantity<Fraction>>,
-    /// Variation of P2 or P1 that counts together with that of the flow; 1 % if none is given.
+    /// Variation of P2 or P1 that must occur together with that of the flow; 1 % if none is given.
     #[schemars(extend("x-above" = "0 %", "x-max" = "50 %"), example = &"1 %")]
     pressure: Option<Quantity<Fraction>>,
-    /// Trips after so long: a jump may touch the surge line, a point may not stay there; 5 s if none is given.
+    /// Trips after this time: a jump may touch the surge line, a point may not stay there; 5 s if none is given.
     #[schemars(extend("x-min" = "0 s", "x-max" = "5 s"), example = &"5 s")]
     dwell: Option<Quantity<Duration>>,
-    /// What is done; `safe` if none is given.
+    /// Reaction; `safe` if none is given.
     #[schemars(example = &"skip_step")]
     reaction: Option<Reaction>,
 }
@@ -165,27 +165,27 @@ struct SurgeFile {
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SpeedFile {
-    /// Largest deviation over the last 10 s of a step; 5 % if none is given, 25 % where `speed_control` is off.
+    /// Largest deviation over the last 10 s of a step; 5 % if none is given, 25 % if `speed_control` is off.
     #[schemars(extend("x-above" = "0 %", "x-max" = "25 %"), example = &"5 %")]
     band: Option<Quantity<Fraction>>,
-    /// What is done; `safe` if none is given.
+    /// Reaction; `safe` if none is given.
     #[schemars(example = &"safe")]
     reaction: Option<Reaction>,
 }
 
-/// What holds for every guarded signal.
+/// Settings of every guarded signal.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct SignalsFile {
-    /// A guarded signal without a good reading for so long ends the run; 3 s if none is given.
+    /// The run ends if a guarded signal has no good reading for this time; 3 s if none is given.
     #[schemars(extend("x-above" = "0 s", "x-max" = "10 s"), example = &"3 s")]
     age: Option<Quantity<Duration>>,
-    /// N, P2 and T2 that have not changed by a bit for so long after a jump of the setpoints are frozen; 20 s if none is given.
+    /// N, P2 and T2 count as frozen if they have not changed by a bit for this time after a jump of the setpoints; 20 s if none is given.
     #[schemars(extend("x-min" = "2 s", "x-max" = "10 min"), example = &"20 s")]
     frozen: Option<Quantity<Duration>>,
 }
 
-/// What the guards are made from beside their own keys.
+/// Inputs of the guards in addition to their own keys.
 pub(crate) struct GuardedBy<'a> {
     pub(crate) limits: &'a Limits,
     pub(crate) sensors: &'a BTreeMap<Channel, SensorDeclaration>,
@@ -193,7 +193,7 @@ pub(crate) struct GuardedBy<'a> {
     pub(crate) speed_is_held: bool,
 }
 
-/// One noisy sample at 10 Hz is none: three in a row are.
+/// One noisy sample at 10 Hz must not trip; three in a row do.
 const DWELL_S: f64 = 0.2;
 const AGE_S: f64 = 3.0;
 const FROZEN_S: f64 = 20.0;
@@ -205,7 +205,7 @@ const SPEED_BAND_RATIO: f64 = 0.05;
 const OPEN_LOOP_BAND_RATIO: f64 = 0.25;
 
 impl GuardsFile {
-    /// All guards of a campaign, with what the file does not say filled in.
+    /// All guards of a campaign, with defaults filled in.
     pub(crate) fn guards(self, by: &GuardedBy<'_>) -> GuardSet {
         let GuardedBy { limits, sensors, dwell_s, speed_is_held } = *by;
         let age_s = or(self.signals.age, AGE_S);
@@ -261,7 +261,7 @@ impl GuardsFile {
                 change: change.inside,
                 within_s: or(file.within, CHANGE_WITHIN_S),
             });
-            // T2 is watched to be alive in any case.
+            // T2 must be monitored in any case.
             if above.is_some() || change.is_some() || channel == Channel::T2 {
                 signals.push(SignalGuard {
                     above,
@@ -272,7 +272,7 @@ impl GuardsFile {
                 });
             }
         }
-        // The third channel that has to be alive: without it nobody sees surge.
+        // The third monitored channel: without it surge would go unnoticed.
         signals.push(guard(GuardName::Signals, Channel::P2, Reaction::Safe));
         if let Some(oil) = self.oil_temperature {
             signals.push(SignalGuard {
@@ -310,7 +310,7 @@ impl GuardsFile {
     }
 }
 
-/// A guard lies within its limit: beyond it, it would guard nothing.
+/// Checks that a guard lies within its limit; beyond the limit it would have no effect.
 pub(crate) fn check(check: &mut Check<'_>) {
     let pairs: [(Kind, &str, &[&str]); 4] = [
         (Kind::Speed, "overspeed", &["limits", "speed"]),
@@ -369,7 +369,7 @@ mod tests {
         let overspeed = of(&usual, GuardName::Overspeed).unwrap();
         assert_eq!((overspeed.above, overspeed.reaction), (Some(180e3), Reaction::Latch));
         assert_eq!(of(&usual, GuardName::TurbineInletPressure).unwrap().above, Some(400e3));
-        // Nobody gave a limit: it is watched to be alive, and no rig that needs the guard accepts that.
+        // No limit is given: it is only monitored for valid readings, and a rig that needs the guard does not accept that.
         assert_eq!(of(&usual, GuardName::CompressorOutletTemperature).unwrap().above, None);
         assert!(!usual.ends_on(GuardName::CompressorOutletTemperature));
         assert!(usual.ends_on(GuardName::TurbineInletTemperature) && usual.ends_on(GuardName::Surge));

@@ -11,39 +11,39 @@ use serde::{Deserialize, Serialize};
 pub struct Identification {
     /// Method.
     pub method: Method,
-    /// Part of each step that is used.
+    /// Part of each step that is evaluated.
     pub window: WindowRule,
-    /// Share of the internal area before compression that is assumed, alpha_A, 0..1.
+    /// Assumed share of the internal area before compression, alpha_A, 0..1.
     pub alpha_area_ratio: f64,
-    /// How far the true share may be off that, one standard deviation.
+    /// Uncertainty of that share, one standard deviation.
     pub alpha_area_sigma_ratio: f64,
-    /// When a point counts as settled.
+    /// Criterion for a settled point.
     pub settle_bands: SettleBands,
-    /// Which refinements the joint method makes.
+    /// Parameters of the joint method.
     pub joint: JointSettings,
 }
 
-/// How efficiency and heat-transfer coefficient are found.
+/// Method that identifies efficiency and heat-transfer coefficient.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct IdentificationFile {
-    /// `joint`, the default, fits all points together; `dynamic` finds both from the transient of each step by itself, as the paper does; `steady` is conventional mapping.
+    /// `joint`, the default, fits all points together; `dynamic` identifies both from the transient of each step alone, as in the paper; `steady` is conventional mapping.
     #[schemars(with = "Option<MethodName>")]
     method: Option<Method>,
-    /// Part of the step that is used: `auto`, the default, begins when speed, flow and pressure ratio have settled; or `start` and `end` after the jump.
+    /// Part of the step that is evaluated: `auto`, the default, begins when speed, flow and pressure ratio have settled; or `start` and `end` after the jump.
     #[schemars(example = &"auto")]
     window: Option<WindowFile>,
-    /// Share of the internal area before compression that identification assumes, a plain number from 0 to 1; the machine's if none is given.
+    /// Assumed share of the internal area before compression, a plain number from 0 to 1; the machine's if none is given.
     #[schemars(range(min = 0, max = 1), example = 0.0)]
     alpha_area: Option<f64>,
-    /// How far the true share may be off the assumed one, one standard deviation, a plain number; 0.15 if none is given. `dynamic` cannot find the share, so its intervals contain this; 0 believes the assumption.
+    /// Uncertainty of the assumed share, one standard deviation, a plain number; 0.15 if none is given. `dynamic` cannot identify the share, so its intervals contain this uncertainty; 0 treats the assumed share as exact.
     #[schemars(range(min = 0, max = 1), example = 0.15)]
     alpha_area_sigma: Option<f64>,
     /// Variations within which a point counts as settled.
     #[serde(default, deserialize_with = "SettleBandsElement::deserialize")]
     #[schemars(with = "SettleBandsElement")]
     stabilisation: SettleBands,
-    /// What `joint` finds and what it takes as declared; everything is found where nothing is said.
+    /// Parameters that `joint` identifies or takes as declared; by default it identifies all.
     #[serde(default)]
     joint: JointSettings,
 }
@@ -59,7 +59,7 @@ enum MethodName {
 }
 
 impl IdentificationFile {
-    /// With the machine's own alpha_A where the file says nothing of it.
+    /// With the machine's own alpha_A if the file does not give it.
     pub(crate) fn identification(self, alpha_area_ratio: f64) -> Identification {
         Identification {
             method: self.method.unwrap_or(Method::Joint),

@@ -8,14 +8,14 @@ use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// What the run must never leave.
+/// Limits that the run must never exceed.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LimitsFile {
     /// Highest shaft speed.
     #[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"180 krpm")]
     speed: Quantity<Speed>,
-    /// Lowest and highest turbine inlet pressure the rig may be told, P3.
+    /// Lowest and highest allowed setpoint of the turbine inlet pressure, P3.
     turbine_inlet_pressure: PressureRangeFile,
     /// Highest turbine inlet temperature, T3.
     #[schemars(extend("x-min" = "250 K", "x-max" = "1400 K"), example = &"600 degC")]
@@ -23,7 +23,7 @@ pub(crate) struct LimitsFile {
     /// Highest compressor outlet temperature, T2.
     #[schemars(extend("x-min" = "250 K", "x-max" = "800 K"), example = &"250 degC")]
     compressor_outlet_temperature: Option<Quantity<Temperature>>,
-    /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one; 0 %, the surge line, if none is given. Below 0 % for a machine that is known to be stable beyond the nominal map's line.
+    /// Smallest surge margin: flow over the surge flow at equal corrected speed, minus one; 0 %, the surge line, if none is given. Use a value below 0 % for a machine that is known to be stable beyond the nominal map's line.
     #[schemars(extend("x-min" = "-50 %", "x-max" = "200 %"), example = &"2 %")]
     surge_margin: Option<Quantity<Fraction>>,
     /// Largest change of the compressor housing within an identification window.
@@ -41,7 +41,7 @@ pub(crate) struct PressureRangeFile {
     /// Highest pressure.
     #[schemars(extend("x-above" = "0 kPa", "x-max" = "2 MPa"), example = &"400 kPa")]
     max: Quantity<Pressure>,
-    /// Time the rig takes from the lowest to the highest pressure; if none is given it plays no part in the plan.
+    /// Time the rig takes from the lowest to the highest pressure; if none is given, the plan ignores it.
     #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"10 s")]
     stroke: Option<Quantity<Duration>>,
 }
@@ -62,7 +62,7 @@ impl From<LimitsFile> for Limits {
     }
 }
 
-/// The limits leave room, and the boundary conditions lie within them.
+/// Checks that the limits leave a valid range and contain the boundary conditions.
 pub(crate) fn check(check: &mut Check<'_>) {
     let low = check.quantity(Kind::Pressure, &steps!["limits", "turbine_inlet_pressure", "min"]);
     let high_path = steps!["limits", "turbine_inlet_pressure", "max"];

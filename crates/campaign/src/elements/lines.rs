@@ -10,16 +10,16 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::HashSet;
 
-/// Surge margin of a line's last point where the file gives none.
+/// Surge margin of a line's last point if the file gives none.
 const USUAL_SURGE_MARGIN_RATIO: f64 = 0.1;
-/// What a line is written with.
+/// Keys of a line.
 const FORM: &str = "write `{speed_corrected: 50 krpm, points: 6}`, or `spacing: 8 g/s` in place of `points`";
 
 /// A speed line: its corrected speed, and its points from choke to surge by their number or by their spacing.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LineFile {
-    /// Corrected shaft speed, to the campaign's reference state; the physical speed follows from T1.
+    /// Corrected shaft speed, in the campaign's reference state; the physical speed follows from T1.
     #[schemars(extend("x-above" = "0 rpm", "x-max" = "1000 krpm"), example = &"50 krpm")]
     speed_corrected: Quantity<Speed>,
     /// Number of points, evenly spaced in corrected flow, both ends included.
@@ -35,7 +35,7 @@ pub(crate) struct LineFile {
     widest_opening: Option<Opening>,
 }
 
-/// What holds for all lines that do not say otherwise.
+/// Defaults of all lines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LineDefaults {
     pub surge_margin: Option<Quantity<Fraction>>,
@@ -43,7 +43,7 @@ pub(crate) struct LineDefaults {
 }
 
 impl LineFile {
-    /// The line in SI. `limits`: no point is asked for where none may be.
+    /// The line in SI. `limits`: no point may violate them.
     pub(crate) fn request(
         &self,
         defaults: LineDefaults,
@@ -56,7 +56,7 @@ impl LineFile {
             reference,
             spread: match (self.points, self.spacing) {
                 (None, Some(spacing)) => Spread::SpacingKgS(spacing.inside),
-                // The check refuses a line with neither.
+                // The check rejects a line that has neither.
                 (count, _) => Spread::Points(count.unwrap_or(2)),
             },
             surge_margin_ratio: margin
@@ -69,7 +69,7 @@ impl LineFile {
     }
 }
 
-/// Each line says how many points it has in one way, and no line appears twice.
+/// Checks that each line defines its points in one way, and that no line appears twice.
 pub(crate) fn check(check: &mut Check<'_>) {
     let mut seen = HashSet::new();
     for index in 0..check.count(&steps!["grid", "lines"]) {
@@ -117,7 +117,7 @@ mod tests {
         let plain = line.request(none, ReferenceState::SAE, &limits(None));
         assert_eq!((plain.surge_margin_ratio, plain.widest_opening_ratio), (0.1, 2.5));
         assert_eq!(plain.spread, Spread::SpacingKgS(0.008));
-        // Never where a limit forbids it.
+        // Never at a place that a limit forbids.
         assert_eq!(line.request(none, ReferenceState::SAE, &limits(Some(0.2))).surge_margin_ratio, 0.2);
         let all = LineDefaults {
             surge_margin: crate::testing::any("3 %").ok(),

@@ -26,7 +26,7 @@ pub struct Machine {
     pub map: MapSource,
 }
 
-/// Where the nominal compressor map comes from.
+/// Source of the nominal compressor map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapSource {
@@ -34,7 +34,7 @@ pub enum MapSource {
     ClosedForm,
     /// A table.
     Table {
-        /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
+        /// Path as resolved from the campaign file. Not part of the canonical JSON: only the text identifies the map.
         #[serde(skip)]
         path: PathBuf,
         /// The path as the campaign writes it. Not part of the canonical JSON either.
@@ -51,20 +51,20 @@ pub enum MapSource {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MachineFile {
-    /// Name of the machine, as it stands on the map.
+    /// Name of the machine, as shown on the map.
     #[schemars(length(min = 1), example = &"turbo_a")]
     name: String,
     /// Serial number; put it into quotes if it is a number.
     #[schemars(example = &"TA-0001")]
     serial_number: Option<String>,
-    /// Sizes and masses; what is left out is that of Burke et al., Appendix A.
+    /// Sizes and masses; omitted values are those of Burke et al., Appendix A.
     geometry: Option<GeometryFile>,
     /// The nominal compressor map: `closed_form`, or a table as `file` with its `reference` state.
     #[schemars(example = &"closed_form")]
     map: MapFile,
 }
 
-// Untagged: which of the two it is shows in the YAML's own form, and the schema is checked before.
+// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum MapFile {
@@ -91,10 +91,10 @@ pub(crate) struct TableFile {
 }
 
 impl MachineFile {
-    /// The machine with the map that the file names, and the T2 probe that its sensors declare.
+    /// The machine with the map of the file, and the T2 probe declared for its sensors.
     ///
     /// # Errors
-    /// Where the map file can no longer be read.
+    /// If the map file can no longer be read.
     pub(crate) fn machine(
         self,
         probe_diameter_m: f64,
@@ -116,7 +116,7 @@ impl MachineFile {
     }
 }
 
-/// The map file can be read, and is a map.
+/// Checks that the map file can be read and is a map.
 pub(crate) fn check(check: &mut Check<'_>) {
     let steps = steps!["machine", "map", "file"];
     let Some(name) = check.text(&steps).filter(|name| !name.is_empty()) else { return };
@@ -127,7 +127,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
             let remedy = "write its path relative to the campaign file, or `map: closed_form`";
             check.note(FindingKind::MissingFile, &steps, message, remedy);
         }
-        // Whether a table is a map does not depend on its reference state, which may be missing yet.
+        // This check does not depend on the reference state, which may still be missing.
         Ok(text) => {
             if let Err(error) = nominal_table(&text, ReferenceState::SAE) {
                 let message = format!("the map file `{}` is not a map: {error}", path.display());

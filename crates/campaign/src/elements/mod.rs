@@ -1,10 +1,10 @@
-//! The elements of a campaign, one file each: how it is written (struct, schema, range, default), what it becomes in SI,
-//! what it must fit, and the tests of all that.
+//! The elements of a campaign, one file each: its form (struct, schema, range, default), its value in SI,
+//! its consistency checks, and the tests of all that.
 //!
-//! Doc comments of what is deserialised become the schema's descriptions, which editors show and messages quote: they
-//! say what to write. `x-quantity`, `x-min`, `x-max` and `x-above` are explained at [`crate::units::Quantity`].
+//! Doc comments of deserialised types become the schema's descriptions, which editors show and messages quote: they
+//! describe what to write. `x-quantity`, `x-min`, `x-max` and `x-above` are explained at [`crate::units::Quantity`].
 //!
-//! Where the program's own struct stands in `mapper-core`, the element is its `serde` remote: the compiler compares the
+//! If the program's own struct is in `mapper-core`, the element is its `serde` remote: the compiler compares the
 //! fields of both.
 
 pub(crate) mod backend;

@@ -1,4 +1,4 @@
-//! The opening of the back-pressure valve, as it is written wherever one is.
+//! The opening of the back-pressure valve, in the form used by all elements.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -3,25 +3,25 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Directory of the run directories where the file names none.
+/// Parent of the run directories if the file gives none.
 const USUAL_DIRECTORY: &str = "runs";
-/// Formats that are written where the file names none.
+/// Output formats if the file gives none.
 const USUAL_FORMATS: [&str; 4] = ["csv", "json", "svg", "fitted"];
 
-/// What is written, and where.
+/// Formats and directory of the results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Outputs {
-    /// Directory of the run directories; `runs` if none is given.
+    /// Parent directory of the run directories; `runs` if none is given.
     #[schemars(length(min = 1), example = &"runs")]
     pub directory: String,
-    /// Formats of the map, each once; csv, json, svg and fitted if none is given. docs/maps.md lists all that can be written.
+    /// Formats of the map, each once; csv, json, svg and fitted if none is given. docs/maps.md lists all supported formats.
     #[schemars(extend("uniqueItems" = true, "examples" = [["csv", "json", "svg"]]))]
     pub formats: Vec<FormatName>,
 }
 
-/// A format of the map by its name, e.g. `csv`. Which names there are is known to whoever holds the table of formats:
-/// [`crate::format_mistake`] is for a name that is not in it.
+/// A format of the map by its name, e.g. `csv`. The owner of the table of formats knows the valid names;
+/// [`crate::format_mistake`] reports any other name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 #[schemars(inline)]

@@ -1,4 +1,4 @@
-//! `readers:`, further sources of channels, which are read beside the rig and never told anything.
+//! `readers:`, auxiliary instruments: further sources of channels, which are read alongside the rig and never commanded.
 
 use super::backend::{BackendChoice, backend};
 use crate::checking::Check;
@@ -8,30 +8,30 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A source of channels beside the rig.
+/// An auxiliary instrument.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReaderChoice {
-    /// Name, for people.
+    /// Display name.
     pub name: String,
-    /// What reads.
+    /// Its backend or driver.
     pub backend: BackendChoice,
-    /// Channels that are taken from it; `None`: all that it delivers.
+    /// Channels to use; `None`: all that it delivers.
     pub channels: Option<Vec<Channel>>,
 }
 
-/// A source that is read beside the rig, and never told anything.
+/// An auxiliary instrument: a source that is read alongside the rig and never commanded.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ReaderFile {
-    /// What reads, by the name of its backend or driver, with its own settings below it.
+    /// Name of its backend or driver, with its own settings below it.
     #[schemars(length(min = 1, max = 1), extend("minProperties" = 1, "maxProperties" = 1), example = serde_json::json!({"ak": {}}))]
     backend: BTreeMap<String, serde_json::Value>,
-    /// Channels that are taken from it, also where the rig delivers them too; all that it delivers if the list is left out.
+    /// Channels to use, even if the rig delivers them too; all that it delivers if the list is left out.
     #[schemars(length(min = 1, max = 19), example = serde_json::json!(["m_c"]))]
     channels: Option<Vec<String>>,
 }
 
-/// The readers, in the order of their names.
+/// The readers, sorted by name.
 pub(crate) fn readers(file: BTreeMap<String, ReaderFile>) -> Vec<ReaderChoice> {
     let choice = |(name, file): (String, ReaderFile)| ReaderChoice {
         name,
@@ -44,7 +44,7 @@ pub(crate) fn readers(file: BTreeMap<String, ReaderFile>) -> Vec<ReaderChoice> {
     file.into_iter().map(choice).collect()
 }
 
-/// Names that can stand in messages, channels that there are, none of them twice.
+/// Checks that names are usable in messages, that channels exist, and that there are no duplicates.
 pub(crate) fn check(check: &mut Check<'_>) {
     let names: Vec<String> = check
         .get(&steps!["readers"])

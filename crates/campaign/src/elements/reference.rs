@@ -5,7 +5,7 @@ use mapper_core::ReferenceState;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-// Untagged: which of the two it is shows in the YAML's own form, and the schema is checked before.
+// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum ReferenceFile {

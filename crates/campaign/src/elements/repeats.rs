@@ -9,12 +9,12 @@ use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Steps between two repeats where the file does not say.
+/// Default number of steps between two repeats.
 const USUAL_SPACING_STEPS: usize = 12;
-/// Repeats where the file does not say.
+/// Default number of repeats.
 const USUAL_COUNT: usize = 2;
 
-// Untagged: which of the two it is shows in the YAML's own form, and the schema is checked before.
+// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum RepeatsFile {
@@ -28,13 +28,13 @@ pub(crate) enum NamedRepeats {
     Off,
 }
 
-/// A jump that is made again and again.
+/// A jump that is repeated.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RepeatedJumpFile {
-    /// The jump; if none is given, from the slowest to the fastest point of the middle opening, or the next best jump that is allowed.
+    /// The jump; if none is given, from the slowest to the fastest point of the middle opening, or the next best allowed jump.
     jump: Option<JumpFile>,
-    /// Steps between two repeats, at most; 12 if none is given.
+    /// Maximum number of steps between two repeats; 12 if none is given.
     #[schemars(range(min = 2, max = 20000), example = 12)]
     every: Option<usize>,
     /// Minimum number of repeats; 2 if none is given.
@@ -42,7 +42,7 @@ pub(crate) struct RepeatedJumpFile {
     at_least: Option<usize>,
 }
 
-/// From where to where.
+/// Start and end of the jump.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JumpFile {
@@ -66,7 +66,7 @@ pub(crate) fn repeats(file: Option<RepeatsFile>) -> Option<Repeats> {
     })
 }
 
-/// A repeated jump leads somewhere.
+/// Checks the points of a repeated jump.
 pub(crate) fn check(check: &mut Check<'_>) {
     let point = |end: &str| {
         let (speed, _) = check.quantity(Kind::Speed, &steps!["repeats", "jump", end, "speed"])?;

@@ -13,13 +13,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a test report needs and no sensor measures.
+/// Information for the test report that no sensor measures.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Report {
-    /// Who ran the test.
+    /// Operator of the test.
     pub operator: Option<String>,
-    /// Where it was run.
+    /// Place of the test.
     pub test_cell: Option<String>,
     /// Day of the last calibration of each sensor, by its symbol, e.g. `T2: 2026-09-01`.
     #[serde(default)]
@@ -29,7 +29,7 @@ pub struct Report {
     #[serde(rename(deserialize = "barometer"), default, deserialize_with = "si_if_given::<Pressure, _>")]
     #[schemars(with = "Option<Quantity<Pressure>>", extend("x-min" = "50 kPa", "x-max" = "120 kPa"))]
     pub barometer_pa: Option<f64>,
-    /// Relative humidity in the cell, whose air the compressor takes in. The air is dry where it is not given.
+    /// Relative humidity in the cell, whose air the compressor takes in. The air is dry if none is given.
     #[serde(rename(deserialize = "humidity"), default, deserialize_with = "si_if_given::<Fraction, _>")]
     #[schemars(with = "Option<Quantity<Fraction>>", extend("x-min" = "0 %", "x-max" = "100 %"), example = &"50 %")]
     pub humidity_ratio: Option<f64>,
@@ -51,19 +51,19 @@ impl Report {
         Air::of_relative_humidity(relative_ratio, temperature_k, pressure_pa)
     }
 
-    /// The air that the compressor takes in: by the humidity in the cell, dry where it is not given.
+    /// The air that the compressor takes in: from the humidity in the cell, dry if none is given.
     pub(crate) fn air(&self, boundary: &BoundaryConditions) -> Air {
         self.humidity_ratio.map_or(Air::DRY, |ratio| self.air_of(ratio, boundary))
     }
 
-    /// One standard deviation of its humidity, kg/kg. Where none is given it lies anywhere between dry and saturated.
+    /// One standard deviation of its humidity, kg/kg. If no humidity is given, it lies anywhere between dry and saturated.
     pub fn humidity_sigma_kg_kg(&self, boundary: &BoundaryConditions) -> f64 {
         let saturated_kg_kg = self.air_of(1.0, boundary).humidity_kg_kg;
         saturated_kg_kg * if self.humidity_ratio.is_some() { HYGROMETER_RATIO } else { ANYWHERE_RATIO }
     }
 }
 
-/// Standard uncertainty of a relative humidity that is read off a hygrometer. Judgement: capacitive ones are sold with 2 to 3 %.
+/// Standard uncertainty of a relative humidity read off a hygrometer. Judgement: capacitive ones are sold with 2 to 3 %.
 const HYGROMETER_RATIO: f64 = 0.03;
 /// Root mean square of a humidity that is uniform between 0 and saturation, over saturation.
 const ANYWHERE_RATIO: f64 = 0.577_350_269_189_625_8;
@@ -94,7 +94,7 @@ struct Date(
      String,
 );
 
-/// Days of calibration are days of the calendar. The form is the schema's business; here only days that no month has.
+/// Checks that days of calibration exist in the calendar. The schema checks their form.
 pub(crate) fn check(check: &mut Check<'_>) {
     let Some(calibration) = check.get(&steps!["report", "calibration"]) else { return };
     for entry in calibration.entries() {
@@ -130,7 +130,7 @@ fn days_of(year: u32, month: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// By the calendar: 1900 was no leap year, 2000 and 2024 were.
+    /// In the calendar 1900 was not a leap year; 2000 and 2024 were.
     #[test]
     fn months_have_their_days() {
         for (year, month, days) in

@@ -5,23 +5,23 @@ use mapper_core::SafeTrajectory;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The way into the safe state, in place of the rig's own: the valve opens and the heater goes off at once, P3 goes down, then the air is cut.
+/// The safe shutdown, in place of the rig's own: the valve opens and the heater goes off at once, P3 goes down, then the air is cut.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SafeStateFile {
-    /// How fast P3 goes down.
+    /// Rate at which P3 goes down.
     #[schemars(extend("x-min" = "1 kPa/s", "x-max" = "10000 kPa/s"), example = &"100 kPa/s")]
     pressure_slew: Quantity<PressureRate>,
-    /// Opening of the back-pressure valve on the way; 1 if none is given. A step that has more keeps it.
+    /// Opening of the back-pressure valve during the shutdown; 1 if none is given. A step with a larger opening keeps it.
     #[schemars(range(min = 0.5, max = 2.5), example = 1.0)]
     opening: Option<f64>,
-    /// Longest time of the way: the air is cut then, wherever P3 is; 20 s if none is given.
+    /// Longest time of the shutdown: the air is cut then, whatever P3 is; 20 s if none is given.
     #[schemars(extend("x-min" = "1 s", "x-max" = "2 min"), example = &"20 s")]
     within: Option<Quantity<Duration>>,
 }
 
 impl SafeStateFile {
-    /// The way, with what the file does not say filled in.
+    /// The shutdown, with defaults filled in.
     pub(crate) fn trajectory(self) -> SafeTrajectory {
         let usual = SafeTrajectory::default();
         SafeTrajectory {

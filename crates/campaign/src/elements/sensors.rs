@@ -63,7 +63,7 @@ pub(crate) struct SensorsFile {
 }
 
 impl SensorsFile {
-    /// What is declared of each channel that has a sensor.
+    /// The declared uncertainties of each channel that has a sensor.
     pub(crate) fn declarations(&self) -> BTreeMap<Channel, SensorDeclaration> {
         use Channel as C;
         let mut all = BTreeMap::new();
@@ -123,10 +123,10 @@ pub(crate) struct SpeedSensor {
     /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
-    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
-    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
     #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
@@ -161,10 +161,10 @@ pub(crate) struct FlowSensor {
     /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
-    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
-    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
     #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
@@ -199,15 +199,15 @@ pub(crate) struct PressureSensor {
     /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
-    /// What the tap feels: `total` (the default), or `static`, converted with `pipe_diameter`.
+    /// What the tap measures: `total` (the default), or `static`, converted with `pipe_diameter`.
     tap: Option<TapName>,
     /// Inner diameter of the pipe at the tap; needed for a static tap.
     #[schemars(extend("x-above" = "0 mm", "x-max" = "1 m"), example = &"40 mm")]
     pipe_diameter: Option<Quantity<Length>>,
-    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
-    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
     #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
@@ -251,10 +251,10 @@ pub(crate) struct TemperatureSensor {
     /// Fixed error of the gain; 0 if none is given.
     #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
     gain: Option<Quantity<Fraction>>,
-    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
-    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
     #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
@@ -292,10 +292,10 @@ pub(crate) struct ProbeSensor {
     /// Diameter of the probe's tip; 0 mm, the default, is a probe without inertia.
     #[schemars(extend("x-min" = "0 mm", "x-max" = "20 mm"), example = &"1.5 mm")]
     probe_diameter: Option<Quantity<Length>>,
-    /// How many sensors like this one measure the channel, 1 to 16; 1 if none is given.
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
     #[schemars(range(min = 1, max = 16), example = 4)]
     count: Option<usize>,
-    /// What people call this sensor, in a list of several; `T2/3` and so on if none is given.
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
     #[schemars(regex(pattern = r"^.{1,40}$"))]
     name: Option<String>,
     /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
@@ -320,7 +320,7 @@ impl Sensor for ProbeSensor {
     }
 }
 
-/// A static tap knows the pipe it sits in.
+/// Checks that a static tap has the diameter of its pipe.
 pub(crate) fn check(check: &mut Check<'_>) {
     for symbol in ["P1", "P2", "P3", "P4"] {
         for sensor in each_place(check, symbol) {
@@ -371,7 +371,7 @@ mod tests {
         let one = "{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm}";
         let alike = several("{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm, count: 4}");
         assert_eq!(alike, several(&format!("[{one}, {one}, {one}, {one}]")));
-        // A fourth of the variance each.
+        // A quarter of the variance each.
         assert!((alike.declared.noise_sigma - 0.05).abs() < 1e-12);
         assert!((alike.declared.offset_sigma - 0.12).abs() < 1e-12);
         assert!((alike.probe_diameter_m - 1e-3).abs() < 1e-12);
@@ -395,7 +395,7 @@ mod tests {
         assert!((redundant.common_offset_sigma - 0.16).abs() < 1e-12);
     }
 
-    /// Plans carry the hash of the campaign's JSON: that of a campaign without several sensors has no word of them.
+    /// Plans carry the hash of the campaign's JSON: a campaign without several sensors must not mention them.
     #[test]
     fn the_json_of_a_single_sensor_has_no_word_of_several() {
         let single = serde_json::to_value(several("{noise: 0.1 K, offset: 0.25 K}")).unwrap();

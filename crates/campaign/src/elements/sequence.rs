@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 /// A sequence script.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SequenceSource {
-    /// Path as the campaign has it.
+    /// Path as written in the campaign.
     #[serde(skip)]
     pub named: String,
-    /// Path as resolved from the campaign file. Not part of the canonical JSON: the text is what counts.
+    /// Path as resolved from the campaign file. Not part of the canonical JSON: only the text identifies the script.
     #[serde(skip)]
     pub path: PathBuf,
     /// The script.
@@ -23,7 +23,7 @@ pub struct SequenceSource {
 /// The script that a campaign names.
 ///
 /// # Errors
-/// Where it can no longer be read.
+/// If it can no longer be read.
 pub(crate) fn sequence(
     name: Option<&str>,
     origin: &Path,
@@ -37,7 +37,7 @@ pub(crate) fn sequence(
     name.map(source).transpose()
 }
 
-/// The script can be read.
+/// Checks that the script can be read.
 pub(crate) fn check(check: &mut Check<'_>) {
     let steps = steps!["sequence"];
     let Some(name) = check.text(&steps).filter(|name| name.ends_with(".rhai")) else { return };

@@ -1,4 +1,4 @@
-//! Several sensors of one channel below `sensors:`: alike by their `count`, or a list.
+//! Several sensors of one channel below `sensors:`: identical ones by their `count`, or a list.
 
 use crate::checking::Check;
 use mapper_core::{Channel, DeclaredElement, DeclaredUncertainty, Element, MAX_ELEMENTS, RedundantSensors};
@@ -9,23 +9,23 @@ use serde::{Deserialize, Serialize};
 /// One sensor as declared; one standard deviation throughout, in the channel's unit (K, Pa, kg/s, rpm).
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SensorDeclaration {
-    /// Noise, offset left after calibration, gain; of several sensors what they are together.
+    /// Noise, offset left after calibration, gain; those of the combined reading if there are several sensors.
     pub declared: DeclaredUncertainty,
-    /// Inner diameter of the pipe at a static tap, m; `None` where the total value is measured.
+    /// Inner diameter of the pipe at a static tap, m; `None` if the total value is measured.
     pub static_tap_pipe_diameter_m: Option<f64>,
-    /// Diameter of the probe's tip, m; 0 is a probe without inertia. Of several sensors that of the one probe that lags as they
-    /// do together.
+    /// Diameter of the probe's tip, m; 0 is a probe without inertia. For several sensors, that of the single probe with the same
+    /// lag as the combined reading.
     pub probe_diameter_m: f64,
-    /// Each of several sensors; `None` where there is one.
+    /// Each of several sensors; `None` if there is only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redundant: Option<RedundantSensors>,
 }
 
-/// The sensors of a channel: one, several alike (`count`), or a list.
+/// The sensors of a channel: one, several identical ones (`count`), or a list.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum Sensors<S> {
-    /// One sensor, or as many like it as `count` says.
+    /// One sensor, or `count` sensors like it.
     Alike(S),
     /// Each sensor by itself.
     Each(#[schemars(length(min = 1, max = 16))] Vec<S>),
@@ -33,25 +33,25 @@ pub(crate) enum Sensors<S> {
 
 /// One entry of `sensors:`.
 pub(crate) trait Sensor {
-    /// What is declared of it by itself.
+    /// The properties of the sensor itself.
     fn declaration(&self) -> SensorDeclaration;
 
-    /// What it says of the other sensors of its channel.
+    /// The statements about the other sensors of its channel.
     fn several(&self) -> Several<'_>;
 }
 
-/// What an entry says of several sensors.
+/// Statements of an entry about several sensors.
 pub(crate) struct Several<'a> {
-    /// How many there are like it.
+    /// Number of identical sensors.
     pub count: usize,
-    /// What it is called.
+    /// Display name.
     pub name: Option<&'a str>,
     /// Offset shared by all, in the channel's unit.
     pub common_offset: f64,
 }
 
 impl<S: Sensor> Sensors<S> {
-    /// What is declared of the channel.
+    /// The declared properties of the channel.
     pub(crate) fn declaration(&self, channel: Channel) -> SensorDeclaration {
         let members: Vec<&S> = match self {
             Sensors::Alike(sensor) => vec![sensor; sensor.several().count],
@@ -71,7 +71,7 @@ impl<S: Sensor> Sensors<S> {
         };
         let first = match self {
             Sensors::Alike(sensor) => sensor.declaration(),
-            // The list is checked to have one at least.
+            // The check ensures that the list is not empty.
             Sensors::Each(sensors) => match sensors.first() {
                 Some(sensor) => sensor.declaration(),
                 None => return SensorDeclaration::default(),
@@ -90,7 +90,7 @@ impl<S: Sensor> Sensors<S> {
     }
 }
 
-/// The places of the sensors of a channel in the file.
+/// The places of a channel's sensors in the file.
 pub(crate) fn each_place(check: &Check<'_>, symbol: &str) -> Vec<Vec<Step>> {
     let channel = steps!["sensors", symbol];
     match check.count(&channel) {
@@ -99,7 +99,7 @@ pub(crate) fn each_place(check: &Check<'_>, symbol: &str) -> Vec<Vec<Step>> {
     }
 }
 
-/// What the sensors of one channel may not say of each other.
+/// Checks for contradictions between the sensors of one channel.
 pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
     let places = each_place(check, symbol);
     let is_list = check.count(&steps!["sensors", symbol]) > 0;

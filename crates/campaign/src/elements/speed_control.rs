@@ -6,7 +6,7 @@ use mapper_core::SpeedControlSettings;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-// Untagged: which of the two it is shows in the YAML's own form, and the schema is checked before.
+// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum SpeedControlFile {
@@ -20,16 +20,16 @@ pub(crate) enum NamedSpeedControl {
     Off,
 }
 
-/// How the shaft speed is held.
+/// Control of the shaft speed.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SettingsFile {
-    /// Within this share of its target the speed counts as reached; 0.3 % if none is given.
+    /// Deviation from the target within which the speed counts as reached; 0.3 % if none is given.
     #[schemars(extend("x-min" = "0.01 %", "x-max" = "10 %"), example = &"0.3 %")]
     band: Option<Quantity<Fraction>>,
 }
 
-/// Held unless the file switches it off.
+/// On unless the file switches it off.
 pub(crate) fn speed_control(file: Option<SpeedControlFile>) -> Option<SpeedControlSettings> {
     match file {
         Some(SpeedControlFile::Named(NamedSpeedControl::Off)) => None,

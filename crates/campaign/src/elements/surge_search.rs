@@ -6,20 +6,20 @@ use mapper_core::SurgeSeek;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The surge line is sought after all other steps: at the end of each speed line the valve closes in small steps while the variation of pressures and flow tells how far surge is, opens again before it, and the surge-side end is marked with its uncertainty.
+/// Search for the surge line after all other steps: at the end of each speed line the valve closes in small steps while the variation of pressures and flow indicates the distance to surge. It opens again before surge, and the surge-side end is marked with its uncertainty.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SurgeSearchFile {
-    /// Smallest surge margin (flow over surge flow, minus one) that is gone to; 3 % if none is given.
+    /// Smallest surge margin (flow over surge flow, minus one) to approach; 3 % if none is given.
     #[schemars(extend("x-min" = "0.5 %", "x-max" = "30 %"), example = &"3 %")]
     closest: Option<Quantity<Fraction>>,
-    /// Largest change of the valve's opening at a step while surge may be near, of the opening; 3 % if none is given.
+    /// Largest change of the valve's opening per step near surge, relative to the opening; 3 % if none is given.
     #[schemars(extend("x-min" = "0.5 %", "x-max" = "10 %"), example = &"3 %")]
     step: Option<Quantity<Fraction>>,
-    /// Time at each opening; 25 s if none is given. The first 5 s are for the rig to follow.
+    /// Time at each opening; 25 s if none is given. The rig needs the first 5 s to follow.
     #[schemars(extend("x-min" = "12 s", "x-max" = "10 min"), example = &"25 s")]
     dwell: Option<Quantity<Duration>>,
-    /// Standard error of the surge flow at which a line is done, without the flow meter's gain; 0.8 % if none is given.
+    /// Standard error of the surge flow at which a line is finished, without the flow meter's gain; 0.8 % if none is given.
     #[schemars(extend("x-min" = "0.1 %", "x-max" = "5 %"), example = &"0.8 %")]
     standard_error: Option<Quantity<Fraction>>,
     /// Maximum number of openings of one line; 40 if none is given.
@@ -28,7 +28,7 @@ pub(crate) struct SurgeSearchFile {
 }
 
 impl SurgeSearchFile {
-    /// The search, with what the file does not say filled in.
+    /// The search, with defaults filled in.
     pub(crate) fn seek(self) -> SurgeSeek {
         let usual = SurgeSeek::default();
         SurgeSeek {

@@ -8,7 +8,7 @@ use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// How long things take: `dwell`, `time_budget` or `required_sigma_eta` sets the time at each point, the same for all of them.
+/// Durations: `dwell`, `time_budget` or `required_sigma_eta` sets the time at each point, the same for all of them.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-removed" = {
@@ -24,10 +24,10 @@ pub(crate) struct TimingFile {
     /// Time at each point, jump included.
     #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"40 s")]
     dwell: Option<Quantity<Duration>>,
-    /// Time that warm-up, all steps and cool-down may take together, in place of `dwell`: the planner chooses the dwell that fits. A soak before the warm-up and a search for surge come on top.
+    /// Total time of warm-up, all steps and cool-down, in place of `dwell`: the planner chooses the dwell that fits. A soak before the warm-up and a search for surge are additional.
     #[schemars(extend("x-above" = "0 s", "x-max" = "24 h"), example = &"45 min")]
     time_budget: Option<Quantity<Duration>>,
-    /// Standard error of the efficiency (rms over the points) that the plan is to reach by its forecast, in place of `dwell`: the planner chooses the shortest dwell that does.
+    /// Standard error of the efficiency (rms over the points) that the plan must reach according to its forecast, in place of `dwell`: the planner chooses the shortest dwell that reaches it.
     #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.3 %")]
     required_sigma_eta: Option<Quantity<Fraction>>,
 }
@@ -45,7 +45,7 @@ impl TimingFile {
     }
 }
 
-/// The dwell is set in one way, and by a number where no planner chooses it.
+/// Checks that the dwell is set in one way, and by a number if no planner chooses it.
 pub(crate) fn check(check: &mut Check<'_>) {
     let timing = steps!["timing"];
     if check.get(&timing).is_none() {

@@ -6,7 +6,7 @@ use mapper_core::ModelTolerances;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 
-/// How far the nominal model may be off without anything being wrong, one standard deviation each. The diagnosis of the gap calls nothing within them an effect.
+/// Normal deviations of the nominal model, one standard deviation each. The diagnosis of the gap reports no deviation within them as an effect.
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(remote = "ModelTolerances", default, deny_unknown_fields)]
 pub(crate) struct TolerancesElement {
@@ -18,11 +18,11 @@ pub(crate) struct TolerancesElement {
     #[serde(rename = "flow_map", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
     flow_map_ratio: f64,
-    /// Efficiency of the compressor map, everywhere alike; 0.5 % if none is given.
+    /// Efficiency of the compressor map, the same everywhere; 0.5 % if none is given.
     #[serde(rename = "compressor_efficiency", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.5 %")]
     compressor_efficiency_ratio: f64,
-    /// Error of the efficiency map that changes smoothly over it; 0.3 % if none is given.
+    /// Error of the efficiency map that varies smoothly over the map; 0.3 % if none is given.
     #[serde(rename = "efficiency_shape", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"0.3 %")]
     efficiency_shape_ratio: f64,
@@ -46,14 +46,14 @@ pub(crate) struct TolerancesElement {
     #[serde(rename = "oil_conductance", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"5 %")]
     oil_conductance_ratio: f64,
-    /// Lag of the turbine inlet pressure behind its command, as declared; 0.3 s if none is given.
+    /// Declared lag of the turbine inlet pressure behind its command; 0.3 s if none is given.
     #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
     actuator_lag_s: f64,
 }
 
 impl TolerancesElement {
-    /// What the file declares; a field of [`CampaignFile`](crate::campaign::CampaignFile) that is there is `Some`.
+    /// The declared tolerances; a field of [`CampaignFile`](crate::campaign::CampaignFile) that is present is `Some`.
     pub(crate) fn declared<'de, D: Deserializer<'de>>(
         deserializer: D,
     ) -> Result<Option<ModelTolerances>, D::Error> {
@@ -77,7 +77,7 @@ mod tests {
         assert!(read("{convection: 0.05}").is_err() && read("{actuator_lag: 3 %}").is_err());
     }
 
-    /// Each description names its default, which the program has elsewhere.
+    /// Each description names its default, which is defined elsewhere in the program.
     #[test]
     fn descriptions_name_the_defaults_that_hold() {
         let schema = schemars::schema_for!(TolerancesElement);

@@ -8,7 +8,7 @@ use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-// Untagged: which of the two it is shows in the YAML's own form, and the schema is checked before.
+// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum WindowFile {
@@ -26,7 +26,7 @@ pub(crate) enum NamedWindow {
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FixedWindow {
-    /// Begin, after the jump.
+    /// Start, after the jump.
     #[schemars(extend("x-min" = "0 s"))]
     start: Quantity<Duration>,
     /// End, after the jump.
@@ -45,7 +45,7 @@ impl From<WindowFile> for WindowRule {
     }
 }
 
-/// A window begins before it ends, and ends within the dwell.
+/// Checks that a window begins before it ends, and ends within the dwell.
 pub(crate) fn check(check: &mut Check<'_>) {
     let end_path = steps!["identification", "window", "end"];
     let start = check.quantity(Kind::Duration, &steps!["identification", "window", "start"]);

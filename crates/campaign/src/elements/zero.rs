@@ -6,26 +6,26 @@ use mapper_core::Soak;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The isothermal zero: the run begins with the machine at rest, and the identification subtracts by how much T1, T2, Tc and T_oil, and P1 and P2, then differ.
+/// The isothermal zero: the run begins with a soak, in which T1, T2, Tc and T_oil see one temperature, and P1 and P2 one pressure; the identification subtracts their differences.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ZeroFile {
-    /// Time at rest before the warm-up, air off: until oil and housing have the temperature of the cell. Its last ten minutes are used, and refused where a temperature still drifts by more than 0.1 K/min.
+    /// Time at rest before the warm-up, air off: until oil and housing have the temperature of the cell. The zero uses its last ten minutes, and is refused if a temperature still drifts by more than 0.1 K/min.
     #[schemars(extend("x-min" = "1 min", "x-max" = "24 h"), example = &"30 min")]
     soak: Quantity<Duration>,
-    /// Oil inlet temperature in the meantime; that of the inlet air if none is given.
+    /// Oil inlet temperature during the soak; that of the inlet air if none is given.
     #[schemars(extend("x-min" = "250 K", "x-max" = "450 K"), example = &"25 degC")]
     oil_temperature: Option<Quantity<Temperature>>,
-    /// How even the rig is at rest, one standard deviation of the temperature at one sensor about that at all: what is left of each offset after the zero; 0.05 K if none is given.
+    /// Temperature non-uniformity of the rig at rest, one standard deviation of the temperature at one sensor about that at all: the uncertainty of each offset after the zero; 0.05 K if none is given.
     #[schemars(extend("x-min" = "0 K", "x-max" = "10 K"), example = &"0.05 K")]
     evenness: Option<Quantity<TemperatureDifference>>,
-    /// The same of the pressure at P1 and P2; 5 Pa if none is given.
+    /// The same for the pressure at P1 and P2; 5 Pa if none is given.
     #[schemars(extend("x-min" = "0 Pa", "x-max" = "1 kPa"), example = &"5 Pa")]
     pressure_evenness: Option<Quantity<PressureDifference>>,
 }
 
 impl ZeroFile {
-    /// The soak, with the inlet air's temperature where the oil has none of its own, K.
+    /// The soak, with the inlet air's temperature if none is given for the oil, K.
     pub(crate) fn soak(self, inlet_temperature_k: f64) -> Soak {
         Soak {
             duration_s: self.soak.inside,

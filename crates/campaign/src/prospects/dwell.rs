@@ -1,4 +1,4 @@
-//! A dwell that leaves the identification no window.
+//! Checks that the dwell leaves the identification a window.
 
 use crate::campaign::Campaign;
 use crate::concern::Concern;
@@ -14,13 +14,13 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
     let Some(dwell_s) = campaign.timing.dwell.fixed_s() else { return Vec::new() };
     let (earliest_s, shortest_s) = (WindowRule::EARLIEST_S, WindowRule::SHORTEST_S);
     let needed_s = earliest_s + shortest_s;
-    // A method that follows a step from its jump on needs no settled window.
+    // A method that evaluates a step from its jump on needs no settled window.
     if identification.method == Method::Joint && dwell_s > earliest_s {
         return Vec::new();
     }
     match identification.window {
         WindowRule::Auto if dwell_s < needed_s => {
-            // A script may stay elsewhere for as long as it likes.
+            // A script may stay elsewhere for any time.
             let none = dwell_s <= earliest_s;
             let outcome =
                 if none { "no point would have an efficiency" } else { "every point would be doubtful" };

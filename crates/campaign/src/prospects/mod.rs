@@ -1,5 +1,5 @@
-//! What can be known before a run to go wrong with a campaign that has no mistake of form: what no machine does is a
-//! mistake, what few machines do a warning.
+//! Concerns about a campaign that is formally correct: impossible values are mistakes, unusual values produce a
+//! warning.
 
 mod dwell;
 mod sizes;
@@ -9,7 +9,7 @@ use crate::campaign::Campaign;
 use crate::concern::Concern;
 use mapper_yaml::Step;
 
-/// Everything that the campaign and its nominal machine tell. `places`: where each of its points stands in the file.
+/// All concerns that follow from the campaign and its nominal machine. `places`: the place of each of its points in the file.
 pub(crate) fn concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern> {
     let mut concerns = dwell::concerns(campaign);
     concerns.extend(sizes::concerns(campaign));

@@ -1,5 +1,5 @@
-//! Sizes and masses that no turbocharger has, held against its wheel: machines are much alike in shape, so that areas grow
-//! with the square of the wheel, masses with the cube, inertia with the fifth power. The measure is the machine of Burke et
+//! Checks sizes and masses against the wheel. Machines are geometrically similar, so that areas grow
+//! with the square of the wheel, masses with the cube, inertia with the fifth power. The reference is the machine of Burke et
 //! al., Appendix A.
 
 use crate::campaign::Campaign;
@@ -7,10 +7,10 @@ use crate::concern::{Concern, mm};
 use mapper_physics::params::Params;
 use mapper_yaml::{Step, steps};
 
-/// Compressor wheels are this large, m: 20 mm in the smallest passenger cars, 200 mm in locomotives. Ships have larger ones, of
-/// which no gas stand of this kind is known.
+/// Range of compressor wheels, m: 20 mm in the smallest passenger cars, 200 mm in locomotives. Ships have larger ones, but
+/// no gas stand of this kind is known for them.
 const USUAL_WHEELS_M: (f64, f64) = (0.02, 0.2);
-/// Factors by which lengths, areas and masses, and the inertia may differ from those of the measure, scaled to the wheel.
+/// Factors by which lengths, areas and masses, and the inertia may differ from those of the reference machine, scaled to the wheel.
 const LENGTH_RATIO: f64 = 4.0;
 const AREA_RATIO: f64 = 10.0;
 const MASS_RATIO: f64 = 10.0;
@@ -18,7 +18,7 @@ const INERTIA_RATIO: f64 = 100.0;
 /// The best turbines of turbochargers reach 0.8 (Baines, Fundamentals of Turbocharging, ch. 5); above this a value was mistyped.
 const TURBINE_EFFICIENCY: f64 = 0.85;
 
-/// A size, how it grows with the wheel, and how it is written.
+/// A size, its exponent with the wheel, and its format.
 struct Size {
     path: [&'static str; 2],
     name: &'static str,
@@ -69,14 +69,14 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
             ),
             remedy: "write its diameter at the exit, with its unit".to_owned(),
         });
-        // By such a wheel nothing else can be judged.
+        // Such a wheel cannot serve as a reference for the other sizes.
         return concerns;
     }
     let scale = wheel_m / measure.compressor.wheel_diameter_m;
     let judged = |size: &Size, at: Vec<Step>| {
         let (value, usual) = ((size.of)(params), (size.of)(&measure) * scale.powi(size.power));
         let ((low, high), (by, unit)) = ((usual / size.factor, usual * size.factor), size.unit);
-        // What the file leaves out is as in the paper.
+        // Omitted values are those of the paper.
         let written = value != (size.of)(&measure);
         (written && !(low..=high).contains(&value)).then(|| Concern {
             grave: false,
@@ -116,7 +116,7 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
     concerns
 }
 
-/// Two digits.
+/// Two significant digits.
 fn short(value: f64) -> String {
     let digits = (1.0 - value.abs().log10().floor()).max(0.0);
     if digits > 4.0 { format!("{value:.1e}") } else { format!("{value:.*}", digits as usize) }

@@ -1,4 +1,4 @@
-//! Speeds that no wheel stands, and speeds of which the nominal map says nothing.
+//! Checks speeds against the strength of the wheel and the range of the nominal map.
 
 use crate::campaign::{Campaign, MapSource};
 use crate::concern::{Concern, mm};
@@ -9,11 +9,11 @@ use std::f64::consts::PI;
 
 /// Tip speed above which no wheel of any material holds together, m/s.
 const BURST_M_S: f64 = 700.0;
-/// Tip speed that milled aluminium reaches, m/s; titanium wheels go on to some 600.
+/// Tip speed that milled aluminium reaches, m/s; titanium wheels reach some 600.
 const USUAL_M_S: f64 = 600.0;
-/// How far beyond its outermost speed lines a map is believed with a warning, as a share of their speed.
+/// Extrapolation of a map beyond its outermost speed lines that only produces a warning, as a share of their speed.
 const BEYOND_RATIO: f64 = 0.1;
-/// How far beyond them nothing is said: corrected speeds of a map's lines are rounded, and the day is warm or cold.
+/// Extrapolation without a warning: corrected speeds of a map's lines are rounded, and ambient temperature varies.
 const ROUNDING_RATIO: f64 = 0.01;
 
 pub(super) fn concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern> {
@@ -61,7 +61,7 @@ fn tips(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
     wheels.into_iter().filter_map(one).collect()
 }
 
-/// The grid's speeds beside those of the nominal table.
+/// The grid's speeds and those of the nominal table.
 fn table(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<Concern> {
     let MapSource::Table { named, text, reference, .. } = &campaign.machine.map else { return Vec::new() };
     let Ok(map) = nominal_table(text, *reference) else { return Vec::new() };
@@ -71,7 +71,7 @@ fn table(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<
     let one = |(rpm, at): (f64, Vec<Step>), edge_rpm: f64, verb: &str, beyond: f64| {
         let corrected_rpm = rpm * correction;
         (beyond > ROUNDING_RATIO).then(|| Concern {
-            // The ends of `lines` are read off the map itself.
+            // The ends of `lines` are taken from the map itself.
             grave: beyond > BEYOND_RATIO || !campaign.lines.is_empty(),
             at,
             message: format!(

@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{interrupt, output_options, output, registry};
+use crate::{interrupt, output, output_options, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_report::{declared_sensors_text, duration, lines_text};

@@ -1,7 +1,7 @@
 //! `mapper completions`.
 
 use crate::failure::Failure;
-use crate::{output_options, output};
+use crate::{output, output_options};
 use clap::Args;
 use clap_complete::Shell;
 

@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{output_options, output};
+use crate::{output, output_options};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;

@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{interrupt, output_options, output, registry};
+use crate::{interrupt, output, output_options, registry};
 use clap::Args;
 use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
@@ -43,7 +43,8 @@ impl Nightly {
         // Opened before the work: a history that cannot be written is known at once, not in the morning.
         let path = self.db.clone().unwrap_or_else(|| nightly.history.clone());
         let mut history = History::open(&path).map_err(SessionError::from)?;
-        let (registry, stop, progress) = (registry::registry(), interrupt::stop_flag()?, output_options::progress());
+        let (registry, stop, progress) =
+            (registry::registry(), interrupt::stop_flag()?, output_options::progress());
         let on_event = |event: &_| progress.show(event);
         let session = Session { on_event: &on_event, stop: &stop, ..Session::new(&registry) };
         let started = jiff::Timestamp::now();

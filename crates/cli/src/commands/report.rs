@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
 use crate::output::Replace;
-use crate::{output_options, output, registry};
+use crate::{output, output_options, registry};
 use clap::Args;
 use mapper_record::ChannelMap;
 use mapper_session::{Gap, Recorded, Registry, Session, SessionError};

@@ -4,7 +4,7 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::shown::ShownArguments;
 use crate::wall::SystemWall;
-use crate::{interrupt, output_options, output, registry, rig_states};
+use crate::{interrupt, output, output_options, registry, rig_states};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
@@ -75,7 +75,8 @@ impl Run {
         }
         let parent = self.out.clone().unwrap_or_else(|| PathBuf::from(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
-        let (registry, stop, progress) = (registry::registry(), interrupt::run_stop()?, output_options::progress());
+        let (registry, stop, progress) =
+            (registry::registry(), interrupt::run_stop()?, output_options::progress());
         progress.begin("planning");
         let states = rig_states::directory(None);
         let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);

@@ -1,5 +1,4 @@
-//! The compressor side as the model has it, with every effect in it; flow and efficiency are not its map's but as measured
-//! and as free as nobody knows them.
+//! Compressor side of the model with all effects. Flow and efficiency come from measurement and free parameters instead of the map.
 
 use super::side::{Side, Smooth, Which, truth};
 use crate::parameters::Spread;
@@ -16,9 +15,9 @@ use mapper_physics::model::{State, rad_s_of_rpm};
 use mapper_physics::params::{BoundaryConditions, MODEL_REFERENCE};
 use std::sync::Arc;
 
-/// What is free in a diagnosis, in the order of [`CompressorSide::predict`]: all but what a cause of the catalogue says (area
-/// split, probe), which is as declared instead. Efficiency is wider than where it is sought, and has what maps have beyond a
-/// parabola: no cause is to be named for a good compressor.
+/// Free parameters of a diagnosis, in the order of [`CompressorSide::predict`]. Parameters of library causes (area split, probe) keep their
+/// declared values. The efficiency prior is wider than in identification and includes map shapes beyond a parabola, so that no cause is
+/// named for a good compressor.
 static UNKNOWNS: [Parameter; 16] = {
     let p = PARAMETERS;
     const FURTHER: f64 = 0.15;
@@ -65,7 +64,7 @@ impl Side for CompressorSide {
     }
 
     fn smooth() -> &'static [Smooth] {
-        // T2: what a polynomial leaves of a map, and one node of a housing. Tc: one thermocouple for a whole housing.
+        // T2: error of a polynomial map and a single housing node. Tc: one thermocouple for a whole housing.
         &[
             Smooth { median_k: 0.18, width: 0.25, alike_s: 2.0 },
             Smooth { median_k: 3.0, width: 0.0, alike_s: 60.0 },
@@ -136,10 +135,10 @@ impl Side for CompressorSide {
         let mut state = self.start(rig, start_k, t2_offset_k);
         let mut tip = Tip { start_k: state.t2_tip_k, last: None };
         for i in 0..rows.len() {
-            // The turbine is asked nothing; it has some flow so that it has an answer.
+            // The turbine does not matter; it has some flow so that the model has a solution.
             let (p1_pa, t1_k) = (p1s_pa[i], t1s_k[i]);
             let boundary = BoundaryConditions { t1_k, p1_pa, p3_pa: 150e3, ..BoundaryConditions::default() };
-            // The wheel of a compressor with recirculation has more flow than what leaves it.
+            // With recirculation, the flow through the wheel exceeds the outlet flow.
             let wheel_kg_s = flows_kg_s[i].max(1e-4) * (1.0 + compressor.recirculation_ratio);
             let speed = (speeds_rpm[i] / self.middle_speed_rpm).ln();
             let flow =
@@ -162,7 +161,7 @@ impl Side for CompressorSide {
                 tip.follow(rows.t_s[i], outputs.t2_probe_target_k, outputs.t2_probe_time_constant_s);
             columns[0].push(t2_probe.read(rows.t_s[i], state.t2_tip_k) + t2_offset_k);
             columns[1].push(tc_probe.read(rows.t_s[i], state.tc_k));
-            // All that follows relaxes exactly towards what holds now: bounded over any gap in the log.
+            // Exact exponential relaxation towards the current equilibrium: bounded over any gap in the log.
             let elapsed_s = rows.t_s.get(i + 1).map_or(0.0, |next_s| next_s - rows.t_s[i]);
             let towards = |from_k: f64, net_w: f64, conductance_w_k: f64, capacity_j_k: f64| {
                 let share = -(-conductance_w_k * elapsed_s / capacity_j_k).exp_m1();
@@ -215,7 +214,7 @@ impl Side for CompressorSide {
 }
 
 impl CompressorSide {
-    /// Probe at what it reads, housing near the mean of inlet and outlet or, where it was measured, at its reading.
+    /// Probe at its reading; housing at its reading if measured, otherwise near the mean of inlet and outlet.
     fn start(&self, rig: &Rig, start_over_k: f64, t2_offset_k: f64) -> State {
         let rows = &self.rows;
         let first = |channel: Channel| {
@@ -230,16 +229,16 @@ impl CompressorSide {
     }
 }
 
-/// Flow over speed at the inlet's density: the flow coefficient but for the wheel's size and the gas constant.
+/// Flow over speed at inlet density: the flow coefficient without wheel size and gas constant.
 fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f64 {
     flow_kg_s * t1_k / (p1_pa * speed_rpm)
 }
 
-/// The tip of a probe between rows: what it tends to is taken for a straight line, for which the lag is exact.
+/// Probe tip between rows: its target is a straight line, for which the lag is exact.
 struct Tip {
-    /// What it read first, K.
+    /// First reading, K.
     start_k: f64,
-    /// Time, what it tended to, and its temperature, at the row before.
+    /// Time, target and temperature of the previous row.
     last: Option<(f64, f64, f64)>,
 }
 
@@ -247,7 +246,7 @@ impl Tip {
     fn follow(&mut self, t_s: f64, target_k: f64, tau_s: f64) -> f64 {
         let tip_k = match self.last {
             _ if tau_s <= 0.0 => target_k,
-            // A slow one begins with what it read, a fast one knows nothing of that.
+            // A slow tip starts at its reading; a fast tip forgets it.
             None => target_k + (self.start_k - target_k) * tau_s / (tau_s + FAST_S),
             Some((before_s, before_k, tip_k)) => {
                 let elapsed_s = t_s - before_s;
@@ -261,10 +260,10 @@ impl Tip {
     }
 }
 
-/// A probe of this time constant begins half with what it read, s.
+/// Time constant of a tip that starts halfway between reading and target, s.
 const FAST_S: f64 = 0.3;
 
-/// A map that says what was measured, whatever it is asked.
+/// A map that returns the measured values at any operating point.
 #[derive(Debug)]
 struct AsMeasured {
     flow_corrected_kg_s: f64,

@@ -1,6 +1,6 @@
-//! A cause of the compressor side that the catalogue has not: on engines T2 is often read by a sensor in a sheath.
+//! A compressor-side cause outside the effect library: on engines, T2 is often measured by a sheathed sensor.
 //!
-//! For this mode alone: probes of a gas stand are bare and declared, and the catalogue's slow probe has one time constant.
+//! Only for this mode: gas-stand probes are bare and declared, and the library's slow probe has a single time constant.
 
 use mapper_core::Channel;
 use mapper_physics::effect::{Effect, Rig, Submodel};
@@ -9,16 +9,16 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 use std::sync::Arc;
 
-/// All of them.
+/// All sensor causes.
 pub fn compressor_sensors() -> Vec<Arc<dyn Effect>> {
     vec![effect_of::<SheathedProbe>()]
 }
 
 effect_parameters! {
-    /// The T2 probe is an element within a sheath: two lags, one behind the other.
+    /// The T2 probe is a sheathed element: two lags in series.
     #[derive(Debug)]
     struct SheathedProbe {
-        /// Diameter of the sheath's tip, which follows the gas as a bare tip does, m.
+        /// Diameter of the sheath's tip, which follows the gas like a bare tip, m.
         diameter_m = "sheath_diameter" ["m"] 0.0 .. 0.012, neutral 0.0, step 0.0015;
         /// Lag of the element behind the sheath, s.
         element_lag_s = "element_lag" ["s"] 0.0 .. 30.0, neutral 0.0, step 1.0;

@@ -1,24 +1,24 @@
-//! Drives less their noise.
+//! Denoises the driving channels.
 //!
-//! A side that is driven by noisy readings fits better the less it responds to them: without a word on noise a cause that dulls
-//! the response would be named. So each reading gives way to a straight line through as many of its neighbours as lie on one
-//! within the sensor's noise; where a drive bends, these are few.
+//! A side driven by noisy readings fits better the less it responds to them, so noise would favour causes that dull the response. Each
+//! reading is therefore replaced by a straight line through as many neighbours as lie on one within the sensor's noise. If a drive
+//! bends, these are few.
 
 use crate::rows::Rows;
 use mapper_observe::Declared;
 use std::ops::Range;
 
-/// Neighbours on each side, at most, and the numbers that are tried.
+/// Numbers of neighbours tried on each side.
 const NEIGHBOURS: [usize; 5] = [12, 8, 5, 3, 2];
-/// Readings are on a line where their mean square is below the sensor's by this factor: of six readings, one set in twenty of pure
-/// noise is not.
+/// Readings count as a line if their mean square is below this multiple of the sensor's variance; one in twenty sets of six pure-noise
+/// readings fails.
 const ON_A_LINE: f64 = 1.5;
-/// Rates are taken over twice so long, s.
+/// Half the time span over which rates are computed, s.
 const RATE_S: f64 = 0.305;
-/// Neighbours further away than this, s, are none.
+/// Maximum distance of a neighbour, s.
 const FURTHEST_S: f64 = 2.0;
 
-/// The rows with calm drives, and how fast these go.
+/// Rows with denoised drives and their rates.
 pub(crate) fn calm(rows: &Rows, declared: &Declared) -> Rows {
     let mut calm = rows.clone();
     calm.rates.clear();
@@ -44,7 +44,7 @@ pub(crate) fn calm(rows: &Rows, declared: &Declared) -> Rows {
 fn calm_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> f64 {
     for count in NEIGHBOURS {
         let (first, last) = (i.saturating_sub(count), (i + count).min(read.len() - 1));
-        // Both sides; where it bends there, the side that does not, as many.
+        // Both sides; at a bend, one side only with the same number of readings.
         let ranges =
             [first..last + 1, i.saturating_sub(2 * count)..i + 1, i..(i + 2 * count).min(read.len() - 1) + 1];
         for range in ranges {
@@ -59,7 +59,7 @@ fn calm_at(t_s: &[f64], read: &[f64], i: usize, sigma: f64) -> f64 {
     read[i]
 }
 
-/// The straight line through a range at `i`; `None` where the readings do not lie on it.
+/// Value at `i` of the straight line through a range; `None` if the readings do not lie on it.
 fn on_a_line(t_s: &[f64], read: &[f64], i: usize, range: Range<usize>, sigma: f64) -> Option<f64> {
     let n = range.len() as f64;
     let mean = |values: &[f64]| values[range.clone()].iter().sum::<f64>() / n;
@@ -80,7 +80,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Of a level, a ramp and a level with noise of 50: a third of the noise is left on the levels, and the corners stay where they are.
+    /// Level, ramp and level with noise of 50: a third of the noise remains on the levels, and the corners stay in place.
     #[test]
     fn noise_goes_and_corners_stay() {
         let sigma = 50.0;

@@ -1,4 +1,4 @@
-//! What of the catalogue can be asked on a side, how small it would be seen, and why the rest cannot be asked.
+//! Which library effects a side can diagnose, their smallest detectable size, and why the others cannot be diagnosed.
 
 use super::diagnosis::NotAsked;
 use super::fit::{BESIDE, Fit, Question, normal, whitened};
@@ -12,15 +12,15 @@ use mapper_gap::study::Hypothesis;
 use mapper_numerics::parallel;
 use mapper_physics::effect::EffectInfo;
 
-/// 95 % quantile of the standard normal distribution: so many sigmas above what is needed, an effect is seen in 95 of 100 logs.
+/// 95 % quantile of the standard normal distribution: at this margin above the threshold, an effect is named in 95 of 100 logs.
 const SURELY: f64 = 1.645;
-/// Looks at a size, and how near in the logarithm is near enough.
+/// Maximum number of sizes tried, and the tolerance in the logarithm.
 const LOOKS: usize = 6;
 const NEAR: f64 = 0.05;
-/// An effect that changes less than this, K, changes nothing.
+/// An effect with a smaller change than this is undetectable, K.
 const NOTHING_K: f64 = 1e-6;
 
-/// Effects that change what is judged, by their places, and the others with the reason.
+/// Indices of the effects that change a judged channel, and the others with the reason.
 pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<NotAsked>) {
     let Some(base) = question.predict(&question.nothing()) else { return (Vec::new(), Vec::new()) };
     let (mut asked, mut silent) = (Vec::new(), Vec::new());
@@ -45,7 +45,7 @@ pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<N
     (asked, silent)
 }
 
-/// Largest change of a channel that was measured, K.
+/// Largest change of a measured channel, K.
 fn largest<S: Side>(question: &Question<'_, S>, said: &[Vec<f64>], base: &[Vec<f64>]) -> f64 {
     let mut largest: f64 = 0.0;
     for ((_, read), (said, base)) in question.side.rows().judged.iter().zip(said.iter().zip(base)) {
@@ -60,9 +60,9 @@ fn not_asked(info: &EffectInfo, reason: String) -> NotAsked {
     NotAsked { effect: info.id.to_string(), name: info.name.to_string(), reason }
 }
 
-/// The smallest size of each effect that would have been named in 95 of 100 logs like this one, on the side of its typical step;
-/// those that none within their range would, with what takes their place, unless they are `open`: what has been seen can be asked.
-/// `found` is the likeliest explanation.
+/// Smallest size of each effect, on the side of its typical step, that would be named in 95 of 100 logs like this one. Effects undetectable
+/// within their range are returned with the parameter that absorbs them, except `open` ones, which were already detected. `found` is the
+/// likeliest explanation.
 pub(crate) fn smallest<S: Side>(
     question: &Question<'_, S>,
     asked: &[usize],
@@ -71,7 +71,7 @@ pub(crate) fn smallest<S: Side>(
     counts: &[bool],
     calibration: &Calibration,
 ) -> (Vec<SmallestSeen>, Vec<NotAsked>) {
-    // Beside what was found of the unknowns, with no effect.
+    // At the fitted unknowns, without any effect.
     let unknowns = S::unknowns().len();
     let base = Hypothesis { effects: Vec::new(), nuisances: found.hypothesis.nuisances.clone() };
     let Some(said) = question.predict(&base) else { return (Vec::new(), Vec::new()) };
@@ -103,7 +103,7 @@ pub(crate) fn smallest<S: Side>(
                 (0..unknowns).max_by(|a, b| (taken[*a] * right[*a]).total_cmp(&(taken[*b] * right[*b])))?;
             Some(((whole - right.dot(&taken)).max(0.0).sqrt(), most))
         };
-        // Of what spans decades its inverse tells how far from neutral it is.
+        // For a parameter that spans decades, its inverse measures the distance from neutral.
         let away =
             |value: f64| if coordinate.is_logarithmic() { 1.0 / value } else { value - parameter.neutral };
         let value_at = |away: f64| {
@@ -112,14 +112,14 @@ pub(crate) fn smallest<S: Side>(
         };
         let typical = away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high));
         let furthest = away(value_at(typical * 1e9));
-        // By itself where it shows by itself: a wall without a mass shows nothing, the lag of an element in no sheath does.
+        // Alone if visible alone: a wall without mass is invisible, but the lag of an element without a sheath is not.
         let neutral: Vec<f64> = others.iter().map(|p| p.neutral).collect();
         let usual: Vec<f64> =
             others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
         let alone = length_beside(&neutral, value_at(typical))?.0 > 1e-6;
         let length = |value: f64| length_beside(if alone { &neutral } else { &usual }, value);
         let (mut here, mut taker) = (typical, 0);
-        // The smallest of those that were looked at and are large enough.
+        // The smallest sufficient size tried.
         let mut seen: Option<f64> = None;
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..LOOKS {

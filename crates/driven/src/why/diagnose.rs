@@ -1,4 +1,4 @@
-//! The diagnosis of one side of a machine from a log without steps.
+//! Diagnosis of one side of a machine from a log without steps.
 
 use super::compressor::CompressorSide;
 use super::compressor_sensors::compressor_sensors;
@@ -28,38 +28,38 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
 
-/// Rows a diagnosis goes through: more do not tell more, for what the model leaves is alike over seconds.
+/// Maximum number of rows; more add no information, because the model error is correlated over seconds.
 const MAX_ROWS: usize = 800;
-/// Rows that are needed: some for each of what is not known.
+/// Minimum number of rows: some for each unknown.
 const MIN_ROWS: usize = 30;
-/// Causes among which each phase chooses.
+/// Maximum number of causes from which each phase selects.
 const CHOICES: usize = 4;
-/// Causes that are shown.
+/// Maximum number of causes shown.
 const SHOWN: usize = 8;
 
-/// What is asked.
+/// Inputs of a diagnosis.
 pub struct Ask<'a> {
     /// The log.
     pub recording: &'a Recording,
-    /// The nominal machine behind ideal sensors.
+    /// The nominal machine with ideal sensors.
     pub nominal: &'a Rig,
     /// Candidate effects.
     pub effects: &'a [Arc<dyn Effect>],
     /// Noise of the sensors.
     pub declared: &'a Declared,
-    /// Priors of causes and the evidence that one needs.
+    /// Priors of causes and the evidence threshold.
     pub calibration: &'a Calibration,
-    /// Rows before this time of the log are looked at, s; the others are predicted.
+    /// End of the fitted part, s; later rows are predicted.
     pub fit_until_s: f64,
-    /// Same seed, same answer.
+    /// The same seed gives the same result.
     pub seed: u64,
 }
 
 /// Diagnoses a side.
 ///
 /// # Errors
-/// [`DrivenError::Channel`] where a channel is missing that the side needs, [`DrivenError::TooFewRows`] where there is too little
-/// to fit, [`DrivenError::NoAnswer`] where the nominal machine has no answer under what drives.
+/// [`DrivenError::Channel`] if a required channel is missing, [`DrivenError::TooFewRows`] if there are too few rows to fit,
+/// [`DrivenError::NoAnswer`] if the nominal machine has no solution under the driving channels.
 pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
     match side {
         Which::Compressor => {
@@ -92,7 +92,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let weighed = weigh(calibration, asked.len(), &found);
     let fit_of = |place: usize| &found.fits[weighed.causes[place].0];
     let causes = weighed.causes.len().min(SHOWN);
-    // What is named before it is weighed against something unknown: held-out phases judge it.
+    // The named cause before the comparison with an unmodelled one; held-out phases judge it.
     let likeliest = if weighed.named && causes > 0 { fit_of(0) } else { &found.null };
     let open = weighed.open;
     let choices: Vec<&Fit> = (0..if weighed.named { causes.min(CHOICES) } else { 0 }).map(fit_of).collect();
@@ -103,7 +103,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     let drives = [S::wanted().drives[0], S::PRESSURE];
     let phases = phases(rows, fitted, &drives);
     let held_out = held_out(&question, &phases, &found.null, &choices, calibration, asked.len());
-    // Steps of noise that drives leave can look like an effect in the part that was fitted, but not in what no fit saw.
+    // Noise steps of the drives can imitate an effect in the fitted part, but not in held-out phases.
     let borne_out = held_out.as_ref().is_none_or(|phases| phases.after_k < phases.before_k);
     let word = match open {
         _ if weighed.outside > 0.5 => Word::Outside,
@@ -146,7 +146,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     })
 }
 
-/// White noise of each judged channel: the sensor's, and what is left of the drives' noise makes of it.
+/// White noise of each judged channel: the sensor's, and the response to the drives' residual noise.
 fn white_k<S: Side>(question: &Question<'_, S>, all: &Rows, ask: &Ask<'_>) -> Option<Vec<f64>> {
     let declared = ask.declared;
     let mut random = Pcg64Mcg::seed_from_u64(ask.seed.wrapping_add(2));
@@ -225,9 +225,9 @@ fn unknowns<S: Side>(fit: &Fit) -> Vec<Unknown> {
         let ends =
             |middle: f64, sigma: f64| (unknown.at(middle - 1.96 * sigma), unknown.at(middle + 1.96 * sigma));
         let ((low, high), (prior_low, prior_high)) = (ends(*z, sigma), ends(0.0, 1.0));
-        let told = high - low < TOLD_RATIO * (prior_high - prior_low);
+        let identified = high - low < TOLD_RATIO * (prior_high - prior_low);
         let (name, description, unit) = (unknown.name, unknown.description, unknown.unit);
-        Unknown { name, description, unit, value: unknown.at(*z), low, high, told }
+        Unknown { name, description, unit, value: unknown.at(*z), low, high, told: identified }
     })
     .collect()
 }

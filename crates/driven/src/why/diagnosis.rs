@@ -1,74 +1,74 @@
-//! What a diagnosis of one side says.
+//! Result of the diagnosis of one side.
 
 use super::side::Which;
 use mapper_gap::report::{Estimate, SmallestSeen};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// The word on the whole.
+/// Overall verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Word {
-    /// Nothing is seen beyond what is not known of such a machine anyway.
+    /// Nothing exceeds the prior uncertainty of such a machine.
     WithinTolerance,
     /// One cause explains it.
     Named,
-    /// Several causes explain it as well as each other.
+    /// Several causes explain it equally well.
     NotToldApart,
-    /// A cause explains what was fitted, and makes phases that no fit saw no better: it is not named.
+    /// A cause explains the fitted part but does not improve held-out phases, so it is not named.
     NotBorneOut,
-    /// Nothing of the catalogue explains it.
+    /// No library cause explains it.
     Outside,
 }
 
-/// A cause that explains what is judged.
+/// A cause that explains the judged channels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cause {
     /// Ids of its effects.
     pub effects: Vec<String>,
-    /// Their names for people.
+    /// Display names.
     pub names: Vec<String>,
     /// Probability.
     pub probability: f64,
     /// Sizes, by parameter, with 95 % intervals.
     pub parameters: BTreeMap<String, Estimate>,
-    /// Parameters that stand at an end of their range: what acts is more than such an effect can be.
+    /// Parameters at a limit of their range: the real cause exceeds this effect's range.
     pub at_the_end: Vec<String>,
-    /// What it leaves beside the noise, K, for each judged channel in their order.
+    /// Its residual beyond noise, K, for each judged channel in order.
     pub left_k: Vec<f64>,
 }
 
-/// An effect that cannot be asked here.
+/// An effect that cannot be diagnosed here.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotAsked {
     /// Id of the effect.
     pub effect: String,
-    /// Its name for people.
+    /// Display name.
     pub name: String,
-    /// Why not.
+    /// Reason.
     pub reason: String,
 }
 
-/// A phase of the log, predicted by fits that did not see it.
+/// A phase of the log, predicted by fits to other phases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Phase {
     /// Time of its first row, s.
     pub from_s: f64,
     /// Time of its last row, s.
     pub until_s: f64,
-    /// Speed at its begin, rpm.
+    /// Speed at its start, rpm.
     pub from_rpm: f64,
     /// Speed at its end, rpm.
     pub until_rpm: f64,
-    /// Root mean square of the first judged channel less its prediction without a cause, K.
+    /// Root mean square of the first judged channel minus its prediction without a cause, K.
     pub before_k: f64,
-    /// The same with the cause that the other phases choose.
+    /// The same with the cause selected by the other phases.
     pub after_k: f64,
-    /// That cause; empty where none is named.
+    /// That cause; empty if none is named.
     pub chosen: Vec<String>,
 }
 
-/// How far the gap shrinks on phases that no fit saw.
+/// Gap reduction on held-out phases.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldOut {
     /// The phases.
@@ -77,15 +77,15 @@ pub struct HeldOut {
     pub before_k: f64,
     /// With the cause, K.
     pub after_k: f64,
-    /// Mean over the phases of what is taken off each, K.
+    /// Mean reduction over the phases, K.
     pub shrink_k: f64,
-    /// Lower end of its 95 % interval: Student's, each phase one witness.
+    /// Lower end of its 95 % interval (Student's t, one sample per phase).
     pub shrink_low_k: f64,
     /// Upper end.
     pub shrink_high_k: f64,
 }
 
-/// What lies behind the part that was fitted.
+/// Prediction after the fitted part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Beyond {
     /// Time of its first row, s.
@@ -94,26 +94,26 @@ pub struct Beyond {
     pub until_s: f64,
     /// Rows.
     pub rows: usize,
-    /// Root mean square of the first judged channel less its prediction without a cause, K.
+    /// Root mean square of the first judged channel minus its prediction without a cause, K.
     pub before_k: f64,
-    /// The same with the likeliest cause; as without where none is named.
+    /// The same with the likeliest cause; equal to `before_k` if none is named.
     pub after_k: f64,
-    /// What that was expected to be, K: median and 95 % interval.
+    /// Expected value of `after_k`, K: median and 95 % interval.
     pub expected_k: f64,
     /// Its lower end, K.
     pub expected_low_k: f64,
     /// Its upper end, K.
     pub expected_high_k: f64,
-    /// Share of the rows whose 95 % interval holds the reading, ratio.
+    /// Share of the rows with the reading inside its 95 % interval, ratio.
     pub inside_ratio: f64,
 }
 
-/// An unknown of the side as the likeliest explanation leaves it.
+/// An unknown of the side under the likeliest explanation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unknown {
     /// Short name.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub description: &'static str,
     /// Its unit; empty for a ratio.
     pub unit: &'static str,
@@ -123,7 +123,7 @@ pub struct Unknown {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Whether the log tells it: else it is what was known beforehand.
+    /// Whether the log identifies it; otherwise the prior dominates.
     pub told: bool,
 }
 
@@ -132,11 +132,11 @@ pub struct Unknown {
 pub struct Course {
     /// Times, s.
     pub t_s: Vec<f64>,
-    /// As read.
+    /// Measured.
     pub read_k: Vec<f64>,
-    /// As the side without a cause would have it.
+    /// Prediction without a cause.
     pub before_k: Vec<f64>,
-    /// With the likeliest cause; as without where none is named.
+    /// Prediction with the likeliest cause; equal to `before_k` if none is named.
     pub after_k: Vec<f64>,
 }
 
@@ -145,40 +145,40 @@ pub struct Course {
 pub struct Diagnosis {
     /// The side.
     pub side: Which,
-    /// Symbols of the channels that drive.
+    /// Symbols of the driving channels.
     pub driven_by: Vec<&'static str>,
-    /// Symbols of the channels that are judged, the first before all.
+    /// Symbols of the judged channels, most important first.
     pub judged: Vec<&'static str>,
-    /// Time up to which it was fitted, s; infinite where all of it was.
+    /// End of the fitted part, s; infinite if all of the log was fitted.
     #[serde(skip_serializing_if = "infinite")]
     pub fitted_until_s: f64,
-    /// The word on the whole.
+    /// Overall verdict.
     pub word: Word,
-    /// Probability that nothing acts but what is not known anyway.
+    /// Probability of no cause beyond the prior uncertainty.
     pub probability_none: f64,
-    /// Probability that something outside the catalogue acts.
+    /// Probability of a cause outside the effect library.
     pub probability_outside: f64,
     /// Causes, likeliest first.
     pub causes: Vec<Cause>,
-    /// How many of these, from the first, are not told apart: together they have 95 % of what all have.
+    /// Number of leading causes that cannot be distinguished; together they have 95 % of the probability of all causes.
     pub open: usize,
     /// Root mean square of the first judged channel in the fitted part, K: without a cause.
     pub before_k: f64,
     /// The same with the likeliest cause, K.
     pub after_k: f64,
-    /// How far it shrinks on phases that no fit saw; `None` where the log has fewer than two phases.
+    /// Gap reduction on held-out phases; `None` if the log has fewer than two phases.
     pub held_out: Option<HeldOut>,
-    /// What lies behind the fitted part; `None` where nothing does.
+    /// Prediction after the fitted part; `None` if nothing follows it.
     pub beyond: Option<Beyond>,
-    /// What was asked, and how small it would have been seen.
+    /// Diagnosable effects with their smallest detectable size.
     pub asked: Vec<SmallestSeen>,
-    /// What of the catalogue cannot be asked here.
+    /// Library effects that cannot be diagnosed here.
     pub not_asked: Vec<NotAsked>,
-    /// What is not known of the side, as the likeliest explanation leaves it.
+    /// Unknowns of the side under the likeliest explanation.
     pub unknowns: Vec<Unknown>,
     /// The first judged channel over time.
     pub course: Course,
-    /// Rows that could not be used.
+    /// Unusable rows.
     pub lost_rows: usize,
 }
 

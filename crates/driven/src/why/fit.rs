@@ -159,7 +159,7 @@ impl<S: Side> Question<'_, S> {
         let mut fitted = Fitted { question: self, start, counts, coordinates, known, whitenings: Vec::new() };
         let point = fitted.at(&unknowns)?;
         let until = Until { iterations: ITERATIONS, enough: ENOUGH };
-        let End { unknowns, point, normal } = descend(&mut fitted, unknowns, point, until);
+        let End { unknowns, point, normal, .. } = descend(&mut fitted, unknowns, point, until);
         let half_ln_determinant = normal.half_ln_determinant()?;
         let outside = |smooth: &Smooth| match smooth.width {
             0.0 => (smooth.median_k, 0.0),

@@ -1,4 +1,4 @@
-//! How far the gap shrinks where no fit looked: phase by phase, and behind the fitted part.
+//! Gap reduction on held-out data: phase by phase, and after the fitted part.
 
 use super::diagnosis::{Beyond, HeldOut, Phase};
 use super::fit::{Fit, Question};
@@ -16,17 +16,17 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use std::ops::Range;
 
-/// Draws of what a fit leaves open.
+/// Number of posterior draws.
 const DRAWS: usize = 300;
 
-/// Root mean square of the first judged channel less what was said, K.
-pub(crate) fn off_k<S: Side>(question: &Question<'_, S>, said: &[Vec<f64>], rows: Range<usize>) -> f64 {
+/// Root mean square of the first judged channel minus its prediction, K.
+pub(crate) fn off_k<S: Side>(question: &Question<'_, S>, predicted: &[Vec<f64>], rows: Range<usize>) -> f64 {
     let read = &question.side.rows().judged[0].1;
-    rms(rows.map(|i| read[i] - said[0][i])).unwrap_or(f64::NAN)
+    rms(rows.map(|i| read[i] - predicted[0][i])).unwrap_or(f64::NAN)
 }
 
-/// Each phase by fits to the others: without a cause, and with the one of `causes` that these choose. `causes` is empty where
-/// none is named.
+/// Predicts each phase from fits to the others: without a cause, and with the one of `causes` that they select. `causes` is empty if none
+/// is named.
 pub(crate) fn held_out<S: Side>(
     question: &Question<'_, S>,
     phases: &[Range<usize>],
@@ -72,10 +72,10 @@ pub(crate) fn held_out<S: Side>(
     };
     let taken: Vec<f64> = found.iter().map(|phase| phase.before_k - phase.after_k).collect();
     let shrink_k = mean(&taken)?;
-    let witnesses = taken.len() as f64;
-    let half_k = student_quantile(0.975, witnesses - 1.0).unwrap_or(f64::INFINITY)
+    let samples = taken.len() as f64;
+    let half_k = student_quantile(0.975, samples - 1.0).unwrap_or(f64::INFINITY)
         * standard_deviation(&taken).unwrap_or(f64::INFINITY)
-        / witnesses.sqrt();
+        / samples.sqrt();
     Some(HeldOut {
         before_k: whole(&|phase| phase.before_k),
         after_k: whole(&|phase| phase.after_k),
@@ -91,7 +91,7 @@ pub(crate) fn ids<S: Side>(question: &Question<'_, S>, hypothesis: &Hypothesis) 
     hypothesis.effects.iter().map(|(index, _)| question.effects[*index].info().id.to_string()).collect()
 }
 
-/// What lies behind the fitted rows beside what `after` lets expect of it.
+/// Compares the rows after the fitted part with the expectation of `after`.
 pub(crate) fn beyond<S: Side>(
     question: &Question<'_, S>,
     fitted: usize,
@@ -105,9 +105,9 @@ pub(crate) fn beyond<S: Side>(
         return None;
     }
     let drawn = draws(question, after, seed);
-    let said = &after.predicted[0];
+    let predicted = &after.predicted[0];
     let off: Vec<f64> =
-        drawn.iter().filter_map(|draw| rms(behind.clone().map(|i| draw[i] - said[i]))).collect();
+        drawn.iter().filter_map(|draw| rms(behind.clone().map(|i| draw[i] - predicted[i]))).collect();
     let at = |share: f64| quantile(&off, share).unwrap_or(f64::NAN);
     let holds = |i: &usize| {
         let end = |share: f64| quantile(drawn.iter().map(|draw| draw[*i]), share).unwrap_or(f64::NAN);
@@ -126,7 +126,7 @@ pub(crate) fn beyond<S: Side>(
     })
 }
 
-/// Readings of the first judged channel as everything that a fit leaves open would have given them, each with noise of its own.
+/// Simulated readings of the first judged channel for posterior draws of a fit, each with its own noise.
 fn draws<S: Side>(question: &Question<'_, S>, fit: &Fit, seed: u64) -> Vec<Vec<f64>> {
     let Some(cholesky) = fit.precision.clone().cholesky() else { return Vec::new() };
     let unknowns = fit.hypothesis.nuisances.len();
@@ -137,7 +137,7 @@ fn draws<S: Side>(question: &Question<'_, S>, fit: &Fit, seed: u64) -> Vec<Vec<f
         let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(DRAWS as u64).wrapping_add(*number));
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         let unit = DVector::from_fn(fit.precision.nrows(), |_, _| normal());
-        // Of the precision L L', L'^-1 times unit noise has its inverse for covariance.
+        // With precision L L', L'^-1 times unit noise has the inverse precision as its covariance.
         let off = cholesky.l().transpose().solve_upper_triangular(&unit)?;
         let mut there = fit.hypothesis.clone();
         for (z, by) in there.nuisances.iter_mut().zip(off.iter()) {
@@ -146,15 +146,15 @@ fn draws<S: Side>(question: &Question<'_, S>, fit: &Fit, seed: u64) -> Vec<Vec<f
         for (place, (coordinate, value)) in coordinates.iter().zip(parameters(&fit.hypothesis)).enumerate() {
             set_parameter(&mut there, place, coordinate.value(coordinate.of(value) + off[unknowns + place]));
         }
-        let mut said = question.predict(&there)?.swap_remove(0);
+        let mut predicted = question.predict(&there)?.swap_remove(0);
         let (mut smooth_k, mut before_s): (f64, Option<f64>) = (0.0, None);
-        for (reading_k, t_s) in said.iter_mut().zip(t_s) {
+        for (reading_k, t_s) in predicted.iter_mut().zip(t_s) {
             let keep = before_s.map_or(0.0, |before_s| (-(t_s - before_s) / alike_s).exp());
             smooth_k = keep * smooth_k + fit.left_k[0] * (1.0 - keep * keep).sqrt() * normal();
             before_s = Some(*t_s);
             *reading_k += smooth_k + question.white_k[0] * normal();
         }
-        Some(said)
+        Some(predicted)
     });
     drawn.into_iter().flatten().collect()
 }

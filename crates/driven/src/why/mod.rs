@@ -1,4 +1,4 @@
-//! Which cause explains what is judged on a side that its measured neighbours drive: gap diagnosis without steps.
+//! Gap diagnosis without steps: which cause explains the judged channels of a side driven by its measured neighbours.
 
 mod compressor;
 mod compressor_sensors;

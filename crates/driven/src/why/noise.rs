@@ -1,21 +1,20 @@
-//! Residuals made white: noise of a sensor, and beside it what the model leaves, which is alike for a while.
+//! Whitens residuals: white sensor noise plus correlated model error.
 //!
-//! What is left is taken for a first-order process seen through white noise; the Kalman filter's innovations over their own
-//! spread are then independent and of unit variance. Its gains depend on times and spreads alone, so that they are made once
-//! and whiten residuals and slopes alike.
+//! The model error is a first-order process observed through white noise; the Kalman filter's innovations divided by their spread are
+//! independent with unit variance. The gains depend only on times and spreads, so they are computed once and used for residuals and slopes.
 
-/// Gains of the filter for one channel.
+/// Filter gains for one channel.
 #[derive(Debug, Clone)]
 pub(crate) struct Whitening {
-    /// For each row: what the state keeps since the row before, its gain, and one over the spread of the innovation; `None`
-    /// where the row is not looked at.
+    /// For each row: the state's decay since the previous row, its gain, and the inverse spread of the innovation; `None` for an unused
+    /// row.
     rows: Vec<(f64, Option<(f64, f64)>)>,
-    /// Sum of the logarithms of the innovations' spreads.
+    /// Sum of the log spreads of the innovations.
     pub(crate) ln_spreads: f64,
 }
 
 impl Whitening {
-    /// For rows at `t_s` of which those that `counts` says are looked at; white noise, smooth noise and how long that is alike.
+    /// For rows at `t_s` selected by `counts`; white noise, correlated noise and its correlation time.
     pub(crate) fn new(t_s: &[f64], counts: &[bool], white: f64, smooth: f64, alike_s: f64) -> Self {
         let (white, smooth) = (white.max(1e-6).powi(2), smooth.powi(2));
         let mut variance = smooth;
@@ -41,7 +40,7 @@ impl Whitening {
         Whitening { rows, ln_spreads }
     }
 
-    /// Whitens a column in place: rows that are not looked at become 0.
+    /// Whitens a column in place: unused rows become 0.
     pub(crate) fn whiten(&self, column: &mut [f64]) {
         let mut state = 0.0;
         for (value, (keep, row)) in column.iter_mut().zip(&self.rows) {
@@ -63,7 +62,7 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
-    /// Against the dense covariance `smooth^2 exp(-|dt|/alike) + white^2`: the same quadratic form and determinant.
+    /// Compared with the dense covariance `smooth^2 exp(-|dt|/alike) + white^2`: the same quadratic form and determinant.
     #[test]
     fn it_is_the_dense_covariance() {
         let t_s = [0.0, 0.1, 0.35, 0.4, 2.0, 2.1, 7.0];

@@ -1,19 +1,19 @@
-//! Phases of a log without steps, found in what drives: stretches in which speed and pressure go along straight lines.
+//! Phases of a log without steps: segments in which the driving speed and pressure follow straight lines.
 
 use crate::rows::Rows;
 use mapper_core::Channel;
 use std::ops::Range;
 
-/// A phase is no shorter than this, s.
+/// Minimum length of a phase, s.
 const SHORTEST_S: f64 = 1.0;
-/// Nor does it have fewer rows.
+/// Minimum number of rows.
 const MIN_ROWS: usize = 8;
-/// Two neighbours are one phase where a single line for both costs less than this share of all that varies.
+/// Two neighbours are merged if one line for both costs less than this share of the total variation.
 const ALIKE_RATIO: f64 = 0.01;
-/// Phases, at least and at most: each is predicted by fits to the others.
+/// Minimum and maximum number of phases; each is predicted by fits to the others.
 const PHASES: (usize, usize) = (3, 8);
 
-/// Phases of the first `count` rows, in their order; none where there are too few rows for two.
+/// Phases of the first `count` rows, in order; empty if there are too few rows for two.
 pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range<usize>> {
     let count = count.min(rows.len());
     let sums: Vec<Sums> =
@@ -47,7 +47,7 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
     if phases.len() < 2 { Vec::new() } else { phases }
 }
 
-/// Sums from which the misfit of a straight line over any stretch follows; the values over their own spread.
+/// Cumulative sums for the misfit of a straight line over any segment; values are scaled by their spread.
 struct Sums {
     /// Sums of 1, t, v, t t, t v, v v before each row.
     before: Vec<[f64; 6]>,
@@ -58,7 +58,7 @@ impl Sums {
         let logarithms: Vec<f64> = values.iter().take(t_s.len()).map(|value| value.max(1e-9).ln()).collect();
         let count = logarithms.len().max(1) as f64;
         let mean = logarithms.iter().sum::<f64>() / count;
-        // A drive that hardly moves has no phases: a percent counts as little.
+        // A nearly constant drive has no phases, so a variation of one percent counts as small.
         let whole = logarithms.iter().map(|v| (v - mean).powi(2)).sum::<f64>().max(1e-4 * count);
         let first_s = t_s.first().copied().unwrap_or(0.0);
         let mut sums = [0.0; 6];

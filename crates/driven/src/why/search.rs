@@ -1,4 +1,4 @@
-//! Which effects, alone or two together, explain what is judged, and how likely each is.
+//! Searches single effects and pairs that explain the judged channels, with their probabilities.
 
 use super::fit::{Fit, Question};
 use super::side::Side;
@@ -10,18 +10,18 @@ use mapper_inference::search::{Causes, Known, Limits, Offer, extend};
 use mapper_numerics::parallel;
 use mapper_physics::effect::EffectInfo;
 
-/// What was fitted.
+/// Search result.
 pub(crate) struct SearchResult {
-    /// Nothing but what is not known.
+    /// Fit of the unknowns alone.
     pub(crate) null: Fit,
     /// Singles and pairs, likeliest first.
     pub(crate) fits: Vec<Fit>,
 }
 
-/// Prior of something outside the catalogue, beside any of it: as rare as what the catalogue's priors leave.
+/// Prior of an unmodelled cause, relative to library causes: as small as the remainder of the library priors.
 pub(crate) const PRIOR_OUTSIDE: f64 = 0.1;
 
-/// Logarithm of what is known of a cause before any data.
+/// Log prior of a cause.
 pub(crate) fn prior(calibration: &Calibration, asked: usize, fit: &Fit) -> f64 {
     let count = asked.max(2) as f64;
     match fit.hypothesis.effects.len() {
@@ -31,17 +31,17 @@ pub(crate) fn prior(calibration: &Calibration, asked: usize, fit: &Fit) -> f64 {
     }
 }
 
-/// Evidence of a fit, prior included.
+/// Evidence of a fit, including its prior.
 pub(crate) fn weight(calibration: &Calibration, asked: usize, fit: &Fit) -> f64 {
     fit.score + prior(calibration, asked, fit)
 }
 
-/// Values from which the search for an effect begins: one and three typical steps off, to either side where it has two.
+/// Search starts for an effect: one and three typical steps from neutral, on each possible side.
 fn starts(info: &EffectInfo) -> Vec<Vec<f64>> {
     let at = |share: f64| -> Vec<f64> {
         let value = |p: &mapper_physics::effect::EffectParameter| {
             let coordinate = Coordinate::new(p);
-            // Of what spans decades a step is a factor.
+            // For a parameter that spans decades a step is a factor.
             let value = if coordinate.is_logarithmic() {
                 coordinate.value(coordinate.of(p.neutral + p.typical_step))
             } else {
@@ -62,10 +62,10 @@ fn starts(info: &EffectInfo) -> Vec<Vec<f64>> {
     starts
 }
 
-/// Judgement: bounds the time. What a line promises is in units of what the model leaves, which a cause makes small: all are worth a look.
+/// Judgement: limits the time. Linear gains are scaled by the model error, which a cause reduces, so all effects are tried.
 const LIMITS: Limits = Limits { members: 2, starts: 3, fits: 6, slack: f64::INFINITY };
 
-/// Fits nothing, each of the effects `asked`, and the pairs of them that promise most.
+/// Fits the null, each of the effects `asked`, and the most promising pairs.
 pub(crate) fn search<S: Side>(
     question: &Question<'_, S>,
     asked: &[usize],
@@ -148,21 +148,21 @@ impl<S: Side> Causes for Search<'_, S> {
     }
 }
 
-/// Scores turned into probabilities.
+/// Probabilities from scores.
 pub(crate) struct CauseProbabilities {
-    /// Of nothing.
+    /// No cause.
     pub(crate) none: f64,
-    /// Of something outside the catalogue.
+    /// Unmodelled cause.
     pub(crate) outside: f64,
-    /// Causes by their places among the fits, likeliest first; what only adds to a better one counts as that one.
+    /// Causes by index of their fit, likeliest first; a superset of a better cause counts as that cause.
     pub(crate) causes: Vec<(usize, f64)>,
-    /// How many of them, from the first, are not told apart.
+    /// Number of leading causes that cannot be distinguished.
     pub(crate) open: usize,
-    /// Whether a cause is likelier than nothing by more than chance makes one.
+    /// Whether a cause is more likely than none by more than chance explains.
     pub(crate) named: bool,
 }
 
-/// Weighs what was found.
+/// Converts the search result to probabilities.
 pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &SearchResult) -> CauseProbabilities {
     let all: Vec<&Fit> = std::iter::once(&found.null).chain(&found.fits).collect();
     let inside = |fit: &Fit| weight(calibration, asked, fit) + (1.0 - PRIOR_OUTSIDE).ln();
@@ -190,7 +190,7 @@ pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &SearchResul
         |part: usize, whole: usize| effects(part).iter().all(|effect| effects(whole).contains(effect));
     causes.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut open = if named { open_ones(&causes) } else { 0 };
-    // Where all that are open have one of them in common, it is that one: what stands beside it is too weak to tell.
+    // If all open causes share one effect, that effect is the cause; the additions are too weak to detect.
     let common = causes[..open]
         .iter()
         .position(|(part, _)| causes[..open].iter().all(|(whole, _)| within(*part, *whole)));
@@ -209,7 +209,7 @@ pub(crate) fn weigh(calibration: &Calibration, asked: usize, found: &SearchResul
     }
 }
 
-/// How many causes, from the first, have what settles it of all together.
+/// Number of leading causes that together reach the settled share of all.
 fn open_ones(causes: &[(usize, f64)]) -> usize {
     let all: f64 = causes.iter().map(|(_, probability)| probability).sum();
     let mut sum = 0.0;

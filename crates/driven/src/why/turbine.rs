@@ -1,5 +1,4 @@
-//! The turbine side as the model has it; flow, pressures and speed are not its own but as measured, and its efficiency, heat
-//! transfer and housing are as free as nobody knows them.
+//! Turbine side of the model. Flow, pressures and speed are measured; efficiency, heat transfer and housing are free parameters.
 
 use super::side::{Side, Smooth, Which, truth};
 use crate::Parameter;
@@ -13,9 +12,9 @@ use mapper_physics::model::rad_s_of_rpm;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::turbine::TurbineInlet;
 
-/// An expansion ratio below which a turbine does hardly any work.
+/// Expansion ratio below which a turbine does hardly any work.
 const WORKING_RATIO: f64 = 1.02;
-/// Smallest flow, kg/s, at which the gas path is evaluated (it divides by it).
+/// Minimum flow at which the gas path is evaluated, kg/s (it divides by it).
 const SMALLEST_FLOW_KG_S: f64 = 1e-3;
 
 const fn unknown(
@@ -29,8 +28,8 @@ const fn unknown(
     Parameter { name, description, unit, middle, width, spread }
 }
 
-/// What is free, in the order of [`TurbineSide::predict`]: scales are over the campaign's machine, and its heat transfer and
-/// housing are those of other turbines of its size.
+/// Free parameters, in the order of [`TurbineSide::predict`]: scale factors on the campaign's machine, with heat transfer and housing
+/// priors from other turbines of its size.
 static UNKNOWNS: [Parameter; 9] = [
     unknown("eta_t", "", 1.0, 0.1, Spread::Normal, "best turbine efficiency, over the declared one"),
     unknown(
@@ -110,7 +109,7 @@ impl Side for TurbineSide {
     }
 
     fn smooth() -> &'static [Smooth] {
-        // T4: what a parabola over the blade-speed ratio leaves of a turbine, of some hundred kelvin of drop.
+        // T4: error of a parabola over the blade-speed ratio, at a temperature drop of some hundred kelvin.
         &[
             Smooth { median_k: 0.45, width: 0.25, alike_s: 2.0 },
             Smooth { median_k: 8.0, width: 0.0, alike_s: 60.0 },
@@ -156,7 +155,7 @@ impl Side for TurbineSide {
         for i in 0..rows.len() {
             let (p3_pa, t3_k, p4_pa) = (p3s_pa[i].max(1.001 * p4s_pa[i]), t3s_k[i], p4s_pa[i]);
             let boundary = BoundaryConditions { p3_pa, t3_k, p4_pa, ..BoundaryConditions::default() };
-            // A turbine that swallows what was measured.
+            // Set the turbine capacity to the measured flow.
             params.turbine.choked_flow_kg_s = choked_kg_s;
             let declared_kg_s = TurbineInlet::new(&params.turbine, &boundary).flow_kg_s;
             params.turbine.choked_flow_kg_s = choked_kg_s * flows_kg_s[i].max(1e-4) / declared_kg_s;
@@ -165,7 +164,7 @@ impl Side for TurbineSide {
             let turbine = inlet.at(tt_k, rad_s_of_rpm(speeds_rpm[i]));
             columns[0].push(t4_probe.read(rows.t_s[i], turbine.t4_k) + t4_offset_k);
             columns[1].push(tt_probe.read(rows.t_s[i], tt_k));
-            // It relaxes exactly towards what holds now: bounded over any gap in the log.
+            // Exact exponential relaxation towards the current equilibrium: bounded over any gap in the log.
             let elapsed_s = rows.t_s.get(i + 1).map_or(0.0, |next_s| next_s - rows.t_s[i]);
             let gas_w_k = turbine.h_w_m2k * params.turbine.internal_area_m2;
             let conductance_w_k = gas_w_k + loss_w_k;
@@ -196,5 +195,5 @@ impl Side for TurbineSide {
     }
 }
 
-/// Logarithm of the expansion ratio about which the efficiency's change is described: a ratio of 2.
+/// Logarithm of the reference expansion ratio for the efficiency's change: a ratio of 2.
 const MIDDLE_LN_RATIO: f64 = std::f64::consts::LN_2;

@@ -1,7 +1,7 @@
-//! Causes of the turbine side that the catalogue has not: it has one effect there, and engines have sensors that are slow.
+//! Turbine-side causes outside the effect library: the library has one effect there, and engine sensors are slow.
 //!
-//! They are effects like those of the catalogue, but for this mode alone: on a gas stand T3 and the turbine's flow are held, and
-//! nobody asks whether their sensors follow.
+//! They work like library effects, but only in this mode: on a gas stand T3 and the turbine flow are held constant, so sensor lag does not
+//! matter.
 
 use mapper_core::Channel;
 use mapper_physics::effect::{Effect, Rig, Submodel};
@@ -10,7 +10,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::TooManyExtraStates;
 use std::sync::Arc;
 
-/// All of them.
+/// All turbine sensor causes.
 pub fn turbine_sensors() -> Vec<Arc<dyn Effect>> {
     vec![
         effect_of::<T4Lag>(),
@@ -25,10 +25,10 @@ pub fn turbine_sensors() -> Vec<Arc<dyn Effect>> {
 macro_rules! sensor {
     ($kind:ident, $id:literal, $name:literal, $unit:literal, $low:literal, $high:literal, $neutral:literal, $step:literal, $channel:ident, $change:expr, $description:literal, $equation:literal) => {
         effect_parameters! {
-            /// A sensor of the turbine side that is off.
+            /// A turbine-side sensor fault.
             #[derive(Debug)]
             struct $kind {
-                /// By how much.
+                /// Size.
                 value = $id [$unit] $low .. $high, neutral $neutral, step $step;
             }
         }

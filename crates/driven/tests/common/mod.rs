@@ -1,4 +1,4 @@
-//! Engines of which the truth is known: the whole lumped machine accelerates and brakes, sensors read it.
+//! Simulated engines with known truth: the lumped machine accelerates and brakes, and sensors measure it.
 
 #![allow(dead_code, reason = "each test binary needs some of it")]
 
@@ -17,12 +17,12 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
-/// Full load begins, and the exhaust brake: less pressure before the turbine, less air.
+/// Start of full load, and of the exhaust brake: less pressure upstream of the turbine, less air.
 pub const LOAD_S: f64 = 6.4;
 pub const BRAKE_S: f64 = 13.2;
 const END_S: f64 = 18.0;
 
-/// What is recorded of each engine, with its noise in the channel's unit.
+/// Recorded channels of each engine, with their noise in the channel's unit.
 const CHANNELS: [(Channel, f64); 13] = [
     (Channel::ShaftSpeed, 50.0),
     (Channel::CompressorFlow, 2e-4),
@@ -39,7 +39,7 @@ const CHANNELS: [(Channel, f64); 13] = [
     (Channel::Tt, 0.5),
 ];
 
-/// Where an engine goes: times of the corners, and speed and valve at each.
+/// Time history of an engine: times of the corners, and speed and valve at each.
 pub struct Course {
     pub corners_s: Vec<f64>,
     pub places: Vec<(f64, f64)>,
@@ -54,7 +54,7 @@ impl Course {
         }
     }
 
-    /// Four minutes of hills: what only metal shows has time to show.
+    /// Four minutes of hills, long enough to show metal temperatures.
     pub fn hills() -> Self {
         let speeds = [60e3, 130e3, 80e3, 145e3, 100e3, 60e3, 120e3, 90e3];
         let mut course = Course { corners_s: Vec::new(), places: Vec::new() };
@@ -67,13 +67,13 @@ impl Course {
     }
 }
 
-/// Lag of the T2 element behind the probe's tip, s, as something to plant: what a sheath has and a bare probe has not.
+/// Lag of the T2 element within the probe's tip, s, as a plantable fault: a sheathed probe has it, a bare one does not.
 pub const ELEMENT_LAG: &str = "element lag";
 
-/// Share of the housing's heat capacity of an inner wall that is planted; what is said of it is its conductance, W/K.
+/// Planted inner wall, as a share of the housing's heat capacity; the reported parameter is its conductance, W/K.
 const INNER_WALL_RATIO: f64 = 0.4;
 
-/// A log of a machine with its own efficiency, heat transfer and housing, and with `planted` effects; with its truth.
+/// A log of a machine with its own efficiency, heat transfer and housing, and `planted` effects; also returns its truth.
 pub fn engine(
     seed: u64,
     course: &Course,
@@ -141,7 +141,7 @@ pub fn engine(
     (Recording { series, ..Recording::default() }, rig.model.params)
 }
 
-/// What is off of a machine beside its probe: efficiency, heat transfer, housing.
+/// Deviations of a fault-free machine: efficiency, heat transfer, housing.
 pub fn healthy(params: &mut Params, normal: &mut dyn FnMut(f64) -> f64) {
     params.compressor.efficiency_scale_ratio = 1.0 + normal(0.04);
     params.compressor.nusselt_coefficient *= normal(0.3).exp();
@@ -152,7 +152,7 @@ pub fn healthy(params: &mut Params, normal: &mut dyn FnMut(f64) -> f64) {
     params.turbine.housing_mass_kg *= normal(0.3).exp();
 }
 
-/// The noise that the engines' sensors have.
+/// Noise of the engines' sensors.
 pub fn declared() -> Declared {
     Declared {
         sensors: CHANNELS

@@ -1,5 +1,4 @@
-//! Recordings of the adaptive simulator, which shares the equations with the driven model but neither its grid, its inputs
-//! nor its noise.
+//! Recordings of the adaptive simulator. It shares the equations with the driven model, but not its grid, inputs or noise.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
@@ -18,7 +17,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 
-/// What is run: points at one opening, a jump between each two.
+/// Operating points at one opening, with a jump between consecutive points.
 pub struct Visits {
     pub speeds_rpm: &'static [f64],
     pub dwell_s: f64,
@@ -46,22 +45,22 @@ pub fn boundary() -> BoundaryConditions {
     BoundaryConditions { valve_opening_ratio: 0.9, ..BoundaryConditions::default() }
 }
 
-/// A recording of a rig, noise and offsets drawn from what is declared.
+/// A recording of a rig with noise and offsets drawn from the declared values.
 pub fn record_of(rig: &Rig, visits: &Visits, seed: u64) -> Recording {
     record_late(rig, visits, seed, &[], 0.0)
 }
 
-/// The same rig, offsets and all, on another night: other noise.
+/// The same rig with the same offsets in another run: different noise.
 pub fn record_another_night(rig: &Rig, visits: &Visits, seed: u64, night_seed: u64) -> Recording {
     recorded(rig, visits, [seed, night_seed], &[], 0.0)
 }
 
-/// The same of a run in real time: told each step so much late, s, its samples taken off their times by so much, one sigma.
+/// A real-time run: each step is commanded late by `late_s`, s, and sample times scatter by so much, one sigma.
 pub fn record_late(rig: &Rig, visits: &Visits, seed: u64, late_s: &[f64], scatter_s: f64) -> Recording {
     recorded(rig, visits, [seed, seed], late_s, scatter_s)
 }
 
-/// Offsets by the first seed, noise by the second.
+/// Offsets from the first seed, noise from the second.
 fn recorded(
     rig: &Rig,
     visits: &Visits,
@@ -76,10 +75,10 @@ fn recorded(
     let end_s = dwell_s * speeds_rpm.len() as f64;
     let times_s: Vec<f64> = (0..(end_s / 0.1) as usize).map(|i| 0.1 * i as f64).collect();
     let mut held_pa = p3_pa[0];
-    // Of a run in real time each hundredth of a second.
+    // For a real-time run: every hundredth of a second.
     let pieces = if late_s.is_empty() { 1 } else { 10 };
     let fine_s: Vec<f64> = (0..times_s.len() * pieces).map(|i| 0.1 / pieces as f64 * i as f64).collect();
-    let told_pa = |t: f64| {
+    let command_pa = |t: f64| {
         let step = (((t - 1e-6) / dwell_s).max(0.0) as usize).min(p3_pa.len() - 1);
         let begun = t - 1e-6 >= dwell_s * step as f64 + late_s.get(step).copied().unwrap_or(0.0);
         p3_pa[if begun { step } else { step.saturating_sub(1) }]
@@ -87,7 +86,7 @@ fn recorded(
     let lagged: Vec<f64> = fine_s
         .iter()
         .map(|t| {
-            let wanted = told_pa(*t);
+            let wanted = command_pa(*t);
             held_pa = wanted + (held_pa - wanted) * (-0.1 / pieces as f64 / rig.instruments.p3_lag_s).exp();
             held_pa
         })
@@ -128,9 +127,9 @@ fn recorded(
     let taken: Vec<f64> =
         if scatter_s > 0.0 { times_s.iter().map(&mut taken_s).collect() } else { times_s.clone() };
     simulator.run_to(end_s, &inputs, taken, sample, |_| {}).unwrap();
-    let told: Vec<f64> = times_s.iter().map(|t| told_pa(*t)).collect();
-    let command =
-        (!late_s.is_empty()).then(|| (Channel::P3Command, Series { t_s: times_s.clone(), values: told }));
+    let commanded: Vec<f64> = times_s.iter().map(|t| command_pa(*t)).collect();
+    let command = (!late_s.is_empty())
+        .then(|| (Channel::P3Command, Series { t_s: times_s.clone(), values: commanded }));
     let series: BTreeMap<Channel, Series> = SENSORS
         .iter()
         .zip(values)

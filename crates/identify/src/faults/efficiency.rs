@@ -1,8 +1,8 @@
-//! Efficiencies of the joint fit against a smooth map, or the declared one, as the logarithm of work over isentropic work: `-ln eta`.
+//! Compares efficiencies of the joint fit with a smooth or declared map, as the logarithm of work over isentropic work: `-ln eta`.
 //!
-//! An error of a temperature adds to the work, so that large ones are nearly as linear as small ones, and a scale of all efficiencies
-//! is a constant. A fixed error counts in proportion to one over the rise, and so bends the map; an error that grows over the run does not
-//! depend on the place.
+//! An error of a temperature adds to the work, so large errors are nearly as linear as small ones. A scale of all efficiencies is a constant.
+//! The effect of a constant error is proportional to one over the rise, so it bends the map. The effect of an error that grows over the run
+//! does not depend on the map position.
 
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::readings::{PerChannel, Readings};
@@ -13,7 +13,7 @@ use mapper_core::ReferenceState;
 use mapper_physics::compression::isentropic_rise_ratio;
 use nalgebra::{DMatrix, DVector};
 
-/// Efficiencies as fitted, before the smoothness of the map has its say.
+/// Efficiencies as fitted, before the smoothness prior.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FittedEfficiencies {
     /// Positions of the steps.
@@ -22,8 +22,8 @@ pub(crate) struct FittedEfficiencies {
     pub(crate) eta: Vec<f64>,
     /// Their covariance, without the declared errors of the sensors.
     pub(crate) covariance: DMatrix<f64>,
-    /// What an error of each reading of all steps does to each of them, per unit of the channel; `None` where no error of the channel is
-    /// declared, so that the fit does not know it.
+    /// Sensitivity of each one to a constant error of each channel in all steps, per unit of the channel; `None` if no error of the channel is
+    /// declared, because the fit then does not compute it.
     pub(crate) by_reading: Vec<[Option<f64>; 7]>,
 }
 
@@ -47,20 +47,20 @@ const ANY_MAP: Smooth = Smooth {
     amplitude: 0.03,
     lengths: (0.7, 0.5),
 };
-/// What it does not follow, ratio: with it the chi-square of a public measured map (TurboTools, 93 points) is 95.
+/// Deviation from the smooth function, ratio: with it the chi-square of a public measured map (TurboTools, 93 points) is 95.
 const ANY_ROUGHNESS: f64 = 4e-3;
 /// Shape of a declared map's error, in units of its tolerance.
 const DECLARED_MAP: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
-/// What a declared map does not follow, ratio: a tenth of a point of efficiency.
+/// Deviation of the rig from a declared map, ratio: a tenth of a point of efficiency.
 const ROUGHNESS: f64 = 1.5e-3;
-/// Heat between gas and housing that eqs. 1-3 lack or have too much of, ratio to what they have, one standard deviation. Judgement: most of
-/// what a law of convection lacks is in the fitted one.
+/// Relative error of the heat between gas and housing in eqs. 1-3, one standard deviation. Judgement: the fitted convection law contains most
+/// of the heat.
 const HEAT_RATIO: f64 = 0.05;
-/// How far along its speed line a point may be misplaced by the tolerances of flow map and valve, in units of the line's
-/// largest flow and largest PR - 1, one standard deviation.
+/// Position error of a point along its speed line due to the tolerances of flow map and valve, one standard deviation. Unit: the line's
+/// largest flow and largest PR - 1.
 const PLACE_RATIO: f64 = 0.01;
 
-/// Efficiencies that are used: beyond, a point says nothing of the work.
+/// Range of usable efficiencies: outside it a point carries no information about the work.
 const USED: std::ops::RangeInclusive<f64> = 0.05..=3.0;
 
 /// `readings`: of all steps, by position.
@@ -70,7 +70,7 @@ pub(crate) fn rows(
     reference: ReferenceState,
     nominal: Option<&NominalRig<'_>>,
 ) -> Option<Rows> {
-    // With the slope along the speed line.
+    // Includes the slope along the speed line.
     let expected = |readings: &Readings| match nominal {
         Some(nominal) => nominal.efficiency(readings).map(|(eta, slope)| (-eta.ln(), slope / eta)),
         None => Some((0.0, 0.0)),
@@ -136,7 +136,7 @@ pub(crate) fn rows(
     Some(Rows { residual, covariance, readings, by_reading, by_machine })
 }
 
-/// Efficiency of a compressor without heat.
+/// Efficiency of a compressor without heat transfer.
 fn apparent(readings: &Readings) -> f64 {
     isentropic_rise_k(readings) / (readings.t2_k() - readings.t1_k())
 }
@@ -146,14 +146,14 @@ fn isentropic_rise_k(readings: &Readings) -> f64 {
         * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k(), readings.air)
 }
 
-/// Temperature that the gas lost to the housing, over its rise by compression.
+/// Temperature loss of the gas to the housing, relative to its rise by compression.
 fn heat(readings: &Readings, eta: f64) -> f64 {
     let rise_k = isentropic_rise_k(readings) / eta;
     (readings.t1_k() + rise_k - readings.t2_k()) / rise_k
 }
 
-/// Readings with the temperature at which a gain of T2 or Tc counts. Such a gain changes the slope of T2 over Tc too, which convection takes
-/// up: what is left is its error where both would be, at the temperature after compression without heat.
+/// Readings with the temperature at which a gain of T2 or Tc applies. Such a gain also changes the slope of T2 over Tc, which convection
+/// absorbs. The remaining effect is the error at equal temperatures, at the temperature after compression without heat.
 fn as_gains_count(readings: &Readings, eta: f64) -> Readings {
     let mut other = *readings;
     [other.values[1], other.values[2]] = [readings.t1_k() + isentropic_rise_k(readings) / eta; 2];

@@ -1,4 +1,4 @@
-//! A fault that was found, and its words.
+//! A detected fault and its description.
 
 use crate::faults::rows::Machine;
 use mapper_core::Channel;
@@ -6,7 +6,7 @@ use mapper_observe::sensor_fault::{FaultKind, SensorFault};
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// What may be wrong.
+/// Possible causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Suspect {
     /// One or several sensors.
@@ -15,23 +15,23 @@ pub enum Suspect {
     Machine(Machine),
 }
 
-/// A fault without which the balances of a recording do not close.
+/// A fault that explains why the balances of a recording do not close.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundFault {
-    /// The most probable one.
+    /// The most probable cause.
     pub suspect: Suspect,
     /// Its size, in the unit of the suspect.
     pub value: f64,
     /// One standard deviation of the size.
     pub sigma: f64,
-    /// Others that explain the recording nearly as well: at least one twentieth as probable.
+    /// Other causes that are at least one twentieth as probable.
     pub alternatives: Vec<Suspect>,
-    /// Whether a number of the points may rest on it; if not, they keep their verdicts.
+    /// Whether any number of the points depends on it; if not, they keep their verdicts.
     pub touches_points: bool,
 }
 
 impl Suspect {
-    /// The channels concerned; none for a machine.
+    /// The channels concerned; empty for a machine.
     pub fn channels(&self) -> &'static [Channel] {
         match self {
             Suspect::Sensor(fault) => fault.channels,
@@ -39,7 +39,7 @@ impl Suspect {
         }
     }
 
-    /// Factor and unit in which people write its size.
+    /// Factor and display unit of its size.
     fn scale(&self) -> (f64, &'static str) {
         let Suspect::Sensor(SensorFault { channels, kind, .. }) = self else { return (100.0, "%") };
         match (kind, channels) {
@@ -54,7 +54,7 @@ impl Suspect {
     }
 }
 
-/// For a program: what it is, its size in SI units or as a ratio, what else it may be.
+/// Machine-readable form: the cause, its size in SI units or as a ratio, and the alternatives.
 impl Serialize for FoundFault {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
@@ -106,7 +106,7 @@ impl fmt::Display for Suspect {
     }
 }
 
-/// With its size, its 95 % interval and what else it may be.
+/// With its size, its 95 % interval and the alternatives.
 impl fmt::Display for FoundFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (scale, unit) = self.suspect.scale();

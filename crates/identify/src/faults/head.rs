@@ -1,8 +1,7 @@
-//! Head against speed squared: similar points of a compressor have the same head coefficient at every speed.
+//! Head over speed squared: similar points of a compressor have the same head coefficient at every speed.
 //!
 //! `dT_is/N^2` over the flow coefficient is one curve, with a slow change by compressibility (Dixon and Hall, Fluid Mechanics and
-//! Thermodynamics of Turbomachinery, ch. 2). Where the map is declared, it has a speed for the measured flow and pressure ratio, and that is
-//! compared with N.
+//! Thermodynamics of Turbomachinery, ch. 2). A declared map gives a speed for the measured flow and pressure ratio, which is compared with N.
 
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::readings::{PerChannel, Readings};
@@ -34,11 +33,11 @@ const ANY_CURVE: Smooth = Smooth {
     amplitude: 0.02,
     lengths: (0.7, 0.5),
 };
-/// What no smooth curve follows, ratio: with it the chi-square of a public measured map (TurboTools, 93 points) is 118.
+/// Deviation from a smooth curve, ratio: with it the chi-square of a public measured map (TurboTools, 93 points) is 118.
 const ANY_ROUGHNESS: f64 = 4e-3;
-/// What a declared map has of smooth error, in units of its declared tolerance of flow: the rest of it is a common factor.
+/// Smooth error of a declared map, in units of its declared tolerance of flow: the remaining error is a common factor.
 const DECLARED_HEAD: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
-/// What a declared map does not follow, ratio: readings at the end of a step that still moves.
+/// Deviation of the rig from a declared map, ratio: readings at the end of a step that is not fully settled.
 const ROUGHNESS: f64 = 2e-3;
 
 pub(crate) fn rows(
@@ -68,7 +67,7 @@ fn declared(
     let at: Vec<At> = readings.iter().map(|readings| places.at(readings)).collect();
     let by_reading: Vec<PerChannel> =
         readings.iter().map(|readings| readings.derivatives(ln_speed)).collect();
-    // A map of more flow has the measured flow at a lower speed.
+    // A map with more flow reaches the measured flow at a lower speed.
     let by_flow: Vec<f64> =
         readings.iter().zip(&by_reading).map(|(readings, by)| by[5] * readings.flow_kg_s()).collect();
     let sigma = nominal.tolerances.flow_map_ratio;
@@ -84,7 +83,7 @@ fn declared(
     })
 }
 
-/// Head and flow coefficient of all points lie on smooth curves. A reading that is off moves the place on the curve too.
+/// Residuals of head and flow coefficient from smooth curves. A wrong reading also moves the position on the curve.
 fn any(readings: &[Readings], noise: &PerChannel, reference: ReferenceState) -> Option<Rows> {
     let readings: Vec<Readings> = readings.iter().filter(|readings| is_on_a_map(readings)).copied().collect();
     let places = Places::of(&readings, reference)?;

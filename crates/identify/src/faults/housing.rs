@@ -1,14 +1,14 @@
 //! Tc against T2: the housing's heat balance.
 //!
-//! Within a step the housing goes from one temperature to another, and T2 follows it by a share `s` that the step itself tells
-//! (`T2 = s Tc + (1 - s) T2ad`, eq. 3, so that `s` is the slope of T2 over Tc, whatever the offsets). The gas then gives the
-//! housing `K (T2 - Tc)` with `K = m cp s/(1 - s)`, and what it gives is stored or lost:
+//! Within a step the housing temperature changes, and T2 follows it by a share `s` that the step itself determines. By eq. 3, `T2 = s Tc + (1
+//! - s) T2ad`, so `s` is the slope of T2 over Tc, whatever the offsets. The heat flow from gas to housing is `K (T2 - Tc)` with `K = m cp s/(1
+//! - s)`, and it is stored or lost:
 //!
 //! `K (T2 - Tc) = C dTc/dt + b Tc - a + alpha K (Tc - T1) + K d`
 //!
-//! with one heat capacity `C`, one loss `b` to oil, cell and turbine, and one share `alpha` before the wheel for the whole recording. `d`
-//! is what T2 reads more than Tc does of the same temperature. `K` changes by a factor of five over a map and `dTc/dt` its sign, so that
-//! this recording alone determines `d` to some tenths of a kelvin. A housing of several masses moves `d`, which is part of the declared
+//! with one heat capacity `C`, one loss `b` to oil, cell and turbine, and one share `alpha` before the wheel for the whole recording. `d` is
+//! the reading difference of T2 and Tc at equal temperature. `K` changes by a factor of five over a map and `dTc/dt` its sign. A single
+//! recording therefore determines `d` to some tenths of a kelvin. A housing of several masses shifts `d`, which is part of the declared
 //! uncertainty.
 
 use crate::IdentifyConfig;
@@ -18,33 +18,33 @@ use crate::samples::Samples;
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
 use mapper_numerics::statistics::mean;
 
-/// Begin of what is looked at, after that of the step, s: speed, flow and probe have settled.
+/// Start of the evaluation after the step's start, s: speed, flow and probe have settled.
 const AFTER_S: f64 = 10.0;
-/// Part over which the housing's slope is taken, s.
+/// Length of a part over which the housing's slope is taken, s.
 const PART_S: f64 = 18.0;
-/// Most parts of a step, and of all together: the effort grows with the cube.
+/// Maximum number of parts of a step, and of all together: the cost grows with the cube.
 const MAX_PARTS: usize = 8;
 const MAX_PARTS_IN_ALL: usize = 1000;
-/// Shortest step that is looked at, behind that begin, s: three times the correlation time of noise tell neither slope nor share.
+/// Shortest usable length after that start, s: three correlation times of noise determine neither slope nor share.
 const SHORTEST_S: f64 = 27.0;
-/// Fewest points that determine the balance. Repeats do not count.
+/// Minimum number of points that determine the balance. Repeats do not count.
 const MIN_POINTS: usize = 8;
-/// Rows of a part and of a step, at least.
+/// Minimum number of rows of a part and of a step.
 const MIN_ROWS: usize = 10;
-/// Shares of T2 that follow the housing and say something of it.
+/// Usable range of the share of T2 that follows the housing.
 const SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.95;
-/// Samples at 10 Hz that remember each other, as noise of 2 s does.
+/// Number of correlated samples at 10 Hz, for noise of 2 s.
 const ALIKE: f64 = 20.0;
-/// What a balance lacks, W, and share of the conductance.
+/// Closure error of a balance, W, and as a share of the conductance.
 const LACKS_W: f64 = 10.0;
 const LACKS_RATIO: f64 = 0.05;
-/// Difference of T2 and Tc that a housing of more than one temperature makes, one standard deviation, K: 1 K is three of it.
+/// Difference of T2 and Tc in a housing with more than one temperature, one standard deviation, K: 1 K is three of it.
 const UNEVEN_K: f64 = 0.35;
-/// The same of what comes over the run as it warms up, K: a housing of two walls makes up to 3 K.
+/// The same for the part that develops over the run as it warms up, K: a housing of two walls makes up to 3 K.
 const UNEVEN_DRIFT_K: f64 = 1.0;
-/// Middle of what Tc and T4 are, so that the constants stay small, K.
+/// Reference temperature of Tc and T4, so that the constants stay small, K.
 const AROUND_K: f64 = 330.0;
-/// Heat capacity of the housing, J/K, its loss, W/K and W, and alpha_A: any that turbochargers have, one standard deviation each.
+/// Heat capacity of the housing, J/K, its loss, W/K and W, and alpha_A: the range of turbochargers, one standard deviation each.
 const ANY_CAPACITY_J_K: f64 = 3e3;
 const ANY_LOSS_W_K: f64 = 50.0;
 const ANY_LOSS_W: f64 = 3e3;
@@ -57,14 +57,14 @@ struct Part {
     t2_k: f64,
     tc_k: f64,
     conductance_w_k: f64,
-    /// Error of the conductance by noise, which all parts of a step share, one standard deviation, W/K.
+    /// Noise error of the conductance, which all parts of a step share, one standard deviation, W/K.
     conductance_error_w_k: f64,
     middle_s: f64,
 }
 
 impl Part {
-    /// What area before the wheel adds beyond its distance from T1, per share of it, K: compression carries that heat on, and the slope
-    /// of T2 over Tc counts it with the heat after the wheel.
+    /// Effect of area before the wheel in addition to its distance from T1, per share of it, K: compression amplifies that heat, and the slope
+    /// of T2 over Tc includes it with the heat after the wheel.
     fn carried_on_k(&self) -> f64 {
         (self.t2_k - self.t1_k) / self.t1_k * (self.t2_k - self.tc_k)
     }
@@ -122,7 +122,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
             _ => 0.0,
         })
     };
-    // A gain of T2 scales the conductance too, which capacity and loss take up: what is left is its error at the housing's temperature.
+    // A gain of T2 also scales the conductance, which capacity and loss absorb. The remaining effect is its error at the housing temperature.
     let readings = |part: &&Part| {
         let values = CHANNELS.map(|channel| match channel {
             Channel::T1 => part.t1_k,
@@ -140,7 +140,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
     })
 }
 
-/// At most `most` parts of a step; none where T2 does not say how far it follows the housing.
+/// At most `most` parts of a step; none if T2 does not determine how far it follows the housing.
 fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfig, most: usize) -> Vec<Part> {
     if end_s - start_s < SHORTEST_S {
         return Vec::new();
@@ -182,8 +182,8 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
     (0..count).filter_map(part).collect()
 }
 
-/// Share of its temperature after compression that the gas keeps, and the error of that: by least squares of `T2 - Tc = kept (T1 - Tc) +
-/// (kept/eta) dT_is`.
+/// Share of its temperature after compression that the gas keeps, and its error: by least squares of `T2 - Tc = kept (T1 - Tc) + (kept/eta)
+/// dT_is`.
 fn kept_ratio(samples: &Samples) -> Option<(f64, f64)> {
     let count = samples.len();
     if count < 2 * MIN_ROWS {

@@ -1,9 +1,8 @@
-//! Faults of sensors and machine, found by the balances that they break.
+//! Detects faults of sensors and machine from balances that do not close.
 //!
-//! Each balance is a law with a declared uncertainty: one opening of the valve has one area, heads go with the speed squared, the
-//! housing stores what the gas gives it, efficiency is a smooth function of the place on the map. The catalogue of sensor faults
-//! ([`mapper_observe::sensor_fault`]) and a machine of another scale are the hypotheses; [`mapper_inference::hypotheses`] finds the most
-//! probable set of them.
+//! Each balance is a law with a declared uncertainty: one opening of the valve has one area, and heads go with the speed squared. The housing
+//! stores the heat from the gas, and efficiency is a smooth function of the map position. The hypotheses are the catalogue of sensor faults
+//! ([`mapper_observe::sensor_fault`]) and a machine of another scale. [`mapper_inference::hypotheses`] finds the most probable set of them.
 
 pub(crate) mod efficiency;
 pub(crate) mod found;
@@ -28,21 +27,20 @@ use mapper_core::{Channel, Method, Recording};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_observe::sensor_fault::CATALOGUE;
 
-/// Faults of a recording that are expected beforehand: one recording in ten has one. Judgement; the figures of docs/validation/faults.md were
-/// found with it.
+/// Prior probability of a fault: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
 const EXPECTED_FAULTS: f64 = 0.1;
-/// What a machine may be off its declaration by, ratio, one standard deviation: another machine of the same series.
+/// Deviation of a machine from its declaration, ratio, one standard deviation: another machine of the same series.
 const OTHER_MACHINE_RATIO: f64 = 0.05;
-/// Relative probability from which on an alternative is named: one in twenty.
+/// Relative probability above which an alternative is named: one in twenty.
 const ALTERNATIVE: f64 = 0.05;
-/// The same below which it is excluded, when points stay good because of that: one in a thousand.
+/// Relative probability below which an alternative is excluded, if points stay good because of that: one in a thousand.
 const EXCLUDED: f64 = 1e-3;
 
-/// Most steps that are used, evenly spread: the effort grows with the cube, and these take a second.
+/// Maximum number of steps, evenly spread: the cost grows with the cube, and these take a second.
 const MAX_STEPS: usize = 500;
 
-/// All balances of a recording, and what is known of the parameters beforehand. `ends`: of the steps that have a say. `fitted`: efficiencies
-/// of the joint fit, where there is one.
+/// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if
+/// available.
 pub(crate) fn likelihood(
     recording: &Recording,
     ends: &[Option<Ends>],
@@ -53,13 +51,13 @@ pub(crate) fn likelihood(
     let priors = priors(config, nominal);
     let mut likelihood = Likelihood::new(priors.always.len() + priors.hypotheses.len());
     for rows in balances(recording, ends, fitted, config, nominal)? {
-        // A balance without a density says nothing.
+        // A balance without a density gives no evidence.
         let _ = likelihood.add(&rows.balance(&CATALOGUE));
     }
     Some((likelihood, priors))
 }
 
-/// Faults without which the balances of a recording do not close; empty where they do.
+/// Faults that explain why the balances of a recording do not close; empty if they close.
 pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> Vec<FoundFault> {
     let likelier_than = |member: &Member, limit: f64| -> Vec<Suspect> {
         let others = member.alternatives.iter().take_while(|(_, relative)| *relative > limit);
@@ -76,13 +74,13 @@ pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> 
     likelihood.explain(priors).unwrap_or_default().members.into_iter().map(found).collect()
 }
 
-/// Whether a number of a point rests on it: none does on the valve, and an apparent efficiency does not on the housing.
+/// Whether a number of a point depends on it: none depends on the valve, and an apparent efficiency does not depend on the housing.
 fn touches_points(suspect: Suspect, method: Method) -> bool {
     let housing = method == Method::Steady && suspect.channels() == [Channel::Tc];
     !(housing || suspect == Suspect::Machine(Machine::ValveArea))
 }
 
-/// What speaks against all points where there are faults that touch them.
+/// Warnings for all points if there are faults that affect them.
 pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection> {
     faults.iter().any(|fault| fault.touches_points).then_some(())?;
     let sensors = faults.iter().any(|fault| matches!(fault.suspect, Suspect::Sensor(_)));
@@ -94,7 +92,7 @@ pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection
     Some(Objection::new(code, message, (0..steps).collect()))
 }
 
-/// What is to be known of faults that leave the points as they are.
+/// Remarks on faults that do not affect the points.
 pub(crate) fn remark(faults: &[FoundFault]) -> Option<String> {
     let harmless = !faults.is_empty() && !faults.iter().any(|fault| fault.touches_points);
     harmless.then(|| format!("{}; no point depends on it", described(faults)))
@@ -105,7 +103,7 @@ fn described(faults: &[FoundFault]) -> String {
     format!("valve, head, heat of the housing and efficiencies do not agree unless {}", sizes.join(", and "))
 }
 
-/// Standard error with which the balances tell each suspect by itself, in its unit.
+/// Standard error of each suspect's size from the balances, in its unit.
 pub(crate) fn standard_errors(likelihood: &Likelihood, priors: &Priors) -> Vec<(Suspect, f64)> {
     let errors = likelihood.standard_errors(priors).unwrap_or_default();
     errors.into_iter().enumerate().map(|(index, error)| (suspect(index), error)).collect()

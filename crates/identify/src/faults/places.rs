@@ -1,8 +1,8 @@
-//! Where points lie on the map, in coordinates in which maps are smooth.
+//! Positions of points on the map, in coordinates in which maps are smooth.
 //!
-//! A speed line is steep near choke and flat near surge, so that neither flow nor head orders its points well. The angle of the point in the
-//! plane of flow and head coefficient does at both ends: the efficiencies of a public measured map of 93 points (TurboTools) are a smooth
-//! function of it to 0.3 points, and of the flow to 1.
+//! A speed line is steep near choke and flat near surge, so neither flow nor head orders its points well. The angle in the plane of flow and
+//! head coefficient orders them at both ends. The efficiencies of a public measured map of 93 points (TurboTools) are a smooth function of it
+//! to 0.3 points, and of the flow to 1.
 
 use crate::faults::readings::Readings;
 use crate::faults::smooth::At;
@@ -24,7 +24,7 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// `None` without points, or where a coefficient is not positive.
+    /// `None` without points, or if a coefficient is not positive.
     pub(crate) fn of(readings: &[Readings], reference: ReferenceState) -> Option<Self> {
         readings.iter().all(is_on_a_map).then_some(())?;
         let middle = (
@@ -49,12 +49,12 @@ impl Places {
         (flow.hypot(head).ln(), flow.atan2(head))
     }
 
-    /// ln of the distance from the origin: a smooth function of the place.
+    /// ln of the distance from the origin: a smooth function of the position.
     pub(crate) fn ln_distance(&self, readings: &Readings) -> f64 {
         self.polar(readings).0
     }
 
-    /// The place, scaled to the points.
+    /// The position, scaled to the points.
     pub(crate) fn at(&self, readings: &Readings) -> At {
         let corrected_rpm = self.corrected_rpm(readings);
         At {
@@ -65,14 +65,14 @@ impl Places {
     }
 }
 
-/// Whether a point has a place at all.
+/// Whether a point has a position at all.
 pub(crate) fn is_on_a_map(readings: &Readings) -> bool {
     let (flow, head) = coefficients(readings);
     flow > 0.0 && head > 0.0 && (flow + head).is_finite()
 }
 
-/// Flow over speed, corrected to the inlet's density, and isentropic temperature rise over speed squared: the dimensional analysis of
-/// compressors without its constants.
+/// Flow over speed, corrected to the inlet's density, and isentropic temperature rise over speed squared: the dimensionless groups of
+/// compressors without their constants.
 fn coefficients(readings: &Readings) -> (f64, f64) {
     let (t1_k, speed_rpm) = (readings.t1_k(), readings.speed_rpm());
     let rise_k = t1_k * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), t1_k, readings.air);

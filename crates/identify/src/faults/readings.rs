@@ -1,4 +1,4 @@
-//! What the channels read at the end of a step, and by how much a number moves with each of them.
+//! Readings at the end of a step, and derivatives with respect to them.
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
@@ -27,7 +27,7 @@ pub(crate) struct Readings {
     pub(crate) values: PerChannel,
     /// Time since the first step's start over the whole run's length.
     pub(crate) run_ratio: f64,
-    /// The air that is compressed.
+    /// The compressed air.
     pub(crate) air: Air,
 }
 
@@ -38,7 +38,7 @@ pub(crate) fn span_s(recording: &Recording) -> Option<(f64, f64)> {
     (last_s > first_s).then_some((first_s, last_s))
 }
 
-/// Steps for derivatives: small against what the balances bend over, large against rounding.
+/// Steps for derivatives: small compared with the curvature of the balances, large compared with rounding.
 const DIFFERENCES: PerChannel = [0.05, 0.05, 0.05, 20.0, 20.0, 1e-5, 20.0];
 
 impl Readings {
@@ -58,7 +58,7 @@ impl Readings {
         }
     }
 
-    /// Flow that dry air would have at the same Mach numbers, kg/s.
+    /// Flow of dry air at the same Mach numbers, kg/s.
     pub(crate) fn dry_flow_kg_s(&self) -> f64 {
         self.flow_kg_s() * self.air.dry_flow_ratio()
     }
@@ -87,7 +87,7 @@ impl Readings {
         self.values[6]
     }
 
-    /// Derivatives of a function of the readings by each of them; 0 where it does not depend on one.
+    /// Derivatives of a function of the readings by each of them; 0 if it does not depend on one.
     pub(crate) fn derivatives(&self, function: impl Fn(&Readings) -> f64) -> PerChannel {
         std::array::from_fn(|channel| {
             let moved = |by: f64| {
@@ -102,7 +102,7 @@ impl Readings {
     }
 }
 
-/// Standard errors of the readings at a step's end by the declared noise, [`CHANNELS`].
+/// Standard errors of the readings at a step's end from the declared noise, [`CHANNELS`].
 pub(crate) fn noise(config: &IdentifyConfig, recording: &Recording) -> PerChannel {
     let colour = coloured(config.noise_colour);
     CHANNELS.map(|channel| {

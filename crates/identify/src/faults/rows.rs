@@ -1,4 +1,4 @@
-//! The rows of one balance, and the columns of all that may move them.
+//! The rows of one balance, and the columns of all parameters that affect them.
 
 use crate::faults::readings::{CHANNELS, PerChannel, Readings};
 use mapper_inference::hypotheses::Balance;
@@ -8,19 +8,19 @@ use nalgebra::{DMatrix, DVector};
 /// A balance of the recording.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
-    /// Residuals: what is measured less what is expected.
+    /// Residuals: measured minus expected.
     pub(crate) residual: Vec<f64>,
-    /// Their covariance by noise and by what is declared of the law behind the balance.
+    /// Their covariance from noise and from the declared uncertainty of the law behind the balance.
     pub(crate) covariance: DMatrix<f64>,
     /// Readings behind each row.
     pub(crate) readings: Vec<Readings>,
     /// Derivatives of each residual by the readings.
     pub(crate) by_reading: Vec<PerChannel>,
-    /// What a machine of another scale does to each residual; empty where nothing is declared of the machine.
+    /// Effect of a machine of another scale on each residual; empty if no machine is declared.
     pub(crate) by_machine: Vec<(Machine, Vec<f64>)>,
 }
 
-/// What of the machine may be other than declared.
+/// Machine properties that may differ from the declaration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Machine {
     /// Flow of the compressor map, all over.
@@ -35,7 +35,7 @@ pub enum Machine {
 pub(crate) const MACHINE: [Machine; 3] = [Machine::FlowCapacity, Machine::Efficiency, Machine::ValveArea];
 
 impl Rows {
-    /// What an error of the readings does to each row. `error`: of a channel's reading.
+    /// Effect of a reading error on each row. `error`: of a channel's reading.
     fn column(&self, error: impl Fn(usize, &Readings) -> f64) -> DVector<f64> {
         let rows = self.readings.iter().zip(&self.by_reading);
         DVector::from_iterator(
@@ -87,7 +87,7 @@ pub(crate) fn own(sigmas: impl ExactSizeIterator<Item = f64>) -> DMatrix<f64> {
     DMatrix::from_diagonal(&DVector::from_iterator(sigmas.len(), sigmas.map(|sigma| sigma * sigma)))
 }
 
-/// Standard errors of rows by the noise of the readings, and by what else each has of its own.
+/// Standard errors of rows from the noise of the readings and from each row's own error.
 pub(crate) fn errors(by_reading: &[PerChannel], noise: &PerChannel, rest: f64) -> Vec<f64> {
     let of = |by: &PerChannel| by.iter().zip(noise).map(|(by, sigma)| (by * sigma).powi(2)).sum::<f64>();
     by_reading.iter().map(|by| (of(by) + rest * rest).sqrt()).collect()

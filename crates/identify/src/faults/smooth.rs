@@ -1,21 +1,21 @@
-//! A smooth function over the map of which nothing but its smoothness is known.
+//! A smooth but otherwise unknown function over the map.
 
 use nalgebra::{DMatrix, DVector};
 
-/// What such a function is like: a polynomial in speed and angle, what friction adds at low speed, and a Gaussian process for the rest.
+/// Prior of such a function: a polynomial in speed and angle, a friction term at low speed, and a Gaussian process for the remainder.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Smooth {
     /// Powers of speed and angle of each term, with the standard deviation of its coefficient.
     pub(crate) terms: &'static [(i32, i32, f64)],
-    /// Standard deviation of the part that goes with the inverse square of the speed.
+    /// Standard deviation of the 1/N^2 term.
     pub(crate) slow: f64,
-    /// Standard deviation of what the polynomial does not follow.
+    /// Standard deviation of the deviation from the polynomial.
     pub(crate) amplitude: f64,
-    /// Lengths over which that changes, halves of the range of the points: speed, angle.
+    /// Correlation lengths of that deviation, halves of the range of the points: speed, angle.
     pub(crate) lengths: (f64, f64),
 }
 
-/// A place of the map.
+/// A position on the map.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct At {
     /// Corrected speed, scaled to the points, -1 to 1.
@@ -27,7 +27,7 @@ pub(crate) struct At {
 }
 
 impl Smooth {
-    /// Covariance of the function's values between two places.
+    /// Covariance of the function's values between two positions.
     fn between(&self, a: &At, b: &At) -> f64 {
         let term = |(i, j, sigma): &(i32, i32, f64)| {
             sigma * sigma * (a.speed * b.speed).powi(*i) * (a.angle * b.angle).powi(*j)
@@ -43,7 +43,7 @@ impl Smooth {
         DMatrix::from_fn(places.len(), places.len(), |i, j| self.between(&places[i], &places[j]))
     }
 
-    /// The most probable value at a place. `weights`: inverse covariance of the measured values times these values.
+    /// The most probable value at a position. `weights`: inverse covariance of the measured values times these values.
     pub(crate) fn value(&self, at: &At, places: &[At], weights: &DVector<f64>) -> f64 {
         places.iter().zip(weights.iter()).map(|(place, weight)| weight * self.between(at, place)).sum()
     }

@@ -1,7 +1,7 @@
-//! Flow through the back-pressure valve: at one opening it has one area.
+//! Flow through the back-pressure valve: one opening has one area.
 //!
-//! `m sqrt(T2)/(P2 psi(P1/P2))`, with the St. Venant and Wantzel function psi of an orifice that blows off to the inlet's
-//! pressure, is the area of the valve. Without a declared valve it may be anything, and need not go with the opening.
+//! `m sqrt(T2)/(P2 psi(P1/P2))`, with the St. Venant and Wantzel function psi of an orifice that discharges to the inlet pressure, is the area
+//! of the valve. Without a declared valve the area is unknown, and need not be proportional to the opening.
 
 use crate::faults::readings::{PerChannel, Readings};
 use crate::faults::rows::{Machine, Rows, common, errors, own};
@@ -9,19 +9,18 @@ use crate::nominal_rig::NominalRig;
 use mapper_physics::orifice;
 use nalgebra::DMatrix;
 
-/// Pressure over that behind the valve below which its flow says nothing of it, Pa.
+/// Pressure difference over the valve below which its flow carries no information about it, Pa.
 const MIN_DIFFERENCE_PA: f64 = 5e3;
-/// Pressure behind the valve less that of the inlet, which is not measured, one standard deviation, Pa. Judgement: filters, silencers and
-/// exhaust lines have some hundred.
+/// Difference between the pressure behind the valve, which is not measured, and the inlet pressure, one standard deviation, Pa. Judgement:
+/// filters, silencers and exhaust lines have some hundred.
 const BEHIND_PA: f64 = 300.0;
-/// What the discharge coefficient of a valve varies with the pressure ratio, one standard deviation, and over which difference of its
-/// logarithm. Judgement.
+/// Variation of a valve's discharge coefficient with the pressure ratio, one standard deviation, and the difference of the logarithm over
+/// which it varies. Judgement.
 const DISCHARGE_RATIO: f64 = 0.02;
 const DISCHARGE_LENGTH: f64 = 0.5;
-/// What the area of a valve that is set again differs by, one standard deviation. Judgement: a positioner resolves some tenths of a
-/// per cent of the travel.
+/// Repeatability of a valve's area, one standard deviation. Judgement: a positioner resolves some tenths of a per cent of the travel.
 const SET_AGAIN_RATIO: f64 = 0.005;
-/// Area of an unknown opening, one standard deviation of its logarithm: any.
+/// Area of an unknown opening, one standard deviation of its logarithm: uninformative.
 const ANY: f64 = 3.0;
 
 pub(crate) fn rows(
@@ -72,7 +71,7 @@ pub(crate) fn rows(
     Some(Rows { residual: residual.collect(), covariance, readings, by_reading, by_machine })
 }
 
-/// ln of the valve's area, discharge coefficient included, m2.
+/// ln of the valve's area, including the discharge coefficient, m2.
 fn ln_area(readings: &Readings) -> f64 {
     let per_m2 = orifice::flow_kg_s(1.0, readings.p2_pa(), readings.t2_k(), readings.p1_pa());
     (readings.flow_kg_s() / per_m2).ln()

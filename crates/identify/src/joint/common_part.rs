@@ -1,17 +1,16 @@
-//! The part of the points' errors that they share, as a few independent errors.
+//! The common part of the points' errors, as a few independent errors.
 
 use nalgebra::DMatrix;
 
-/// Most errors that a covariance is described by.
+/// Maximum number of common errors that describe a covariance.
 const MAX: usize = 8;
-/// Share of the common variance below which an error is left to the points' own part.
+/// Share of the common variance below which an error goes to the points' own part.
 const MIN_RATIO: f64 = 2e-3;
 
-/// For each quantity, what one standard deviation of each common error changes.
+/// Change of each quantity per standard deviation of each common error.
 ///
-/// `covariance` of the quantities, `own_variances` the part of its diagonal that no other quantity shares. The rest is
-/// described by its leading eigenvectors (factor analysis by principal factors), scaled so that each quantity has the
-/// standard error in `errors`.
+/// `covariance` is that of the quantities, `own_variances` the part of its diagonal that no other quantity shares. The common remainder is
+/// described by its leading eigenvectors (factor analysis by principal factors), scaled to the standard errors in `errors`.
 pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], errors: &[f64]) -> Vec<Vec<f64>> {
     let count = errors.len();
     let none = vec![Vec::new(); count];
@@ -30,7 +29,7 @@ pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], erro
     let mut changes = none;
     for k in leading {
         let vector = eigen.eigenvectors.column(*k);
-        // An eigenvector has no sign of its own: upwards on the whole.
+        // The sign of an eigenvector is arbitrary: make its sum positive.
         let size = eigen.eigenvalues[*k].sqrt() * if vector.sum() < 0.0 { -1.0 } else { 1.0 };
         for (i, changes) in changes.iter_mut().enumerate() {
             changes.push(size * vector[i]);
@@ -39,7 +38,7 @@ pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], erro
     for (i, (changes, error)) in changes.iter_mut().zip(errors).enumerate() {
         let all = covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
         let shared = changes.iter().map(|change| change * change).sum::<f64>().sqrt();
-        // No part is more than the whole.
+        // The common part must not exceed the whole.
         let scale = error / all.max(shared);
         changes.iter_mut().for_each(|change| *change *= scale);
     }
@@ -50,7 +49,7 @@ pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], erro
 mod tests {
     use super::*;
 
-    /// Two common errors and an own one for each quantity, put together and taken apart again.
+    /// Recovers two common errors and one individual error per quantity from their combined covariance.
     #[test]
     fn what_was_put_in_comes_out() {
         let [first, second] = [[1.0, 2.0, 3.0, 2.0, 1.0], [0.5, -0.5, 0.0, 0.5, -0.5]];

@@ -1,7 +1,7 @@
-//! What the joint method will make of steps that were only forecast: for planning, before anything is measured.
+//! Predicts the joint method's result for forecast steps, for planning before the measurement.
 //!
-//! The forecast is identified as a recording without noise is, and the covariance where that ends holds the declared noise,
-//! what is left of the offsets and everything that the steps share: the Fisher information of all steps together.
+//! The forecast is identified like a noise-free recording. The covariance at the minimum includes the declared noise, the remaining offsets
+//! and everything that the steps share: the Fisher information of all steps together.
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
@@ -13,17 +13,17 @@ use crate::joint::start::{self, START_S};
 use crate::joint::{refinements, smoothness};
 use mapper_numerics::coloured_noise::BlockNoise;
 
-/// Fewest rows of a step that the method takes.
+/// Minimum number of rows of a step.
 const MIN_ROWS: usize = 4;
 
-/// Blocks of a forecast are so much longer than those of a recording: half of what sensor noise remembers at first and all of it
-/// later, which costs a few percent of what the rows know and halves the work.
+/// Ratio of forecast to recording block length. Blocks are half the noise correlation time at first and all of it later, which costs a few
+/// percent of the rows' information and halves the computation.
 const COARSER: f64 = 2.0;
 
-/// A step that was only forecast.
+/// A forecast step.
 #[derive(Debug, Clone, Copy)]
 pub struct ExpectedStep<'a> {
-    /// Its instants, `t_s` counted from the jump, the last one at the step's end.
+    /// Its instants; `t_s` counts from the jump, the last one is the step's end.
     pub rows: &'a [ExpectedRow],
     /// Efficiency at its end, fraction.
     pub eta: f64,
@@ -32,26 +32,26 @@ pub struct ExpectedStep<'a> {
 }
 
 impl ExpectedStep<'_> {
-    /// Where a fit may start.
+    /// Start values for a fit.
     fn estimate(&self) -> Estimate {
         Estimate { eta: Some((self.eta, None)), h_w_m2k: Some((self.h_w_m2k, None)), ..Estimate::default() }
     }
 }
 
-/// What the joint method will make of the steps of a campaign.
+/// The expected result of the joint method for the steps of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedTogether {
-    /// One result for each step on a machine that is as declared; `None` for a step that is too short.
+    /// One result per step on a machine as declared; `None` for a step that is too short.
     pub steps: Vec<Option<Expected>>,
-    /// By how much the efficiencies would be off (rms over the steps, one sigma, fraction) if alpha_A, probe and heating/cooling ratio had
-    /// to be found from these steps. Above [`MAX_RESTING_ETA`](crate::MAX_RESTING_ETA) the points rest on the declaration and are doubtful.
+    /// Error of the efficiencies (rms over the steps, one sigma, fraction) if alpha_A, probe and heating/cooling ratio had to be found from
+    /// these steps. Above [`MAX_RESTING_ETA`](crate::MAX_RESTING_ETA) the points depend on the declaration and are doubtful.
     pub resting_eta: f64,
 }
 
 /// Identifies noise-free steps together; `None` if the fit does not converge.
 ///
-/// For the errors alpha_A, probe and heating/cooling ratio stand where they are declared: without evidence against the declaration, the
-/// method shrinks them towards it. After an isothermal zero `config` is that of [`expected_after_zero`](crate::expected_after_zero).
+/// The errors are computed with alpha_A, probe and heating/cooling ratio as declared: without evidence against the declaration, the method
+/// shrinks them towards it. After an isothermal zero `config` is that of [`expected_after_zero`](crate::expected_after_zero).
 pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) -> Option<ExpectedTogether> {
     let condensed: Vec<StepRows> =
         steps.iter().enumerate().filter_map(|(position, step)| condensed(position, step, config)).collect();
@@ -81,7 +81,7 @@ pub fn expected_together(steps: &[ExpectedStep<'_>], config: &IdentifyConfig) ->
     Some(ExpectedTogether { steps: found, resting_eta })
 }
 
-/// The rows that the method would condense a recording's samples to.
+/// The rows to which the method would condense the samples of a recording.
 fn condensed(position: usize, step: &ExpectedStep<'_>, config: &IdentifyConfig) -> Option<StepRows> {
     let first = step.rows.partition_point(|expected| expected.t_s < START_S);
     let first_s = step.rows.get(first)?.t_s;

@@ -1,37 +1,34 @@
-//! Whether h before the wheel is that after it or follows the inlet's own diameter.
+//! Decides whether h before the wheel equals h after it or follows the law at the inlet's own diameter.
 //!
-//! Both readings have the same numbers to find, and nearly the same T2: a recording sees `h alpha_A` before the wheel and
-//! `h (1 - alpha_A)` behind it, so with another h before it alpha_A and h come out otherwise, and the efficiencies do not.
-//! The ratio of the two laws varies by a few percent over a map (with the gas temperature behind the wheel), which is all
-//! that a recording can tell them by, unless alpha_A is held as declared. Then the readings differ by some hundredths of alpha_A,
-//! for which small faults of the model pass as well: a map that drops more steeply than the surface that is fitted was seen
-//! to speak for the wrong one by odds of hundreds to one. So both are fitted and weighed, such faults
-//! counted in; where the recording does not decide, the difference is carried on as an error of everything that it moves.
+//! Both models have the same parameters and predict nearly the same T2. A recording determines `h alpha_A` before the wheel and `h (1 -
+//! alpha_A)` after it. Another h before the wheel therefore changes alpha_A and h, but not the efficiencies. The ratio of the two laws varies
+//! by a few percent over a map, with the gas temperature after the wheel. A recording can distinguish the laws only by this variation, unless
+//! alpha_A is fixed as declared. Then the models differ by some hundredths of alpha_A, and small model errors can cause the same change. A map
+//! steeper than the fitted surface has favoured the wrong model by odds of hundreds to one. So both models are fitted and compared, with such
+//! errors included. If the recording does not decide, the difference becomes an error of everything that it moves.
 
 use crate::joint::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
 use crate::joint::solve::{Covariance, FULLY, Problem};
 use mapper_core::{FoundInlet, InletConvection, Origin};
 use nalgebra::DMatrix;
 
-/// Standard errors of alpha_A below which the readings differ by less than what is left open of it anyway.
+/// Number of standard errors of alpha_A below which the difference of the models is smaller than the uncertainty of alpha_A.
 const AT_WORK_SIGMAS: f64 = 2.0;
-/// What small errors of the model can pass for, as a change of alpha_A: a clearance that grows by a percent as the housing warms up by 100 K
-/// looks like 0.06.
+/// Change of alpha_A that small model errors can cause: a clearance that grows by a percent as the housing warms up by 100 K looks like 0.06.
 const PASSES_FOR_ALPHA: f64 = 0.025;
-/// Least spread of the points about the surface of efficiencies, fraction, where the readings are compared: a true map that drops more
-/// steeply than the surface speaks for the wrong one. The surface misses the
-/// nominal map by as much at eighteen points without noise (`tests/inlet.rs`).
+/// Minimum spread of the points about the efficiency surface when the models are compared, fraction. A true map steeper than the surface
+/// favours the wrong model. The surface misses the nominal map by as much at eighteen points without noise (`tests/inlet.rs`).
 const MIN_SURFACE_SIGMA: f64 = 3e-3;
-/// Probability of the other reading below which the recording has decided.
+/// Probability of the other model below which the recording has decided.
 const DECIDED: f64 = 0.05;
-/// Share of the distance between the readings that is one standard deviation at least where it has not: the 95 % interval
-/// then reaches from one to the other and a quarter beyond, for what noise adds to the other.
+/// Minimum standard deviation if the recording has not decided, as a share of the distance between the models: the 95 % interval then reaches
+/// from one to the other and a quarter beyond, for the noise of the other.
 const OPEN_SIGMA: f64 = 0.65;
 
-/// Beyond this the straight line says nothing of the distance, and so neither does its ratio to it.
+/// Maximum ratio of the distance to its linear estimate: beyond it the linearisation is not valid.
 const LARGEST_STRETCH: f64 = 2.0;
 
-/// How far h before the wheel follows the inlet's own law.
+/// Degree to which h before the wheel follows the inlet's own law.
 pub(crate) fn power_of(convection: InletConvection) -> f64 {
     match convection {
         InletConvection::Shared => 0.0,
@@ -43,8 +40,8 @@ fn convection_of(power: f64) -> InletConvection {
     if power == 0.0 { InletConvection::Shared } else { InletConvection::Own }
 }
 
-/// Compares both readings on a problem that is at its minimum, and takes the other one where the recording decides for it. Gives what they
-/// leave open, one standard deviation of the power; `None` where it makes no difference.
+/// Compares both models on a problem at its minimum and selects the other one if the recording decides for it. Returns the remaining
+/// uncertainty of the power, one standard deviation; `None` if it makes no difference.
 pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let error = problem.covariance()?.error_of(ALPHA).unwrap_or(0.0);
     if problem.shared[ALPHA] <= AT_WORK_SIGMAS * error {
@@ -78,7 +75,7 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     };
     let seen = 0.5 * (problem.square() - other.square()) * share_of_noise(problem)?;
     let mut left = 1.0 / (1.0 + (-seen).exp());
-    // The declared reading stands unless the recording decides against it: where it does not, the other one has other efficiencies.
+    // Keep the declared model unless the recording decides against it: the other one has other efficiencies.
     if left > 1.0 - DECIDED {
         std::mem::swap(problem, &mut other);
         left = 1.0 - left;
@@ -99,7 +96,7 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     Some(Some(stretched))
 }
 
-/// Carries what the readings leave open into the covariance: by how much everything moves from one towards the other.
+/// Adds the undecided difference between the models to the covariance: how far each quantity moves from one towards the other.
 pub(crate) fn carry(problem: &mut Problem<'_>, sigma: f64, without: &Covariance) -> Option<Covariance> {
     problem.priors[INLET].sigma = sigma;
     problem.active[INLET] = true;
@@ -120,8 +117,8 @@ pub(crate) fn carry(problem: &mut Problem<'_>, sigma: f64, without: &Covariance)
     Some(with)
 }
 
-/// By how much less the readings are told apart than noise alone says: its share of the variance, noise and faults of the model, of a
-/// power between 0 and 1 by which h before the wheel follows its own law. 1 where alpha_A is fitted and takes up such faults.
+/// Factor by which model errors weaken the decision between the models, compared with noise alone: the noise's share of the variance of the
+/// power (0 to 1) by which h before the wheel follows its own law. It is 1 if alpha_A is fitted, because alpha_A then absorbs such errors.
 fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
     if problem.active[ALPHA] {
         return Some(1.0);
@@ -130,15 +127,15 @@ fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
     let alpha = problem.shared[ALPHA];
     let ln_ratios = problem.ln_inlet_ratios();
     let ln_ratio = mapper_numerics::statistics::mean(&ln_ratios)?;
-    // The change of alpha_A that passes for the whole way from one reading to the other.
+    // The change of alpha_A equivalent to the whole way from one model to the other.
     let way = (alpha * (1.0 - alpha) * ln_ratio).abs();
     let by_faults = PASSES_FOR_ALPHA / way;
     let share = (by_noise / by_noise.hypot(by_faults)).powi(2);
     share.is_finite().then_some(share)
 }
 
-/// How much farther apart the two fits are than the straight line from one towards the other says: alpha_A and the level of
-/// h answer to each other's product, which bends.
+/// Ratio of the distance between the two fits to its linear estimate. The dependence is curved because only the product of alpha_A and h is
+/// determined.
 fn stretch(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) -> f64 {
     let Some(own) = covariance.row_of(INLET) else { return 1.0 };
     let way = other.shared[INLET] - problem.shared[INLET];
@@ -154,13 +151,13 @@ fn stretch(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) 
         .min(LARGEST_STRETCH)
 }
 
-/// The problem at its minimum with the other reading; `None` where it comes to none.
+/// The problem at its minimum with the other model; `None` if the fit does not converge.
 fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     let mut other = problem.clone();
     other.shared[INLET] = 1.0 - problem.shared[INLET];
     let alpha = problem.shared[ALPHA];
     if problem.active[ALPHA] && alpha > 0.0 && alpha < 1.0 {
-        // Where both give the same heats: h alpha_A and h (1 - alpha_A) times the ratio before the wheel stay.
+        // Start with equal heat flows: keep h alpha_A, and h (1 - alpha_A) times the ratio before the wheel.
         let ln_ratios = problem.ln_inlet_ratios();
         let ln_ratio = mapper_numerics::statistics::mean(&ln_ratios)?;
         let towards_own = other.shared[INLET] - problem.shared[INLET];
@@ -168,7 +165,7 @@ fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
         other.shared[ALPHA] = odds / (1.0 + odds);
         other.shared[LN_COEFFICIENT] += ((1.0 - alpha) * (1.0 + odds)).ln();
     }
-    // The probe says nothing of the inlet; one that rests on its bound in one fit alone would.
+    // The probe does not depend on the inlet, but it could be on its bound in only one of the fits.
     other.active[PROBE_MM2] = false;
     other.minimise(FULLY)?;
     other.active[PROBE_MM2] = problem.active[PROBE_MM2];

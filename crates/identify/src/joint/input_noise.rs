@@ -1,10 +1,9 @@
-//! What noise in the model's inputs adds to the sum of squares, as a function of the probe's lag.
+//! The contribution of noise in the model's inputs to the sum of squares, as a function of the probe's lag.
 //!
-//! T1, Tc, flow and pressures drive the predicted gas temperature, their noise included; the real gas knows nothing of
-//! it. A probe that lags smooths the prediction and so removes some of that noise from the residual: least squares would
-//! take every rig for one with a slow probe. The expected sum of squares of this noise is therefore subtracted (corrected
-//! least squares, e.g. Carroll et al., Measurement Error in Nonlinear Models, ch. 7). It is found by sending noise of the
-//! declared kind the same way: smoothing, model, probe, whitening.
+//! T1, Tc, flow and pressures drive the predicted gas temperature, including their noise, which the real gas does not see. A lagging probe
+//! smooths the prediction and so removes some of that noise from the residual. Least squares would therefore find a slow probe on every rig.
+//! The fit subtracts the expected sum of squares of this noise (corrected least squares, e.g. Carroll et al., Measurement Error in Nonlinear
+//! Models, ch. 7). It comes from noise with the declared statistics that passes through the same smoothing, model, probe and whitening.
 
 use crate::IdentifyConfig;
 use crate::joint::input_noise_spline::Explained;
@@ -19,12 +18,12 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-/// Diameters at which it is worked out, mm; between them the square counts.
+/// Diameters at which it is computed, mm; the spline between them uses the square.
 const DIAMETERS_MM: [f64; 10] = [0.0, 0.25, 0.5, 0.8, 1.2, 1.7, 2.3, 3.2, 4.5, 7.0];
-/// Draws of noise for each step: the scatter of their mean adds a sixteenth to that of the recording's own noise.
+/// Noise samples per step: the scatter of their mean adds a sixteenth to that of the recording's own noise.
 const DRAWS: usize = 16;
 
-/// Works it out where the fit stands; nothing without a fitted probe or declared noise.
+/// Computes it at the current parameters; `None` without a fitted probe or declared noise.
 pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Explained {
     let noisy: Vec<(usize, f64)> =
         [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow]
@@ -39,7 +38,7 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
     }
     let squares_mm2: Vec<f64> = DIAMETERS_MM.iter().map(|diameter| diameter * diameter).collect();
     let mut draws = vec![vec![0.0; squares_mm2.len()]; DRAWS];
-    // Always the same noise: the same recording gives the same result.
+    // Fixed seed: the same recording gives the same result.
     let mut rng = Pcg64::seed_from_u64(1);
     for (member, step) in problem.members.iter().zip(steps).filter(|(member, _)| member.shares) {
         let rows = &step.rows;
@@ -53,7 +52,7 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
         for sums in &mut draws {
             let noise = smoother.apply(&draw(&t_s, rows, config, sigma_k, &mut rng));
             for (sum, lags) in sums.iter_mut().zip(&lags) {
-                // What the first row holds is the step's own parameter.
+                // The first reading is a parameter of the step.
                 let mut reading = noise.first().copied().unwrap_or(0.0);
                 let mut readings = vec![reading];
                 for (lag, pair) in lags.iter().zip(noise.windows(2)) {
@@ -74,7 +73,7 @@ fn ideal_gas(setting: &Setting, member: &Member<'_>, shared: &SharedVector) -> V
     setting.predict(&member.course, &ideal, &member.local, &[false; SHARED], false).t2_k
 }
 
-/// One course of noise, block means.
+/// One noise sequence, as block means.
 fn draw(t_s: &[f64], rows: &[Row], config: &IdentifyConfig, sigma: f64, rng: &mut Pcg64) -> Vec<f64> {
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
     let mut last_s = f64::NEG_INFINITY;

@@ -1,19 +1,19 @@
-//! The sum of squares that noise in the model's inputs adds, as a function of the probe's lag: a natural cubic spline over
-//! the squares of diameters. How it is found stands in `input_noise.rs`.
+//! The sum of squares that noise in the model's inputs adds, as a function of the probe's lag: a natural cubic spline over the squares of
+//! diameters. `input_noise.rs` computes its values.
 
-/// Expected sum of squares over the squares of diameters.
+/// Expected sum of squares as a function of the square of the diameter.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Explained {
     /// Second derivatives of a natural cubic spline, with its knots.
     squares_mm2: Vec<f64>,
     sums: Vec<f64>,
     curvatures: Vec<f64>,
-    /// Variance of the slope between knots from one course of noise to another.
+    /// Variance of the slope between knots over the noise sequences.
     slope_variances: Vec<f64>,
 }
 
 impl Explained {
-    /// From the sums at rising squares of diameters, mm2, of each course of noise.
+    /// Builds the spline from the sums of each noise sequence at increasing squares of diameters, mm2.
     pub(crate) fn new(squares_mm2: Vec<f64>, draws: &[Vec<f64>]) -> Self {
         let count = (draws.len() as f64).max(1.0);
         let sums: Vec<f64> =
@@ -43,7 +43,7 @@ impl Explained {
         Explained { squares_mm2, sums, curvatures, slope_variances }
     }
 
-    /// Variance of half the slope: how far the recording's own noise pulls the probe on top of what least squares sees.
+    /// Variance of half the slope: the effect of the recording's own noise on the probe, in addition to least squares.
     pub(crate) fn pull_variance(&self, square_mm2: f64) -> f64 {
         let after = self.squares_mm2.partition_point(|knot| *knot <= square_mm2);
         let segment = after.saturating_sub(1).min(self.slope_variances.len().saturating_sub(1));

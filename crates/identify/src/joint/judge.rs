@@ -1,4 +1,4 @@
-//! What speaks against a joint fit: for one step, and for the model as a whole.
+//! Checks of a joint fit: of each step, and of the model as a whole.
 
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
@@ -12,28 +12,28 @@ use crate::width;
 use mapper_core::EstimateUncertainty;
 use mapper_numerics::statistics::{mean, median, rms};
 
-/// Whitened mean square above which a step is doubted.
+/// Whitened mean square above which a step is doubtful.
 const DOUBT_SQUARE: f64 = 2.0;
-/// Whitened mean square, and its multiple of the median step's, above which a step has no say in what is shared.
+/// Whitened mean square, and its ratio to the median step's, above which a step is excluded from the shared parameters.
 const EXCLUDE_SQUARE: f64 = 4.0;
-/// Whitened mean square of all steps above which the model itself is doubted.
+/// Whitened mean square of all steps above which the model itself is doubtful.
 const MODEL_SQUARE: f64 = 1.4;
-/// The same for the sums over [`STRETCH_ROWS`] rows: smoothed inputs and fitted numbers leave about 0.8 of 1 where the model
-/// has what the rig has.
+/// The same for the sums over [`STRETCH_ROWS`] rows: smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model fits the
+/// rig.
 const SLOW_SQUARE: f64 = 1.3;
-/// Rows of a stretch, 5 to 10 s: what the model does not know is slower than noise.
+/// Rows of a segment, 5 to 10 s: model errors are slower than noise.
 const STRETCH_ROWS: usize = 10;
-/// Scatter of the points about the convection law above which it is not a law, ratio.
+/// Scatter of the points about the convection law above which the law does not apply, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
-/// Standard errors by which alpha_A may come out outside 0 to 1 by chance.
+/// Standard errors by which alpha_A may be outside 0 to 1 by chance.
 const BY_CHANCE_SIGMAS: f64 = 3.0;
-/// Standard errors by which a number must lie outside its range to count against the model.
+/// Standard errors by which a parameter must be outside its range to count against the model.
 const OUTSIDE_SIGMAS: f64 = 2.0;
-/// Exponents of the Reynolds number that pipe-like flow may have: 0.33 is laminar, 0.8 turbulent, and Burke et al. have 1.13.
+/// Exponents of the Reynolds number possible in pipe-like flow: 0.33 is laminar, 0.8 turbulent, and Burke et al. have 1.13.
 const EXPONENT_RANGE: (f64, f64) = (0.5, 1.5);
-/// Largest tip of a probe that anyone would put into a compressor's outlet, mm.
+/// Largest practical probe tip in a compressor outlet, mm.
 const LARGEST_PROBE_MM: f64 = 4.0;
-/// Isentropic efficiency, total to total, beyond what any compressor of a turbocharger reaches (the best stay below 0.85).
+/// Isentropic efficiency, total to total, above that of any turbocharger compressor (the best stay below 0.85).
 const HIGHEST_EFFICIENCY: f64 = 0.88;
 /// Standard errors by which rising and falling steps may differ.
 const SPLIT_SIGMAS: f64 = 4.0;
@@ -44,7 +44,7 @@ pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
     residual.iter().map(|r| r * r).sum::<f64>() / (residual.len() as f64).max(1.0)
 }
 
-/// Mean square of sums over stretches of a step's whitened residual, over that of independent ones.
+/// Mean square of segment sums of a step's whitened residual, relative to that of independent residuals.
 fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
     let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
     let stretches: Vec<f64> = residual
@@ -54,7 +54,7 @@ fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
     mean(&stretches)
 }
 
-/// Takes steps that fit far worse than the others out of what is shared; true where that changed anything.
+/// Excludes steps that fit far worse than the others from the shared parameters; true if that changed anything.
 pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
     let squares: Vec<f64> = problem
         .members
@@ -65,7 +65,7 @@ pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
     let Some(middle) = median(open()) else { return false };
     let limit = EXCLUDE_SQUARE * middle.max(1.0);
     let mut changed = false;
-    // Never more than a third: then it is the model that is wrong, not the steps.
+    // At most a third is excluded: beyond that, the model is wrong, not the steps.
     let bad = open().filter(|square| *square > limit).count();
     let few = 3 * bad <= open().count();
     for (member, square) in problem.members.iter_mut().zip(&squares) {
@@ -127,7 +127,7 @@ pub(crate) fn judge_step(
     }
 }
 
-/// What speaks against the model as a whole, one sentence each.
+/// Arguments against the model as a whole, one sentence each.
 pub(crate) fn doubts(
     problem: &Problem<'_>,
     covariance: &Covariance,
@@ -212,7 +212,7 @@ pub(crate) fn doubts(
     doubts
 }
 
-/// Fits steps whose T2 rises and steps whose T2 falls apart: what they share must be the same.
+/// Fits steps with rising T2 and steps with falling T2 separately: their shared parameters must agree.
 fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Option<String> {
     let rises = |member: &Member<'_>| match (member.measured_k.first(), member.measured_k.last()) {
         (Some(first), Some(last)) => last > first,
@@ -221,7 +221,7 @@ fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Opti
     let half = |rising: bool| {
         let mut half = problem.clone();
         half.members.retain(|member| member.shares && rises(member) == rising);
-        // A half knows less than the whole: what the whole takes for neutral is not sought again.
+        // A half carries less information than the whole: parameters neutral for the whole are not searched for again.
         for index in refinements.map_or(&[][..], |refinements| &refinements.indices) {
             half.active[*index] &= refinements.is_some_and(|found| found.probability(*index) > 0.5);
         }

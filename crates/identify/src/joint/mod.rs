@@ -1,9 +1,8 @@
 //! The joint method: all steps of a campaign together.
 //!
-//! Each step keeps its own efficiency; what the steps share (how convection follows flow and temperature, the share of
-//! the area before the wheel, the probe's lag, what a hotter wall does, the sensors' offsets, how efficiency varies over
-//! the map) is found once, from all of them. Why that is needed, what it assumes and what it can not do stands in
-//! `docs/identification.md`.
+//! Each step keeps its own efficiency. The shared parameters are estimated once, from all steps: the convection law, the area share before the
+//! wheel, the probe's lag, the effect of a hotter wall, the sensors' offsets, and how efficiency varies over the map. See
+//! `docs/identification.md` for the reasons, assumptions and limits.
 
 pub(crate) mod common_part;
 pub(crate) mod expected;
@@ -41,31 +40,30 @@ use mapper_core::{
 };
 use mapper_numerics::statistics::rms;
 
-/// Fits before the last one.
+/// Number of fits before the last one.
 const ROUNDS: usize = 3;
 
 /// Growth of the points' standard errors above which leaving a region out costs more than it gains.
 const MAX_LOST_RATIO: f64 = 2.0;
 
-/// Error of the efficiencies, fraction, that only the declaration of alpha_A, probe and direction factor may keep away: more, and
-/// a machine that is not as declared passes for one that is.
+/// Maximum error of the efficiencies, fraction, that only the declaration of alpha_A, probe and heating/cooling ratio excludes: above it, a
+/// machine not as declared could pass for one that is.
 pub const MAX_RESTING_ETA: f64 = 0.0125;
 
-/// What the method makes of a recording.
+/// Result of the method for a recording.
 #[derive(Debug)]
 pub(crate) struct Joint {
     pub(crate) estimates: Vec<Estimate>,
-    /// What the points share; `None` where nothing is.
+    /// Shared parameters of the points; `None` if there are none.
     pub(crate) thermal: Option<ThermalModel>,
-    /// What the two-parameter method makes of the steps that it can use.
+    /// Result of the two-parameter method for the steps that it can use.
     pub(crate) two_parameter: Vec<TwoParameter>,
-    /// The efficiencies before the smoothness of the map had its say; `None` where nothing was fitted together.
+    /// The efficiencies before the smoothness prior; `None` if nothing was fitted jointly.
     pub(crate) fitted: Option<FittedEfficiencies>,
 }
 
-/// Identifies all steps. `end_states` and `findings`: one for each step; no end state, no estimate. `alone`: each step by
-/// itself, with what speaks against it. `condemned`: the readings are
-/// refused already, so it is of no use to look for what else they may be.
+/// Identifies all steps. `end_states` and `findings`: one for each step; without an end state there is no estimate. `alone`: each step fitted
+/// alone, with its findings. `condemned`: the readings are refused already, so other explanations are not searched.
 pub(crate) fn estimate(
     recording: &Recording,
     end_states: &[Option<EndState>],
@@ -74,16 +72,16 @@ pub(crate) fn estimate(
     condemned: bool,
     findings: &mut [Findings],
 ) -> Joint {
-    let (alone, told) = alone;
+    let (alone, own_findings) = alone;
     let mut two_parameter = Vec::new();
-    for ((step, estimate), own) in recording.steps.iter().zip(&alone).zip(&told) {
+    for ((step, estimate), own) in recording.steps.iter().zip(&alone).zip(&own_findings) {
         if let (Some((eta, Some(error))), true) = (estimate.eta, own.verdict != Verdict::Unusable) {
             let (eta_low, eta_high) = confidence_interval_95(eta, error.combined_standard_error());
             two_parameter.push(TwoParameter { step: step.index, eta, eta_low, eta_high });
         }
     }
     if config.joint == JointSettings::all_off() {
-        findings.iter_mut().zip(told).for_each(|(findings, told)| findings.take(told));
+        findings.iter_mut().zip(own_findings).for_each(|(findings, own)| findings.take(own));
         return Joint { estimates: alone, thermal: None, two_parameter: Vec::new(), fitted: None };
     }
     let steps = start::steps(recording, end_states, config, findings);
@@ -101,7 +99,7 @@ pub(crate) fn estimate(
         },
     };
     let Some(attempt) = attempt else {
-        // Each step on its own is better than nothing.
+        // Single-step results are better than none.
         let mut estimates = vec![Estimate::default(); recording.steps.len()];
         for step in &steps {
             let message = "least squares over all steps did not converge: this step was identified by itself"
@@ -181,20 +179,20 @@ pub(crate) fn estimate(
     Joint { estimates, thermal: Some(thermal), two_parameter, fitted }
 }
 
-/// A fit with what is made of it.
+/// A fit with its results.
 struct Attempt<'a> {
     problem: Problem<'a>,
     covariance: Covariance,
     smoothed: Smoothed,
     thermal: ThermalModel,
-    /// By how much the efficiencies would be off if what was drawn to its declared value were not as declared, fraction.
+    /// Error of the efficiencies if parameters shrunk to their declared values are not as declared, fraction.
     resting: f64,
-    /// Why the barred steps are barred, if any are.
+    /// Reason for excluding the barred steps, if any.
     left_out: Option<String>,
 }
 
 impl<'a> Attempt<'a> {
-    /// `barred`: indices of steps that have no say in what is shared.
+    /// `barred`: indices of steps excluded from the shared parameters.
     fn new(
         steps: &'a [rows::StepRows],
         alone: &[Estimate],
@@ -214,7 +212,7 @@ impl<'a> Attempt<'a> {
             };
         let mut found = smoothed(&problem, &covariance, &refined);
         if found.strain > smoothness::STRAIN_SIGMAS {
-            // The declaration does not hold: the offsets then have the spread that they show.
+            // The declaration is wrong: the offsets then get the spread that they show.
             let strain = found.strain;
             for prior in &mut problem.priors[OFFSETS..FLOW_GAIN] {
                 prior.sigma *= strain;
@@ -229,7 +227,7 @@ impl<'a> Attempt<'a> {
         Some(Attempt { problem, covariance, smoothed: found, thermal, resting, left_out: None })
     }
 
-    /// The fit without the region of the map that disagrees most, if there is one.
+    /// The fit without the region of the map that disagrees most, if any.
     fn without_a_region(
         &self,
         steps: &'a [rows::StepRows],
@@ -244,7 +242,7 @@ impl<'a> Attempt<'a> {
                     (&self.problem, &self.covariance),
                     (&rest.problem, &rest.covariance),
                 )?;
-                // What is left must still know what it is about.
+                // The remaining steps must still determine the shared parameters.
                 let knows = rest.smoothed.middle_error() < MAX_LOST_RATIO * self.smoothed.middle_error();
                 (undoubted && knows).then_some((region, rest, sigmas))
             });
@@ -259,7 +257,7 @@ impl<'a> Attempt<'a> {
         })
     }
 
-    /// This one after another was doubted: the doubts remain.
+    /// This fit after another one had warnings: the warnings remain.
     fn instead_of(mut self, doubted: Option<Attempt<'_>>) -> Self {
         let doubts = match doubted {
             Some(doubted) => doubted.thermal.doubts,
@@ -275,7 +273,7 @@ impl<'a> Attempt<'a> {
     }
 }
 
-/// The refinements held as declared.
+/// The parameters with a prior, fixed as declared.
 fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
     let held = JointSettings {
         alpha_area: Choice::Fixed,
@@ -290,23 +288,22 @@ fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
 /// A problem at its minimum.
 struct Fitted {
     covariance: Covariance,
-    /// `None` where no refinement is looked for.
+    /// `None` if there is no parameter with a prior to search for.
     refined: Option<(Refinements, Gain)>,
-    /// What is left open of h before the wheel.
+    /// Remaining uncertainty of h before the wheel.
     inlet_sigma: Option<f64>,
-    /// How far the efficiencies rest on what is declared, fraction.
+    /// Dependence of the efficiencies on the declaration, fraction.
     resting: f64,
 }
 
-/// Fits, learns from the fit how noisy steps are and how far points may scatter, leaves out what fits far worse, fits again, and weighs
-/// the refinements.
+/// Fits, estimates noise and spreads from the fit, excludes steps that fit far worse, fits again, and evaluates the parameters with a prior.
 fn fitted(problem: &mut Problem<'_>, steps: &[rows::StepRows], config: &IdentifyConfig) -> Option<Fitted> {
     for _ in 0..ROUNDS {
         problem.minimise(ROUGHLY)?;
         start::refine(problem, steps, config)?;
         problem.explained = input_noise::explained(problem, steps, config);
         judge::exclude(problem);
-        // A probe that came to rest on its bound may leave it under better weights.
+        // A probe on its bound may leave it with better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise(FULLY)?;
@@ -321,8 +318,8 @@ fn fitted(problem: &mut Problem<'_>, steps: &[rows::StepRows], config: &Identify
     Some(Fitted { covariance, refined: refinements.zip(gain), inlet_sigma, resting })
 }
 
-/// The covariance of a problem that stands at the mean of the mixture, with what the mixture and the readings of the inlet leave open; and
-/// how everything answers to the refinements.
+/// The covariance of a problem at the mean of the mixture, including the uncertainty from the mixture and the inlet model; and the regression
+/// of all parameters on those with a prior.
 fn covariance(
     problem: &mut Problem<'_>,
     refinements: Option<&Refinements>,

@@ -1,4 +1,4 @@
-//! The reading of T2 that a step's rows give under given parameters, and its derivatives.
+//! Predicts the T2 reading of a step's rows for given parameters, with its derivatives.
 
 use crate::joint::parameters::{
     ALPHA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_COEFFICIENT, LN_DEVIATION,
@@ -12,40 +12,40 @@ use mapper_physics::compression::{CompressionInputs, compress, compressed_k, ise
 use mapper_physics::inlet_convection::InletLaw;
 use mapper_physics::nusselt;
 
-/// What is fixed for all steps.
+/// Settings common to all steps.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Setting {
     pub(crate) internal_area_m2: f64,
     pub(crate) outlet_diameter_m: f64,
     pub(crate) inlet_diameter_m: f64,
-    /// The air that is compressed.
+    /// The compressed air.
     pub(crate) air: Air,
-    /// Reynolds number at which the law's coefficient is taken.
+    /// Reynolds number at which the law's coefficient is defined.
     pub(crate) reynolds_reference: f64,
-    /// Whether h follows the law; else it holds still within a step.
+    /// Whether h follows the convection law; otherwise h is constant within a step.
     pub(crate) with_law: bool,
-    /// Whether efficiency follows the surface.
+    /// Whether the efficiency follows the surface.
     pub(crate) shaped: bool,
 }
 
-/// A step as the model needs it: its rows, and the surface's terms at each minus those at the step's end.
+/// The model's data of a step: its rows, and the surface terms at each row minus those at the step's end.
 #[derive(Debug, Clone)]
 pub(crate) struct Course<'a> {
     pub(crate) rows: &'a [Row],
     pub(crate) terms: Vec<[f64; TERM_COUNT]>,
 }
 
-/// Predicted readings with their derivatives, one column per parameter: shared first, then those of the step.
+/// Predicted readings with their derivatives, one column per parameter: shared parameters first, then those of the step.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Prediction {
     pub(crate) t2_k: Vec<f64>,
     pub(crate) columns: Vec<Vec<f64>>,
 }
 
-/// Relative step of one-sided derivatives: rounding and curvature both stay below 1e-6 of them.
+/// Relative step of one-sided derivatives: it keeps both rounding and curvature errors below 1e-6.
 const STEP_RATIO: f64 = 1e-6;
 
-/// Gas properties on the way, one row.
+/// Gas properties along the flow path, one row.
 #[derive(Debug, Clone, Copy)]
 struct Gas {
     t1_k: f64,
@@ -53,36 +53,36 @@ struct Gas {
     flow_kg_s: f64,
     rise_ratio: f64,
     eta: f64,
-    /// The air that is compressed.
+    /// The compressed air.
     air: Air,
 }
 
-/// Convection on the way, one row.
+/// Convection along the flow path, one row.
 #[derive(Debug, Clone, Copy)]
 struct Convection {
     /// After the wheel, W/(m2 K).
     h_w_m2k: f64,
-    /// Temperature of its properties, K.
+    /// Temperature at which the gas properties are taken, K.
     bulk_k: f64,
     /// h before the wheel over that after it.
     inlet_h_ratio: f64,
 }
 
-/// How convection answers to the gas, first order: what it costs to move one more quantity is then a few products.
+/// First-order sensitivities of convection to the gas state: each further derivative then costs only a few products.
 #[derive(Debug, Clone, Copy)]
 struct Answer {
-    /// ln h by the temperature of its properties, 1/K.
+    /// Derivative of ln h with respect to the temperature of the gas properties, 1/K.
     ln_h_by_bulk: f64,
-    /// The same of h before the wheel over that after it, of its value, 1/K.
+    /// Derivative of the ratio of h before the wheel to h after it with respect to the same temperature, 1/K.
     inlet_by_bulk: f64,
-    /// ln h by the metal's temperature, 1/K.
+    /// Derivative of ln h with respect to the metal temperature, 1/K.
     ln_h_by_metal: f64,
-    /// ln h by ln of the flow.
+    /// Derivative of ln h with respect to ln of the flow.
     ln_h_by_ln_flow: f64,
 }
 
 impl Answer {
-    /// Convection where the gas has moved a little from `gas`, at the same inlet temperature.
+    /// Convection for a small change of the gas from `gas`, at the same inlet temperature.
     fn moved(&self, from: &Convection, gas: &Gas, to: &Gas) -> Convection {
         let bulk_k = compressed_k(to.t1_k, to.rise_ratio, to.eta);
         let by_k = bulk_k - from.bulk_k;
@@ -98,10 +98,10 @@ impl Answer {
 }
 
 impl Setting {
-    /// How convection, which is `here` at `gas`, answers to it.
+    /// Sensitivities of convection, which is `here` at `gas`.
     fn answer(&self, gas: &Gas, here: &Convection, shared: &SharedVector, ln_deviation: f64) -> Answer {
         let step_k = here.bulk_k * STEP_RATIO;
-        // Of the law the pressure moves the bulk temperature and nothing else.
+        // In the law, pressure changes only the bulk temperature.
         let rise_ratio = gas.eta * ((here.bulk_k + step_k) / gas.t1_k - 1.0);
         let hotter = self.h(&Gas { rise_ratio, ..*gas }, shared, ln_deviation);
         let by_k = hotter.bulk_k - here.bulk_k;
@@ -116,7 +116,7 @@ impl Setting {
         }
     }
 
-    /// Heat-transfer coefficients by the law.
+    /// Heat-transfer coefficients from the law.
     fn h(&self, gas: &Gas, shared: &SharedVector, ln_deviation: f64) -> Convection {
         let bulk_k = compressed_k(gas.t1_k, gas.rise_ratio, gas.eta);
         let inlet_h_ratio = if shared[INLET] == 0.0 {
@@ -140,7 +140,7 @@ impl Setting {
         Convection { h_w_m2k, bulk_k, inlet_h_ratio }
     }
 
-    /// ln of h before over h after the wheel by the inlet's own law.
+    /// ln of the ratio of h before the wheel to h after it, by the inlet's own law.
     fn ln_inlet_ratio(&self, gas: &Gas, shared: &SharedVector, bulk_k: f64) -> f64 {
         let law = InletLaw {
             exponent: shared[EXPONENT],
@@ -150,8 +150,8 @@ impl Setting {
         law.h_ratio(gas.t1_k, bulk_k).ln()
     }
 
-    /// T2 by eqs. 1-3. The direction factor scales h where the metal is the hotter; eqs. 1-3 have one h, so each part of
-    /// the area is scaled instead.
+    /// T2 by eqs. 1-3. The heating/cooling ratio scales h if the metal is the hotter one. Eqs. 1-3 have one h, so each part of the area is
+    /// scaled instead.
     fn t2_k(&self, gas: &Gas, convection: Convection, alpha: f64, ln_direction: f64) -> f64 {
         let Convection { h_w_m2k, bulk_k, inlet_h_ratio } = convection;
         let outward = |hotter: bool| if hotter && ln_direction != 0.0 { ln_direction.exp() } else { 1.0 };
@@ -169,7 +169,7 @@ impl Setting {
                 internal_area_m2: before_m2 + after_m2,
                 air: gas.air,
             };
-            // Without the law the identification is that of the paper, which takes cp at T2'.
+            // Without the law this is the identification of the paper, which takes cp at T2'.
             compress(&inputs, self.with_law.then_some(bulk_k))
         };
         let after_m2 = (1.0 - alpha) * self.internal_area_m2;
@@ -200,7 +200,7 @@ impl Setting {
         }
     }
 
-    /// ln of h before over h after the wheel by the inlet's own law, at a step's end.
+    /// ln of the ratio of h before the wheel to h after it, by the inlet's own law, at a step's end.
     pub(crate) fn ln_inlet_ratio_at(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> f64 {
         let gas = self.gas(end, &[0.0; TERM_COUNT], shared, local);
         self.ln_inlet_ratio(&gas, shared, compressed_k(gas.t1_k, gas.rise_ratio, gas.eta))
@@ -213,7 +213,7 @@ impl Setting {
         (h_w_m2k, (self.reynolds(gas.flow_kg_s, bulk_k) / self.reynolds_reference).ln())
     }
 
-    /// Derivative of T2 at a step's end by each reading: T1, T2, Tc, P1, P2, flow. What a sensor's noise does.
+    /// Derivative of T2 at a step's end with respect to each reading: T1, T2, Tc, P1, P2, flow. Gives the effect of sensor noise.
     pub(crate) fn sensitivities(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> [f64; 6] {
         let course = Course { rows: std::slice::from_ref(end), terms: vec![[0.0; TERM_COUNT]] };
         let ideal = {
@@ -235,7 +235,7 @@ impl Setting {
         ]
     }
 
-    /// Derivative of T2 at a step's end by the efficiency, K.
+    /// Derivative of T2 at a step's end with respect to the efficiency, K.
     pub(crate) fn by_efficiency(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> f64 {
         let at = |eta: f64| {
             let mut moved = *local;
@@ -246,7 +246,7 @@ impl Setting {
         (at(local[ETA] + STEP_RATIO) - at(local[ETA] - STEP_RATIO)) / (2.0 * STEP_RATIO)
     }
 
-    /// Readings of T2, with derivatives by the parameters in `active` and those of the step where `derivatives` asks.
+    /// Predicts T2, with derivatives by the parameters in `active` and by those of the step if `derivatives` is set.
     pub(crate) fn predict(
         &self,
         course: &Course<'_>,
@@ -309,7 +309,7 @@ impl Setting {
                 let by_ln_inlet = (self.t2_k(&gas, moved, alpha, ln_direction) - t2_k) / STEP_RATIO;
                 put(INLET, by_ln_inlet * self.ln_inlet_ratio(&gas, shared, h.bulk_k));
                 if self.with_law {
-                    // The exponent is that of the Reynolds numbers on both sides.
+                    // The exponent applies to the Reynolds numbers on both sides.
                     let ln_reynolds = (self.reynolds(gas.flow_kg_s, h.bulk_k) / self.reynolds_reference).ln();
                     let ln_inlet_over_outlet = (self.outlet_diameter_m * air::viscosity_pa_s(h.bulk_k)
                         / (self.inlet_diameter_m * air::viscosity_pa_s(gas.t1_k)))
@@ -321,7 +321,7 @@ impl Setting {
                 put(ALPHA, (self.t2_k(&gas, h, alpha + STEP_RATIO, ln_direction) - t2_k) / STEP_RATIO);
             }
             if active[LN_DIRECTION] {
-                // Away from 0, where the factor is switched off.
+                // Stay away from 0, where the factor is switched off.
                 let step = if ln_direction == -STEP_RATIO { -STEP_RATIO } else { STEP_RATIO };
                 put(LN_DIRECTION, (self.t2_k(&gas, h, alpha, ln_direction + step) - t2_k) / step);
             }
@@ -359,14 +359,14 @@ impl Setting {
         self.through_probe(course.rows, gas_k, columns, shared, local, active)
     }
 
-    /// The probe's lag from row to row, for the square of its diameter.
+    /// Lag of the probe from row to row, for the square of its diameter.
     pub(crate) fn lags(&self, rows: &[Row], gas_k: &[f64], square_mm2: f64) -> Vec<Lag> {
         let diameter_m = 1e-3 * square_mm2.max(0.0).sqrt();
         let rows = rows.iter().zip(gas_k).map(|(row, gas_k)| (row.t_s, row.flow_kg_s, *gas_k));
         probe::lags(rows, diameter_m, self.outlet_diameter_m)
     }
 
-    /// Lets the probe follow the gas, and every derivative with it.
+    /// Applies the probe's lag to the gas temperature and to every derivative.
     fn through_probe(
         &self,
         rows: &[Row],
@@ -389,7 +389,7 @@ impl Setting {
         for (index, column) in columns.iter_mut().enumerate() {
             let own_offset = index == OFFSETS + 1;
             if !column.is_empty() && !own_offset && index != PROBE_MM2 && index != SHARED + FIRST_READING {
-                // The first reading is a parameter of its own.
+                // The first reading is a separate parameter.
                 *column = follow(&lags, 0.0, column);
             }
         }
@@ -406,7 +406,7 @@ impl Setting {
     }
 }
 
-/// The surface's coefficients among the shared parameters.
+/// The surface coefficients among the shared parameters.
 pub(crate) fn surface_of(shared: &SharedVector) -> &[f64; TERM_COUNT] {
     const NONE: [f64; TERM_COUNT] = [0.0; TERM_COUNT];
     shared.get(SURFACE..BENDS).and_then(|tail| tail.try_into().ok()).unwrap_or(&NONE)

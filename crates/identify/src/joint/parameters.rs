@@ -1,17 +1,17 @@
-//! The numbers of a joint fit: those that all steps share, and those of each step.
+//! The parameters of a joint fit: those that all steps share, and those of each step.
 
 use crate::joint::surface::TERM_COUNT;
 use mapper_core::Channel;
 
-/// Index of ln of the Nusselt number's coefficient at the reference Reynolds number.
+/// Index of ln of the Nusselt coefficient at the reference Reynolds number.
 pub(crate) const LN_COEFFICIENT: usize = 0;
 /// Index of the exponent of the Reynolds number.
 pub(crate) const EXPONENT: usize = 1;
 /// Index of alpha_A.
 pub(crate) const ALPHA: usize = 2;
-/// Index of the square of the probe's diameter, mm2: the lag grows with it from 0 on.
+/// Index of the square of the probe's diameter, mm2: the lag grows with it from 0.
 pub(crate) const PROBE_MM2: usize = 3;
-/// Index of ln of the direction factor.
+/// Index of ln of the heating/cooling ratio of h.
 pub(crate) const LN_DIRECTION: usize = 4;
 /// Index of the first offset, in the order of [`OFFSET_CHANNELS`]; K or Pa.
 pub(crate) const OFFSETS: usize = 5;
@@ -22,14 +22,14 @@ pub(crate) const OFFSET_CHANNELS: [Channel; 5] =
 pub(crate) const FLOW_GAIN: usize = OFFSETS + OFFSET_CHANNELS.len();
 /// Index of the humidity's error, kg/kg.
 pub(crate) const HUMIDITY: usize = FLOW_GAIN + 1;
-/// Index of how far h before the wheel follows the inlet's own law: 0 is h after the wheel, 1 is that law, and in between
-/// it moves as a power. Never sought: next to alpha_A a recording says next to nothing of it.
+/// Index of the degree to which h before the wheel follows the inlet's own law: 0 is h after the wheel, 1 is that law, with a power law
+/// between. Never fitted: a recording carries almost no information about it next to alpha_A.
 pub(crate) const INLET: usize = HUMIDITY + 1;
 /// Index of the first coefficient of the efficiency surface.
 pub(crate) const SURFACE: usize = INLET + 1;
-/// Index of the first bend of the efficiencies that an offset brings, in the order of [`OFFSET_CHANNELS`] and in units of that offset. The fit
-/// takes the readings for exact, so that an offset bends the efficiencies it finds; without these the surface would resist, and the
-/// refinements would give way.
+/// Index of the first bend of the efficiencies that an offset causes, in the order of [`OFFSET_CHANNELS`] and in units of that offset. The fit
+/// takes the readings as exact, so an offset bends the fitted efficiencies. Without these terms the surface would resist that bend and bias
+/// alpha_A, the probe and the heating/cooling ratio.
 pub(crate) const BENDS: usize = SURFACE + TERM_COUNT;
 /// Number of shared parameters.
 pub(crate) const SHARED: usize = BENDS + OFFSET_CHANNELS.len();
@@ -50,7 +50,7 @@ pub(crate) type SharedVector = [f64; SHARED];
 /// Values of a step's parameters.
 pub(crate) type LocalVector = [f64; LOCAL];
 
-/// A normal distribution; infinite `sigma` knows nothing.
+/// A normal distribution; infinite `sigma` means no information.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Prior {
     pub(crate) mean: f64,
@@ -64,23 +64,23 @@ impl Prior {
     }
 }
 
-/// What a refinement may be beforehand, one standard deviation about its declared value.
+/// Prior of alpha_A: one standard deviation about its declared value.
 pub(crate) const ALPHA_SIGMA: f64 = 0.3;
-/// The same of the probe's diameter squared, mm2.
+/// The same of the square of the probe's diameter, mm2.
 pub(crate) const PROBE_SIGMA_MM2: f64 = 10.0;
-/// The same of the logarithm of the direction factor.
+/// The same of the logarithm of the heating/cooling ratio.
 pub(crate) const LN_DIRECTION_SIGMA: f64 = 0.5;
 
-/// What small errors of the model can pass for, as a change of alpha_A: it moves an efficiency by a quarter of a point, which is what
-/// offsets leave open of it. `benches/identification.py` calibrates it: with 0.025 the error at an undeclared alpha_A of 0.05 is 2.1 points instead of 0.4.
+/// Change of alpha_A that small model errors can cause: it moves an efficiency by a quarter of a point, as do the offsets.
+/// `benches/identification.py` calibrates it: with 0.025 the error at an undeclared alpha_A of 0.05 is 2.1 points instead of 0.4.
 pub(crate) const ALPHA_MODEL_ERROR: f64 = 0.005;
-/// Of each refinement: standard deviation of its slab, and what small errors of the model can pass for. Compressors have 0 to 0.3 of their
-/// area before the wheel; probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple; heated and cooled
+/// For each parameter with a prior: standard deviation of its slab, and the change that small model errors can cause. Compressors have 0 to
+/// 0.3 of their area before the wheel. Probes of 0.5 to 3 mm are sold, and half a millimetre is a sheathed thermocouple. Heated and cooled
 /// boundary layers differ by up to a third (Gnielinski's (Pr/Pr_w)^0.11 and (T/T_w)^0.45 between 300 and 600 K).
 pub(crate) const REFINEMENTS: [(usize, f64, f64); 3] =
     [(ALPHA, 0.1, ALPHA_MODEL_ERROR), (PROBE_MM2, 2.0, 0.1), (LN_DIRECTION, 0.2, 0.015)];
 
-/// Symbol of a shared parameter for people.
+/// Display symbol of a shared parameter.
 pub(crate) fn symbol(index: usize) -> String {
     match index {
         LN_COEFFICIENT => "Nusselt coefficient".to_owned(),

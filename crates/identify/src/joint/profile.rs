@@ -1,17 +1,16 @@
-//! The profile of alpha_A: how much worse everything else fits when it is held at a value.
+//! The profile of alpha_A: the increase of the sum of squares if alpha_A is fixed at a given value.
 
 use crate::joint::parameters::ALPHA;
 use crate::joint::solve::Problem;
 use mapper_core::ProfilePoint;
 
-/// Values at which it is held: the range that a compressor may have.
+/// Values at which alpha_A is fixed: the range found in compressors.
 const GRID: [f64; 9] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
 
-/// Decrease of the sum of squares that is enough: a profile is read against 3.84.
+/// Convergence tolerance on the sum of squares: a profile is compared with 3.84.
 const ENOUGH_SQUARE: f64 = 0.1;
 
-/// All others fitted again at each value, without what was believed of alpha_A beforehand; empty where it is not fitted
-/// or a fit does not converge.
+/// Refits all other parameters at each value, without the prior of alpha_A. Empty if alpha_A is not fitted or a fit does not converge.
 pub(crate) fn alpha_area(problem: &Problem<'_>) -> Vec<ProfilePoint> {
     if !problem.active[ALPHA] {
         return Vec::new();

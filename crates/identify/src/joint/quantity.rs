@@ -1,4 +1,4 @@
-//! Numbers that err with the parameters of a joint fit, and how they err together.
+//! Quantities that depend on the parameters of a joint fit, and the covariance of their errors.
 
 use crate::joint::parameters::{
     ETA, EXPONENT, HUMIDITY, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SharedVector,
@@ -7,18 +7,18 @@ use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use nalgebra::DVector;
 
-/// A number that errs with the parameters: its covariance with every point's efficiency, its variance, its covariances
-/// with the shared parameters.
+/// A quantity that depends on the parameters: its covariance with every point's efficiency, its variance, and its covariances with the shared
+/// parameters.
 pub(crate) struct Quantity {
     pub(crate) value: f64,
     pub(crate) by_eta: DVector<f64>,
-    /// The part of `by_eta` that smoothness may speak of: what offsets and a step's own noise bring.
+    /// The part of `by_eta` that the smoothness prior may reduce: from the offsets and from the step's own noise.
     pub(crate) by_smooth: DVector<f64>,
     pub(crate) variance: f64,
     pub(crate) by_shared: DVector<f64>,
-    /// How the number answers to the shared parameters.
+    /// Sensitivity of the quantity to the shared parameters.
     pub(crate) answer: DVector<f64>,
-    /// Variance when all that is shared is known: of the step's own noise; and its covariance with the step's efficiency.
+    /// Variance with all shared parameters known (the step's own noise), and its covariance with the step's efficiency.
     pub(crate) own_variance: f64,
     pub(crate) own_with_eta: f64,
 }
@@ -27,7 +27,7 @@ pub(crate) fn is_offset(index: usize) -> bool {
     (OFFSETS..=HUMIDITY).contains(&index)
 }
 
-/// A shared parameter, about what the fit has.
+/// A shared parameter, relative to the fitted value.
 pub(crate) fn of_shared(covariance: &Covariance, row: usize) -> Quantity {
     let by_shared: DVector<f64> = covariance.shared.column(row).into_owned();
     let by_eta = DVector::from_iterator(
@@ -50,7 +50,7 @@ pub(crate) fn of_shared(covariance: &Covariance, row: usize) -> Quantity {
     }
 }
 
-/// Covariance of a quantity with every point's efficiency through the offsets alone.
+/// Covariance of a quantity with every point's efficiency, through the offsets alone.
 fn by_offsets(covariance: &Covariance, by_shared: &DVector<f64>) -> DVector<f64> {
     let carried: Vec<(usize, f64)> = (0..covariance.fitted.len())
         .filter(|row| is_offset(covariance.fitted[*row]))
@@ -62,13 +62,13 @@ fn by_offsets(covariance: &Covariance, by_shared: &DVector<f64>) -> DVector<f64>
     DVector::from_iterator(covariance.own.len(), covariance.own.iter().map(of_step))
 }
 
-/// Covariance of two of a step's numbers when all that is shared is known.
+/// Covariance of two quantities of one step with all shared parameters known.
 fn alone(covariance: &Covariance, step: usize, first: usize, second: usize) -> f64 {
     let (own, mixed) = &covariance.own[step];
     own[(first, second)] - mixed.row(second).dot(&covariance.answers[step].row(first))
 }
 
-/// Efficiency, and ln h over what the fit has, of every step.
+/// Efficiency and ln h of every step, relative to the fitted values.
 pub(crate) fn quantities(
     problem: &Problem<'_>,
     covariance: &Covariance,
@@ -111,7 +111,7 @@ pub(crate) fn quantities(
                 let (h_w_m2k, ln_re) = at(&problem.shared);
                 weights[LN_COEFFICIENT] = 1.0;
                 weights[EXPONENT] = ln_re;
-                // The law is evaluated at the readings: an error of the flow is one of h by itself.
+                // The convection law is evaluated at the readings, so a flow error is an error of h.
                 for index in covariance.fitted.iter().copied().filter(|index| is_offset(*index)) {
                     let step = 0.1 * problem.priors[index].sigma;
                     let mut moved = problem.shared;

@@ -1,9 +1,9 @@
-//! Which refinements of eqs. 1-3 are at work: alpha_A, the probe, the ratio of heating to cooling.
+//! Selects the model parameters with a prior in eqs. 1-3: alpha_A, the probe, and the heating/cooling ratio of h.
 //!
-//! Each one that is free costs the points some certainty, also on a machine that needs none of it, and the small errors of any
-//! model look like a little of each. So each is neutral or free, and all sets are evaluated on the one Gaussian that a fit with all
-//! of them free gives ([`mapper_inference::mixture`]). The fit then stands at the mean of the mixture, is linearised there once more
-//! (the probe's lag is far from linear), and what the mixture leaves open is carried into every number of every point.
+//! Each free parameter increases the uncertainty of the points, even if the machine does not need it. Small model errors also look like a
+//! small value of each. So each one is neutral or free, and all sets are evaluated on the Gaussian of a fit with all of them free
+//! ([`mapper_inference::mixture`]). The fit moves to the mean of the mixture and is linearised again there, because the probe's lag is far
+//! from linear. The spread of the mixture then enters the uncertainty of every number of every point.
 
 use crate::joint::parameters::{ALPHA, ETA, OFFSETS, PROBE_MM2, REFINEMENTS, SURFACE};
 use crate::joint::solve::{Covariance, FULLY, Problem};
@@ -13,35 +13,35 @@ use mapper_inference::mixture::{Draw, Mixture, Parameter};
 use mapper_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
 
-/// Share of the cases in which an interval contains the truth.
+/// Coverage of an interval.
 const COVERAGE: f64 = 0.95;
-/// Linearisations after the first: another one changes the error of five classes of `benches/identification.py` by less than 0.001 points.
+/// Number of relinearisations: another one changes the error of five classes of `benches/identification.py` by less than 0.001 points.
 const RELINEARISATIONS: usize = 1;
 
-/// What the refinements may be.
+/// The joint distribution of the parameters with a prior.
 #[derive(Debug, Clone)]
 pub(crate) struct Refinements {
-    /// Shared parameters, by index.
+    /// Indices of the shared parameters.
     pub(crate) indices: Vec<usize>,
     pub(crate) mixture: Mixture,
-    /// Where the fit stands, as distances from what is declared.
+    /// Current values, as differences from the declared values.
     at: DVector<f64>,
-    /// Values that fit best with all of them free, as distances from what is declared, and their standard errors.
+    /// Best-fit values with all of them free, as differences from the declared values, and their standard errors.
     free: Vec<(f64, f64)>,
 }
 
-/// How every shared parameter answers to the refinements: their regression on them.
+/// Regression of every shared parameter on these parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Gain(pub(crate) DMatrix<f64>);
 
-/// The refinements that a problem looks for.
+/// The parameters that a problem searches for.
 fn sought(problem: &Problem<'_>) -> Vec<(usize, f64, f64)> {
     let looked_for =
         |index: usize| if index == PROBE_MM2 { problem.probe_fitted } else { problem.active[index] };
     REFINEMENTS.into_iter().filter(|(index, ..)| looked_for(*index)).collect()
 }
 
-/// Holds the refinements where they are declared.
+/// Fixes these parameters at their declared values.
 pub(crate) fn hold(problem: &mut Problem<'_>) {
     for (index, ..) in REFINEMENTS {
         problem.active[index] = false;
@@ -49,8 +49,8 @@ pub(crate) fn hold(problem: &mut Problem<'_>) {
     }
 }
 
-/// By how much the efficiencies would be off, fraction (rms of one standard error), if the refinements that `neutral` picks were at work:
-/// what is known of the efficiencies without their declaration.
+/// Error of the efficiencies, fraction (rms of one standard error), if the parameters selected by `neutral` were not neutral. This is the
+/// uncertainty of the efficiencies without the declaration.
 pub(crate) fn resting_on_declaration(open: &Problem<'_>, neutral: impl Fn(usize) -> bool) -> Option<f64> {
     let sought: Vec<_> = sought(open).into_iter().filter(|(index, ..)| neutral(*index)).collect();
     if sought.is_empty() {
@@ -66,8 +66,8 @@ pub(crate) fn resting_on_declaration(open: &Problem<'_>, neutral: impl Fn(usize)
     Some(mean(&of_steps)?.sqrt())
 }
 
-/// Evaluates the mixture of a problem that is at its minimum, and moves the problem to the mixture's mean; `Some(None)` where no refinement
-/// is looked for.
+/// Evaluates the mixture of a problem at its minimum and moves the problem to the mean of the mixture; `Some(None)` if there is nothing to
+/// search for.
 pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<Refinements>> {
     let sought = sought(problem);
     if sought.is_empty() {
@@ -80,7 +80,7 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<Refinements>> {
     Some(Some(refinements))
 }
 
-/// The mixture by a linearisation where the problem stands, and the problem at its mean.
+/// Evaluates the mixture by linearising the problem at its current values, and moves the problem to its mean.
 fn linearised(problem: &mut Problem<'_>, sought: &[(usize, f64, f64)]) -> Option<Refinements> {
     let indices: Vec<usize> = sought.iter().map(|(index, ..)| *index).collect();
     let declared: Vec<f64> = indices.iter().map(|index| problem.priors[*index].mean).collect();
@@ -97,7 +97,7 @@ fn linearised(problem: &mut Problem<'_>, sought: &[(usize, f64, f64)]) -> Option
         .iter()
         .zip(&declared)
         .map(|((index, slab_sigma, model_error), declared)| {
-            // A share of an area and the square of a diameter.
+            // alpha_A is a share of an area, and the probe parameter is the square of a diameter.
             let (lowest, highest) = match *index {
                 ALPHA => (0.0, 1.0),
                 PROBE_MM2 => (0.0, f64::INFINITY),
@@ -125,24 +125,24 @@ fn linearised(problem: &mut Problem<'_>, sought: &[(usize, f64, f64)]) -> Option
 }
 
 impl Refinements {
-    /// Where one of them stands among the others.
+    /// Position of a parameter among the others.
     fn place(&self, index: usize) -> Option<usize> {
         self.indices.iter().position(|other| *other == index)
     }
 
-    /// Probability of a refinement to be at work; 0 where it is not looked for.
+    /// Probability that a parameter is not neutral; 0 if it is not searched for.
     pub(crate) fn probability(&self, index: usize) -> f64 {
         self.place(index).map_or(0.0, |place| self.mixture.off_neutral[place])
     }
 
-    /// The value that fits best with all of them free, as a distance from what is declared, and its standard error; `None` where it is not
-    /// looked for.
+    /// Best-fit value with all of them free, as a difference from the declared value, and its standard error; `None` if it is not searched
+    /// for.
     pub(crate) fn free(&self, index: usize) -> Option<(f64, f64)> {
         self.place(index).map(|place| self.free[place])
     }
 
-    /// Puts the mixture in the place of the refinements' Gaussian. The offsets keep their declared spread and do not answer: what a
-    /// refinement has to be says nothing of them that could be relied on.
+    /// Replaces the Gaussian of these parameters with the mixture. The offsets keep their declared spread and do not move: these parameters
+    /// give no reliable information about them.
     pub(crate) fn apply(&self, covariance: &mut Covariance) -> Option<Gain> {
         let rows: Vec<usize> = self.indices.iter().filter_map(|index| covariance.row_of(*index)).collect();
         let columns =
@@ -150,7 +150,7 @@ impl Refinements {
         let block = |matrix: &DMatrix<f64>| {
             DMatrix::from_fn(rows.len(), rows.len(), |a, b| matrix[(rows[a], rows[b])])
         };
-        // What is left when the offsets, which are independent of each other, are known.
+        // The remaining variance if the offsets, which are mutually independent, are known.
         let mut by_noise = covariance.shared.clone();
         for (row, index) in covariance.fitted.iter().enumerate() {
             if (OFFSETS..SURFACE).contains(index) {
@@ -172,10 +172,9 @@ impl Refinements {
         Some(Gain(gain))
     }
 
-    /// 95 % interval of a number that the fit gives with a normal distribution, this value and variance, and that answers to the
-    /// shared parameters in this way. The interval is the shortest one of the mixture, joined with that of all refinements free: a
-    /// small refinement that the mixture takes for neutral must not make an interval too narrow. With it comes, signed, the standard error
-    /// that this adds, which all numbers share.
+    /// 95 % interval of a quantity with this value, this normal variance and this sensitivity to the shared parameters. It is the union of the
+    /// shortest interval of the mixture and the interval with all parameters free: a small effect that the mixture takes for neutral must not
+    /// narrow it. Also returns the signed standard error that this adds, which all quantities share.
     pub(crate) fn interval(
         &self,
         gain: &Gain,
@@ -202,7 +201,7 @@ impl Refinements {
 }
 
 impl Gain {
-    /// With a row for one more parameter, which does not answer.
+    /// Adds a row for one more parameter that does not depend on these parameters.
     pub(crate) fn with_row(self, row: usize) -> Self {
         Gain(self.0.insert_row(row, 0.0))
     }

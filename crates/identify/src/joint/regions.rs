@@ -1,9 +1,9 @@
-//! One bad region of the map may not condemn a recording: which steps disagree with the rest on what all share.
+//! Finds a region of the map whose steps disagree with the others on the shared parameters, so that it does not condemn the recording.
 //!
-//! Tried where the fit of all steps is doubted: without the steps of one end of the map (near choke, near surge, slowest,
-//! fastest) the doubts are gone, and what the rest says of the shared numbers lies outside what all steps say of them by more
-//! than its own uncertainty can explain. Where nothing is wrong, the rest only knows less: the variance of the difference is
-//! then the difference of the variances (Hausman, Econometrica 46, 1978, eq. 2.10).
+//! It runs if the fit of all steps has warnings. A region is one end of the map (near choke, near surge, slowest, fastest). It is left out if
+//! the warnings disappear without it, and if the shared parameters change by more than their own uncertainty explains. If there is no error,
+//! the remaining steps only carry less information: the variance of the difference is then the difference of the variances (Hausman,
+//! Econometrica 46, 1978, eq. 2.10).
 
 use crate::joint::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_DIRECTION};
 use crate::joint::rows::StepRows;
@@ -11,28 +11,28 @@ use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::SurfaceScale;
 use mapper_core::ReferenceState;
 
-/// Shares of the steps that a region has; the smallest that helps is left out.
+/// Shares of the steps in a region; the smallest one that helps is left out.
 const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
-/// Fewest steps of which something can be left out.
+/// Minimum number of steps for leaving any out.
 const MIN: usize = 9;
-/// Standard errors of the difference beyond which the rest disagrees.
+/// Standard errors of the difference beyond which the remaining steps disagree.
 const DISAGREES_SIGMAS: f64 = 4.0;
-/// Least standard error of the difference of each number: what smooth faults of any model make of it.
+/// Minimum standard error of the difference of each parameter: the effect of small smooth model errors.
 const FLOORS: [(usize, f64); 4] =
     [(ALPHA, 0.02), (EXPONENT, 0.02), (LN_COEFFICIENT, 0.02), (LN_DIRECTION, 0.01)];
 
 /// Steps at one end of the map.
 pub(crate) struct Region {
-    /// For people: "near choke".
+    /// Display name: "near choke".
     pub(crate) name: &'static str,
     /// Indices of the steps.
     pub(crate) steps: Vec<usize>,
 }
 
-/// What of a place (speed and flow, scaled) puts it first in a region.
+/// Sort key of a position (scaled speed and flow): the lowest come first in a region.
 type Rank = fn(&(f64, f64)) -> f64;
 
-/// All regions, the small ones first; those of equal size stand together.
+/// All regions, the small ones first; those of equal size are adjacent.
 pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<Region>> {
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let Some(scale) = SurfaceScale::of(&places, reference).filter(|_| steps.len() >= MIN) else {
@@ -59,14 +59,13 @@ pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<
     SHARES.into_iter().map(of_size).collect()
 }
 
-/// By how many standard errors the rest disagrees with all steps, at the shared number where most; `None` within what is
-/// expected.
+/// Largest difference between the remaining steps and all steps over the shared parameters, in standard errors; `None` if as expected.
 pub(crate) fn disagreement(
     all: (&Problem<'_>, &Covariance),
     rest: (&Problem<'_>, &Covariance),
 ) -> Option<f64> {
     let error = |(problem, covariance): (&Problem<'_>, &Covariance), index: usize| {
-        // A number that is held as declared is known without error.
+        // A parameter fixed as declared has no error.
         if problem.active[index] { covariance.error_of(index) } else { Some(0.0) }
     };
     FLOORS

@@ -1,4 +1,4 @@
-//! One step condensed to block means, with where on the map each of them lies.
+//! One step condensed to block means, with the map position of each block.
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
@@ -9,18 +9,18 @@ use mapper_core::{Channel, Recording, Window};
 use mapper_numerics::coloured_noise::BlockNoise;
 use mapper_numerics::statistics::mean;
 
-/// Block over which samples are averaged before they are fitted, s: a quarter of what sensor noise remembers, and far
-/// below anything that moves in a window.
+/// Length of the blocks over which samples are averaged before the fit, s: a quarter of the correlation time of sensor noise, and far below
+/// any time scale in a window.
 const BLOCK_S: f64 = 0.5;
-/// The same with noise when nothing but the housing moves any more, s: half of what sensor noise remembers, which loses
-/// next to none of what a row knows. Without noise it would cost a thousandth of alpha_A behind a slow probe.
+/// The same for noisy data once only the housing still changes, s: half the correlation time of sensor noise, with almost no loss of
+/// information. Without noise it would cost a thousandth of alpha_A behind a slow probe.
 const LATE_BLOCK_S: f64 = 1.0;
-/// Time from the first sample on after which that holds, s: several times what a probe and the speed need to settle.
+/// Time from the first sample after which that applies, s: several settling times of probe and speed.
 const LATE_S: f64 = 20.0;
 
-/// Time from the first row on after which lags of lines and sensors no longer show, s.
+/// Time from the first row after which lags of lines and sensors are no longer visible, s.
 const SETTLED_S: f64 = 8.5;
-/// Fewest rows that a step may be cut to.
+/// Minimum number of rows of a shortened step.
 const MIN_ROWS: usize = 20;
 
 /// Means over one block.
@@ -38,18 +38,18 @@ pub(crate) struct Row {
     pub(crate) noise: BlockNoise,
 }
 
-/// One step with what the fit needs of it.
+/// One step with the data that the fit needs.
 #[derive(Debug, Clone)]
 pub(crate) struct StepRows {
     /// Position in the recording.
     pub(crate) position: usize,
     pub(crate) rows: Vec<Row>,
-    /// Means over the step's end: one row more, that is not fitted.
+    /// Means over the step's end: one additional row that is not fitted.
     pub(crate) end: Row,
 }
 
 impl StepRows {
-    /// Without the rows in which pressures, flow and speed still follow the jump.
+    /// Returns the step without the rows in which pressures, flow and speed still follow the jump.
     pub(crate) fn settled(&self) -> StepRows {
         let from_s = self.rows.first().map_or(0.0, |row| row.t_s) + SETTLED_S;
         let rows: Vec<Row> = self.rows.iter().filter(|row| row.t_s >= from_s).copied().collect();
@@ -119,13 +119,13 @@ pub(crate) fn condensed(
     usable.then_some(StepRows { position, rows, end })
 }
 
-/// Length of a block that begins so long after the first sample, s.
+/// Length of a block that starts at this time after the first sample, s.
 pub(crate) fn block_s_after(elapsed_s: f64, config: &IdentifyConfig) -> f64 {
     let late = !config.declared.is_empty() && elapsed_s >= LATE_S;
     if late { LATE_BLOCK_S } else { BLOCK_S }
 }
 
-/// Smooths T1, Tc, P1, P2, flow and the place on the map.
+/// Smooths T1, Tc, P1, P2, flow and the map position.
 fn smooth(rows: &mut [Row]) {
     let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
     let smoother = Smoother::new(&t_s);

@@ -1,4 +1,4 @@
-//! The shared numbers of a joint fit as others see them.
+//! Reports the shared parameters of a joint fit.
 
 use crate::IdentifyConfig;
 use crate::joint::judge;
@@ -14,12 +14,12 @@ use crate::joint::smoothness::Smoothed;
 use crate::joint::solve::{Covariance, Problem};
 use mapper_core::{ConvectionLaw, Entangled, EstimateUncertainty, Origin, SharedValue, ThermalModel};
 
-/// Correlation beyond which two numbers count as entangled.
+/// Correlation above which two parameters count as entangled.
 const ENTANGLED: f64 = 0.95;
-/// Standard error over that of the prior above which the recording said nothing.
+/// Ratio of standard error to prior spread above which the recording carries no information.
 const UNINFORMED_RATIO: f64 = 0.7;
 
-/// Puts them together.
+/// Collects the shared parameters.
 pub(crate) fn thermal_model(
     problem: &Problem<'_>,
     covariance: &Covariance,
@@ -83,7 +83,7 @@ pub(crate) fn thermal_model(
     }
 }
 
-/// A parameter as others see it; `transform` from how it is fitted to how it is told.
+/// A reported parameter; `transform` converts from the fitted to the reported form.
 fn value(
     problem: &Problem<'_>,
     covariance: &Covariance,
@@ -97,7 +97,7 @@ fn value(
     };
     let (shift, sigma) = smoothed.shared[row];
     let fitted = problem.shared[index] + shift;
-    let told = transform(fitted);
+    let reported = transform(fitted);
     let variance = sigma * sigma;
     let slope = (transform(fitted + 1e-6) - transform(fitted - 1e-6)) / 2e-6;
     let mut bias = 0.0;
@@ -107,13 +107,13 @@ fn value(
         }
     }
     let beforehand = problem.priors[index].sigma;
-    // Of a refinement the recording's own word counts, not what was believed beforehand.
+    // For a parameter with a prior, use the error from the recording alone.
     let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
     let uninformed = known > UNINFORMED_RATIO * beforehand;
     let is_offset = is_offset(index);
     SharedValue {
-        // An offset has its declared spread even where the recording adds nothing.
-        value: (!uninformed || is_offset).then_some(told),
+        // An offset has its declared spread even if the recording adds nothing.
+        value: (!uninformed || is_offset).then_some(reported),
         uncertainty: EstimateUncertainty {
             noise_standard_error: slope.abs() * (variance - bias.min(variance)).max(0.0).sqrt(),
             bias_standard_error: slope.abs() * bias.min(variance).sqrt(),
@@ -122,8 +122,7 @@ fn value(
     }
 }
 
-/// The probe's diameter. Its square was fitted, which for an ideal probe rests on 0: then the error says how large a
-/// probe could hide in the noise.
+/// The probe's diameter. Its square is fitted, which is 0 for an ideal probe: the error is then the largest probe that noise could hide.
 fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
     let square = problem.shared[PROBE_MM2].max(0.0);
     if !problem.probe_fitted {

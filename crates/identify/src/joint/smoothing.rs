@@ -1,30 +1,30 @@
-//! Smooths what drives the model, along a step.
+//! Smooths the inputs of the model along a step.
 //!
-//! The model takes T1, Tc, flow and pressures as read. Their noise would not only add to that of T2: a fitted probe could
-//! "explain" it by a lag that smooths the prediction, and a slope by a smaller one. Over ten seconds nothing that really
-//! moves in a window is more than a cubic; noise that remembers two seconds is.
+//! The model takes T1, Tc, flow and pressures as read. Their noise adds to that of T2, and it biases the fit: a lag of the fitted probe
+//! smooths the prediction and could "explain" the noise, and a smaller surface slope could too. Over ten seconds a real change in a window is
+//! at most a cubic. Noise with a correlation time of two seconds is not.
 
 use nalgebra::{Matrix4, Vector4};
 
-/// Half of the stretch of time that a local cubic is fitted to, s.
+/// Half the width of the local cubic fit, s.
 const HALF_S: f64 = 10.0;
-/// Fewest rows in it.
+/// Minimum number of rows in the local fit.
 const MIN_ROWS: usize = 6;
-/// Half of that stretch at the first row, s.
+/// Half the width of the local fit at the first row, s.
 const SHORTEST_HALF_S: f64 = 3.0;
 
-/// For each row the rows around it and their weights in a local cubic.
+/// For each row, the neighbouring rows and their weights in a local cubic.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Smoother {
     weights: Vec<(usize, Vec<f64>)>,
 }
 
 impl Smoother {
-    /// For rows at these times.
+    /// Builds the weights for rows at these times.
     pub(crate) fn new(t_s: &[f64]) -> Self {
         let weights = (0..t_s.len())
             .map(|i| {
-                // Soon after a jump things move faster.
+                // Changes are faster soon after a jump.
                 let half_s = (SHORTEST_HALF_S + 0.5 * (t_s[i] - t_s[0])).min(HALF_S);
                 let start = t_s.partition_point(|t| *t < t_s[i] - half_s);
                 let end = t_s.partition_point(|t| *t <= t_s[i] + half_s);
@@ -50,7 +50,7 @@ impl Smoother {
         Smoother { weights }
     }
 
-    /// The smoothed column.
+    /// Returns the smoothed column.
     pub(crate) fn apply(&self, column: &[f64]) -> Vec<f64> {
         self.weights
             .iter()

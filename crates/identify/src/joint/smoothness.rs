@@ -1,11 +1,10 @@
-//! What the smoothness of an efficiency map says of the offsets.
+//! What a smooth efficiency map implies for the offsets.
 //!
-//! A fixed error of a temperature or pressure changes the efficiencies found by about one over the square of the speed: by
-//! points at the slowest speed line and by tenths at the fastest. A map that bends so is unlikely, and how unlikely, the
-//! points themselves say: the true efficiencies are taken for a Gaussian process over speed and flow (Rasmussen and
-//! Williams, Gaussian Processes for Machine Learning, 2006, ch. 2 and 5) whose amplitude and lengths are averaged over with
-//! the weights that the points give them. On a map that bends much by itself the offsets then keep their declared spread;
-//! on a flat one they lose about half of it. Everything that errs with the efficiencies is corrected along with them.
+//! A constant error of a temperature or pressure changes the fitted efficiencies in proportion to about one over the square of the speed: by
+//! points at the slowest speed line and by tenths at the fastest. A map of that shape is unlikely, and the points themselves determine how
+//! unlikely. The true efficiencies are a Gaussian process over speed and flow (Rasmussen and Williams, Gaussian Processes for Machine
+//! Learning, 2006, ch. 2 and 5). Its amplitude and lengths are averaged with their posterior weights. On a strongly curved map the offsets
+//! keep their declared spread; on a flat one they lose about half of it. All quantities correlated with the efficiencies are corrected too.
 
 use crate::faults::efficiency::FittedEfficiencies;
 use crate::faults::readings::CHANNELS;
@@ -21,27 +20,26 @@ use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Standard deviations of the efficiencies about their mean, fraction: what maps of compressors show along a valve opening
-/// and across.
+/// Standard deviations of the efficiencies about their mean, fraction: the range of compressor maps along a valve opening and across.
 const AMPLITUDES: [f64; 3] = [0.05, 0.1, 0.2];
-/// Lengths over which efficiency changes with speed, in halves of the range of the points.
+/// Correlation lengths of efficiency over speed, in halves of the range of the points.
 const SPEED_LENGTHS: [f64; 4] = [0.7, 1.0, 1.4, 2.0];
-/// The same with flow at equal speed.
+/// The same over flow at equal speed.
 const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
-/// What no smooth function follows, fraction.
+/// Deviation from any smooth function, fraction.
 const ROUGHNESSES: [f64; 2] = [1e-3, 4e-3];
-/// Mean of efficiencies and its standard deviation, fraction: any.
+/// Mean of efficiencies and its standard deviation, fraction: an uninformative prior.
 const MEAN: (f64, f64) = (0.65, 1.0);
-/// Points from which on the weights are found from a part of them: the effort grows with the cube.
+/// Number of points above which the weights come from a subset: the cost grows with the cube.
 const MANY: usize = 120;
-/// Points beyond which offsets keep their declared spread: the effort would be minutes.
+/// Number of points above which offsets keep their declared spread: the computation would take minutes.
 const MAX: usize = 500;
-/// Standard deviations by which a point may lie off what the others say before it is left out.
+/// Standard deviations between a point and its prediction from the others beyond which it is left out.
 const FAR_SIGMAS: f64 = 4.0;
-/// Share of the weight below which amplitude and lengths are not worth a solution.
+/// Share of the weight below which a choice of amplitude and lengths is not solved.
 const MIN_WEIGHT: f64 = 0.01;
 
-/// Declared standard deviations by which the offsets may have to be moved for a smooth map.
+/// Maximum shift of the offsets for a smooth map, in declared standard deviations.
 pub(crate) const STRAIN_SIGMAS: f64 = 3.0;
 
 /// A number with its error by origin.
@@ -49,9 +47,9 @@ pub(crate) const STRAIN_SIGMAS: f64 = 3.0;
 pub(crate) struct Judged {
     pub(crate) value: f64,
     pub(crate) uncertainty: EstimateUncertainty,
-    /// Its 95 % interval: about the value where it is normally distributed, else the shortest one.
+    /// Its 95 % interval: symmetric about the value for a normal distribution, otherwise the shortest one.
     pub(crate) interval: (f64, f64),
-    /// Standard error without what the interval holds beyond the mixture of refinements, and that, which all numbers share.
+    /// Standard error without the interval's excess over the mixture, and that excess, which all numbers share.
     error: f64,
     added: f64,
 }
@@ -60,33 +58,33 @@ pub(crate) struct Judged {
 #[derive(Debug, Clone)]
 pub(crate) struct Smoothed {
     pub(crate) eta: Vec<Judged>,
-    /// ln of h at the step's end, over what the fit has.
+    /// ln of h at the step's end, relative to the fitted value.
     pub(crate) ln_h: Vec<Judged>,
-    /// What each of the errors that the points share does to every point's efficiency, and to its ln h.
+    /// Effect of each common error of the points on every point's efficiency, and on its ln h.
     pub(crate) common: [Vec<Vec<f64>>; 2],
-    /// For each shared parameter that was fitted or carried: by how much it moves, and its standard error then.
+    /// Shift and resulting standard error of each shared parameter that was fitted or propagated.
     pub(crate) shared: Vec<(f64, f64)>,
-    /// How far the offsets were moved, in declared standard deviations.
+    /// Shift of the offsets, in declared standard deviations.
     pub(crate) strain: f64,
 }
 
 impl Smoothed {
-    /// Middle one of the efficiencies' standard errors, fraction; infinite without any.
+    /// Median standard error of the efficiencies, fraction; infinite without any.
     pub(crate) fn middle_error(&self) -> f64 {
         let errors = self.eta.iter().map(|judged| judged.uncertainty.combined_standard_error());
         median(errors).unwrap_or(f64::INFINITY)
     }
 }
 
-/// One choice of amplitude and lengths, solved.
+/// Solution for one choice of amplitude and lengths.
 struct Solved {
     weight: f64,
     factors: Cholesky<f64, Dyn>,
-    /// Inverse covariance times what the points are off the mean.
+    /// Inverse covariance times the deviation of the points from the mean.
     drive: DVector<f64>,
 }
 
-/// Judges all numbers; as the fit has them where no offset is carried or the map is not followed.
+/// Corrects all numbers; returns the fitted ones if no offset is propagated or the map does not support it.
 pub(crate) fn smoothed(
     problem: &Problem<'_>,
     covariance: &Covariance,
@@ -115,14 +113,14 @@ pub(crate) fn smoothed(
     judged(covariance, refined, &etas, &ln_hs, &solved)
 }
 
-/// The efficiencies as the steps alone have them, and what errors of the readings do to them: what smoothness has taken off can no longer
-/// be held against a map. Steps that have no say in what is shared are left out.
+/// The efficiencies from the steps alone, and the effect of reading errors on them: an error that the smoothness prior has removed no longer
+/// counts against a map. Steps excluded from the shared parameters are left out.
 pub(crate) fn as_measured(problem: &Problem<'_>, steps: &[StepRows]) -> Option<FittedEfficiencies> {
     let problem = &problem.without_a_surface()?;
     let covariance = &problem.covariance()?;
     let (etas, _) = quantities(problem, covariance, steps);
     let kept: Vec<usize> = (0..etas.len()).filter(|i| problem.members[*i].shares).collect();
-    // With an error of a reading known, the efficiency would be the higher by what it is found too low without.
+    // If the error is known, the efficiency rises by the amount that the error had lowered it.
     let answer = |i: usize, row: usize| etas[i].by_shared[row] / covariance.shared[(row, row)];
     let carried: Vec<usize> =
         (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row])).collect();
@@ -150,7 +148,7 @@ pub(crate) fn as_measured(problem: &Problem<'_>, steps: &[StepRows]) -> Option<F
     })
 }
 
-/// The channel to whose error a shared parameter belongs.
+/// The channel whose error a shared parameter describes.
 fn channel_of(index: usize) -> Option<Channel> {
     if index == FLOW_GAIN {
         return Some(Channel::CompressorFlow);
@@ -167,7 +165,7 @@ fn judged(
 ) -> Smoothed {
     let shared: Vec<Quantity> = (0..covariance.fitted.len()).map(|row| of_shared(covariance, row)).collect();
     let carried = (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row]));
-    // Errors that offsets and what is assumed bring, before and after.
+    // Errors from offsets and assumptions, before and after.
     let biased: Vec<usize> = (0..covariance.fitted.len())
         .filter(|row| (OFFSETS..SURFACE).contains(&covariance.fitted[*row]))
         .collect();
@@ -233,13 +231,12 @@ fn judged(
     Smoothed { eta, ln_h, common, shared, strain }
 }
 
-/// Covariance of a number of all steps, and the part of its diagonal that is each step's own, after the correction by the
-/// best of the choices.
+/// Covariance of a quantity over all steps after the correction by the best choice, and the part of its diagonal that is each step's own.
 fn together(quantities: &[Quantity], etas: &[Quantity], best: Option<&Solved>) -> (DMatrix<f64>, Vec<f64>) {
     let count = quantities.len();
     let mut matrix = DMatrix::from_fn(count, count, |i, j| {
         let (one, other) = (&quantities[i], &quantities[j]);
-        // The noise of one step is not that of another.
+        // The noise of different steps is independent.
         if i == j { one.variance } else { one.answer.dot(&other.by_shared) }
     });
     let mut own: Vec<f64> = quantities.iter().map(|quantity| quantity.own_variance).collect();
@@ -258,7 +255,7 @@ fn together(quantities: &[Quantity], etas: &[Quantity], best: Option<&Solved>) -
     (matrix, own)
 }
 
-/// All choices of amplitude and lengths that have a say.
+/// All choices of amplitude and lengths with sufficient weight.
 fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'_>) -> Vec<Solved> {
     let mut used: Vec<bool> = problem.members.iter().map(|member| member.shares).collect();
     let every = used.len().div_ceil(MANY).max(1);
@@ -286,7 +283,7 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
             .zip(&relative)
             .filter(|(_, weight)| **weight > MIN_WEIGHT * total)
             .map(|(choice, weight)| {
-                // What does not take part is given an error that leaves it without a say.
+                // Excluded points get an error so large that they have no weight.
                 let matrix = matrix(etas, coordinates, &(0..etas.len()).collect::<Vec<_>>(), choice, &used);
                 let factors = matrix.cholesky()?;
                 let off = DVector::from_iterator(etas.len(), etas.iter().map(|eta| eta.value - MEAN.0));
@@ -298,14 +295,14 @@ fn solve(etas: &[Quantity], coordinates: &[(f64, f64, f64)], problem: &Problem<'
         solved.iter_mut().for_each(|one| one.weight /= total);
         let left = used.iter().filter(|used| **used).count();
         match farthest(&solved, &used) {
-            // Never more than a fifth: then it is the map that is rough.
+            // At most a fifth is left out: beyond that, the map itself is rough.
             Some(index) if 5 * (used.len() - left + 1) <= used.len() => used[index] = false,
             _ => return solved,
         }
     }
 }
 
-/// The point farthest off what the others say of it, where that is too far.
+/// The point that differs most from its prediction by the others, if beyond the limit.
 fn farthest(solved: &[Solved], used: &[bool]) -> Option<usize> {
     let best = solved.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
     let inverse = best.factors.inverse();
@@ -317,7 +314,7 @@ fn farthest(solved: &[Solved], used: &[bool]) -> Option<usize> {
         .map(|(i, _)| i)
 }
 
-/// Covariance of the efficiencies found at some of the points.
+/// Covariance of the efficiencies at a subset of the points.
 fn matrix(
     etas: &[Quantity],
     coordinates: &[(f64, f64, f64)],
@@ -332,14 +329,14 @@ fn matrix(
         let own = if i == j { roughness * roughness + if used[i] { 0.0 } else { 1e4 } } else { 0.0 };
         0.5 * (etas[i].by_eta[j] + etas[j].by_eta[i])
             + amplitude * amplitude * (-0.5 * (by_speed * by_speed + by_flow * by_flow)).exp()
-            // It can not be told from an offset at all.
+            // It cannot be distinguished from an offset.
             + SLOW_LOSS * SLOW_LOSS * slow * other_slow
             + MEAN.1 * MEAN.1
             + own
     })
 }
 
-/// Logarithm of the density of the points under a choice, but for a constant.
+/// Log density of the points under a choice, up to a constant.
 fn evidence(
     etas: &[Quantity],
     coordinates: &[(f64, f64, f64)],

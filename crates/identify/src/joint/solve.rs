@@ -1,5 +1,5 @@
-//! Levenberg-Marquardt on the joint fit's normal equations, whose matrix has the shape of an arrow: each step's own
-//! parameters touch only themselves and the shared ones, so they are eliminated step by step.
+//! Levenberg-Marquardt on the joint fit's normal equations. Their matrix has arrow shape: a step's own parameters couple only with themselves
+//! and the shared ones, so they are eliminated step by step.
 
 use crate::joint::input_noise_spline::Explained;
 use crate::joint::model::{Course, Setting};
@@ -16,16 +16,15 @@ use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 const MAX_ITERATIONS: usize = 60;
 /// Relative decrease of the cost below which the search ends.
 const ENOUGH_RATIO: f64 = 1e-10;
-/// Of the search for a step: bold, since the start is good and the model nearly linear.
+/// Damping for the step search: small, since the start is good and the model nearly linear.
 const DAMPING: DampingRule =
     DampingRule { start: 1e-4, growth: 10.0, relief: 0.1, renewed: 1e-8, least: 1e-12, most: 1e8, tries: 12 };
-/// Decrease in squares of standard deviations that is enough for a fit that only leads to another, or is held against
-/// standard errors.
+/// Sufficient decrease, in squares of standard deviations, for an intermediate fit or one that is compared with standard errors.
 pub(crate) const ROUGHLY: f64 = 1e-4;
-/// The same for the last fit: noise-free recordings are told by less than any standard error.
+/// The same for the last fit: noise-free recordings resolve less than any standard error.
 pub(crate) const FULLY: f64 = 0.0;
 
-/// Spread of the efficiencies about a surface that says nothing, fraction.
+/// Spread of the efficiencies about a surface without information, fraction.
 pub(crate) const NO_SURFACE_SIGMA: f64 = 1e3;
 
 /// One step in the fit.
@@ -35,15 +34,15 @@ pub(crate) struct Member<'a> {
     /// Measured T2 of each row, K.
     pub(crate) measured_k: Vec<f64>,
     pub(crate) whitening: WhiteningFilter,
-    /// What the shared parameters make of the point's efficiency: the surface's terms at the step's end, and for each
-    /// offset's bend what that offset does to the efficiency found.
+    /// Contribution of the shared parameters to the point's efficiency: the surface terms at the step's end, and for each offset's bend the
+    /// effect of that offset on the fitted efficiency.
     pub(crate) coupling: SharedVector,
     pub(crate) local: LocalVector,
-    /// Of the step's parameters; that of the efficiency is not used: see `surface_sigma`.
+    /// Priors of the step's parameters; that of the efficiency is not used: see `surface_sigma`.
     pub(crate) priors: [Prior; LOCAL],
-    /// Whether the step takes part in the shared parameters.
+    /// Whether the step contributes to the shared parameters.
     pub(crate) shares: bool,
-    /// Whether it never does: its region of the map disagrees with the rest.
+    /// Whether the step is always excluded: its region of the map disagrees with the others.
     pub(crate) barred: bool,
 }
 
@@ -55,48 +54,48 @@ pub(crate) struct Problem<'a> {
     pub(crate) shared: SharedVector,
     pub(crate) priors: [Prior; SHARED],
     pub(crate) active: [bool; SHARED],
-    /// Lowest value of each shared parameter.
+    /// Lower bound of each shared parameter.
     pub(crate) lowest: SharedVector,
-    /// How far a point's efficiency may lie off the surface, one standard deviation; infinite where there is none.
+    /// Spread of a point's efficiency about the surface, one standard deviation; infinite without a surface.
     pub(crate) surface_sigma: f64,
-    /// What noise in T1, Tc, flow and pressures adds to the sum of squares, by the probe.
+    /// Contribution of noise in T1, Tc, flow and pressures to the sum of squares, as a function of the probe.
     pub(crate) explained: Explained,
-    /// Whether the probe is sought, be it on its bound for now.
+    /// Whether the probe is fitted, even if it is currently on its bound.
     pub(crate) probe_fitted: bool,
-    /// Whether the recording is asked what h before the wheel follows.
+    /// Whether the recording is to decide which law h before the wheel follows.
     pub(crate) inlet_sought: bool,
-    /// What came of that; `None` where it makes no difference.
+    /// Result of that decision; `None` if it makes no difference.
     pub(crate) inlet: Option<FoundInlet>,
 }
 
-/// The normal equations where the parameters stand, and the cost there.
+/// The normal equations and the cost at the current parameters.
 struct Normal {
     cost: f64,
     equations: Arrow<LOCAL>,
 }
 
-/// Covariance of everything, as far as it is needed.
+/// Covariance of all parameters, as far as needed.
 #[derive(Debug, Clone)]
 pub(crate) struct Covariance {
-    /// Shared parameters that were fitted, by index.
+    /// Indices of the fitted shared parameters.
     pub(crate) fitted: Vec<usize>,
     /// Their covariance.
     pub(crate) shared: DMatrix<f64>,
-    /// For each step: own covariance with the shared ones free, and own by shared.
+    /// For each step: covariance of its own parameters with the shared ones free, and of own with shared.
     pub(crate) own: Vec<(Matrix4<f64>, Matrix4xX<f64>)>,
-    /// For each step: how its own parameters answer to the shared ones.
+    /// For each step: sensitivity of its own parameters to the shared ones.
     pub(crate) answers: Vec<Matrix4xX<f64>>,
 }
 
 impl Member<'_> {
-    /// How far the point's efficiency lies off the surface.
+    /// Deviation of the point's efficiency from the surface.
     pub(crate) fn off_surface(&self, shared: &SharedVector, local: &LocalVector) -> f64 {
         local[ETA] - self.coupling.iter().zip(shared).map(|(a, b)| a * b).sum::<f64>()
     }
 }
 
 impl Covariance {
-    /// Where a shared parameter stands; `None` where it was not fitted.
+    /// Row of a shared parameter; `None` if it was not fitted.
     pub(crate) fn row_of(&self, index: usize) -> Option<usize> {
         self.fitted.iter().position(|fitted| *fitted == index)
     }
@@ -108,7 +107,7 @@ impl Covariance {
 }
 
 impl Problem<'_> {
-    /// All shared parameters that are not known, offsets last.
+    /// All uncertain shared parameters, offsets last.
     pub(crate) fn unknown(&self) -> Vec<usize> {
         let (carried, mut sought): (Vec<usize>, Vec<usize>) = (0..SHARED)
             .filter(|index| self.active[*index])
@@ -117,14 +116,14 @@ impl Problem<'_> {
         sought
     }
 
-    /// Those that are sought. Offsets and gains are not: next to what is declared of them the recording says nothing of
-    /// them, and what little it seems to say is rather the model's smallest faults. They are carried into the covariance.
+    /// The fitted parameters, without offsets and gains. A recording carries almost no information about those beyond the declaration, and
+    /// small model errors would dominate it. They are propagated into the covariance.
     fn fitted(&self) -> Vec<usize> {
         (0..SHARED).filter(|index| self.active[*index] && !(OFFSETS..SURFACE).contains(index)).collect()
     }
 
-    /// Whitened residuals of a step (measured minus predicted), and derivatives of the prediction by its own parameters
-    /// and by the shared ones named in `by`.
+    /// Whitened residuals of a step (measured minus predicted), and derivatives of the prediction by its own parameters and by the shared ones
+    /// named in `by`.
     pub(crate) fn residual(
         &self,
         member: &Member<'_>,
@@ -132,7 +131,7 @@ impl Problem<'_> {
         local: &LocalVector,
         by: Option<&[bool; SHARED]>,
     ) -> (Vec<f64>, Vec<Vec<f64>>) {
-        // Where a sought probe rests at 0 it still has its first reading.
+        // A fitted probe on its bound 0 still has its first reading.
         let mut none = [false; SHARED];
         none[PROBE_MM2] = self.active[PROBE_MM2];
         let prediction =
@@ -192,7 +191,7 @@ impl Problem<'_> {
             }
         }
         let surface_weight = 1.0 / (self.surface_sigma * self.surface_sigma);
-        // What is only carried costs as many evaluations of the model as what is sought: not while searching.
+        // Propagated parameters cost as many model evaluations as fitted ones, so the search skips them.
         let mut wanted = [false; SHARED];
         for index in fitted {
             wanted[*index] = true;
@@ -257,8 +256,8 @@ impl Problem<'_> {
         normal
     }
 
-    /// Adds what is known of a step beside its readings: the priors of its own parameters, and that its efficiency lies about the
-    /// surface.
+    /// Adds the information of a step in addition to its readings: the priors of its own parameters, and the spread of its efficiency about
+    /// the surface.
     pub(crate) fn add_known(
         &self,
         member: &Member<'_>,
@@ -283,13 +282,13 @@ impl Problem<'_> {
         self.shared_cost(shared) + costs.iter().sum::<f64>()
     }
 
-    /// The sum of squares where the parameters stand.
+    /// The sum of squares at the current parameters.
     pub(crate) fn square(&self) -> f64 {
         let locals: Vec<LocalVector> = self.members.iter().map(|member| member.local).collect();
         self.cost(&self.shared, &locals)
     }
 
-    /// ln of h before over h after the wheel by the inlet's own law, at the end of each step.
+    /// ln of the ratio of h before the wheel to h after it by the inlet's own law, at the end of each step.
     pub(crate) fn ln_inlet_ratios(&self) -> Vec<f64> {
         self.members
             .iter()
@@ -300,8 +299,7 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// Finds the minimum from where the parameters stand; `None` where it comes to no finite end. `enough_square`: see
-    /// [`ROUGHLY`] and [`FULLY`].
+    /// Finds the minimum from the current parameters; `None` if it does not converge. `enough_square`: see [`ROUGHLY`] and [`FULLY`].
     pub(crate) fn minimise(&mut self, enough_square: f64) -> Option<f64> {
         let mut fitted = self.fitted();
         let mut damping = Damping::new(DAMPING);
@@ -328,12 +326,12 @@ impl Problem<'_> {
                 (cost <= best * (1.0 + 1e-14)).then_some((shared, locals, cost))
             };
             let Some((shared, locals, cost)) = damping.search(trial) else { break };
-            // A parameter on its bound rests there as long as the others are searched.
+            // A parameter on its bound stays there while the others are fitted.
             fitted.retain(|index| shared[*index] > self.lowest[*index]);
             for (active, (value, lowest)) in self.active.iter_mut().zip(shared.iter().zip(&self.lowest)) {
                 *active &= value > lowest;
             }
-            // A step without a say is not in the cost: it moves only where it fits better.
+            // An excluded step is not in the cost: it moves only if its own fit improves.
             let moves: Vec<bool> = self
                 .members
                 .iter()
@@ -359,7 +357,7 @@ impl Problem<'_> {
         Some(best)
     }
 
-    /// Values of some shared parameters after one undamped step, whatever their bounds.
+    /// Values of some shared parameters after one undamped step, ignoring bounds.
     pub(crate) fn full_step(&self, indices: &[usize]) -> Option<Vec<f64>> {
         let fitted = self.fitted();
         let (change, _) = self.normal(&fitted).equations.step(0.0)?;
@@ -367,8 +365,8 @@ impl Problem<'_> {
         indices.iter().map(|index| Some(self.shared[*index] + change[row(index)?])).collect()
     }
 
-    /// What the recording alone knows of a shared parameter when all that are fitted are free: one over its variance by least
-    /// squares, minus the prior's part. It need not be fitted itself.
+    /// Information of the recording alone about a shared parameter with all fitted ones free: the inverse of its least-squares variance, minus
+    /// the prior's part. The parameter itself need not be fitted.
     pub(crate) fn information(&self, index: usize) -> Option<f64> {
         let mut fitted = self.fitted();
         if !fitted.contains(&index) {
@@ -380,7 +378,7 @@ impl Problem<'_> {
         Some(1.0 / variance - self.priors[index].weight())
     }
 
-    /// The problem at its minimum when no efficiency is drawn to a surface: what each step and what all share say by themselves.
+    /// The problem at its minimum without the efficiency surface: the information of the steps and shared parameters alone.
     pub(crate) fn without_a_surface(&self) -> Option<Self> {
         let mut free = self.clone();
         free.surface_sigma = NO_SURFACE_SIGMA;
@@ -392,17 +390,16 @@ impl Problem<'_> {
         Some(free)
     }
 
-    /// The same problem with readings that have no offset and no gain.
+    /// The same problem with readings that have no offset and no gain error.
     pub(crate) fn with_exact_readings(&self) -> Self {
         let mut exact = self.clone();
         exact.active[OFFSETS..SURFACE].fill(false);
         exact
     }
 
-    /// Covariance at the minimum; `None` where the equations are singular.
+    /// Covariance at the minimum; `None` if the equations are singular.
     ///
-    /// Offsets keep their declared spread, and everything else answers to them as the fit would (Schmidt's consider
-    /// covariance).
+    /// Offsets keep their declared spread, and all other parameters respond to them as in the fit (Schmidt's consider covariance).
     pub(crate) fn covariance(&self) -> Option<Covariance> {
         let fitted = self.unknown();
         let equations = self.normal(&fitted).equations;
@@ -416,7 +413,7 @@ impl Problem<'_> {
             reduced.view((0, 0), (sought, sought)).into_owned().cholesky()?.inverse()
         };
         let answer = -(&inverse * reduced.view((0, sought), (sought, carried)));
-        // The noise of the inputs pulls the probe beyond what least squares knows of.
+        // Input noise moves the probe more than least squares expects.
         let mut inverse = inverse;
         for (row, index) in fitted[..sought].iter().enumerate() {
             let pulled = inverse.column(row).into_owned();

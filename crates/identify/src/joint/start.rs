@@ -1,4 +1,4 @@
-//! From a recording to a fit that can be started, and what the fit learns of its own spreads.
+//! Prepares a recording for the fit, and estimates noise and spreads from the fit.
 
 use crate::cleaning::cleaned;
 use crate::dynamic::{self, Estimate};
@@ -25,31 +25,30 @@ use mapper_numerics::statistics::{mean, median};
 use mapper_physics::air;
 use nalgebra::DVector;
 
-/// Start of what is used of a step, after the last change of a command, s: h and efficiency are followed while the
-/// operating point settles. Where noise could pass for a slow probe the seconds right after the jump are needed, which
-/// tell the two apart by tens of kelvin; without noise they only show where the surface is none. The inputs are smoothed over 3 s at
-/// first: from 1.5 s on that made a probe of 0.7 mm 0.026 mm too small, from 2 s on it is within its error (mean of 20 seeds).
+/// Start of the used part of a step after the last command change, s: h and efficiency are modelled while the operating point settles. If
+/// noise could look like a slow probe, the fit needs the seconds right after the jump, where the two differ by tens of kelvin. Without noise
+/// they only show where the surface is wrong. Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too
+/// small, from 2 s on it is within its error (mean of 20 seeds).
 pub(crate) const START_S: f64 = 3.0;
 pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
 /// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. The recordings of
 /// `benches/identification.py` have 0.0006, those of a machine with a map that drops steeply at choke 0.005.
 const SURFACE_SIGMA: f64 = 1e-3;
-/// Share of what the surface moves a prediction by that is wrong: surfaces through a few points bend otherwise than maps.
+/// Relative error of the surface's effect on a prediction: surfaces through a few points bend differently from maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
-/// Residual of a step on its own, over that of the median step and in K, beyond which it is kept out until it has shown
-/// that it fits the others.
+/// Residual of a single step, relative to the median step and in K, above which the step is excluded until it is shown to fit the others.
 const SUSPECT_RATIO: f64 = 6.0;
 const SUSPECT_K: f64 = 0.5;
 /// Expected spread of the points' h about the law, ratio. The recordings of `benches/identification.py` have 0.0022 to 0.003.
 const LAW_SIGMA: f64 = 3e-3;
-/// Weight of what is expected of a spread, in points: few next to the dozens of a campaign, enough where there are none.
+/// Weight of the expected spread, in points: small next to the dozens of points of a campaign, sufficient without any.
 const PRIOR_WEIGHT: f64 = 4.0;
-/// Standard deviations at which a point stops to count for a larger spread: one in four hundred by chance.
+/// Standard deviations beyond which a point does not increase the spread: one in four hundred by chance.
 const FAR_SIGMAS: f64 = 3.0;
-/// Spreads tried on either side of the expected one, and their distance in logarithms: from a thirtieth to thirty times.
+/// Number of spreads tried on either side of the expected one, and their distance in logarithms: from a thirtieth to thirty times.
 const SPREADS: i32 = 34;
 const SPREAD_STEP: f64 = 0.1;
-/// Standard deviation of a sample of T2 where nothing is declared, K; refined from the residual.
+/// Standard deviation of a T2 sample without a declaration, K; refined from the residual.
 const UNDECLARED_NOISE_K: f64 = 0.1;
 
 /// Condenses every step that has a window with enough samples.
@@ -101,7 +100,7 @@ fn rows_of(
         return None;
     }
     if !config.declared.is_empty() {
-        // What varies is followed; but a point is where a step settles.
+        // The fit follows changes within the step, but the point is the settled end of the step.
         let rest = window::rest(recording, step, &config.settle_bands);
         let needed_s = WindowRule::rest_at_end_s(step.end_s - step.start_s);
         if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
@@ -147,7 +146,7 @@ pub(crate) fn problem<'a>(
     let mut shared = [0.0; SHARED];
     let mut active = [false; SHARED];
     let mut lowest = [f64::NEG_INFINITY; SHARED];
-    // A turbocharger's law may be far from Appendix A's, but not by orders of magnitude.
+    // The law of a turbocharger may differ much from Appendix A, but not by orders of magnitude.
     let law = mapper_physics::params::Params::default().compressor;
     shared[EXPONENT] = law.nusselt_exponent;
     shared[LN_COEFFICIENT] = law.nusselt_coefficient.ln() + law.nusselt_exponent * ln_reference;
@@ -220,7 +219,7 @@ pub(crate) fn problem<'a>(
     })
 }
 
-/// A step with its start values. `found`: what it gives by itself; `mean_eta` stands for an efficiency that it does not give.
+/// A step with its start values. `found`: result of the step alone; `mean_eta` replaces an efficiency that it does not give.
 pub(crate) fn member<'a>(
     step: &'a StepRows,
     found: Option<&Estimate>,
@@ -267,7 +266,7 @@ pub(crate) fn member<'a>(
     }
 }
 
-/// `shape_k`: how far the surface moves the prediction at each row, K; part of that is wrong, and as slow as itself.
+/// `shape_k`: effect of the surface on the prediction at each row, K. Part of it is wrong, and varies as slowly as it does.
 fn whitening(
     step: &StepRows,
     config: &IdentifyConfig,
@@ -282,8 +281,7 @@ fn whitening(
     WhiteningFilter::new(noise, config.noise_colour.time_constant_s, sigma_k, white_sigma_k)
 }
 
-/// Takes the noise of each step and the spreads of the points about surface and law from what was found; `None` where the equations are
-/// singular.
+/// Estimates the noise of each step and the spreads of the points about surface and law from the fit; `None` if the equations are singular.
 pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<()> {
     weigh(problem, steps, config);
     let covariance = problem.with_exact_readings().covariance()?;
@@ -316,10 +314,10 @@ pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &Ide
     Some(())
 }
 
-/// Standard deviation of a normal distribution about 0 from which the numbers come whose posterior means and variances under another one,
-/// `under_sigma`, are given: the most probable one under an inverse chi-square prior about `expected`.
+/// Standard deviation of a zero-mean normal distribution, from posterior means and variances found with another one, `under_sigma`. Returns
+/// the most probable value under an inverse chi-square prior about `expected`.
 fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
-    // Values and variances by the recording alone.
+    // Values and variances from the recording alone.
     let seen: Vec<(f64, f64)> = posteriors
         .iter()
         .filter_map(|(value, variance)| {
@@ -330,7 +328,7 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
     let ln_density = |sigma: f64| -> f64 {
         let of_point = |(value, variance): &(f64, f64)| {
             let total = sigma * sigma + variance;
-            // A bad step must not make room for itself.
+            // A bad step must not widen its own tolerance.
             -0.5 * (total.ln() + (value * value / total).min(FAR_SIGMAS * FAR_SIGMAS))
         };
         let prior = -PRIOR_WEIGHT * (sigma.ln() + 0.5 * (expected / sigma).powi(2));
@@ -342,14 +340,14 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
         .unwrap_or(expected)
 }
 
-/// How the efficiency that is found answers to the offsets, by how T2 answers to the readings and to the efficiency; `None` where it
-/// does not.
+/// Sensitivity of the fitted efficiency to the offsets, from the sensitivities of T2 to the readings and to the efficiency; `None` if T2 does
+/// not depend on the efficiency.
 pub(crate) fn coupled(slopes: &[f64; 6], by_eta: f64) -> Option<[f64; OFFSET_CHANNELS.len()]> {
     let coupled = std::array::from_fn(|i| -slopes[i] / by_eta);
     coupled.iter().all(|x: &f64| x.is_finite()).then_some(coupled)
 }
 
-/// The noise of each step, and how its efficiency answers to offsets, where the parameters stand.
+/// Sets the noise of each step and the sensitivity of its efficiency to offsets, at the current parameters.
 pub(crate) fn weigh(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
     let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
     let declared: Vec<f64> = channels
@@ -360,7 +358,7 @@ pub(crate) fn weigh(problem: &mut Problem<'_>, steps: &[StepRows], config: &Iden
         let member = &problem.members[i];
         let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
         let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
-        // Without a declaration the residual itself says what noise there is; 0.3 mK is what block means cost.
+        // Without a declaration the residual gives the noise; 0.3 mK is the error of block means.
         let sigma_k = if expected > 0.0 {
             expected.sqrt()
         } else {

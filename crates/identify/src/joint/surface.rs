@@ -1,15 +1,15 @@
 //! A smooth efficiency surface over corrected speed and flow, linear in its coefficients.
 //!
-//! Coordinates are scaled to the points: u is the speed, v the flow over a power of the speed that the points themselves
-//! give, so that equal valve openings have about equal v. At each speed the surface is a cubic in v at most; whatever it
-//! cannot follow remains each point's own deviation. Over speed it is a cubic and what small Reynolds numbers and leakage cost at
-//! low speed: a cubic alone lays itself above the slowest line and below the next one, and takes the points with it.
+//! Coordinates are scaled to the points: u is the speed, v the flow divided by a power of the speed fitted to the points, so that equal valve
+//! openings have about equal v. At each speed the surface is at most a cubic in v; the remainder is each point's own deviation. Over speed it
+//! is a cubic plus a term for small Reynolds numbers and leakage at low speed. A cubic alone lies above the slowest line and below the next
+//! one, and biases the points.
 
 use mapper_core::ReferenceState;
 use mapper_physics::efficiency_shape::EfficiencyShape;
 
-/// Powers of u and v of each term but the last, lowest first, with the standard deviation that its coefficient is given beforehand:
-/// maps bend, but the higher the order the less (efficiency varies by some 0.3 over a map, |u|, |v| <= 1).
+/// Powers of u and v of each term but the last, lowest first, with the prior standard deviation of its coefficient. Maps bend, but less at
+/// higher order (efficiency varies by some 0.3 over a map, |u|, |v| <= 1).
 const POWERS: [(i32, i32, f64); TERM_COUNT - 1] = [
     (0, 0, 1.0),
     (1, 0, 0.3),
@@ -23,14 +23,13 @@ const POWERS: [(i32, i32, f64); TERM_COUNT - 1] = [
     (0, 3, 0.05),
     (2, 2, 0.05),
 ];
-/// Efficiency that small Reynolds numbers and leakage cost beyond that, fraction, one standard deviation, times
-/// [`SurfaceScale::slowness`], the last term: published maps fall by 2 to 10 points from their peak to a third of full speed, where it is
-/// about 3.
+/// Additional loss of efficiency at small Reynolds numbers and by leakage, fraction: one standard deviation of the last term, which multiplies
+/// [`SurfaceScale::slowness`]. Published maps fall by 2 to 10 points from their peak to a third of full speed, where it is about 3.
 pub(crate) const SLOW_LOSS: f64 = 1e-2;
 /// Number of coefficients.
 pub(crate) const TERM_COUNT: usize = 12;
 
-/// Where on the map the surface lies.
+/// Position and scale of the surface on the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SurfaceScale {
     pub(crate) reference: ReferenceState,
@@ -45,7 +44,7 @@ pub(crate) struct SurfaceScale {
 pub(crate) type Place = (f64, f64);
 
 impl SurfaceScale {
-    /// Scales to the places of the points; `None` for none, or places that are not positive.
+    /// Scales for the positions of the points; `None` for no points, or positions that are not positive.
     pub(crate) fn of(places: &[Place], reference: ReferenceState) -> Option<Self> {
         let usable = |x: f64| x.is_finite() && x > 0.0;
         if places.is_empty() || !places.iter().all(|(speed, flow)| usable(*speed) && usable(*flow)) {
@@ -74,24 +73,24 @@ impl SurfaceScale {
         (u, (reduced - self.middle) / self.half_range)
     }
 
-    /// Square of the middle speed over the speed, less 1.
+    /// Square of the ratio of middle speed to speed, minus 1.
     pub(crate) fn slowness(&self, (speed_rpm, _): Place) -> f64 {
         (self.speed_middle_rpm / speed_rpm).powi(2) - 1.0
     }
 
-    /// The terms at a place.
+    /// The terms at a position.
     pub(crate) fn terms(&self, place: Place) -> [f64; TERM_COUNT] {
         let (u, v) = self.coordinates(place);
         with_last(POWERS.map(|(i, j, _)| u.powi(i) * v.powi(j)), self.slowness(place))
     }
 
-    /// Standard deviations of the coefficients beforehand.
+    /// Prior standard deviations of the coefficients.
     pub(crate) fn prior_sigmas() -> [f64; TERM_COUNT] {
         with_last(POWERS.map(|(_, _, sigma)| sigma), SLOW_LOSS)
     }
 }
 
-/// Middle and half of the range; a range of a tenth of the middle at least, so that a single point has one.
+/// Middle and half of the range. The range is at least a tenth of the middle, so that a single point has one.
 pub(crate) fn middle_and_half_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
@@ -99,7 +98,7 @@ pub(crate) fn middle_and_half_range(values: impl Iterator<Item = f64>) -> (f64, 
     (middle, (0.5 * (high - low)).max(0.05 * middle))
 }
 
-/// Slope of ln flow over ln speed, 1 where the points do not give one.
+/// Slope of ln flow over ln speed; 1 if the points do not determine one.
 fn exponent(places: &[Place]) -> f64 {
     let n = places.len() as f64;
     let (mut x, mut y) = (0.0, 0.0);
@@ -141,9 +140,8 @@ mod tests {
     use super::*;
     use nalgebra::{SMatrix, SVector};
 
-    /// Published maps fall by 2 to 10 points towards a third of full speed, about as one over the speed squared. Pinned as loosely as
-    /// short steps pin it (half a point a step), the surface stays within 0.12 points of a fall by 6; a cubic alone is off by 0.18 at
-    /// the second line.
+    /// Published maps fall by 2 to 10 points towards a third of full speed, about as one over the speed squared. With half a point per step,
+    /// as in short steps, the surface follows a fall of 6 to within 0.12 points; a cubic alone is off by 0.18 at the second line.
     #[test]
     fn a_loss_at_low_speed_is_followed() {
         const OWN: f64 = 5e-3;

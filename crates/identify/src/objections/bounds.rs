@@ -1,23 +1,23 @@
-//! T2 against what any compressor can do.
+//! Checks T2 against the physical limits of any compressor.
 //!
-//! The gas leaves between what isentropic compression makes of it and some three times that: turbocharger compressors have 0.3
-//! to 0.85. A housing that is far from the gas moves this apparent efficiency, but at 20 K of rise and more never beyond 0.2
-//! to 1.3 (docs/physics.md: the housing exchanges at most half of the capacity flow times its distance). Hot turbine
-//! inlet gas that is read as T2 is beyond that; a turbine may be driven by cold gas.
+//! T2 lies between isentropic compression and about three times that rise: turbocharger compressors have 0.3 to 0.85. A housing far from the
+//! gas temperature changes this apparent efficiency, but for a rise of 20 K or more it stays within 0.2 to 1.3 (docs/physics.md: the housing
+//! exchanges at most half of the capacity flow times its distance). Hot turbine inlet gas read as T2 is beyond that; a turbine may be driven
+//! by cold gas.
 
 use crate::findings::code;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
 use mapper_numerics::statistics::median;
 
-/// Isentropic rise from which heat no longer hides the work, K.
+/// Isentropic rise above which heat no longer hides the work, K.
 const MIN_RISE_K: f64 = 20.0;
-/// Apparent efficiency of the middle point, and of any point.
+/// Apparent efficiency of the median point, and of any point.
 const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 const ANY: std::ops::RangeInclusive<f64> = 0.2..=1.6;
-/// Points of which a share can be told.
+/// Minimum number of points for a share.
 const MIN: usize = 3;
-/// Share of points with P2 below P1 at which it is no longer the point's own affair.
+/// Share of points with P2 below P1 above which the whole recording is concerned.
 const BELOW_SHARE: f64 = 1.0 / 3.0;
 
 pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
@@ -39,8 +39,8 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
         return found;
     }
     let apparent = |end: &Ends| end.isentropic_rise_k() / (end.t2_k - end.t1_k);
-    // A turbine may be driven by cold gas, or by gas as warm as the compressor's outlet. Hot gas that is read as T2 is warmer
-    // than any compressor makes it.
+    // A turbine may be driven by cold gas, or by gas as warm as the compressor's outlet. Hot gas that is read as T2 is warmer than any
+    // compressor makes it.
     let exchanged =
         |end: &&&Ends| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k) && apparent(end) < *MIDDLE.start();
     if 2 * known.iter().filter(exchanged).count() > known.len() {
@@ -49,7 +49,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
         found.push(Objection::new(code::SWAPPED_CHANNELS, message.to_owned(), all()));
     }
     let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > MIN_RISE_K).collect();
-    // T2 that does not rise at all has no efficiency, and more than any.
+    // Without a rise of T2 the efficiency is undefined; treat it as too high.
     let value = |end: &Ends| if end.t2_k > end.t1_k { apparent(end) } else { f64::INFINITY };
     let Some(middle) = median(judged.iter().map(|end| value(end))) else { return found };
     let impossible: Vec<usize> =
@@ -100,7 +100,7 @@ mod tests {
         (0..5).map(|position| Some(Ends { position, t2_k, ..end })).collect()
     }
 
-    /// Stands drive turbines with cold gas, and adiabatic mapping with gas as warm as the compressor's outlet.
+    /// Rigs drive turbines with cold gas; adiabatic mapping uses gas as warm as the compressor's outlet.
     #[test]
     fn gas_colder_than_the_outlet_is_no_mistake_and_hot_gas_read_as_t2_is_one() {
         for t3_k in [300.0, 385.0, 773.15] {

@@ -1,8 +1,8 @@
-//! Channels that are late: at a jump of the operating point all of the compressor's readings move at once.
+//! Detects late channels: at a jump of the operating point all compressor readings change at once.
 //!
-//! Speed, flow, P2 and T2 show the jump as a change of level, the housing as a change of slope, since its temperature cannot
-//! jump. Over all jumps of a recording the moment of the largest change is known to a second or two, whatever the jumps are. Two
-//! loggers with clocks of their own, a filter, and a reader of field buses that waits make a channel late.
+//! Speed, flow, P2 and T2 show the jump as a change of level. The housing shows a change of slope, since its temperature cannot jump. Over all
+//! jumps of a recording the moment of the largest change is known to a second or two. Two loggers with separate clocks, a filter, or a slow
+//! fieldbus client make a channel late.
 
 use crate::commands::begins_with_jump;
 use crate::findings::code;
@@ -10,18 +10,18 @@ use crate::objections::objection::Objection;
 use mapper_core::{Channel, Recording, Series};
 use mapper_numerics::statistics::{mean, median};
 
-/// What is compared: means of so many seconds before and after a moment.
+/// Averaging time before and after a moment.
 const LEVEL_S: f64 = 2.0;
 const SLOPE_S: f64 = 4.0;
-/// Moments looked at, after the jump and before, s.
+/// Range of moments around the jump, s.
 const BEFORE_S: f64 = 10.0;
 const AFTER_S: f64 = 45.0;
 const EVERY_S: f64 = 0.5;
-/// What a change looks at behind its moment, and a second for the jump to begin early, s.
+/// Time span needed after a moment, including a second for a jump that begins early, s.
 const AHEAD_S: f64 = SLOPE_S + 1.0;
-/// Lag behind the others from which on a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
+/// Lag behind the others above which a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
-/// Jumps from which on they can be averaged, and the most that are.
+/// Minimum number of jumps for an average, and the maximum used.
 const MIN: usize = 4;
 const MAX: usize = 60;
 
@@ -38,7 +38,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))
-        // The change at the last moment looks ahead, and must not see the next jump.
+        // The window after the last moment must not include the next jump.
         .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + AHEAD_S)
         .map(|position| steps[position].start_s)
         .take(MAX)
@@ -53,7 +53,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
             Some((channel, lag_s(recording.series.get(&channel)?, &jumps_s, slope)?))
         })
         .collect();
-    // Three clocks agree on the time.
+    // At least three channels are needed for a reference time.
     let Some(middle_s) = median(lags_s.iter().map(|(_, lag_s)| *lag_s)).filter(|_| lags_s.len() >= 3) else {
         return found;
     };
@@ -74,7 +74,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     found
 }
 
-/// A housing of a kilogram cannot jump with the gas: where Tc does so more than T2, the two are exchanged.
+/// A housing of a kilogram cannot jump with the gas: if Tc jumps more than T2, the two are swapped.
 fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
     let jump_k = |channel: Channel| {
         let series = recording.series.get(&channel)?;
@@ -90,7 +90,7 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
     })
 }
 
-/// When after the jumps a channel changes most, s; `None` where it does not change.
+/// Time after the jumps at which a channel changes most, s; `None` if it does not change.
 fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
     let moments = ((BEFORE_S + AFTER_S) / EVERY_S) as usize;
     let mut squares = vec![0.0; moments + 1];
@@ -102,11 +102,11 @@ fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
             })
             .collect();
         let whole = mean(&changes).filter(|mean| *mean > 0.0)?;
-        // Each jump counts alike.
+        // Give each jump equal weight.
         squares.iter_mut().zip(changes).for_each(|(sum, square)| *sum += square / whole);
     }
     let (at, largest) = squares.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    // What noise makes has no peak.
+    // Pure noise has no peak.
     let clear = *largest > 4.0 * mean(&squares)?;
     clear.then_some(at as f64 * EVERY_S - BEFORE_S)
 }

@@ -1,4 +1,4 @@
-//! The readings at the end of each step, where everything but the housing has settled.
+//! The readings at the end of each step, when everything but the housing has settled.
 
 use crate::{IdentifyConfig, taps};
 use mapper_core::{Channel, Recording};
@@ -22,13 +22,13 @@ pub(crate) struct Ends {
     pub(crate) p2_pa: f64,
     pub(crate) t1_k: f64,
     pub(crate) t2_k: f64,
-    /// Housing; `None` where it was not recorded.
+    /// Housing; `None` if it was not recorded.
     pub(crate) tc_k: Option<f64>,
-    /// Turbine side; `None` where it was not recorded.
+    /// Turbine side; `None` if it was not recorded.
     pub(crate) turbine_flow_kg_s: Option<f64>,
     pub(crate) t3_k: Option<f64>,
     pub(crate) t4_k: Option<f64>,
-    /// The air that is compressed.
+    /// The compressed air.
     pub(crate) air: Air,
 }
 
@@ -39,7 +39,7 @@ impl Ends {
     }
 }
 
-/// One for each step; `None` where one of its compressor readings is missing.
+/// One for each step; `None` if one of its compressor readings is missing.
 pub(crate) fn ends(recording: &Recording, config: &IdentifyConfig) -> Vec<Option<Ends>> {
     recording
         .steps

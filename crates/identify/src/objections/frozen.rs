@@ -1,8 +1,7 @@
-//! Frozen and saturated channels: a reading with noise does not repeat to the last digit.
+//! Detects frozen and saturated channels: a reading with noise does not repeat to the last digit.
 //!
-//! A sensor that hangs, a logger that lost its module and an amplifier at its limit all show one and the same value over and
-//! over. A coarse logger repeats values too, but then it does so all the time; of such a channel only what stands still over a
-//! jump that moves it is called frozen.
+//! A stuck sensor, a logger with a failed module and a saturated amplifier all repeat one value. A coarse logger also repeats values, but all
+//! the time. Such a channel counts as frozen only if it stays constant over a jump that should move it.
 
 use crate::IdentifyConfig;
 use crate::findings::code;
@@ -11,18 +10,18 @@ use crate::objections::objection::Objection;
 use crate::objections::plausible::read_by;
 use mapper_core::{Channel, Recording, Series, with_unit};
 
-/// Time for which a noisy channel may show one and the same value, s, and samples that it must show it at least.
+/// Time for which a noisy channel may repeat one value, s, and the minimum number of samples.
 const SHORTEST_S: f64 = 5.0;
 const MIN: usize = 8;
 /// Share of equal neighbours outside the long runs above which a logger counts as coarse.
 const COARSE_SHARE: f64 = 0.3;
-/// After a jump by so much every channel but those of the inlet has moved, s.
+/// Time after a jump within which every channel but those of the inlet has moved, s.
 const AFTER_JUMP_S: f64 = 15.0;
 
-/// Difference of two steps' ends that is a jump, ratio.
+/// Minimum difference of two steps' ends that counts as a jump, ratio.
 const MOVED_RATIO: f64 = 0.02;
 
-/// A stretch of one and the same value.
+/// A run of one repeated value.
 struct Run {
     first: usize,
     last: usize,
@@ -37,7 +36,7 @@ pub(crate) fn objections(
     read_by(config).filter_map(|channel| of_channel(recording, channel, moves, config)).collect()
 }
 
-/// Whether anything that moves with the operating point is another at some step.
+/// Whether the operating point changes between any steps.
 fn moves(ends: &[Option<Ends>]) -> bool {
     let read: [fn(&Ends) -> f64; 3] = [|end| end.speed_rpm, |end| end.flow_kg_s, |end| end.p2_pa];
     read.into_iter().any(|read| {
@@ -62,7 +61,7 @@ fn of_channel(
     let equal = series.values.windows(2).filter(|pair| pair[0] == pair[1]).count();
     let coarse = (equal - in_runs) as f64 > COARSE_SHARE * (pairs - in_runs).max(1) as f64;
     let noisy = config.declared.get(&channel).is_some_and(|declared| declared.noise_sigma > 0.0);
-    // Inlet conditions may be as still as they are commanded.
+    // Controlled inlet conditions may be constant.
     let inlet = matches!(channel, Channel::P1 | Channel::T1);
     let over_a_jump = |run: &Run| {
         let (from_s, to_s) = (series.t_s[run.first], series.t_s[run.last]);
@@ -88,13 +87,13 @@ fn of_channel(
          which it stands still can be used, so mend the channel and repeat them",
         with_unit(format!("{:.6}", series.values[longest.first]), channel.unit())
     );
-    // Of a channel with declared noise the samples that stand still are left out; of the speed nothing else is asked.
+    // Cleaning removes the constant samples of a channel with declared noise; speed needs no other check.
     let samples_left_out = noisy && channel != Channel::ShaftSpeed;
     let objection = Objection { samples_left_out, ..Objection::new(code::FROZEN_CHANNEL, message, steps) };
     (!objection.steps.is_empty()).then_some(objection)
 }
 
-/// The long stretches of one and the same value.
+/// The long runs of one repeated value.
 fn runs(series: &Series) -> Vec<Run> {
     let mut runs = Vec::new();
     let mut first = 0;

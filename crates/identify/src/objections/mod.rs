@@ -1,8 +1,8 @@
-//! What speaks against the readings themselves, whoever recorded them: channels that are frozen, dead, scaled, creeping, late
-//! or exchanged, and steps that cannot be what they say.
+//! Checks of the readings themselves, for any data source: channels that are frozen, dead, wrongly scaled, drifting, late or swapped, and
+//! impossible steps.
 //!
-//! One file for each check, with its reason. A check looks at the recording as a whole, names the channel as far as physics
-//! tells, and says it once: every point that rests on the channel carries the same sentence and is not good.
+//! One file for each check, with its reason. A check examines the whole recording and names the channel as far as physics allows. All points
+//! that depend on the channel get the same sentence and are not good.
 
 mod bounds;
 mod clock;
@@ -20,7 +20,7 @@ use crate::objections::ends::{Ends, ends};
 use crate::objections::objection::Objection;
 use mapper_core::Recording;
 
-/// All objections, and the ends of the steps to which there is none.
+/// All failed checks, and the ends of the unaffected steps.
 pub(crate) fn objections(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -31,7 +31,7 @@ pub(crate) fn objections(
     found.extend(frozen::objections(recording, &ends, config));
     found.extend(noise::objections(recording, config));
     found.extend(clock::objections(recording));
-    // A channel that is named is not named again by what it contradicts.
+    // A channel already named is not reported again because of a contradiction that it causes.
     leave_out(&mut ends, &found);
     found.extend(specific_speed::objections(&ends));
     found.extend(bounds::objections(&ends));
@@ -40,7 +40,7 @@ pub(crate) fn objections(
     (found, ends)
 }
 
-/// Takes away the ends of steps to which there are objections.
+/// Removes the ends of steps that failed a check.
 fn leave_out(ends: &mut [Option<Ends>], found: &[Objection]) {
     for position in found.iter().flat_map(|objection| &objection.steps) {
         if let Some(end) = ends.get_mut(*position) {

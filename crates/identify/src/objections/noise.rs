@@ -1,7 +1,7 @@
-//! Noise far beyond its declaration: a broken shield, a loose contact, a flow that pulsates.
+//! Detects noise far above its declaration: a broken shield, a loose contact, a pulsating flow.
 //!
-//! Successive samples of a slow quantity differ by noise alone. What is declared decides how every reading is weighed and how wide
-//! intervals are, so that a channel with several times as much makes them too narrow.
+//! Successive samples of a slow quantity differ only by noise. The declared noise sets the weight of each reading and the width of intervals.
+//! A channel with several times that noise makes the intervals too narrow.
 
 use crate::IdentifyConfig;
 use crate::findings::code;
@@ -10,10 +10,9 @@ use crate::objections::plausible::read_by;
 use mapper_core::{Recording, with_unit};
 use mapper_numerics::statistics::robust_sigma;
 
-/// Standard deviation of a sample over the declared one. Noise with a time constant differs less from sample to sample, never
-/// more.
+/// Ratio of a sample's standard deviation to the declared one. Noise with a time constant only reduces the difference between samples.
 const MAX_RATIO: f64 = 3.0;
-/// Samples that are further apart than this differ by more than noise, s.
+/// Sample spacing above which differences are more than noise, s.
 const NEIGHBOUR_S: f64 = 1.5;
 
 pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {

@@ -1,6 +1,6 @@
-//! One thing that speaks against readings.
+//! A failed check of the readings.
 
-/// Something that speaks against readings, and the steps that rest on them.
+/// A failed check of the readings, and the steps that depend on them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Objection {
     /// Stable code of the warning.
@@ -9,7 +9,7 @@ pub(crate) struct Objection {
     pub(crate) message: String,
     /// Positions of the steps.
     pub(crate) steps: Vec<usize>,
-    /// Whether identification leaves out the samples that it is about, so that the rest of a step may speak.
+    /// Whether identification omits the samples concerned, so that the rest of the step can be used.
     pub(crate) samples_left_out: bool,
 }
 

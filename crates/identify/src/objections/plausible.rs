@@ -1,4 +1,4 @@
-//! Dead channels and wrong units: the middle reading of a step is not one of a running machine.
+//! Detects dead channels and wrong units: the median reading of a step is impossible for a running machine.
 //!
 //! The ranges are those of [`mapper_observe::plausible`], wide enough for every turbocharger on a gas stand.
 
@@ -9,7 +9,7 @@ use mapper_core::{Channel, Method, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 
-/// What every method reads.
+/// Channels that every method reads.
 pub(crate) const READ: [Channel; 6] =
     [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::T1, Channel::P2, Channel::T2];
 

@@ -1,8 +1,8 @@
-//! The compressor's power beside the turbine's: no shaft gives more than it gets.
+//! Compares compressor and turbine power: a shaft cannot deliver more than it receives.
 //!
-//! `m_c cp (T2 - T1)` against `m_t cp (T3 - T4)`, the whole enthalpy that the exhaust gas loses, heat included. Bearings and
-//! housings take 10 to 40 % of it. A point by itself may have more for a while, where a hot compressor housing heats the air or
-//! the shaft slows down; the middle of a campaign may not.
+//! `m_c cp (T2 - T1)` against `m_t cp (T3 - T4)`, the whole enthalpy that the exhaust gas loses, heat included. Bearings and housings take 10
+//! to 40 % of it. A single point may exceed it for a while, if a hot compressor housing heats the air or the shaft slows down. The median of a
+//! campaign may not.
 
 use crate::findings::code;
 use crate::objections::ends::Ends;
@@ -12,8 +12,8 @@ use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 use mapper_physics::air;
 
-/// Compressor over turbine power of the middle point: above, and below. A turbine housing that loses as much as it passes
-/// on is far below every gas stand.
+/// Limits for the ratio of compressor to turbine power of the median point: upper, and lower. A turbine housing that loses as much as it
+/// delivers is far below every gas stand.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.15;
 
 pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {

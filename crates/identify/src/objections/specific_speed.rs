@@ -1,14 +1,14 @@
-//! Speed, flow and head beside each other: the specific speed `omega sqrt(Q)/dh^0.75` knows no diameter, and radial compressors
-//! have 0.3 to 2 of it from surge to near choke, whatever their size (Cordier's diagram, e.g. Balje, Turbomachines, 1981).
+//! Compares speed, flow and head: the specific speed `omega sqrt(Q)/dh^0.75` is independent of the diameter. Radial compressors have 0.3 to 2
+//! from surge to near choke, whatever their size (Cordier's diagram, e.g. Balje, Turbomachines, 1981).
 //!
-//! A unit taken for another moves it by far more than machines differ: 1/s for rpm by 60, kg/h for kg/s by 60.
+//! A wrong unit changes it far more than machines differ: 1/s for rpm by 60, kg/h for kg/s by 60.
 
 use crate::findings::code;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
 use mapper_numerics::statistics::median;
 
-/// Middle of a campaign's points; a wide margin about what machines have.
+/// Limits for the median of a campaign's points, with a wide margin about real machines.
 const POSSIBLE: std::ops::RangeInclusive<f64> = 0.15..=4.0;
 
 pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {

@@ -1,4 +1,4 @@
-//! Steps that cannot be what they say: a rig is at one operating point at a time, and a number names one step.
+//! Detects impossible steps: a rig is at one operating point at a time, and a number identifies one step.
 
 use crate::findings::code;
 use crate::objections::objection::Objection;
@@ -6,16 +6,16 @@ use mapper_core::{Recording, step_number};
 
 /// Overlap that rounded times of other loggers explain, s.
 const ROUNDED_S: f64 = 0.5;
-/// No plan has as many steps: a year of steps of 20 s has 1.6 million.
+/// Maximum number of steps in a plan: a year of steps of 20 s has 1.6 million.
 const MAX_STEPS: usize = 10_000_000;
 
-/// Steps that overlap in time, share a number, or have one that no plan has.
+/// Steps that overlap in time, share a number, or exceed the maximum number.
 pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let mut found = Vec::new();
     let mut by_time: Vec<usize> = (0..steps.len()).filter(|i| steps[*i].start_s < steps[*i].end_s).collect();
     by_time.sort_by(|a, b| steps[*a].start_s.total_cmp(&steps[*b].start_s));
-    // The step that reaches furthest so far: one that begins before its end lies over it.
+    // The step with the latest end so far: a step that begins before that end overlaps it.
     let mut furthest: Option<usize> = None;
     for &position in &by_time {
         let step = &steps[position];

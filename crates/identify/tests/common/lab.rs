@@ -1,4 +1,4 @@
-//! Continuous campaigns on the lumped model, with what it knows: noise-free, or as a rig would record them.
+//! Continuous campaigns on the lumped model, with their true values: noise-free, or as a rig would record them.
 #![allow(dead_code, reason = "each user takes its own part")]
 
 use super::common::add_noise;
@@ -14,7 +14,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::BTreeMap;
 
-/// What the model knows of the end of a step.
+/// True values at the end of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Truth {
     pub eta: f64,
@@ -27,14 +27,14 @@ pub struct Campaign {
     pub truth: Vec<Truth>,
 }
 
-/// What differs from the nominal machine.
+/// Differences from the nominal machine.
 #[derive(Debug, Clone, Copy)]
 pub struct Machine {
     pub alpha: f64,
     pub probe_m: f64,
-    /// On h where the metal is hotter than the gas it touches.
+    /// Factor on h if the metal is hotter than the gas.
     pub direction: f64,
-    /// What h before the wheel follows.
+    /// The law of h before the wheel.
     pub inlet: InletConvection,
     /// Water per dry air, kg/kg.
     pub humidity_kg_kg: f64,
@@ -63,8 +63,8 @@ impl Machine {
     }
 }
 
-/// Visits the points in the order given, `dwell_s` each, from the settled first one; 10 Hz, no noise. The turbine inlet
-/// pressure is the one that holds the speed on the nominal machine.
+/// Visits the points in the given order, `dwell_s` each, from the settled first one; 10 Hz, no noise. The turbine inlet pressure is the one
+/// that holds the speed on the nominal machine.
 pub fn campaign(points: &[(f64, f64)], dwell_s: f64, machine: Machine) -> Campaign {
     let (model, nominal) = (machine.model(), Model::nominal());
     let at = |valve: f64| BoundaryConditions { valve_opening_ratio: valve, ..BoundaryConditions::default() };
@@ -135,7 +135,7 @@ pub fn campaign(points: &[(f64, f64)], dwell_s: f64, machine: Machine) -> Campai
     Campaign { recording, truth }
 }
 
-/// T2 with a factor on h where the metal is the hotter: the gas path of the model, evaluated once more.
+/// T2 with a factor on h if the metal is hotter: the gas path of the model, evaluated once more.
 fn directional(
     machine: Machine,
     boundary: &BoundaryConditions,
@@ -156,7 +156,7 @@ fn directional(
             isentropic_rise_ratio: rise,
             efficiency: outputs.efficiency,
             h_w_m2k: outputs.h_w_m2k,
-            // Machines of the tests have a direction or an inlet of their own, not both.
+            // Test machines have either a heating/cooling ratio or their own inlet law.
             inlet_h_ratio: 1.0,
             alpha_area_ratio: before_m2 / (before_m2 + after_m2),
             internal_area_m2: before_m2 + after_m2,
@@ -168,7 +168,7 @@ fn directional(
     pass(after_m2 * factor(tc_k > t2_prime_k)).t2_k
 }
 
-/// The grid of the recordings of a rig: three openings, at each six speeds in zigzag.
+/// The grid of a rig's recordings: three openings, at each six speeds in zigzag.
 pub fn eighteen() -> Vec<(f64, f64)> {
     let speeds = [90e3, 150e3, 50e3, 130e3, 70e3, 110e3];
     [0.5, 0.7, 1.0].into_iter().flat_map(|valve| speeds.map(|speed| (valve, speed))).collect()

@@ -7,7 +7,7 @@ use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_r
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// A transient with everything constant but the housing temperature, which goes from one value to another.
+/// A transient with a changing housing temperature and everything else constant.
 #[derive(Debug, Clone, Copy)]
 pub struct Transient {
     pub t1_k: f64,

@@ -1,8 +1,8 @@
-//! How a recording is doctored: each function is one way in which a channel, a clock or a list of steps goes wrong.
+//! Ways to doctor a recording: each function is one fault of a channel, a clock or a list of steps.
 
 use mapper_core::{Channel, Recording, Series};
 
-/// Start and end of what was recorded, s.
+/// Start and end of the recording, s.
 fn span_s(recording: &Recording) -> (f64, f64) {
     let steps = &recording.steps;
     (steps[0].start_s, steps[steps.len() - 1].end_s)
@@ -12,7 +12,7 @@ fn series(recording: &mut Recording, channel: Channel) -> &mut Series {
     recording.series.get_mut(&channel).unwrap()
 }
 
-/// Each value by what `becomes` makes of its share of the run (0 at the start, 1 at the end) and of itself.
+/// Replaces each value: `becomes` gets its share of the run (0 at the start, 1 at the end) and the value.
 pub fn each(recording: &mut Recording, channel: Channel, becomes: impl Fn(f64, f64) -> f64) {
     let (start_s, end_s) = span_s(recording);
     let Series { t_s, values } = series(recording, channel);
@@ -59,7 +59,7 @@ pub fn frozen_step(recording: &mut Recording, channel: Channel, position: usize)
     }
 }
 
-/// No reading above the given share of the span of its values.
+/// Limits readings to the given share of the span of its values.
 pub fn clipped(recording: &mut Recording, channel: Channel, share: f64) {
     let values = &series(recording, channel).values;
     let (low, high) =
@@ -74,7 +74,7 @@ pub fn swapped(recording: &mut Recording, one: Channel, other: Channel) {
     *series(recording, one) = second;
 }
 
-/// The channel is told `by_s` late.
+/// Delays the channel by `by_s`.
 pub fn late(recording: &mut Recording, channel: Channel, by_s: f64) {
     let before = series(recording, channel).clone();
     let after = series(recording, channel);
@@ -83,7 +83,7 @@ pub fn late(recording: &mut Recording, channel: Channel, by_s: f64) {
     }
 }
 
-/// Every hundredth sample is off by `by`, at irregular places and in both directions.
+/// Every hundredth sample has an error of `by`, at irregular places and in both directions.
 pub fn spikes(recording: &mut Recording, channel: Channel, by: f64) {
     for (i, value) in series(recording, channel).values.iter_mut().enumerate() {
         // Knuth's multiplicative hash: irregular, and the same each time.
@@ -94,7 +94,7 @@ pub fn spikes(recording: &mut Recording, channel: Channel, by: f64) {
     }
 }
 
-/// White noise of this standard deviation on top (Box and Muller on a multiplicative hash: the same each time).
+/// Adds white noise of this standard deviation (Box and Muller on a multiplicative hash: the same each time).
 pub fn noise(recording: &mut Recording, channel: Channel, sigma: f64) {
     let uniform = |i: u64| {
         let mixed = (i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -107,7 +107,7 @@ pub fn noise(recording: &mut Recording, channel: Channel, sigma: f64) {
     }
 }
 
-/// One sample of `keep` is left, in all channels.
+/// Keeps one sample of `keep`, in all channels.
 pub fn thinned(recording: &mut Recording, keep: usize) {
     for series in recording.series.values_mut() {
         series.t_s = series.t_s.iter().step_by(keep).copied().collect();
@@ -115,7 +115,7 @@ pub fn thinned(recording: &mut Recording, keep: usize) {
     }
 }
 
-/// The values run backwards in time.
+/// Reverses the values in time.
 pub fn backwards(recording: &mut Recording, channel: Option<Channel>) {
     for (name, series) in &mut recording.series {
         if channel.is_none_or(|channel| channel == *name) {

@@ -6,7 +6,7 @@ use mapper_core::Channel::{
 };
 use mapper_core::Recording;
 
-/// A name and what is done.
+/// A name and the change.
 pub type Doctored = (&'static str, fn(&mut Recording));
 
 #[rustfmt::skip]
@@ -58,7 +58,7 @@ pub const DOCTORED: &[Doctored] = &[
     ("Tc times 1.1",  |r| gain(r, Tc, 1.1)),
     ("rise of T2 times 1.1", |r| each(r, T2, |_, k| 298.15 + 1.1 * (k - 298.15))),
     ("rise of T2 times 0.9", |r| each(r, T2, |_, k| 298.15 + 0.9 * (k - 298.15))),
-    // Offsets of ten times the declared one.
+    // Offsets of ten times the declared value.
     ("P1 plus 500 Pa",   |r| offset(r, P1, 500.0)),
     ("P2 plus 1000 Pa",  |r| offset(r, P2, 1000.0)),
     ("P2 minus 1000 Pa", |r| offset(r, P2, -1000.0)),
@@ -68,7 +68,7 @@ pub const DOCTORED: &[Doctored] = &[
     ("T2 minus 2.5 K",   |r| offset(r, T2, -2.5)),
     ("Tc plus 3 K",      |r| offset(r, Tc, 3.0)),
     ("Tc minus 3 K",     |r| offset(r, Tc, -3.0)),
-    // Creeps over the run.
+    // Drifts over the run.
     ("T1 creeps by 5 K",    |r| creep(r, T1, 5.0)),
     ("T1 creeps by 20 K",   |r| creep(r, T1, 20.0)),
     ("T2 creeps by 5 K",    |r| creep(r, T2, 5.0)),
@@ -118,7 +118,7 @@ pub const DOCTORED: &[Doctored] = &[
     ("N in Hz",           |r| gain(r, N, 1.0 / 60.0)),
     ("P2 is gauge",       |r| offset(r, P2, -100e3)),
     ("P1 and P2 are gauge", |r| { offset(r, P1, -100e3); offset(r, P2, -100e3) }),
-    // Late against the others.
+    // Delays relative to the others.
     ("m_c is 5 s late",  |r| late(r, Flow, 5.0)),
     ("m_c is 30 s late", |r| late(r, Flow, 30.0)),
     ("P2 is 5 s late",   |r| late(r, P2, 5.0)),

@@ -1,4 +1,4 @@
-//! What was tested where, under which conditions, with which instruments.
+//! Test object, place, conditions and instruments.
 
 use crate::prose::prose;
 use crate::run_page::RunPage;

@@ -1,4 +1,4 @@
-//! The diagnosis of the gap to the nominal model, where one was made.
+//! The diagnosis of the gap to the nominal model, if there is one.
 
 use crate::run_page::RunPage;
 use maud::{Markup, html};

@@ -1,4 +1,4 @@
-//! Verdict and what to do first.
+//! Verdict and the most important actions.
 
 use crate::advice::{first_things, is_clean};
 use crate::prose::sentence;

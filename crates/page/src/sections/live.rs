@@ -1,8 +1,8 @@
-//! The parts of the live page; its script fills them.
+//! The parts of the live page, filled by its script.
 
 use maud::{Markup, html};
 
-/// Buttons: request, words, what the operator is asked before it is sent.
+/// Buttons: request, label, confirmation question.
 const BUTTONS: [(&str, &str, &str); 4] = [
     ("hold", "Hold", "Stay at this step until somebody lets it go on?"),
     ("go-on", "Go on", "Let the held step end as planned?"),

@@ -4,7 +4,7 @@ use crate::run_page::RunPage;
 use mapper_core::Verdict;
 use maud::{Markup, html};
 
-/// Layers that can be switched: name in the script, name for people, whether it is on at first.
+/// Layers that can be switched: name in the script, label, whether it is on at first.
 const LAYERS: [(&str, &str, bool); 6] = [
     ("lines", "speed lines", true),
     ("contours", "efficiency contours", true),
@@ -40,7 +40,7 @@ pub(crate) fn map(page: &RunPage<'_>) -> Markup {
     }
 }
 
-/// What the signs of the drawings mean; only those that are there.
+/// Legend of the symbols that are present.
 fn legend(page: &RunPage<'_>) -> Markup {
     let map = page.report.map;
     let has = |verdict| page.report.points.iter().any(|scored| scored.point.verdict == verdict);

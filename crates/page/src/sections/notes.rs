@@ -1,4 +1,4 @@
-//! Zero, drift, surge, sensors, events, doubts: what happened beside the map.
+//! Everything except the map: zero, drift, surge, sensors, events, doubts.
 
 use crate::prose::{prose, sentence};
 use crate::run_page::RunPage;

@@ -1,4 +1,4 @@
-//! The plan as it was flown, beside what was expected.
+//! The executed plan compared with the expected results.
 
 use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table};

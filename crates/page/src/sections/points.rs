@@ -1,4 +1,4 @@
-//! The points by speed line, as test reports list them.
+//! The points by speed line, as in test reports.
 
 use crate::run_page::RunPage;
 use crate::table::{Cell, Row, data_table};

@@ -1,4 +1,4 @@
-//! What the numbers were made from, and by what.
+//! Inputs and programs behind the numbers.
 
 use crate::run_page::RunPage;
 use crate::table::facts;

@@ -1,5 +1,5 @@
-//! The rig of these tests, and what it does wrong where it is a driver: each row is known to the test and to
-//! `examples/mapper-backend-faulty.rs` by its place.
+//! The rig of these tests and its faults as a driver. The test and `examples/mapper-backend-faulty.rs` both refer to a row
+//! by its index.
 
 use mapper_backends::virtual_lab::{LabSettings, SensorErrors, VirtualLab};
 use mapper_conformance::Fault;
@@ -7,7 +7,7 @@ use mapper_core::Channel::{self, P2, P3, ShaftSpeed, T2};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 
-/// A fault in the middle of the second step, s.
+/// Start of a fault in the middle of the second step, s.
 pub(crate) const FAULT_S: f64 = 70.0;
 
 pub(crate) fn lab() -> VirtualLab {
@@ -25,19 +25,19 @@ pub(crate) fn lab() -> VirtualLab {
     })
 }
 
-/// How a run ends.
+/// Expected end of a run.
 pub(crate) enum Ends {
-    /// By a guard, with these words, at this time at the latest, s.
+    /// A guard trips with this text, at this time at the latest, s.
     Trips(&'static str, f64),
-    /// By an error with these words; the rig has said that it is safe.
+    /// An error with this text; the rig has confirmed its safe state.
     Fails(&'static str),
-    /// The same, but what was lost has to be looked at by somebody.
+    /// The same, but a person has to inspect what was lost.
     Lost(&'static str),
-    /// By an error with these words; nobody knows what the rig does.
+    /// An error with this text; the state of the rig is unknown.
     InDoubt(&'static str),
 }
 
-/// When a fault begins, s, what it is, and how the run ends over the protocol.
+/// Start of a fault, s, the fault, and the end of the run over the protocol.
 #[rustfmt::skip]
 pub(crate) const OVER_THE_PROTOCOL: &[(f64, Fault, Ends)] = &[
     (FAULT_S, Fault::Nan(ShaftSpeed), Ends::Trips("(N) has given no good reading", FAULT_S + 4.0)),
@@ -51,17 +51,17 @@ pub(crate) const OVER_THE_PROTOCOL: &[(f64, Fault, Ends)] = &[
     (FAULT_S, Fault::Reads(T2, 600.0), Ends::Trips("(T2) is", FAULT_S + 1.5)),
     (FAULT_S, Fault::Trips { says_so: true }, Ends::Trips("tripped by itself", FAULT_S + 1.5)),
     (FAULT_S, Fault::Trips { says_so: false }, Ends::Trips("no longer drives it", 130.0)),
-    // From before the jump on.
+    // These faults start before the jump.
     (60.0, Fault::Ignores, Ends::Trips("asked for", 130.0)),
     (40.0, Fault::Frozen(T2), Ends::Trips("frozen", 91.5)),
-    // The host sees these before any guard does.
+    // The host detects these before any guard.
     (FAULT_S, Fault::Mute(1.5), Ends::Lost("are missing")),
     (FAULT_S, Fault::Doubled, Ends::Lost("was expected")),
     (FAULT_S, Fault::Reordered, Ends::Lost("a sample at")),
     (FAULT_S, Fault::Backward(100.0), Ends::Lost("a sample at")),
     (FAULT_S, Fault::Torn(T2), Ends::Lost("values for")),
     (60.0, Fault::Refuses, Ends::Fails("outside what the rig can do")),
-    // The driver's, which goes on.
+    // Faults of the driver, which continues to run.
     (FAULT_S, Fault::Panics, Ends::Lost("the driver failed")),
     (FAULT_S, Fault::Lost, Ends::InDoubt("Cut its air by hand")),
 ];

@@ -1,5 +1,5 @@
-//! Every fault that a rig may have, on the virtual lab behind a backend that misbehaves on demand: what the run makes of it, and
-//! that the rig ends safe.
+//! Every fault of a rig, injected into the virtual lab by a misbehaving backend: the reaction of the run, and the safe state at
+//! its end.
 
 mod behind;
 #[cfg(unix)]
@@ -37,13 +37,13 @@ fn guard(name: GuardName, channel: Channel, above: Option<f64>) -> SignalGuard {
         hysteresis: 0.0,
         dwell_s: 0.2,
         age_s: 3.0,
-        // P3 has no noise here, and may stand still.
+        // P3 has no noise here, and may stay constant.
         frozen_s: (channel != Channel::P3).then_some(20.0),
         reaction: Reaction::Safe,
     }
 }
 
-/// What a campaign guards without a word.
+/// The default guards of a campaign.
 fn usual() -> GuardSet {
     GuardSet {
         signals: vec![
@@ -108,8 +108,8 @@ fn without_a_fault_no_guard_has_anything_to_say() {
     assert_eq!(night.rig.safe_at_s, [130.0], "made safe once, at its end");
 }
 
-/// Each trips with its words within its time, the rig is made safe, and the events say so in order. The longest times are a
-/// frozen sensor's, seen 20 s after the jump before it (at 70 s) was not followed, and those of the speed, judged at the end.
+/// Each fault trips with its text within its time, the rig is made safe, and the events follow in order. Two cases take longest:
+/// a frozen sensor (20 s after the jump at 70 s), and the speed, which is judged at the end of the step.
 #[test]
 fn every_fault_of_a_rig_ends_the_run_in_the_safe_state() {
     use Channel::{P2, P3, ShaftSpeed, T2};
@@ -131,13 +131,13 @@ fn every_fault_of_a_rig_ends_the_run_in_the_safe_state() {
         (Fault::Trips { says_so: false }, "no longer drives it", 130.0),
         (Fault::Ignores, "asked for", 130.0),
     ] {
-        // Setpoints are ignored from before the jump on.
+        // Setpoints are ignored from before the jump.
         let begin_s = if fault == Fault::Ignores { 60.0 } else { FAULT_S };
         let night = night(&[(begin_s, fault.clone())], &usual());
         let end = night.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
         let RunEnd::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
         assert!(trip.reason.contains(words), "{fault:?}: {}", trip.reason);
-        // A fault is in the whole batch of its second.
+        // A fault affects the whole batch of its second.
         assert!((begin_s - 1.0..=at_most_s).contains(&trip.t_s), "{fault:?}: at {} s", trip.t_s);
         assert!(!night.rig.safe_at_s.is_empty(), "{fault:?}: the air is still on");
         let kinds = &night.notebook.events;
@@ -146,7 +146,7 @@ fn every_fault_of_a_rig_ends_the_run_in_the_safe_state() {
     }
 }
 
-/// A sensor that froze before the jump at 70 s has to be seen by 20 s after it, with a second of polling.
+/// A sensor that froze before the jump at 70 s is detected 20 s after it, with a polling interval of one second.
 #[test]
 fn a_frozen_sensor_is_seen_after_the_next_jump() {
     for channel in [Channel::P2, Channel::T2, Channel::ShaftSpeed] {
@@ -159,11 +159,11 @@ fn a_frozen_sensor_is_seen_after_the_next_jump() {
 
 #[test]
 fn a_link_that_is_gone_for_a_second_is_lost_samples_and_one_that_waits_is_nothing() {
-    // The samples of that second are gone, which the numbers of those behind them show.
+    // The samples of that second are lost, which the sequence numbers of later ones show.
     let night_without = night(&[(FAULT_S, Fault::Mute(1.5))], &usual());
     let RunEnd::Tripped(trip) = night_without.end.unwrap() else { panic!("not seen") };
     assert!(trip.reason.contains("samples were lost"), "{}", trip.reason);
-    // Held back and handed over whole, nothing is lost.
+    // Samples that are only delayed are not lost.
     let held = night(&[(FAULT_S, Fault::Late(1.5))], &usual());
     assert_eq!(held.end.unwrap(), RunEnd::Completed);
     assert_eq!(held.notebook.samples.len(), 1351);
@@ -198,7 +198,7 @@ fn becoming_safe_is_tried_again_and_then_said_loudly() {
     assert!(error.to_string().contains("(T2) has given no good reading"), "{error}");
 }
 
-/// A wall that passes only while somebody waits, or while a disk is slow.
+/// A clock that advances only during waits and slow disk writes.
 struct Idle(std::cell::Cell<f64>);
 
 impl mapper_core::Wall for &Idle {
@@ -210,7 +210,7 @@ impl mapper_core::Wall for &Idle {
     }
 }
 
-/// Takes so long over everything that is written, s on the wall.
+/// Takes this time for every write, s on the wall clock.
 struct SlowDisk<'a> {
     wall: &'a Idle,
     takes_s: f64,
@@ -225,7 +225,7 @@ impl mapper_runner::RunObserver for SlowDisk<'_> {
     }
 }
 
-/// Faults of a night by the clock: a rig that is asked for each sample, and everything written slowly.
+/// Faults with a wall clock: the rig is polled sample by sample, and every write is slow.
 fn night_by_the_clock(
     faults: &[(f64, Fault)],
     takes_s: f64,
@@ -255,16 +255,16 @@ fn night_by_the_clock(
     (end, rig, written, wall.0.get())
 }
 
-/// A disk that takes 0.8 s over each second's samples delays nothing but itself: the run is in time again at each poll, and the first safe
-/// command leaves with the sample that violates, before anything of it is written. One that takes 3 s makes the run late, never
-/// blind: every sample is looked at all the same.
+/// A disk that takes 0.8 s for each second's samples delays only itself: the run catches up at each poll. The first safe command
+/// follows the violating sample directly, before anything is written. A disk that takes 3 s delays the run, but the guards still
+/// see every sample.
 #[test]
 fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
     for (takes_s, late_s) in [(0.8, 1.0), (3.0, 400.0)] {
         let faults = [(FAULT_S, Fault::Reads(Channel::T2, 600.0))];
         let (end, rig, written, wall_s) = night_by_the_clock(&faults, takes_s);
         let RunEnd::Tripped(trip) = end.unwrap() else { panic!("not seen") };
-        // Two tenths of a second of dwell, and the sample after.
+        // The dwell of 0.2 s, and the next sample.
         assert!(trip.t_s - FAULT_S < 0.35, "{takes_s} s: {}", trip.t_s);
         let first = rig.told.iter().find(|(_, told)| told.t3_k < 300.0).unwrap();
         assert!(first.0 - trip.t_s < 0.11, "{takes_s} s: {} after {}", first.0, trip.t_s);
@@ -273,7 +273,7 @@ fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
     }
 }
 
-/// Between two tries of the safe state the link has half a second of the run's clock to come back.
+/// Between two safe-state commands the link has half a second of the run's clock to recover.
 #[test]
 fn the_tries_of_the_safe_state_have_a_pause_between_them() {
     let wall_of = |fails: usize| {
@@ -281,7 +281,7 @@ fn the_tries_of_the_safe_state_have_a_pause_between_them() {
         let (end, rig, _, wall_s) = night_by_the_clock(&faults, 0.0);
         assert_eq!(end.is_ok(), fails < 3);
         assert_eq!(rig.safe_at_s.len(), usize::from(fails < 3));
-        // Up to the safe state: the seconds that are watched afterwards come where it was confirmed.
+        // Until the safe state: a confirmed one is followed by seconds of observation.
         if fails < 3 { wall_s - 5.0 } else { wall_s }
     };
     let at_once_s = wall_of(0);
@@ -290,8 +290,8 @@ fn the_tries_of_the_safe_state_have_a_pause_between_them() {
     }
 }
 
-/// P3 falls by 50 kPa/s from where it was, each tenth of a second, with the valve open and the heater off, and the air is cut at
-/// the lowest P3.
+/// P3 falls by 50 kPa/s, in steps of a tenth of a second, with the valve open and the heater off. The air is cut at the lowest
+/// P3.
 #[test]
 fn the_way_down_is_the_declared_one() {
     let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
@@ -300,7 +300,7 @@ fn the_way_down_is_the_declared_one() {
     let before = night.rig.told.iter().rev().find(|(_, told)| told.t3_k > 300.0).unwrap().1;
     let expected = ((before.p3_pa - 110e3) / 5e3).floor() as usize;
     assert_eq!(way.len(), expected, "from {} Pa", before.p3_pa);
-    // The first command leaves with the poll that has the violation: a simulated rig's, of a second.
+    // The first command follows the poll with the violation; a simulated rig is polled every second.
     assert!(way[0].0 - trip.t_s < 1.01, "{} s after {} s", way[0].0, trip.t_s);
     for (step, (_, told)) in way.iter().enumerate() {
         assert!((told.p3_pa - (before.p3_pa - 5e3 * (step + 1) as f64)).abs() < 1e-6);
@@ -320,7 +320,7 @@ fn two_guards_at_once_and_the_graver_has_the_say() {
     assert_eq!((trip.guard, trip.reaction), (GuardName::Overspeed, Reaction::Latch));
 }
 
-/// What each mild reaction does about a T2 that is too high in the second step: everything the rig measures stays as it is.
+/// Mild reactions to a T2 above its limit in the second step.
 #[test]
 fn mild_reactions_do_what_they_say() {
     let with = |reaction: Reaction, faults: &[(f64, Fault)]| {
@@ -332,7 +332,7 @@ fn mild_reactions_do_what_they_say() {
     let noted = with(Reaction::Note, &high);
     assert_eq!(noted.end.unwrap(), RunEnd::Completed);
     assert!(noted.notebook.events.iter().all(|kind| *kind == EventKind::GuardActed));
-    // Said when it begins, and each ten seconds it goes on.
+    // Reported at its start, and every ten seconds while it continues.
     assert!((5..=7).contains(&noted.notebook.events.len()), "{:?}", noted.notebook.events);
     assert_eq!(noted.notebook.ends.len(), 2);
 
@@ -350,7 +350,7 @@ fn mild_reactions_do_what_they_say() {
         assert!(told[3..].iter().any(|p3_pa| (p3_pa - piece_pa).abs() < 1e-6), "{share}: {told:?}");
     }
 
-    // Held for as long as may be, then it ends.
+    // Held for the maximum time; then the run ends.
     let held = with(Reaction::Hold, &high);
     assert_eq!(held.rig.held_at_s.len(), 1, "the rig is told once, when it begins");
     assert!((FAULT_S + 5.0..FAULT_S + 7.0).contains(&held.rig.held_at_s[0]), "{:?}", held.rig.held_at_s);
@@ -364,7 +364,7 @@ fn what_is_recorded_of_a_fault_is_whole() {
     let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
     let times: Vec<f64> = night.notebook.samples.iter().map(|(t_s, _)| *t_s).collect();
     assert!(times.is_sorted_by(|a, b| a < b));
-    // Ten a second, through the violation and the way down.
+    // Ten samples a second, through the violation and the run-down.
     let gaps = times.windows(2).map(|two| two[1] - two[0]);
     assert!(gaps.into_iter().all(|gap_s| (gap_s - 0.1).abs() < 1e-6));
     let _: &Recorded = &night.notebook.samples;

@@ -1,4 +1,4 @@
-//! The same faults where the rig is a driver, a program of its own that is talked to over pipes.
+//! The same faults with the rig as a driver: a separate program, connected by pipes.
 
 use super::behind::{Ends, OVER_THE_PROTOCOL};
 use super::{night_on, usual};
@@ -8,7 +8,7 @@ use mapper_runner::RunEnd;
 
 #[test]
 fn every_fault_over_the_protocol_ends_the_run_in_the_safe_state_or_says_that_it_does_not() {
-    // target/debug/deps/run-..., with target/debug/examples beside deps.
+    // target/debug/deps/run-..., with target/debug/examples next to deps.
     let own = std::env::current_exe().unwrap();
     let program = own.parent().unwrap().parent().unwrap().join("examples/mapper-backend-faulty");
     assert!(program.is_file(), "{} is built with the tests", program.display());

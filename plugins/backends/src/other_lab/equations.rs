@@ -9,7 +9,7 @@ use mapper_physics::simulate::Watch;
 use mapper_physics::steady;
 use std::sync::Arc;
 
-/// Gives a virtual lab the equations and sensors of this one.
+/// Replaces equations and sensors of a virtual lab by those of this one.
 pub fn turn_into(lab: &mut LabSettings, structure: OtherStructure) {
     let sensors = structure.sensors();
     lab.second_order = sensors
@@ -35,7 +35,7 @@ impl Structure for OtherStructure {
         boundary: &BoundaryConditions,
         watch: Watch,
     ) -> Result<Box<dyn RunningMachine>, StructureError> {
-        // From where the lumped model rests these equations come to their own rest.
+        // Starting at the steady state of the lumped model, these equations settle to their own.
         let rest = steady::settle_under(model, boundary)?;
         let mut motion = Motion::new(model, self.clone(), t_s, rest.state, watch);
         motion.settle(boundary)?;

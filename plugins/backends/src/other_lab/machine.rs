@@ -1,7 +1,7 @@
-//! The rates of this lab's states, and what its sensors would see.
+//! The rates of this lab's states, and the values at its sensors.
 //!
-//! Map, turbine, bearing and the laws of single parts are the model's own, so that every effect has its meaning here; how
-//! the parts hang together is not.
+//! Map, turbine, bearing and the closure terms of single parts are the model's own, so that every effect has the same meaning here.
+//! The coupling of the parts differs.
 
 use super::passage::{
     AREA_SHARES, BACK_NODE, CAPACITY_SHARES, EXTERNAL_SHARES, FLANGE_NODE, NODES, PROBE_NODE, along, h_ratios,
@@ -26,16 +26,16 @@ const OUTER: usize = 8;
 const INNER: usize = 12;
 const EXTRA: usize = 16;
 
-/// Usual sizes of the states.
+/// Typical magnitudes of the states.
 pub(super) const SIZES: [f64; STATES] =
     [1e4, 1e5, 0.1, 1e5, 5e2, 3e2, 3e2, 1.0, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2, 3e2];
 
 /// Specific heat ratio of air in the volumes.
 const GAMMA: f64 = 1.4;
-/// Place on the speed line where the flow separates, and by how much it must go back before it lies on again.
+/// Position on the speed line at which the flow separates, and the return that it needs to reattach.
 const SEPARATES_AT: f64 = 0.90;
 const LIES_ON_BELOW: f64 = 0.12;
-/// Width of that transition in places on the speed line, and its time, s.
+/// Width of that transition as a position on the speed line, and its time, s.
 const TRANSITION: f64 = 0.04;
 const SEPARATION_S: f64 = 0.5;
 
@@ -46,7 +46,7 @@ pub(super) struct Instantly {
     pub(super) rates: [f64; STATES],
 }
 
-/// All states of a machine that the lumped model has at `state`.
+/// All states of a machine that correspond to the lumped model's `state`.
 pub(super) fn start(model: &Model, boundary: &BoundaryConditions, state: &State) -> [f64; STATES] {
     let outputs = model.prepare(boundary).evaluate(state);
     let mut y = [state.tc_k; STATES];
@@ -63,7 +63,7 @@ pub(super) fn start(model: &Model, boundary: &BoundaryConditions, state: &State)
     y
 }
 
-/// What the rig's sensors would call the state: P2 before the valve, Tc at its probe.
+/// The state as the rig's sensors define it: P2 before the valve, Tc at its probe.
 pub(super) fn seen(y: &[f64; STATES]) -> State {
     State {
         shaft_speed_rad_s: y[SHAFT],
@@ -84,7 +84,7 @@ fn mean(values: &[f64; NODES], shares: &[f64; NODES]) -> f64 {
     values.iter().zip(shares).map(|(value, share)| value * share).sum()
 }
 
-/// Everything at one instant. `model` is the rig's, whose scales of flow and efficiency are those without separation.
+/// Evaluates everything at one instant. `model` is the rig's, with flow and efficiency scales without separation.
 pub(super) fn evaluate(
     model: &Model,
     structure: &OtherStructure,
@@ -109,11 +109,11 @@ pub(super) fn evaluate(
         inner_k: mean(&inner_k, &AREA_SHARES),
         ..seen(y)
     };
-    // The model's own way through map, wheel and turbine, at the mean of the walls.
+    // The model's own map, wheel and turbine, at the mean wall temperature.
     let lumped = prepared.evaluate(&wheel);
     let mut outputs = lumped;
 
-    // Along the nodes in place of the one wall.
+    // Along the nodes instead of the single wall.
     let flow_kg_s = lumped.flow_kg_s;
     let moist_cp_ratio = air::moist_heat_capacity_ratio(compressor.humidity_kg_kg);
     let gas_constant_j_kgk = air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg);
@@ -132,9 +132,9 @@ pub(super) fn evaluate(
     let one_wall_w_k = behind_w_k(lumped.wall_k, lumped.t2_prime_k);
     let (one_wall_w, one_wall_k) =
         compression::after_wheel(one_wall_w_k, lumped.t2_prime_k, lumped.wall_k, flow_kg_s, cp2_j_kgk);
-    // What hooks make of the gas at the outlet stays.
+    // Keeps the change that hooks make to the outlet gas.
     let gas_k = gas_k + (lumped.t2_k - one_wall_k);
-    // Before the wheel the gas meets the shroud; its temperature there is the model's, at the mean of the walls.
+    // Before the wheel the gas meets the shroud; its temperature there is the model's, at the mean wall temperature.
     heats_w[0] += lumped.compressor_heat_w - one_wall_w;
 
     // Two volumes and the duct between them.
@@ -203,7 +203,7 @@ pub(super) fn evaluate(
         let along_w: f64 = [node.checked_sub(1), Some(node + 1).filter(|next| *next < NODES)]
             .into_iter()
             .flatten()
-            .map(|beside| structure.housing_coupling_w_k * (outer_k[beside] - outer_k[node]))
+            .map(|neighbour| structure.housing_coupling_w_k * (outer_k[neighbour] - outer_k[node]))
             .sum();
         let gas_w = heats_w[node] + share * lumped.added.inner_heat_w;
         let from_inside_w = if has_inner {
@@ -235,7 +235,7 @@ pub(super) fn evaluate(
     Instantly { state: seen(y), outputs, rates }
 }
 
-/// Two stable states between the two thresholds: what lies on separates at the upper one, what has separated lies on again
+/// Two stable states between the two thresholds: attached flow separates at the upper one, separated flow reattaches
 /// below the lower one.
 fn separation_rate(structure: &OtherStructure, place: f64, separation: f64) -> f64 {
     if structure.hysteresis_ratio == 0.0 {
@@ -250,7 +250,7 @@ fn separation_rate(structure: &OtherStructure, place: f64, separation: f64) -> f
 mod tests {
     use super::*;
 
-    /// Between the thresholds the flow stays as it was, on whichever side it came from.
+    /// Between the thresholds the flow keeps its state.
     #[test]
     fn what_separated_stays_so_until_it_is_well_back() {
         let structure = OtherStructure::default();

@@ -1,4 +1,4 @@
-//! A gas stand of other equations than the model's, so that a diagnosis is not checked by the model that it assumes: a
+//! A gas stand with different equations than the model, so that a diagnosis is not checked by the model that it assumes: a
 //! housing of four nodes, a volume, a duct and another volume behind the wheel, a map with hysteresis, sensors of second
 //! order. Actuators, weather, offsets, noise, standstill and trips are the virtual lab's.
 
@@ -17,7 +17,7 @@ use mapper_core::{Backend, BackendError};
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::nominal_rig::NominalRig;
 
-/// The lab as campaigns ask for it.
+/// The lab as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin =
     BackendPlugin { name: NAME, summary: "simulated gas stand of other equations, needs nothing", make };
 

@@ -1,4 +1,4 @@
-//! This lab's machine in motion.
+//! Integration of this lab's machine.
 
 use super::machine::{SIZES, STATES, evaluate, seen, start};
 use super::structure::OtherStructure;
@@ -9,16 +9,16 @@ use mapper_physics::params::{BoundaryConditions, Params};
 use mapper_physics::rosenbrock::{Integrator, OdeSystem, Tolerances};
 use mapper_physics::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch};
 
-/// Time in which everything has come to rest: many time constants of the turbine housing, s.
+/// Time to a steady state: many time constants of the turbine housing, s.
 const LONG_S: f64 = 40_000.0;
 
-/// A machine of these equations.
+/// A machine with these equations.
 #[derive(Debug)]
 pub(super) struct Motion {
     model: Model,
     structure: OtherStructure,
     watch: Watch,
-    /// `None` until the boundary conditions are known; then the start is in it.
+    /// `None` until the boundary conditions are known; then it contains the start.
     integrator: Option<Integrator<STATES>>,
     begin: (f64, State),
     /// Whether it was beyond the surge line and above the speed limit at the end of the last step.
@@ -36,7 +36,7 @@ impl Motion {
         Motion { model: model.clone(), structure, watch, integrator: None, begin: (t_s, state), beyond: None }
     }
 
-    /// Lets everything come to rest under `boundary`, in no time of the lab's.
+    /// Settles to the steady state under `boundary`, without advancing the lab's time.
     pub(super) fn settle(&mut self, boundary: &BoundaryConditions) -> Result<(), StructureError> {
         let (t_s, state) = self.begin;
         let mut integrator = Integrator::new(t_s, start(&self.model, boundary, &state), tolerances());
@@ -116,7 +116,7 @@ impl RunningMachine for Motion {
     }
 }
 
-/// Tells what was crossed since the last step, at the step's end: its steps are far shorter than anybody looks.
+/// Reports crossings of limits since the last step, at the step's end: the steps are far shorter than any sample.
 fn report(
     model: &Model,
     structure: &OtherStructure,
@@ -170,7 +170,7 @@ impl<I: Inputs> OdeSystem<STATES> for System<'_, I> {
         if self.constant {
             return None;
         }
-        // One-sided, ahead: behind may lie a kink.
+        // A one-sided forward difference: there may be a kink behind.
         let ahead_s = 1e-6;
         let moved = self.rates(t_s + ahead_s, y);
         Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))

@@ -1,24 +1,24 @@
-//! The gas on its way along the four nodes of the compressor housing.
+//! The gas along the four nodes of the compressor housing.
 
 use super::structure::OtherStructure;
 use mapper_physics::compression::after_wheel;
 
 /// Nodes of the housing: shroud, diffuser, scroll, outlet flange.
 pub(super) const NODES: usize = 4;
-/// Share of the area behind the wheel that each node has; the shroud has that before the wheel.
+/// Share of each node in the area behind the wheel; the shroud also has the area before the wheel.
 pub(super) const AREA_SHARES: [f64; NODES] = [0.1, 0.3, 0.35, 0.25];
 /// Share of the housing's heat capacity.
 pub(super) const CAPACITY_SHARES: [f64; NODES] = [0.2, 0.2, 0.4, 0.2];
 /// Share of the external area.
 pub(super) const EXTERNAL_SHARES: [f64; NODES] = [0.15, 0.15, 0.45, 0.25];
-/// The node that the bearing housing is bolted to, and that the turbine shines on.
+/// The node next to the bearing housing, which the turbine radiates to.
 pub(super) const BACK_NODE: usize = 1;
-/// The node that holds the probe of Tc.
+/// The node with the Tc probe.
 pub(super) const PROBE_NODE: usize = 2;
-/// The node that the stem of the T2 probe is screwed into.
+/// The node with the stem of the T2 probe.
 pub(super) const FLANGE_NODE: usize = 3;
 
-/// h of each node over the mean: falling along the passage, its mean over the area kept.
+/// h of each node over the mean: it falls along the passage and keeps its area mean.
 pub(super) fn h_ratios(structure: &OtherStructure) -> [f64; NODES] {
     let slope = structure.uneven_h_ratio;
     let raw: [f64; NODES] =
@@ -27,9 +27,9 @@ pub(super) fn h_ratios(structure: &OtherStructure) -> [f64; NODES] {
     raw.map(|raw| raw / mean)
 }
 
-/// Gas behind the last node, K, and the heat that each node takes, W. `conductance_w_k` is that of all nodes together at
-/// mean h, asked for with the wall and the gas that meets it;
-/// `mixed` gas is at one temperature in all of the passage.
+/// Gas behind the last node, K, and the heat into each node, W. `conductance_w_k` is that of all nodes together at
+/// mean h, as a function of the wall and its gas;
+/// `mixed` gas has one temperature in the whole passage.
 pub(super) fn along(
     h_ratios: &[f64; NODES],
     mixed: bool,
@@ -42,7 +42,7 @@ pub(super) fn along(
     let node_w_k =
         |node: usize, gas_k: f64| conductance_w_k(walls_k[node], gas_k) * h_ratios[node] * AREA_SHARES[node];
     if mixed {
-        // Each node meets the gas of the outlet: eq. 3 with several walls.
+        // Each node meets the outlet gas: eq. 3 with several walls.
         let nodes_w_k: [f64; NODES] = std::array::from_fn(|node| node_w_k(node, gas_k));
         let stream_w_k = flow_kg_s * cp_j_kgk;
         let from_walls_w: f64 = nodes_w_k.iter().zip(walls_k).map(|(node, wall_k)| node * wall_k).sum();
@@ -73,7 +73,7 @@ mod tests {
         assert!((mean - 1.0).abs() < 1e-12 && ratios[0] > 1.4 && ratios[3] < 0.7, "{ratios:?}");
     }
 
-    /// What the nodes take, the gas has lost.
+    /// The heat into the nodes equals the loss of the gas.
     #[test]
     fn the_gas_loses_what_the_nodes_take() {
         let walls_k = [330.0, 325.0, 320.0, 318.0];

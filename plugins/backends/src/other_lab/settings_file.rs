@@ -9,32 +9,32 @@ use mapper_physics::nominal_rig::NominalRig;
 use mapper_yaml::units::{Conductance, Fraction, Length, Quantity};
 use serde::Deserialize;
 
-/// The keys below `structure`. Everything may be left out.
+/// The keys below `structure`. All are optional.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct StructureFile {
-    /// Conductance between neighbouring nodes of the housing; 5 W/K where left out.
+    /// Conductance between neighbouring nodes of the housing; default 5 W/K.
     housing_coupling: Option<Quantity<Conductance>>,
-    /// By how much h falls along the passage; 50 % where left out.
+    /// Fall of h along the passage; default 50 %.
     uneven_h: Option<Quantity<Fraction>>,
-    /// Whether the gas has one temperature in all of the passage; it has not where left out.
+    /// Whether the gas has one temperature in the whole passage; default false.
     mixed_gas: Option<bool>,
-    /// Length of the duct; 400 mm where left out.
+    /// Length of the duct; default 400 mm.
     duct_length: Option<Quantity<Length>>,
-    /// Loss of the duct over its dynamic pressure; 0.2 where left out.
+    /// Loss of the duct over its dynamic pressure; default 0.2.
     duct_loss: Option<f64>,
-    /// Share of the outlet volume before the duct; 30 % where left out.
+    /// Share of the outlet volume before the duct; default 30 %.
     volume_share: Option<Quantity<Fraction>>,
-    /// Loss of efficiency once the flow has separated; 1 % where left out.
+    /// Loss of efficiency after flow separation; default 1 %.
     hysteresis: Option<Quantity<Fraction>>,
-    /// Factor on the natural frequencies of the sensors; 1 where left out.
+    /// Factor on the natural frequencies of the sensors; default 1.
     sensor_speed: Option<f64>,
 }
 
 /// Reads a campaign's settings for this lab.
 ///
 /// # Errors
-/// [`BackendError::Settings`] with the key that is wrong and what would be right.
+/// [`BackendError::Settings`] with the wrong key and the correct form.
 pub(super) fn read(settings: &serde_json::Value, nominal: &NominalRig) -> Result<LabSettings, BackendError> {
     read_keys(settings, nominal).map_err(|error| match error {
         BackendError::Settings { path, source, .. } => {

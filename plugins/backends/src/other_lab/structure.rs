@@ -1,31 +1,31 @@
-//! What the equations of this lab have that the lumped model has not, in numbers.
+//! Parameters of this lab's equations that the lumped model does not have.
 
 use mapper_core::Channel;
 
-/// Name under which campaigns ask for this backend.
+/// Name of this backend in campaigns.
 pub const NAME: &str = "other_lab";
 
-/// The structure. The defaults were set from the usual build of such machines before anything was diagnosed with them, and
-/// are not fitted to how a diagnosis comes out.
+/// The structure. The defaults were set from the usual design of such machines before any diagnosis, and
+/// are not fitted to the results of a diagnosis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherStructure {
     /// Conductance between neighbouring nodes of the housing, W/K, > 0. Aluminium, 160 W/(m K), a wall of 150 mm by 8 mm,
     /// nodes 40 mm apart: 5 W/K.
     pub housing_coupling_w_k: f64,
-    /// By how much h falls along the passage, ratio: 0 is even; 0.5 is from 1.5 times the mean behind the wheel to 0.5
+    /// Fall of h along the passage, ratio: 0 is even; 0.5 is from 1.5 times the mean behind the wheel to 0.5
     /// times at the outlet flange.
     pub uneven_h_ratio: f64,
-    /// Whether the gas has one temperature in all of the passage, as in the lumped model; it cools along it otherwise.
+    /// Whether the gas has one temperature in the whole passage, as in the lumped model; otherwise it cools along it.
     pub mixed_gas: bool,
     /// Length of the duct between the two volumes, m, > 0: its gas has inertia.
     pub duct_length_m: f64,
     /// Loss of the duct over its dynamic pressure.
     pub duct_loss_ratio: f64,
-    /// Share of the outlet volume that lies between wheel and duct, 0..1 without its ends.
+    /// Share of the outlet volume between wheel and duct, in the open interval 0..1.
     pub volume_share_ratio: f64,
-    /// Loss of efficiency, as a ratio, once the flow has separated; half of it is the loss of flow.
+    /// Loss of efficiency after flow separation, as a ratio; the loss of flow is half of it.
     pub hysteresis_ratio: f64,
-    /// Factor on the natural frequencies of all sensors; infinity for sensors that follow at once.
+    /// Factor on the natural frequencies of all sensors; infinity for sensors without lag.
     pub sensor_speed_ratio: f64,
 }
 
@@ -45,8 +45,8 @@ impl Default for OtherStructure {
 }
 
 impl OtherStructure {
-    /// The limit in which these equations become the lumped model's: nodes tied together, even h, mixed gas, a short duct without loss,
-    /// hardly a volume before it, no hysteresis, fast sensors.
+    /// The limit in which these equations equal the lumped model's: coupled nodes, even h, mixed gas, a short duct without loss,
+    /// almost no volume before it, no hysteresis, fast sensors.
     pub fn lumped_limit() -> Self {
         OtherStructure {
             housing_coupling_w_k: 1e5,
@@ -60,8 +60,8 @@ impl OtherStructure {
         }
     }
 
-    /// Sensors of second order: channel, natural frequency in Hz, damping. Pressure lines ring, meters are filtered, probes
-    /// in a sheath are slow twice.
+    /// Second-order sensors: channel, natural frequency in Hz, damping. Pressure lines oscillate, meters are filtered, probes
+    /// in a sheath have two lags.
     pub(super) fn sensors(&self) -> Vec<(Channel, f64, f64)> {
         let usual = [
             (Channel::P2, 8.0, 0.5),

@@ -3,13 +3,13 @@
 /// How an actuator follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ActuatorDynamics {
-    /// Time constant of the lag, s; 0 follows at once.
+    /// Time constant of the lag, s; 0 without lag.
     pub lag_s: f64,
-    /// Largest rate, unit of the actuator per second; infinity for none.
+    /// Maximum rate, unit of the actuator per second; infinity for none.
     pub slew_per_s: f64,
 }
 
-/// One actuator and where it stands.
+/// One actuator and its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuator {
     dynamics: ActuatorDynamics,
@@ -20,11 +20,11 @@ pub struct Actuator {
     command: f64,
 }
 
-/// The part of the last command's jump at which the actuator counts as arrived.
+/// Remaining share of the last command's jump at which the actuator counts as arrived.
 const ARRIVED_RATIO: f64 = 1e-9;
 
 impl Actuator {
-    /// An actuator that rests at `value`.
+    /// An actuator at rest at `value`.
     pub fn at_rest(dynamics: ActuatorDynamics, value: f64) -> Self {
         Actuator { dynamics, since_s: 0.0, start: value, command: value }
     }
@@ -38,7 +38,7 @@ impl Actuator {
         }
     }
 
-    /// Where the actuator stands at `t_s`, at or after the last command.
+    /// Position of the actuator at `t_s`, at or after the last command.
     pub fn value(&self, t_s: f64) -> f64 {
         let after_s = t_s - self.since_s;
         let jump = self.command - self.start;
@@ -48,13 +48,13 @@ impl Actuator {
         } else if after_s < ramp_s {
             self.start + self.dynamics.slew_per_s * jump.signum() * after_s
         } else {
-            // What is left when the lag's own rate falls below the slew limit.
+            // The distance to the command at which the lag's own rate falls below the slew limit.
             let left = jump.abs().min(self.dynamics.slew_per_s * self.dynamics.lag_s);
             self.command - left * jump.signum() * (-(after_s - ramp_s) / self.dynamics.lag_s).exp()
         }
     }
 
-    /// The next time after `t_s` at which the value's course changes its form; infinity where none does.
+    /// The next time after `t_s` at which the time history changes its form; infinity if there is none.
     pub fn next_kink_s(&self, t_s: f64) -> f64 {
         let (ramp_s, exponential_s) = self.phases_s();
         [self.since_s + ramp_s, self.since_s + ramp_s + exponential_s]
@@ -63,7 +63,7 @@ impl Actuator {
             .unwrap_or(f64::INFINITY)
     }
 
-    /// Whether the value holds still from `t_s` on.
+    /// Whether the value is constant from `t_s` on.
     pub fn has_arrived(&self, t_s: f64) -> bool {
         let (ramp_s, exponential_s) = self.phases_s();
         t_s >= self.since_s + ramp_s + exponential_s
@@ -107,7 +107,7 @@ mod tests {
             assert!(value >= before && value - before <= 2.0 * 0.01 + 1e-12);
             before = value;
         }
-        // Turned round on the way, it starts from where it is.
+        // Reversed on its way, it starts from its current position.
         actuator.set(1.0, 0.0);
         assert!((actuator.value(1.0) - 2.0).abs() < 1e-12);
         assert!(actuator.value(1.1) < 2.0);

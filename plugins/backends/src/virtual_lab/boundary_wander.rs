@@ -1,4 +1,4 @@
-//! What cell and supply do by themselves: temperatures and pressures wander slowly and smoothly.
+//! Uncommanded changes of test cell and supply: temperatures and pressures wander slowly and smoothly.
 
 use mapper_physics::params::BoundaryConditions;
 use rand::{RngExt, SeedableRng};
@@ -18,7 +18,7 @@ impl Wave {
     }
 }
 
-/// Waves of each boundary condition that nobody commands, and of the supplies behind two that somebody does.
+/// Waves of each uncommanded boundary condition, and of the supplies behind two commanded ones.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Weather {
     t1_k: Vec<Wave>,
@@ -38,7 +38,7 @@ impl Weather {
     /// A day of `seed`: inlet and cell within about 1 K over a quarter of an hour and more, oil 2 K, turbine inlet 1 K over
     /// minutes, P1 and P4 some ten to hundred pascal, and an exhaust that resists by up to 8 Pa per kPa of P3.
     pub fn drawn(seed: u64) -> Self {
-        // A stream of its own: other odd multipliers than those of noise and offsets.
+        // A separate random stream: the odd multipliers differ from those of noise and offsets.
         let mut random =
             Pcg64::seed_from_u64(seed.wrapping_mul(0xBF58_476D_1CE4_E5B9) ^ 0x94D0_49BB_1331_11EB);
         let mut waves = |amplitude: f64, [shortest_s, longest_s]: [f64; 2]| {
@@ -64,12 +64,12 @@ impl Weather {
         }
     }
 
-    /// Whether nothing moves.
+    /// Whether all values are constant.
     pub fn is_calm(&self) -> bool {
         *self == Weather::default()
     }
 
-    /// The boundary conditions that this weather makes of `boundary` at `t_s`.
+    /// The boundary conditions at `t_s`: `boundary` with this weather.
     pub fn over(&self, boundary: BoundaryConditions, t_s: f64) -> BoundaryConditions {
         let sum = |waves: &[Wave]| waves.iter().map(|wave| wave.at(t_s)).sum::<f64>();
         BoundaryConditions {

@@ -1,4 +1,4 @@
-//! What is drawn from declared uncertainty: the errors of a sensor, by the seed and its own stream of random numbers.
+//! Draws from declared uncertainty: the errors of a sensor, by the seed and its own stream of random numbers.
 
 use super::sensor::SensorErrors;
 use mapper_core::{Channel, DeclaredUncertainty};
@@ -12,7 +12,7 @@ const WHITE_SHARE: f64 = 0.8;
 const COLOURED_SHARE: f64 = 0.6;
 const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
 
-/// How the errors of sensors are made of what is declared of them.
+/// How sensor errors follow from declared uncertainties.
 pub(super) struct Draws {
     pub(super) seed: u64,
     /// Noise over declared noise.
@@ -22,7 +22,7 @@ pub(super) struct Draws {
 }
 
 impl Draws {
-    /// Errors of the sensor that has this stream of random numbers.
+    /// Errors of the sensor with this random stream.
     pub(super) fn errors(&self, declared: &DeclaredUncertainty, stream: u64) -> SensorErrors {
         let (offset, gain) = self.of(stream);
         SensorErrors {
@@ -42,7 +42,7 @@ impl Draws {
 
 /// Two standard normal numbers that belong to one stream of one seed: for its offset and for its gain.
 pub(super) fn draw(seed: u64, stream: u64) -> (f64, f64) {
-    // Another stream than the sensor's noise: that one starts from the same seed with other multipliers.
+    // A separate stream from the sensor's noise: that one starts from the same seed with other multipliers.
     let mixed = seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (stream + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
     let mut random = Pcg64::seed_from_u64(mixed);
     (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))

@@ -1,39 +1,39 @@
-//! What drifts in the lab while it runs: a sensor, or the machine itself.
+//! Drifts in the lab at run time: of a sensor, or of the machine itself.
 
 use mapper_core::{Channel, Dimension};
 use mapper_physics::params::Params;
 
-/// What drifts.
+/// The drifting quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drifting {
-    /// A sensor's reading; of a flow meter its gain.
+    /// A sensor's reading; for a flow meter, its gain.
     Sensor(Channel),
     /// Efficiency of the compressor, relative, and the flow of its map by 0.6 of it.
     Fouling,
-    /// Power c omega^2 that the bearing takes from the shaft: c, W s^2/rad^2.
+    /// Bearing power loss c omega^2: c, W s^2/rad^2.
     BearingFriction,
 }
 
-/// One drift: a step at its begin, or a steady change from there on that does not end.
+/// One drift: a step at its begin, or a steady and unlimited change from then on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LabDrift {
-    /// What drifts.
+    /// The drifting quantity.
     pub what: Drifting,
     /// Step, or change over [`LabDrift::over_s`]; K, Pa, rpm, ratio or W s^2/rad^2.
     pub change: f64,
-    /// How long the change takes, s; `None` is a step.
+    /// Duration of the change, s; `None` is a step.
     pub over_s: Option<f64>,
-    /// Begin, time of the run, s; below 0 it began before the run.
+    /// Begin, run time, s; below 0 it began before the run.
     pub from_s: f64,
 }
 
-/// Share of fouling's change of efficiency by which the flow of the map changes.
+/// Change of the map's flow by fouling, as a share of its change of efficiency.
 const FOULING_FLOW_SHARE: f64 = 0.6;
-/// A machine that drifts is a new one so often, s.
+/// Interval between updates of a drifting machine, s.
 pub const MACHINE_HOLDS_S: f64 = 5.0;
 
 impl LabDrift {
-    /// How far it has come.
+    /// The change at a time.
     pub fn at(&self, t_s: f64) -> f64 {
         match self.over_s {
             None if t_s < self.from_s => 0.0,
@@ -42,13 +42,13 @@ impl LabDrift {
         }
     }
 
-    /// Whether the machine drifts, and not its sensors.
+    /// Whether the machine itself drifts.
     pub fn is_machine(&self) -> bool {
         !matches!(self.what, Drifting::Sensor(_))
     }
 }
 
-/// The reading of a sensor, its drifts put on.
+/// The reading of a sensor with its drifts.
 pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading: f64) -> f64 {
     let own = drifts.iter().filter(|drift| drift.what == Drifting::Sensor(channel));
     own.fold(reading, |reading, drift| match channel.info().dimension {
@@ -57,7 +57,7 @@ pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading:
     })
 }
 
-/// The machine as it is at a time.
+/// The drifted machine at a time.
 pub fn drifted_machine(drifts: &[LabDrift], mut params: Params, t_s: f64) -> Params {
     for drift in drifts {
         let now = drift.at(t_s);

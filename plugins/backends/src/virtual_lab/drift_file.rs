@@ -1,4 +1,4 @@
-//! `drift:` below `virtual_lab`: what drifts while the campaign runs.
+//! `drift:` below `virtual_lab`: drifts during the campaign.
 
 use super::drift::{Drifting, LabDrift};
 use super::setting_problem::SettingProblem;
@@ -12,12 +12,12 @@ use serde::Deserialize;
 pub(super) struct DriftFile {
     /// A channel, `fouling` or `bearing_friction`.
     cause: String,
-    /// How far, with its unit.
+    /// Size of the change, with its unit.
     change: String,
-    /// How long the change takes; it goes on at this rate afterwards. A step where left out.
+    /// Duration of the change; it continues at this rate afterwards. Default: a step.
     #[serde(default)]
     over: Option<Quantity<mapper_yaml::units::Duration>>,
-    /// Begin; 0 where left out, negative for a drift that began before the run.
+    /// Begin; default 0, negative for a drift that began before the run.
     #[serde(default)]
     from: Option<Quantity<mapper_yaml::units::Duration>>,
 }
@@ -49,7 +49,7 @@ fn is_command(channel: Channel) -> bool {
     matches!(channel, Channel::P3Command | Channel::T3Command | Channel::ValveCommand | Channel::TOilCommand)
 }
 
-/// Beyond that the machine, or the air supply behind a sensor, would have no meaning.
+/// Beyond this limit the machine, or the air supply behind a sensor, would be unphysical.
 const LARGEST_CHANGE_RATIO: f64 = 0.3;
 
 fn change(what: Drifting, text: &str) -> Result<f64, SettingProblem> {

@@ -1,4 +1,4 @@
-//! `effects:` below `virtual_lab`: what the machine has that the campaign's nominal model has not.
+//! `effects:` below `virtual_lab`: effects of the true machine that the campaign's nominal model does not have.
 
 use super::setting_problem::SettingProblem;
 use mapper_core::BackendError;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// One value, or several by their names.
+/// One value, or several by name.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
 pub(super) enum EffectValues {
@@ -25,7 +25,7 @@ pub(super) enum ValueText {
     Text(String),
 }
 
-/// Puts the effects into a rig.
+/// Applies the effects to a rig.
 pub(super) fn put_in(
     rig: &mut Rig,
     wanted: &BTreeMap<String, EffectValues>,
@@ -49,7 +49,7 @@ pub(super) fn put_in(
 }
 
 impl EffectValues {
-    /// A name that none of the parameters has.
+    /// The first name that is not a parameter.
     fn unknown_name(&self, parameters: &[EffectParameter]) -> Option<&str> {
         let EffectValues::Named(values) = self else { return None };
         values.keys().map(String::as_str).find(|name| parameters.iter().all(|one| one.name != *name))

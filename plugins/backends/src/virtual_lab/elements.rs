@@ -1,4 +1,4 @@
-//! Several sensors of one channel in the lab: each with its own errors, its own probe, and perhaps a fault.
+//! Redundant sensors of one channel in the lab: each with its own errors, its own probe, and perhaps a fault.
 
 use super::sensor::{Sensor, SensorErrors};
 use mapper_core::{Channel, Element, ElementColumn, RedundantSensors};
@@ -6,29 +6,29 @@ use mapper_physics::instruments::{ChannelFollower, ChannelPath};
 use mapper_physics::model::Outputs;
 use mapper_physics::thermocouple;
 
-/// One of several sensors as it truly is.
+/// True properties of one of several sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LabElement {
     /// Its errors.
     pub errors: SensorErrors,
-    /// Diameter of its tip, m, where it has another one than the machine's T2 probe; of T2 alone.
+    /// Diameter of its tip, m, if it differs from the machine's T2 probe; for T2 only.
     pub probe_diameter_m: Option<f64>,
-    /// Time constant of a lag of its own, s; 0 follows at once.
+    /// Time constant of its own lag, s; 0 without lag.
     pub lag_s: f64,
-    /// Run time from which on it reads what it read last, s; infinite for a sound one.
+    /// Run time at which the reading freezes, s; infinite for a fault-free sensor.
     pub stuck_after_s: f64,
 }
 
 /// The sensors of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabElements {
-    /// As declared: how the rig makes one reading of them.
+    /// As declared: how the rig combines them into one reading.
     pub declared: RedundantSensors,
     /// As they truly are.
     pub elements: Vec<LabElement>,
 }
 
-/// Tells the random numbers of a channel's sensors apart from those of the channels, whose streams are below it.
+/// Offset of the random streams of redundant sensors, above those of the channels.
 const STREAMS_OF_CHANNELS: u64 = 1000;
 
 /// The stream of random numbers of one of several sensors.
@@ -96,7 +96,7 @@ impl ElementBank {
         })
     }
 
-    /// What each of them reads of `truth`, and what the rig makes of it. `outputs`: of a running machine; `drifted` is what drift makes of a reading.
+    /// Reading of each sensor for `truth`, and the rig's combined reading. `outputs`: of a running machine; `drifted` adds drift to a reading.
     pub(super) fn read(
         &mut self,
         t_s: f64,
@@ -121,7 +121,7 @@ impl Member {
     /// Temperature of its own tip minus that of the machine's probe, K; 0 for all but T2 probes of another diameter.
     fn behind_the_probe_k(&mut self, t_s: f64, outputs: Option<&Outputs>, pipe_diameter_m: f64) -> f64 {
         let Some((diameter_m, outputs)) = self.of.probe_diameter_m.zip(outputs) else {
-            // At rest all tips have long come to one temperature.
+            // At rest all tips have settled to one temperature.
             self.tip = None;
             return 0.0;
         };

@@ -1,4 +1,4 @@
-//! The lab's several sensors from what is declared, and `faults:` below `virtual_lab`: which of them is off, slow or stuck.
+//! The lab's redundant sensors as declared, and `faults:` below `virtual_lab`: offset, slow or stuck sensors.
 
 use super::draws::{Draws, offset_kind};
 use super::elements::{LabElement, LabElements, stream};
@@ -14,25 +14,25 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FaultFile {
-    /// A channel with several sensors.
+    /// A channel with redundant sensors.
     channel: Channel,
     /// Number of the sensor, from 1.
     element: usize,
-    /// Its offset, in place of the one that is drawn.
+    /// Its offset, in place of the drawn one.
     #[serde(default)]
     offset: Option<String>,
-    /// Run time from which on it reads what it read last.
+    /// Run time at which the reading freezes.
     #[serde(default)]
     stuck_after: Option<Quantity<Duration>>,
-    /// Diameter of its tip; of T2 alone.
+    /// Diameter of its tip; for T2 only.
     #[serde(default)]
     probe_diameter: Option<Quantity<Length>>,
-    /// Time constant with which it lags.
+    /// Time constant of its lag.
     #[serde(default)]
     lag: Option<Quantity<Duration>>,
 }
 
-/// The sensors of all channels that have several.
+/// The sensors of all channels with redundant sensors.
 pub(super) fn read(
     files: &[FaultFile],
     nominal: &NominalRig,
@@ -44,7 +44,7 @@ pub(super) fn read(
         .keys()
         .filter_map(|channel| Some((*channel, of_channel(*channel, nominal, draws)?)))
         .collect();
-    // What is said of a channel holds for each of its sensors.
+    // Settings of a channel apply to each of its sensors.
     for (channel, offset) in offset_of {
         let members = lab.get_mut(channel).map(|elements| &mut elements.elements);
         members.into_iter().flatten().for_each(|member| member.errors.offset = *offset);
@@ -58,7 +58,7 @@ pub(super) fn read(
 fn of_channel(channel: Channel, nominal: &NominalRig, draws: &Draws) -> Option<LabElements> {
     let declared = nominal.redundant.get(&channel)?.clone();
     let common = declared.common_offset_sigma * draws.of(channel as u64).0;
-    // Probes that are all alike are the machine's own, which may truly be another one than declared.
+    // Probes of equal diameter are the machine's own, whose true diameter may differ from the declared one.
     let first_m = declared.elements.first().map(|element| element.probe_diameter_m);
     let alike = declared.elements.iter().all(|element| Some(element.probe_diameter_m) == first_m);
     let of_element = |(index, element): (usize, &DeclaredElement)| {

@@ -1,11 +1,11 @@
-//! The lab's boundary conditions: what the cell gives, and what the actuators make of the commands.
+//! The lab's boundary conditions: from the test cell, and from the actuators that follow the commands.
 
 use super::actuator::{Actuator, ActuatorDynamics};
 use super::boundary_wander::Weather;
 use mapper_physics::inputs::Inputs;
 use mapper_physics::params::BoundaryConditions;
 
-/// The air supply never falls to P4 while the model runs: it divides by the turbine's flow.
+/// Minimum ratio of air supply to P4 while the model runs: the model divides by the turbine's flow.
 pub const LOWEST_EXPANSION_RATIO: f64 = 1.0005;
 
 /// Actuators over the conditions of the cell.
@@ -26,7 +26,7 @@ pub struct LabInputs {
 }
 
 impl LabInputs {
-    /// Everything held at `boundary`.
+    /// Everything constant at `boundary`.
     pub fn held(boundary: &BoundaryConditions) -> Self {
         let at_rest =
             |value: f64| Actuator::at_rest(ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY }, value);

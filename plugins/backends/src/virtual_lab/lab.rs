@@ -24,11 +24,11 @@ use mapper_physics::standstill::{self, StandstillState};
 /// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;
 
-/// Pressure ratio below which surge is nothing that anybody would call so: on its way from rest the machine crosses the
-/// extrapolated surge line, with next to no pressure behind it that could turn the flow back.
+/// Minimum pressure ratio for surge events: during start-up the machine crosses the
+/// extrapolated surge line with too little pressure to reverse the flow.
 const MIN_SURGE_RATIO: f64 = 1.01;
 
-/// What moves in the lab.
+/// The simulated machine.
 #[derive(Debug)]
 enum Machine {
     /// Gas flows.
@@ -53,7 +53,7 @@ struct EffectFault {
 #[derive(Debug)]
 struct Armed {
     inputs: LabInputs,
-    /// `None` until the first setpoints, where the lab starts settled.
+    /// `None` until the first setpoints, at which the lab starts settled.
     machine: Option<Machine>,
     wanted: RigMode,
     tripped: bool,
@@ -64,7 +64,7 @@ struct Armed {
     pending_events: Vec<Event>,
 }
 
-/// A gas stand that exists in equations only. Same settings, same calls: same samples to the bit.
+/// A simulated gas stand. The same settings and calls give the same samples, to the bit.
 #[derive(Debug)]
 pub struct VirtualLab {
     settings: LabSettings,
@@ -103,7 +103,7 @@ impl Backend for VirtualLab {
             reached_at: None,
             needs_guarded: vec![GuardName::Overspeed, GuardName::TurbineInletPressure],
             accepts: Some(setpoint_limits::ACCEPTED),
-            // As fast as a usual air supply closes.
+            // Closing rate of a usual air supply.
             safe: SafeTrajectory { p3_slew_pa_s: Some(100e3), valve_opening_ratio: 1.0, within_s: 20.0 },
         }
     }
@@ -185,7 +185,7 @@ impl Backend for VirtualLab {
             actuator.set(now_s, command);
         }
         if first {
-            // A rig that has stood at its first setpoints for long.
+            // The rig starts as if it had been at its first setpoints for a long time.
             armed.inputs.p3 = Actuator::at_rest(settings.p3_actuator, p3_pa);
             armed.inputs.t3 = Actuator::at_rest(settings.t3_actuator, setpoints.t3_k);
             armed.inputs.valve = Actuator::at_rest(settings.valve_actuator, setpoints.valve_opening_ratio);
@@ -229,7 +229,7 @@ impl Backend for VirtualLab {
     }
 }
 
-/// A machine that has settled under the inputs of now.
+/// A machine in steady state under the present inputs.
 fn settled(settings: &LabSettings, armed: &Armed, now_s: f64) -> Result<Machine, BackendError> {
     match armed.wanted {
         RigMode::Running => {
@@ -256,7 +256,7 @@ fn watch(settings: &LabSettings) -> Watch {
 impl Armed {
     fn advance(&mut self, settings: &LabSettings, until_s: f64) -> Result<SampleBatch, BackendError> {
         let mut batch = SampleCollector::new(self.next_sequence, &self.readers);
-        // A time before the first sample, or none at all, asks for nothing.
+        // A time before the first sample, or NaN, requests no sample.
         let asks_for_the_first = self.next_sequence == 0 && until_s >= 0.0;
         while self.now_s < until_s || (self.now_s == 0.0 && asks_for_the_first) {
             self.switch_machine(settings);
@@ -292,7 +292,7 @@ impl Armed {
         self.machine = Some(next);
     }
 
-    /// The machine as it has become by now.
+    /// Applies the drift up to now.
     fn drift(&mut self, settings: &LabSettings) {
         if let Some(Machine::Running(simulator)) = self.machine.as_mut()
             && settings.drifts.iter().any(LabDrift::is_machine)
@@ -307,7 +307,7 @@ impl Armed {
         }
     }
 
-    /// Runs the machine to `until_s`, or for a second where it may have to be switched; returns the time reached.
+    /// Runs the machine to `until_s`, or for a second if it may have to be switched; returns the time reached.
     fn advance_machine(
         &mut self,
         settings: &LabSettings,
@@ -318,7 +318,7 @@ impl Armed {
         let coasting = self.wanted == RigMode::Standstill;
         let mut end_s = if coasting { until_s.min(start_s + 1.0) } else { until_s };
         if settings.drifts.iter().any(LabDrift::is_machine) {
-            // On a grid of its own: how often the lab is polled changes nothing.
+            // A fixed grid, so that the polling rate changes nothing.
             end_s =
                 end_s.min(((start_s / drift::MACHINE_HOLDS_S + 1e-9).floor() + 1.0) * drift::MACHINE_HOLDS_S);
         }
@@ -355,7 +355,7 @@ impl Armed {
                     self.report(settings, crossing, end_s);
                 }
                 result.map_err(|error| {
-                    // A hook cannot fail by itself: it gives NaN and keeps the reason.
+                    // A hook returns NaN on failure and keeps the reason.
                     let source = match settings.model.hooks.fault() {
                         Some(fault) => EffectFault { source: error, fault }.into(),
                         None => error.into(),

@@ -1,6 +1,7 @@
-//! A gas stand that exists in equations only: the lumped model, actuators, sensors, standstill, surge, overspeed.
+//! A simulated gas stand: the lumped model, actuators, sensors, standstill, surge, overspeed.
 
 mod actuator;
+mod boundary_wander;
 mod draws;
 mod drift;
 mod drift_file;
@@ -20,9 +21,9 @@ mod settings;
 mod settings_file;
 mod tolerances;
 mod truth;
-mod boundary_wander;
 
 pub use actuator::ActuatorDynamics;
+pub use boundary_wander::Weather;
 pub use drift::{Drifting, LabDrift};
 pub use elements::{LabElement, LabElements};
 pub use inputs::LabInputs;
@@ -36,13 +37,12 @@ pub use setting_problem::{SettingProblem, within};
 pub use settings::{LabSettings, Start};
 pub use settings_file::read_settings;
 pub use tolerances::draw_tolerances;
-pub use boundary_wander::Weather;
 
 use mapper_core::{Backend, BackendError};
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::nominal_rig::NominalRig;
 
-/// The lab as campaigns ask for it.
+/// The lab as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin =
     BackendPlugin { name: NAME, summary: "simulated gas stand, needs nothing", make };
 

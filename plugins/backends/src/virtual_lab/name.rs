@@ -1,4 +1,4 @@
 //! The lab's name.
 
-/// Name under which campaigns ask for this backend.
+/// Name of this backend in campaigns.
 pub const NAME: &str = "virtual_lab";

@@ -1,10 +1,10 @@
-//! What flow and pressures do before surge: they swing ever more as the operating point nears the surge line.
+//! Fluctuations of flow and pressures before surge: they grow as the operating point approaches the surge line.
 //!
 //! Compressor, outlet duct and volume are a Helmholtz resonator whose damping is the slope of the speed line (E. M. Greitzer,
 //! "Surge and rotating stall in axial flow compressors, part I", J. Eng. Power 98 (1976) 190-198). Near the zero-slope point
 //! that slope goes to zero in proportion to the distance in flow, and a resonator that turbulence excites has a variance in
-//! inverse proportion to its damping. Sampled at some 10 Hz, what arrives is folded noise whose size grows. Growth of that kind
-//! before surge is measured on turbochargers, e.g. by J. Galindo et al., Exp. Thermal Fluid Sci. 30 (2006) 449-462.
+//! inverse proportion to its damping. Sampled at some 10 Hz, it appears as aliased noise of growing size. Such growth
+//! before surge was measured on turbochargers, e.g. by J. Galindo et al., Exp. Thermal Fluid Sci. 30 (2006) 449-462.
 
 use mapper_physics::air;
 use mapper_physics::params::Params;
@@ -12,14 +12,14 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-/// How the swing grows; a size of 0 is none.
+/// Growth of the fluctuation; a size of 0 means none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurgePrecursor {
     /// Surge margin (flow over surge flow, minus one) below which flow and pressures begin to swing, ratio, > 0.
     pub onset_margin_ratio: f64,
-    /// Root mean square of the flow's swing at half that margin, ratio of the flow.
+    /// Root mean square of the flow fluctuation at half that margin, ratio of the flow.
     pub size_ratio: f64,
-    /// Exponent of the growth: the variance goes with the `-growth`th power of the margin; 1 by theory.
+    /// Exponent of the growth: the variance is proportional to the `-growth`th power of the margin; 1 by theory.
     pub growth: f64,
 }
 
@@ -27,15 +27,15 @@ impl SurgePrecursor {
     /// A lab without any.
     pub const NONE: SurgePrecursor =
         SurgePrecursor { onset_margin_ratio: 0.25, size_ratio: 0.0, growth: 1.0 };
-    /// Where a campaign says nothing.
+    /// The default of a campaign.
     pub const USUAL: SurgePrecursor = SurgePrecursor { size_ratio: 3e-3, ..SurgePrecursor::NONE };
 
-    /// Root mean square of the flow's swing, ratio: at most `most_ratio`, where the swing limits itself.
+    /// Root mean square of the flow fluctuation, ratio: at most `most_ratio`, at which the swing limits itself.
     fn rms_ratio(&self, margin_ratio: f64, most_ratio: f64) -> f64 {
         if margin_ratio >= self.onset_margin_ratio {
             return 0.0;
         }
-        // What it is at the onset is part of the noise that sensors have anyway.
+        // Its value at the onset is already part of the sensors' noise.
         let over = |margin_ratio: f64| (self.onset_margin_ratio / margin_ratio).powf(self.growth) - 1.0;
         let variance = over(margin_ratio.max(1e-4)) / over(0.5 * self.onset_margin_ratio);
         (self.size_ratio * variance.max(0.0).sqrt()).min(most_ratio)
@@ -60,7 +60,7 @@ fn helmholtz_rad_s(params: &Params, gas_k: f64) -> f64 {
 pub(super) struct Swing {
     /// Of the compressor's flow.
     pub(super) flow_ratio: f64,
-    /// Of P2: less than that of the flow, it is the volume's.
+    /// Of P2: smaller than that of the flow, since the volume damps it.
     pub(super) p2_ratio: f64,
     /// Of P1.
     pub(super) p1_ratio: f64,
@@ -71,7 +71,7 @@ pub(super) const P2_SHARE: f64 = 0.2;
 /// Swing of P1 over that of the flow: the inlet duct is open.
 const P1_SHARE: f64 = 0.01;
 
-/// The resonator, with random numbers of its own: readings away from surge do not depend on it.
+/// The resonator, with its own random numbers, so that readings away from surge do not depend on it.
 #[derive(Debug)]
 pub(super) struct Resonator {
     settings: SurgePrecursor,
@@ -88,7 +88,7 @@ impl Resonator {
         Resonator { settings, random, swing }
     }
 
-    /// The swing at the next sample; `margin_ratio` is the surge margin, `most_ratio` the largest root mean square.
+    /// The swing at the next sample; `margin_ratio` is the surge margin, `most_ratio` the maximum root mean square.
     pub(super) fn next(
         &mut self,
         margin_ratio: f64,
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn the_variance_grows_as_the_damping_falls_and_none_is_beyond_the_onset() {
         assert_eq!(rms(0.25), [0.0, 0.0]);
-        // 40 000 samples, at 2 % of margin some 20 000 independent ones: the root mean square is known to 0.5 %.
+        // 40 000 samples, at 2 % of margin some 20 000 independent ones: the root mean square is accurate to 0.5 %.
         for (margin_ratio, expected) in [(0.125, 3e-3), (0.05, 6e-3), (0.025, 9e-3)] {
             let [flow, p2] = rms(margin_ratio);
             assert!((flow / expected - 1.0).abs() < 0.03, "{margin_ratio}: {flow} {expected}");
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn the_resonator_has_the_frequency_of_duct_and_volume() {
-        // 375 m/s of sound at 350 K, 9.62 cm2 of duct, 0.5 m, 0.78 l: 375/(2 pi) sqrt(9.62e-4/3.9e-4) = 93.7 Hz.
+        // Speed of sound 375 m/s at 350 K, 9.62 cm2 of duct, 0.5 m, 0.78 l: 375/(2 pi) sqrt(9.62e-4/3.9e-4) = 93.7 Hz.
         let hz = helmholtz_rad_s(&Params::default(), 350.0) / (2.0 * std::f64::consts::PI);
         assert!((hz / 93.7 - 1.0).abs() < 0.01, "{hz}");
     }

@@ -1,4 +1,4 @@
-//! What moves the machine while gas flows: the lumped model, or other equations under the same rig.
+//! The running machine: the lumped model, or other equations in the same rig.
 
 use super::inputs::LabInputs;
 use super::name::NAME;
@@ -10,21 +10,21 @@ use mapper_physics::steady;
 /// Why a machine cannot be settled.
 pub type StructureError = Box<dyn std::error::Error + Send + Sync>;
 
-/// A machine whose shaft turns: what the lab asks of it, whatever its equations are.
+/// A running machine: the lab's interface to its equations.
 pub trait RunningMachine: std::fmt::Debug + Send {
-    /// What the rig's sensors would call its state.
+    /// Its state as the rig's sensors define it.
     fn state(&self) -> State;
 
-    /// Forgets the step size; called after a jump of the inputs.
+    /// Resets the step size; called after a jump of the inputs.
     fn restart(&mut self);
 
-    /// Goes on as a machine of other parameters.
+    /// Continues with other machine parameters.
     fn change_params(&mut self, params: Params);
 
     /// Runs to `end_s`, with samples and events on the way, as [`Simulator::run_to`] does.
     ///
     /// # Errors
-    /// [`SimulationError`] where the inputs have no meaning or the tolerance cannot be met.
+    /// [`SimulationError`] if the inputs are invalid or the tolerance cannot be met.
     fn run_to(
         &mut self,
         end_s: f64,
@@ -37,16 +37,16 @@ pub trait RunningMachine: std::fmt::Debug + Send {
 
 /// Equations of a machine.
 pub trait Structure: std::fmt::Debug + Send + Sync {
-    /// Name under which campaigns ask for a lab of these equations.
+    /// Name of a lab with these equations in campaigns.
     fn name(&self) -> &'static str;
 
     /// A machine that starts at `state` at `t_s`.
     fn started(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine>;
 
-    /// A machine that has stood under `boundary` for long.
+    /// A machine in steady state under `boundary`.
     ///
     /// # Errors
-    /// Where there is no state of rest, e.g. with too little air.
+    /// If there is no steady state, e.g. with too little air.
     fn settled(
         &self,
         model: &Model,

@@ -1,4 +1,4 @@
-//! What the lab's sensors read: the model's values through taps, lags and errors, collected into a batch.
+//! Readings of the lab's sensors: the model's values through taps, lags and errors, collected into a batch.
 
 use super::drift;
 use super::elements::ElementBank;
@@ -16,7 +16,7 @@ use mapper_physics::pressure_tap;
 /// Frequency of the surge cycle, Hz: the order of a small compressor with a short outlet duct.
 const SURGE_FREQUENCY_HZ: f64 = 7.3;
 
-/// What the sensors see at one instant, before their errors.
+/// True values at the sensors at one instant.
 pub(super) struct Instant<'a> {
     pub(super) boundary: BoundaryConditions,
     pub(super) speed_rpm: f64,
@@ -31,12 +31,12 @@ impl Instant<'_> {
         self.running.map(|(_, outputs)| outputs)
     }
 
-    /// Flow at which the machine as it is would go into surge at this speed, kg/s; NaN at standstill.
+    /// Flow at which the current machine would surge at this speed, kg/s; NaN at standstill.
     fn surge_flow_kg_s(&self, settings: &LabSettings) -> f64 {
         let Some(outputs) = self.outputs() else { return f64::NAN };
         let map = &settings.model.map;
         let corrected_rpm = map.reference().corrected_speed_rpm(self.speed_rpm, self.boundary.t1_k);
-        // In proportion to the flow here, which the model turned from corrected to physical.
+        // In proportion to the present flow, which the model converted from corrected to physical.
         let scale_ratio = settings.model.params.compressor.flow_scale_ratio;
         let surge_ratio = scale_ratio * map.surge_point(corrected_rpm).0 / outputs.flow_corrected_kg_s;
         surge_ratio * outputs.flow_kg_s
@@ -48,11 +48,11 @@ impl Instant<'_> {
 pub(super) struct Readers {
     pub(super) sensors: Vec<(Channel, Sensor)>,
     pub(super) followers: Vec<ChannelFollower>,
-    /// Sensors that follow in second order, beside their channel.
+    /// Second-order sensors, by channel.
     pub(super) second_order: Vec<Option<SecondOrderFollower>>,
     /// Channels with several sensors.
     pub(super) several: Vec<ElementBank>,
-    /// What flow and pressures do before surge.
+    /// Fluctuations of flow and pressures before surge.
     pub(super) resonator: Resonator,
 }
 
@@ -134,7 +134,7 @@ impl SampleCollector {
     }
 }
 
-/// How flow and pressures swing: in surge by its cycle, before it by the precursor.
+/// Swing of flow and pressures: by the surge cycle in surge, by the precursor before it.
 fn swing(
     t_s: f64,
     instant: &Instant<'_>,
@@ -149,13 +149,13 @@ fn swing(
         return Swing { flow_ratio, p2_ratio: P2_SHARE * flow_ratio, p1_ratio: 0.0 };
     }
     let margin_ratio = outputs.flow_kg_s / surge_flow_kg_s - 1.0;
-    // Half of what it swings in surge, where the swing of the surge cycle takes over.
+    // Half of the swing in surge, beyond which the surge cycle takes over.
     let most_ratio = 0.5 * settings.surge_swing_ratio;
     let params = &settings.model.params;
     resonator.next(margin_ratio, 1.0 / settings.sample_rate_hz, params, outputs.t2_k, most_ratio)
 }
 
-/// Static pressure at the wall of the pipe of one of the four stations; the total one where the pipe would choke.
+/// Static pressure at the pipe wall of one of the four stations; the total pressure if the pipe would choke.
 fn at_the_wall_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant: &Instant<'_>) -> f64 {
     let Some(outputs) = instant.outputs() else { return total_pa };
     let (flow_kg_s, temperature_k) = match channel {
@@ -193,7 +193,7 @@ fn true_value(
             _ => value,
         };
     }
-    // At rest every gas probe but T1's sees the cell.
+    // At rest every gas probe except T1's reads the cell temperature.
     match channel {
         Channel::ShaftSpeed | Channel::CompressorFlow | Channel::TurbineFlow => 0.0,
         Channel::P1 | Channel::P2 => boundary.p1_pa,

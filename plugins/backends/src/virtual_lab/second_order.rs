@@ -1,6 +1,6 @@
-//! A sensor that follows in second order: a pressure line, a meter with its filter, a probe in its sheath.
+//! A second-order sensor: a pressure line, a meter with its filter, a probe in its sheath.
 
-/// How it follows: `y'' = w^2 (x - y) - 2 zeta w y'`, `w = 2 pi f`.
+/// Its response: `y'' = w^2 (x - y) - 2 zeta w y'`, `w = 2 pi f`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SecondOrder {
     /// Natural frequency, Hz, > 0.
@@ -9,7 +9,7 @@ pub struct SecondOrder {
     pub damping_ratio: f64,
 }
 
-/// Follows from sample to sample; starts settled at its first value.
+/// Computes the response from sample to sample; starts settled at its first value.
 #[derive(Debug, Clone)]
 pub(super) struct SecondOrderFollower {
     of: SecondOrder,
@@ -24,9 +24,9 @@ struct Last {
     rate_per_s: f64,
 }
 
-/// Part of 1/w that one step of the integration takes: fourth order, so an error of 1e-6 of a jump.
+/// Integration step as a share of 1/w: fourth order, so an error of 1e-6 of a jump.
 const STEP_RATIO: f64 = 0.1;
-/// Maximum number of steps between two samples; beyond it the sensor is far faster than it is sampled.
+/// Maximum number of steps between two samples; beyond it the sensor is far faster than the sampling.
 const MAX_STEPS: f64 = 2000.0;
 
 impl SecondOrderFollower {
@@ -34,7 +34,7 @@ impl SecondOrderFollower {
         SecondOrderFollower { of, last: None }
     }
 
-    /// The output at `t_s`, which rises from call to call; between samples the input is taken as linear.
+    /// The output at `t_s`, which must increase from call to call; between samples the input is taken as linear.
     pub(super) fn read(&mut self, t_s: f64, input: f64) -> f64 {
         let now = match self.last {
             Some(last) if t_s > last.t_s => self.advance(last, t_s, input),
@@ -75,8 +75,8 @@ impl SecondOrderFollower {
 mod tests {
     use super::*;
 
-    /// A ramp is followed late by 2 zeta/w, and an underdamped sensor overshoots a step by exp(-pi zeta/sqrt(1 - zeta^2))
-    /// (any text on second-order systems).
+    /// The output lags a ramp by 2 zeta/w, and an underdamped sensor overshoots a step by exp(-pi zeta/sqrt(1 - zeta^2))
+    /// (any textbook on second-order systems).
     #[test]
     fn ramps_are_late_and_steps_overshoot_as_the_text_book_says() {
         let of = SecondOrder { frequency_hz: 0.5, damping_ratio: 0.6 };

@@ -1,4 +1,4 @@
-//! What a sensor makes of the true value: offset, white noise, noise with memory.
+//! Sensor errors: offset, white noise, coloured noise.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -19,7 +19,7 @@ pub struct SensorErrors {
     pub gain_ratio: f64,
 }
 
-/// One sensor with its own stream of random numbers, so that its noise does not depend on how the others are read.
+/// One sensor with its own random stream, so that its noise does not depend on reads of other sensors.
 #[derive(Debug, Clone)]
 pub struct Sensor {
     errors: SensorErrors,
@@ -30,7 +30,7 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// A sensor sampled every `sample_s`; `stream` tells the sensors of one seed apart.
+    /// A sensor sampled every `sample_s`; `stream` distinguishes the sensors of one seed.
     pub fn new(errors: SensorErrors, sample_s: f64, seed: u64, stream: u64) -> Self {
         // Two different odd multipliers spread (seed, stream) over the generator's state.
         let mixed = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ stream.wrapping_mul(0xD1B5_4A32_D192_ED03);
@@ -40,7 +40,7 @@ impl Sensor {
         } else {
             0.0
         };
-        // Starts in its stationary state: the noise is as old as the rig.
+        // Starts in its stationary state.
         let first: f64 = StandardNormal.sample(&mut random);
         Sensor { errors, random, coloured: errors.coloured_sigma * first, memory_ratio }
     }
@@ -79,10 +79,10 @@ mod tests {
         let covariance = |lag: usize| {
             readings.iter().zip(&readings[lag..]).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>() / n
         };
-        // 200 000 samples hold some 5 000 independent ones of the coloured part: a standard error of 1 %.
+        // 200 000 samples contain some 5 000 independent ones of the coloured part: a standard error of 1 %.
         assert!((mean - 105.0).abs() < 0.03, "{mean}");
         assert!((covariance(0) - 1.0).abs() < 0.04, "{}", covariance(0));
-        // One second later the white part is forgotten and exp(-1/2) of the coloured variance is left.
+        // After one second the white part is uncorrelated and exp(-1/2) of the coloured variance remains.
         assert!((covariance(10) - 0.36 * (-0.5f64).exp()).abs() < 0.03, "{}", covariance(10));
     }
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a value below `virtual_lab:`.
+//! Errors of values below `virtual_lab:`.
 
 use super::name::NAME;
 use mapper_core::{BackendError, Channel, with_unit};
@@ -6,10 +6,10 @@ use mapper_physics::effect::EffectError;
 use mapper_yaml::units::{Kind, UnitError};
 use std::ops::RangeInclusive;
 
-/// What is wrong with one of the lab's settings. [`BackendError::Settings`] carries it beside the key.
+/// An error in one of the lab's settings. [`BackendError::Settings`] carries it together with the key.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingProblem {
-    /// An unknown key, or a value of another kind.
+    /// An unknown key, or a value of the wrong type.
     #[error(transparent)]
     Form(#[from] serde_json::Error),
     /// A value without meaning.
@@ -43,20 +43,20 @@ pub enum SettingProblem {
     /// A text that is not a value with a unit of the right kind.
     #[error("{source}; {}", source.remedy(*kind))]
     Quantity {
-        /// What is measured.
+        /// Its physical quantity.
         kind: Kind,
-        /// What is wrong with the text.
+        /// The error in the text.
         source: UnitError,
     },
-    /// A value in a unit of which there is only one way of writing.
+    /// A value in a unit with only one notation.
     #[error("`{text}` is not a number and `{unit}`: write e.g. `1e-6 {unit}`")]
     NotInUnit {
-        /// What was written.
+        /// The written text.
         text: String,
         /// The unit.
         unit: String,
     },
-    /// A bare number where a unit is needed.
+    /// A bare number without its unit.
     #[error("{value} lacks its unit: write `{value} {unit}`")]
     BareNumber {
         /// The number.
@@ -64,10 +64,10 @@ pub enum SettingProblem {
         /// The unit.
         unit: String,
     },
-    /// An effect that is not in the catalogue.
+    /// An effect that is not in the library.
     #[error("there is no such effect; the effects are {known}")]
     UnknownEffect {
-        /// Ids of the effects there are.
+        /// Ids of the available effects.
         known: String,
     },
     /// Values that do not have the names of the effect's parameters.
@@ -76,41 +76,41 @@ pub enum SettingProblem {
         /// Every parameter with its unit.
         form: String,
     },
-    /// What the effect itself says of its values.
+    /// An error reported by the effect itself.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// A cause of drift that the lab does not have.
+    /// An unknown drifting quantity.
     #[error("`{cause}` cannot drift: write a measured channel, `fouling` or `bearing_friction`")]
     UnknownDrift {
-        /// What was written.
+        /// The written text.
         cause: String,
     },
-    /// A change that takes no time.
+    /// A change of zero duration.
     #[error("{over_s} s is not a duration for a change; leave `over` out for a step")]
     NoDuration {
-        /// What was written, s.
+        /// The written duration, s.
         over_s: f64,
     },
-    /// A fault of a sensor that the channel does not have.
+    /// A fault of a sensor number that the channel does not have.
     #[error(
         "{channel} has {count} sensors of which one could fail: name one of several that the campaign declares"
     )]
     NoElement {
         /// The channel.
         channel: Channel,
-        /// How many of several sensors it has; 0 where it has but one.
+        /// Number of redundant sensors; 0 for a single one.
         count: usize,
     },
-    /// A probe where none is simulated.
+    /// A probe diameter of a channel without a simulated probe.
     #[error("only the probes of T2 have a tip here: write `lag` for {channel}")]
     NoProbe {
         /// The channel.
         channel: Channel,
     },
-    /// A drift after which the machine has no meaning.
+    /// A drift that makes the machine unphysical.
     #[error("{text} is beyond {} %", 100.0 * limit_ratio)]
     DriftTooLarge {
-        /// What was written.
+        /// The written text.
         text: String,
         /// Largest change, ratio.
         limit_ratio: f64,

@@ -1,13 +1,13 @@
-//! Settings of the virtual lab, in SI units. They are truth: nothing but the lab reads them.
+//! Settings of the virtual lab, in SI units. They are the truth: only the lab reads them.
 
 use super::actuator::ActuatorDynamics;
+use super::boundary_wander::Weather;
 use super::drift::LabDrift;
 use super::elements::LabElements;
 use super::precursor::SurgePrecursor;
 use super::running::{Lumped, Structure};
 use super::second_order::SecondOrder;
 use super::sensor::SensorErrors;
-use super::boundary_wander::Weather;
 use mapper_core::Channel;
 use mapper_physics::effect::Rig;
 use mapper_physics::instruments::Instruments;
@@ -16,7 +16,7 @@ use mapper_physics::params::BoundaryConditions;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// How the machine stands when the lab is armed.
+/// State of the machine when the lab is armed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
     /// At rest, everything at ambient temperature.
@@ -25,18 +25,18 @@ pub enum Start {
     Settled,
 }
 
-/// Everything a virtual lab is made of.
+/// All settings of a virtual lab.
 #[derive(Debug, Clone)]
 pub struct LabSettings {
-    /// The machine as it truly is; may differ from the one that the campaign declares.
+    /// The true machine; it may differ from the declared one.
     pub model: Model,
-    /// Lags, gains and offsets before the sensors' own errors; the lag of P3 is [`LabSettings::p3_actuator`]'s.
+    /// Lags, gains and offsets before the sensors' own errors; [`LabSettings::p3_actuator`] has the lag of P3.
     pub instruments: Instruments,
-    /// How cell and supplies wander.
+    /// Wander of cell and supplies.
     pub weather: Weather,
-    /// T1, P1, P4 and ambient temperature hold throughout but for the weather; the other values are the state at arming.
+    /// T1, P1, P4 and ambient temperature are constant except for the weather; the other values are the state at arming.
     pub cell: BoundaryConditions,
-    /// Name of the rig that this lab stands for, which no two runs may have at once; `None`: each run has its own.
+    /// Name of the simulated rig, which two runs cannot share at once; `None`: each run has its own.
     pub rig: Option<String>,
     /// Sample rate, Hz.
     pub sample_rate_hz: f64,
@@ -52,19 +52,19 @@ pub struct LabSettings {
     pub oil_actuator: ActuatorDynamics,
     /// Errors of the sensors; channels without an entry are ideal.
     pub sensors: BTreeMap<Channel, SensorErrors>,
-    /// Channels with several sensors, which read in place of the one in `sensors`.
+    /// Channels with redundant sensors, which replace the one in `sensors`.
     pub redundant: BTreeMap<Channel, LabElements>,
-    /// What the sensors see at rest beyond what the cell has throughout, in the channel's unit: no rig is quite even.
+    /// Offset of the sensors' true temperatures at rest, in the channel's unit: no rig is perfectly uniform.
     pub uneven_at_rest: BTreeMap<Channel, f64>,
-    /// What drifts while the lab runs.
+    /// Drifts at run time.
     pub drifts: Vec<LabDrift>,
-    /// Pressures that are tapped at the wall of a pipe, with its inner diameter, m; the others are total.
+    /// Pressures with a wall tap, with the inner diameter of the pipe, m; the others are total.
     pub static_tap_pipe_diameters_m: BTreeMap<Channel, f64>,
     /// Shaft speed at which the lab cuts the air by itself, rpm.
     pub trip_speed_rpm: f64,
-    /// The equations that move the machine.
+    /// The equations of the machine.
     pub structure: Arc<dyn Structure>,
-    /// Sensors that follow in second order before their own lag; none in the nominal lab.
+    /// Sensors with a second-order response before their own lag; none in the nominal lab.
     pub second_order: BTreeMap<Channel, SecondOrder>,
     /// Swing of flow and outlet pressure beyond the surge line, ratio of their values.
     pub surge_swing_ratio: f64,
@@ -75,7 +75,7 @@ pub struct LabSettings {
 }
 
 impl LabSettings {
-    /// Takes machine and instruments from a rig; what its P3 is slower than declared, the actuator is.
+    /// Takes machine and instruments from a rig; additional lag of its P3 goes to the actuator.
     pub fn take(&mut self, rig: Rig) {
         let slower_s = rig.instruments.p3_lag_s - mapper_physics::instruments::NOMINAL_P3_LAG_S;
         self.p3_actuator.lag_s = (self.p3_actuator.lag_s + slower_s).max(0.0);
@@ -83,7 +83,7 @@ impl LabSettings {
         self.instruments = rig.instruments;
     }
 
-    /// A lab without any sensor error whose actuators act at once: the model itself.
+    /// A lab without sensor errors and actuator lag: the model itself.
     pub fn ideal(model: Model, cell: BoundaryConditions) -> Self {
         let at_once = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
         LabSettings {

@@ -1,6 +1,7 @@
 //! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
 
 use super::actuator::ActuatorDynamics;
+use super::boundary_wander::Weather;
 use super::draws::{Draws, draw, offset_kind};
 use super::drift_file::{self, DriftFile};
 use super::effects_file::{EffectValues, put_in};
@@ -11,7 +12,6 @@ use super::sensor::SensorErrors;
 use super::setting_problem::{SettingProblem, within};
 use super::settings::{LabSettings, Start};
 use super::tolerances::draw_tolerances;
-use super::boundary_wander::Weather;
 use mapper_core::{BackendError, Channel};
 use mapper_physics::effect::Rig;
 use mapper_physics::instruments::Instruments;
@@ -26,15 +26,15 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The keys below `virtual_lab`. Everything may be left out.
+/// The keys below `virtual_lab`. All are optional.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct SettingsFile {
-    /// Name of the rig that the lab stands for, so that locks and latches can be rehearsed; none where left out.
+    /// Name of the simulated rig, so that rig locks can be rehearsed; default none.
     rig: Option<String>,
-    /// Samples per second; 10 Hz where left out.
+    /// Samples per second; default 10 Hz.
     sample_rate: Option<Quantity<Frequency>>,
-    /// `standstill` (cold, the default) or `settled` (long at the first setpoints).
+    /// `standstill` (cold, the default) or `settled` (in steady state at the first setpoints).
     start: StartName,
     /// `declared` (the default) or `none`.
     noise: NoiseName,
@@ -42,40 +42,40 @@ struct SettingsFile {
     offsets: OffsetsName,
     /// Offsets of single channels, in their own units, instead of drawn ones.
     offset_of: BTreeMap<Channel, String>,
-    /// What the machine has that the declared one has not.
+    /// Effects of the true machine that the declared one does not have.
     effects: BTreeMap<String, EffectValues>,
-    /// Which of several sensors of a channel is off, slow or stuck.
+    /// Offset, slow or stuck sensors of a redundant channel.
     faults: Vec<FaultFile>,
-    /// What drifts while the lab runs.
+    /// Drifts at run time.
     drift: Vec<DriftFile>,
     /// `calm` (the default) or `wandering`.
     weather: WeatherName,
     /// `drawn` from the campaign's tolerances, or `none` (the default).
     tolerances: TolerancesName,
-    /// Seed of that draw, so that a machine stays itself under other noise; the campaign's where left out.
+    /// Seed of that draw, so that a machine stays the same under other noise; default: the campaign's.
     tolerances_seed: Option<u64>,
-    /// By how much the machine is off within its tolerances, in place of a draw.
+    /// Deviations of the machine within its tolerances, in place of a draw.
     deviations: DeviationsFile,
     /// How the actuators follow.
     actuators: ActuatorsFile,
-    /// Where the true machine differs from the declared one.
+    /// Differences of the true machine from the declared one.
     machine: MachineFile,
-    /// Shaft speed at which the lab cuts its own air; 1.1 times the campaign's limit where left out.
+    /// Shaft speed at which the lab cuts its own air; default 1.1 times the campaign's limit.
     trip_speed: Option<Quantity<Speed>>,
-    /// Swing of the flow in surge; 8 % where left out.
+    /// Swing of the flow in surge; default 8 %.
     surge_swing: Option<Quantity<Fraction>>,
-    /// How flow and pressures swing before surge.
+    /// Fluctuations of flow and pressures before surge.
     surge_precursor: PrecursorFile,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct PrecursorFile {
-    /// Surge margin at which it begins; 25 % where left out.
+    /// Surge margin at which it begins; default 25 %.
     onset: Option<Quantity<Fraction>>,
-    /// Root mean square of the flow's swing at half that margin; 0.3 % where left out.
+    /// Root mean square of the flow's swing at half that margin; default 0.3 %.
     size: Option<Quantity<Fraction>>,
-    /// Exponent by which the variance grows with the inverse of the margin; 1 where left out.
+    /// Exponent by which the variance grows with the inverse of the margin; default 1.
     growth: Option<f64>,
 }
 
@@ -119,7 +119,7 @@ enum TolerancesName {
     None,
 }
 
-/// By how much the machine is off, as a diagnosis found it.
+/// Deviations of the machine, as a diagnosis found them.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct DeviationsFile {
@@ -134,7 +134,7 @@ struct DeviationsFile {
 }
 
 impl DeviationsFile {
-    /// Puts them into a rig.
+    /// Applies them to a rig.
     fn put_into(&self, rig: &mut Rig) -> Result<(), BackendError> {
         let scale = |key: &str, deviation: &Option<Quantity<Fraction>>| {
             let ratio = deviation.as_ref().map_or(0.0, |deviation| deviation.inside);
@@ -193,7 +193,7 @@ struct MachineFile {
 /// Reads a campaign's settings for the virtual lab.
 ///
 /// # Errors
-/// [`BackendError::Settings`] with the key that is wrong and what would be right.
+/// [`BackendError::Settings`] with the wrong key and the correct form.
 pub fn read_settings(
     settings: &serde_json::Value,
     nominal: &NominalRig,
@@ -336,10 +336,10 @@ fn sensors(
     sensors
 }
 
-/// Drawn from the declared evenness of the soak; nothing where there is none.
+/// Drawn from the declared non-uniformity of the soak; empty without a declaration.
 fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     let Some(soak) = nominal.soak else { return BTreeMap::new() };
-    // Another stream than that of the offsets.
+    // A separate stream from that of the offsets.
     let seed = nominal.seed ^ 0x6A09_E667_F3BC_C908;
     let drawn = |channel: Channel, sigma: f64| (channel, sigma * draw(seed, channel as u64).0);
     let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
@@ -348,7 +348,7 @@ fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     temperatures.into_iter().chain(pressures).collect()
 }
 
-/// The unit in which a rate is kept.
+/// The storage unit of a rate.
 fn rate_unit<Rate: Dimension>() -> &'static str {
     Rate::KIND.units().first().map_or("", |unit| unit.symbol())
 }
@@ -440,7 +440,7 @@ mod tests {
             })
             .collect();
         let rms = (offsets.iter().map(|offset| offset * offset).sum::<f64>() / 2000.0).sqrt();
-        // A standard deviation from 2000 draws is known to 1.6 %.
+        // A standard deviation from 2000 draws is accurate to 1.6 %.
         assert!((rms / 0.25 - 1.0).abs() < 0.06, "{rms}");
     }
 

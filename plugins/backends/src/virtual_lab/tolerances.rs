@@ -1,4 +1,4 @@
-//! What every machine has without anything being wrong: parameters and a map that are off within declared tolerances.
+//! Normal deviations of every fault-free machine: parameters and a map that differ within declared tolerances.
 
 use mapper_core::{Channel, ModelTolerances, ReferenceState};
 use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use std::sync::Arc;
 
-/// Puts a draw of `seed` from the tolerances into a rig.
+/// Applies a draw of `seed` from the tolerances to a rig.
 pub fn draw_tolerances(rig: &mut Rig, tolerances: &ModelTolerances, seed: u64) {
     let mut random = Pcg64::seed_from_u64(seed.wrapping_mul(0xD6E8_FEB8_6659_FD93) ^ 0xA076_1D64_78BD_642F);
     let mut scale = |sigma_ratio: f64| {
@@ -22,7 +22,7 @@ pub fn draw_tolerances(rig: &mut Rig, tolerances: &ModelTolerances, seed: u64) {
     params.turbine.peak_efficiency *= scale(tolerances.turbine_efficiency_ratio);
     params.outlet.valve_area_m2 *= scale(tolerances.valve_area_ratio);
     params.compressor.nusselt_coefficient *= scale(tolerances.convection_ratio);
-    // A wide tolerance must not turn round the heat.
+    // A wide tolerance must not reverse the heat flow.
     params.external_convection_ratio *= scale(tolerances.external_convection_ratio).max(0.1);
     params.bearing.oil_conductance_w_k *= scale(tolerances.oil_conductance_ratio).max(0.1);
     if tolerances.efficiency_shape_ratio > 0.0 {
@@ -34,7 +34,7 @@ pub fn draw_tolerances(rig: &mut Rig, tolerances: &ModelTolerances, seed: u64) {
 /// Waves of the error over the map.
 const WAVES: usize = 4;
 
-/// A map whose efficiency is off by a smooth error.
+/// A map with a smooth efficiency error.
 #[derive(Debug)]
 struct UnevenMap {
     map: Arc<dyn CompressorCharacteristic>,
@@ -43,7 +43,7 @@ struct UnevenMap {
 }
 
 impl UnevenMap {
-    /// An error with a standard deviation of `sigma_ratio` over all draws, that turns round about once over the map.
+    /// An error with a standard deviation of `sigma_ratio` over all draws, and about one period over the map.
     fn new(map: Arc<dyn CompressorCharacteristic>, sigma_ratio: f64, random: &mut Pcg64) -> Self {
         let amplitude = sigma_ratio * (2.0 / WAVES as f64).sqrt();
         let turn = 2.0 * std::f64::consts::PI;
@@ -117,7 +117,7 @@ mod tests {
             let point = |rig: &Rig| rig.model.map.evaluate(100e3, 1.8).efficiency;
             shape += (point(&rig) / point(&nominal) - 1.0).powi(2);
         }
-        // A standard deviation from 2000 draws is known to 1.6 %.
+        // A standard deviation from 2000 draws is accurate to 1.6 %.
         let [efficiency, shape] = [efficiency, shape].map(|sum: f64| (sum / 2000.0).sqrt());
         assert!((efficiency / 0.005 - 1.0).abs() < 0.07, "{efficiency}");
         assert!((shape / 0.003 - 1.0).abs() < 0.07, "{shape}");

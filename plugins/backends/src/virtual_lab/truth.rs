@@ -1,11 +1,11 @@
-//! What only the simulator knows, sample by sample; recorded under /truth and read by scoring alone.
+//! True values known only to the simulator, sample by sample; recorded under /truth and read by scoring alone.
 
 use mapper_core::TruthColumn;
 use mapper_physics::model::Outputs;
 
 type Reader = fn(&Outputs) -> f64;
 
-/// Columns that come from the model's outputs: name, unit, value. Undefined (NaN) at standstill.
+/// Columns from the model's outputs: name, unit, value. Undefined (NaN) at standstill.
 const FROM_OUTPUTS: [(&str, &str, Reader); 9] = [
     ("eta", "1", |outputs| outputs.efficiency),
     ("h_w_m2k", "W/(m2 K)", |outputs| outputs.h_w_m2k),
@@ -29,7 +29,7 @@ pub struct TruthRecorder {
 }
 
 impl TruthRecorder {
-    /// Adds one sample: shaft speed, temperatures of both housings, flow at which this speed would surge; `outputs` is `None` at standstill.
+    /// Adds one sample: shaft speed, temperatures of both housings, surge flow at this speed; `outputs` is `None` at standstill.
     pub fn push(&mut self, [speed_rpm, tc_k, tt_k, surge_flow_kg_s]: [f64; 4], outputs: Option<&Outputs>) {
         for (column, (_, _, read)) in self.from_outputs.iter_mut().zip(FROM_OUTPUTS) {
             column.push(outputs.map_or(f64::NAN, read));

@@ -1,4 +1,4 @@
-//! Every backend keeps every rule of the seam. A new backend gets its row in [`candidates`], and all rules with it.
+//! Every backend follows every rule of the interface. A new backend needs only its row in [`candidates`].
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_backends::other_lab::{self, OtherStructure};
@@ -9,7 +9,7 @@ use mapper_core::{Backend, BackendError, Channel, Recording, RigMode, Series, Se
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 
-/// All backends, each as it is driven in practice.
+/// All backends, in their practical configuration.
 fn candidates() -> [Candidate<'static>; 5] {
     [
         Candidate { name: virtual_lab::NAME, make: &settled_lab, setpoints: setpoints(150e3), lasts_s: None },
@@ -35,7 +35,7 @@ fn setpoints(p3_pa: f64) -> Setpoints {
     }
 }
 
-/// Noise, offsets and slow actuators: all that a seed decides.
+/// Noise, offsets and slow actuators: everything that depends on the seed.
 fn lab(start: Start) -> LabSettings {
     let errors = SensorErrors {
         white_sigma: 0.08,
@@ -75,7 +75,7 @@ fn other_at_rest() -> Result<Box<dyn Backend>, BackendError> {
     other(Start::Standstill)
 }
 
-/// More than any rule takes.
+/// Longer than any rule needs.
 const RECORDED_S: f64 = 30.0;
 
 /// Half a minute of the lab.

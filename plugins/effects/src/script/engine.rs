@@ -1,4 +1,4 @@
-//! The engine of a script: what it lacks, how much it may do, and one per thread.
+//! The script engine: its restrictions, its limits, and one instance per thread.
 
 use super::header::Mistake;
 use super::hook_names::HOOK_NAMES;
@@ -14,26 +14,26 @@ use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Operations of one call: a place is asked some million times in a run.
+/// Maximum operations of one call: a hook is called some million times in a run.
 const OPERATION_LIMIT: u64 = 10_000;
 const CALL_DEPTH_LIMIT: usize = 8;
 const EXPRESSION_DEPTH_LIMIT: usize = 64;
 const STRING_LIMIT: usize = 256;
 const VARIABLE_LIMIT: usize = 64;
 const FUNCTION_LIMIT: usize = 64;
-/// Engines that a thread keeps.
+/// Maximum number of engines in a thread's cache.
 const KEPT_ENGINES: usize = 32;
 
-/// What a script sees of the machine: `at.tc_k` and so on.
+/// The machine's values for a script: `at.tc_k` and so on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct At {
     values: [f64; FIELDS.len()],
 }
 
-/// Reads one value of the machine.
+/// Reads one of the machine's values.
 type Field = fn(&Site<'_>) -> f64;
 
-/// What a script sees, by its name. Values that come later in the gas path than a hook are NaN there.
+/// The values of a script by name. Values from later in the gas path than a hook are NaN there.
 const FIELDS: [(&str, Field); 23] = [
     ("t_s", |site| site.t_s),
     ("speed_rad_s", |site| site.state.shaft_speed_rad_s),
@@ -70,7 +70,7 @@ impl At {
 #[derive(Debug, Clone)]
 pub(super) struct Numbers(Arc<[f64]>);
 
-/// A script that compiles, told apart from every other.
+/// A compiled script with a unique number.
 #[derive(Debug)]
 pub(super) struct Program {
     id: u64,
@@ -86,13 +86,13 @@ struct Compiled {
 }
 
 thread_local! {
-    /// rhai's engines stay on their thread, so that scripts run on all cores without waiting for each other.
+    /// Each thread has its own rhai engines, so that scripts run on all cores without waiting for each other.
     static COMPILED: RefCell<HashMap<u64, Rc<Compiled>>> = RefCell::new(HashMap::new());
 }
 
 impl Program {
-    /// Compiles a script to see that it can be.
-    /// `takes_part`: whether it must define one hook at least.
+    /// Compiles a script to check it.
+    /// `takes_part`: whether it must define at least one hook.
     pub(super) fn new(text: &str, parameters: Vec<String>, takes_part: bool) -> Result<Self, Mistake> {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let Compiled { ast, .. } = compile(text, &parameters)?;
@@ -133,7 +133,7 @@ impl Program {
         Ok(Numbers(self.parameters.iter().map(|name| values.get(name)).collect::<Result<_, _>>()?))
     }
 
-    /// Whether it defines no hook at all.
+    /// Whether it defines no hook.
     pub(super) fn takes_no_part(&self) -> bool {
         self.defined.is_empty()
     }
@@ -142,7 +142,7 @@ impl Program {
         self.defined.contains(name)
     }
 
-    /// Calls a function; what goes wrong is kept in `fault`, and the result is NaN.
+    /// Calls a function. An error is stored in `fault`, and the result is NaN.
     pub(super) fn call(&self, name: &str, arguments: impl FuncArgs, fault: &OnceLock<String>) -> f64 {
         match self.try_call(name, arguments) {
             Ok(value) => value,
@@ -197,7 +197,7 @@ fn engine(parameters: &[String]) -> Engine {
     ArithmeticPackage::new().register_into_engine(&mut engine);
     LogicPackage::new().register_into_engine(&mut engine);
     BasicMathPackage::new().register_into_engine(&mut engine);
-    // Numbers only: without arrays and maps nothing can grow.
+    // Numbers only: without arrays and maps, memory cannot grow.
     for symbol in ["eval", "this", "[", "#{"] {
         engine.disable_symbol(symbol);
     }

@@ -1,8 +1,8 @@
-//! What is wrong with a script.
+//! Errors of a script.
 
 use std::path::{Path, PathBuf};
 
-/// Longest line and message that are shown, characters.
+/// Maximum length of a shown line or message, characters.
 const SHOWN_LIMIT: usize = 200;
 
 /// A script that is not an effect.
@@ -11,11 +11,11 @@ const SHOWN_LIMIT: usize = 200;
 pub struct ScriptEffectError {
     /// The script's file.
     pub path: PathBuf,
-    /// Line, from 1; `None` where the whole script is meant.
+    /// Line, from 1; `None` for the whole script.
     pub line: Option<usize>,
     /// The line itself.
     pub source_line: String,
-    /// What is wrong and what would be right.
+    /// The error and the correct form.
     pub message: String,
 }
 

@@ -1,26 +1,26 @@
-//! The header of a script: lines `//! key: value` that say what the effect is.
+//! The header of a script: lines `//! key: value` that describe the effect.
 
 use mapper_core::Channel;
 use mapper_physics::effect::{EffectInfo, EffectParameter, Submodel};
 use std::borrow::Cow;
 
-/// A line, from 1, where one is meant, and what is wrong.
+/// A line, from 1, if known, and the error.
 pub(super) type Mistake = (Option<usize>, String);
 
 /// Maximum number of parameters of a script: each is a dimension of the fit.
 const PARAMETER_LIMIT: usize = 4;
 
-/// How a lag is written.
+/// Notation of a lag.
 const LAG_FORM: &str = "//! lag: CHANNEL PARAMETER";
 
-/// How a parameter is written.
+/// Notation of a parameter.
 const PARAMETER_FORM: &str = "//! parameter: NAME [UNIT] LOW .. HIGH, neutral VALUE, step VALUE";
 
-/// What a header says.
+/// The contents of a header.
 pub(super) struct Header {
     /// Of the effect.
     pub info: EffectInfo,
-    /// Sensors that follow late, each by the parameter that holds its time constant.
+    /// Sensor lags, each with the parameter that holds its time constant.
     pub lags: Vec<(Channel, String)>,
 }
 

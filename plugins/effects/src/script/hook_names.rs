@@ -1,7 +1,7 @@
-//! The places at which a script can take part.
+//! The hooks of a script.
 
-/// Functions a script may define, besides `reading_CHANNEL(at, p, value)`, with the number of their arguments:
-/// `(at, p, value)` gives the value the model shall use, `(at, p)` what is added.
+/// Functions a script may define, in addition to `reading_CHANNEL(at, p, value)`, with the number of their arguments:
+/// `(at, p, value)` returns the value for the model, `(at, p)` a term to add.
 pub const HOOK_NAMES: [(&str, usize); 11] = [
     ("flow_kg_s", 3),
     ("efficiency", 3),

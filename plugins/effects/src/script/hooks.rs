@@ -1,4 +1,4 @@
-//! A script at the named places of the model.
+//! A script at the hooks of the model.
 
 use super::engine::{At, Numbers, Program};
 use super::hook_names::HOOK_NAMES;
@@ -28,7 +28,7 @@ impl ScriptHooks {
         ScriptHooks { program, numbers, defined, readings, fault: OnceLock::new() }
     }
 
-    /// The value that hook `index` makes of `value`.
+    /// The result of hook `index` for `value`.
     fn change(&self, index: usize, site: &Site<'_>, value: f64) -> f64 {
         if !self.defined[index] {
             return value;
@@ -37,7 +37,7 @@ impl ScriptHooks {
         self.program.call(HOOK_NAMES[index].0, arguments, &self.fault)
     }
 
-    /// What hook `index` adds.
+    /// The term from hook `index`.
     fn add(&self, index: usize, site: &Site<'_>) -> f64 {
         if !self.defined[index] {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Rows of points to a map: what `mapper` writes, with all its columns, and tables of others with the four columns that
+//! Reads rows of points as a map: files of `mapper` with all their columns, and tables from other programs with the four columns that
 //! a map needs.
 
 use crate::lines::{Row, line, map_of_rows, room_for_one_more};
@@ -10,23 +10,23 @@ use mapper_core::{
 };
 use mapper_yaml::units::{FoundColumn, Kind, TableText, WantedColumn, find_columns, with_units_row};
 
-/// What the four columns measure.
+/// Physical quantities of the four columns.
 const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
 
-/// Most common errors that are read of a point; `mapper` writes up to 13.
+/// Maximum number of common errors of a point; `mapper` writes up to 13.
 const MAX_COMMON: usize = 64;
 
-/// What stands in the `#` lines and the column names.
+/// The `#` lines and the column names.
 struct Head {
     reference: Option<ReferenceState>,
     machine: String,
     method: Option<Method>,
-    /// What the steps count from: files of version 0.1.0 do not say, and count from 0.
+    /// First step number: files of version 0.1.0 do not give it, and start at 0.
     first_step: f64,
     columns: Columns,
 }
 
-/// Names of the columns as found, and which of them are the four.
+/// The column names of the file, and the positions of the four.
 struct Columns {
     names: Vec<String>,
     four: [FoundColumn; 4],
@@ -62,7 +62,7 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
     let (columns, mut pending) = match numeric(&first, table) {
         true => (Columns { names: Vec::new(), four: [0, 1, 2, 3].map(bare) }, Some(first)),
         false => {
-            // Units may have a row of their own.
+            // Units may have their own row.
             let second = records.next().map(record).transpose()?;
             let names: Vec<&str> = first.iter().collect();
             let below =
@@ -104,7 +104,7 @@ fn at(record: &StringRecord) -> usize {
     record.position().map_or(1, |position| position.line() as usize)
 }
 
-/// How the first line of content is separated.
+/// The separator of the first line of content.
 fn table_text(text: &str) -> TableText {
     let line = text.lines().find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
     TableText::of(line.unwrap_or_default())
@@ -114,7 +114,7 @@ fn numeric(record: &StringRecord, table: TableText) -> bool {
     record.len() >= 4 && record.iter().take(4).all(|field| table.number(field).is_some())
 }
 
-/// A column without a heading: in the unit used inside.
+/// A column without a heading, in the internal unit.
 fn bare(index: usize) -> FoundColumn {
     FoundColumn { index, unit: None }
 }
@@ -139,7 +139,7 @@ impl Columns {
         record.get(self.find(name)?).filter(|text| !text.is_empty())
     }
 
-    /// Numbers separated by semicolons; none where the column or the field is empty.
+    /// Numbers separated by semicolons; empty if the column is missing or the field is empty.
     fn list(&self, record: &StringRecord, name: &str) -> Result<Vec<f64>, ImportError> {
         let Some(text) = self.text(record, name) else { return Ok(Vec::new()) };
         text.split(';').take(MAX_COMMON).map(|part| finite(part, record, name)).collect()
@@ -183,7 +183,7 @@ fn row(record: &StringRecord, columns: &Columns, table: TableText) -> Result<Row
     Ok(row)
 }
 
-/// A file of our own: lines and all columns as written.
+/// A file of `mapper`: lines and all columns as written.
 fn own(
     head: &Head,
     rows: &[(Row, StringRecord)],

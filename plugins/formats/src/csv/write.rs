@@ -2,7 +2,7 @@
 
 use mapper_core::{CompressorMap, ExportError, MapPoint, SpeedLine, Verdict, step_number};
 
-/// Column names, in order. An absent number is an empty field; `eta*` are fractions, 95 % intervals.
+/// Column names, in order. A missing number is an empty field; `eta*` are fractions, 95 % intervals.
 const COLUMNS: [&str; 28] = [
     "line_speed_corrected_rpm",
     "speed_corrected_rpm",

@@ -1,30 +1,30 @@
-//! What the heading above the rows says about their units.
+//! Units and order of the columns from the heading above the rows.
 
 use mapper_core::MAP_COLUMNS;
 use mapper_yaml::units::{FoundColumn, HeadingError, Kind, WantedColumn, find_columns};
 
-/// What the four columns measure.
+/// Physical quantities of the four columns.
 const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
 
-/// Where the four quantities stand in a row, and their units.
+/// Positions of the four quantities in a row, and their units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Columns([FoundColumn; 4]);
 
 impl Default for Columns {
-    /// As the format has it: corrected rpm, corrected kg/s, pressure ratio, efficiency.
+    /// The format's own: corrected rpm, corrected kg/s, pressure ratio, efficiency.
     fn default() -> Self {
         Columns(std::array::from_fn(|index| FoundColumn { index, unit: None }))
     }
 }
 
 impl Columns {
-    /// The quantities of a row, in the units used inside.
+    /// The quantities of a row, in internal units.
     pub(super) fn inside(&self, numbers: [f64; 4]) -> [f64; 4] {
         self.0.map(|column| numbers.get(column.index).map_or(f64::NAN, |value| column.inside(*value)))
     }
 
-    /// What a line of words says about the columns: the units of those that it names, and their order where it names all four.
-    /// A title that names none changes nothing. Of a comment only that counts which names all four.
+    /// Reads a heading: the units of the named columns, and the order if all four are named.
+    /// A title without column names changes nothing. A comment counts only if it names all four.
     pub(super) fn read(&mut self, line: &str, is_comment: bool) -> Result<(), HeadingError> {
         let fields = fields(line);
         let headings: Vec<&str> = fields.iter().map(String::as_str).collect();
@@ -57,7 +57,7 @@ impl Columns {
     }
 }
 
-/// Headings between blanks, commas and semicolons; a unit behind a blank belongs to the name before it.
+/// Headings between blanks, commas and semicolons; a unit after a blank belongs to the name before it.
 fn fields(line: &str) -> Vec<String> {
     let mut fields: Vec<String> = Vec::new();
     for word in

@@ -1,5 +1,5 @@
 //! A realistic map made from closed formulas (`docs/physics.md`, compressor map of turbo_a), independent of the
-//! physics crate: this crate may not see it.
+//! physics crate, which this crate may not depend on.
 
 use mapper_core::{
     CommonErrors, CompressorMap, EstimateUncertainty, IdentifiedPoint, MapPoint, Method, OperatingPoint,
@@ -25,7 +25,7 @@ pub fn closed_form(speed_corrected_rpm: f64, x: f64) -> (f64, f64, f64) {
     (flow, ratio, eta)
 }
 
-/// Eight speed lines of six points; the first point of all and one more are unusable, some are doubtful.
+/// Eight speed lines of six points; the first of all points and one more are unusable, some are doubtful.
 pub fn turbo_a() -> CompressorMap {
     let mut step = 0;
     let lines = (0..8)
@@ -60,7 +60,7 @@ pub fn turbo_a() -> CompressorMap {
 
 fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPoint {
     let (flow_kg_s, pressure_ratio, eta) = closed_form(speed_rpm, x);
-    // Slow lines are less sure, as small temperature rises are; a fixed pattern stands for chance.
+    // Slow lines are less accurate because of small temperature rises; a fixed pattern replaces random numbers.
     let standard_error = 0.0012 * (160_000.0 / speed_rpm).powi(2) * (1.0 + 0.5 * (step % 3) as f64);
     let eta = eta + standard_error * [0.6, -0.9, 0.2, 1.1, -0.4][step % 5];
     let (verdict, code) = match step {
@@ -113,7 +113,7 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
     MapPoint { flow_corrected_kg_s: flow_kg_s, pressure_ratio, eta, identified, shift: None }
 }
 
-/// [`turbo_a`] with a surface through it.
+/// [`turbo_a`] with a fitted surface.
 #[allow(dead_code)]
 pub fn fitted() -> CompressorMap {
     let options = mapper_assemble::MapFitOptions { leave_one_out: false, ..Default::default() };

@@ -1,4 +1,4 @@
-//! What a workbook would unpack to, before a library unpacks it without bounds.
+//! Checks the unpacked size of a workbook, since the library unpacks it without limits.
 
 use super::NAME;
 use mapper_logs::{LogError, LogFile};
@@ -8,31 +8,31 @@ use std::cell::Cell;
 use std::io::{self, BufReader, Read};
 use std::rc::Rc;
 
-/// Largest part of a workbook beside its sheets, unpacked, bytes: all of it is held in memory.
+/// Maximum unpacked size of a part other than a sheet, bytes: the library holds all of it in memory.
 const PART_LIMIT: u64 = 128 << 20;
 
-/// Largest part with the formats of cells, unpacked, bytes: each format holds copies of what it names.
+/// Maximum unpacked size of the part with cell formats, bytes: each format copies its strings.
 const STYLES_LIMIT: u64 = 8 << 20;
 
-/// All parts together, unpacked, bytes: a sheet of a million rows with 40 columns.
+/// Maximum unpacked size of all parts together, bytes: a sheet of a million rows with 40 columns.
 const WHOLE_LIMIT: u64 = 4 << 30;
 
-/// Most parts.
+/// Maximum number of parts.
 const PART_COUNT_LIMIT: usize = 10_000;
 
-/// Longest piece between two tags, or tag, bytes, and longest cell: Excel's own limit of a cell is 32 767 letters.
+/// Maximum length of a tag, of a piece between two tags and of a cell, bytes: Excel's own limit of a cell is 32 767 letters.
 const PIECE_LIMIT: u64 = 1 << 20;
 
-/// Longest tag among the formats of cells, bytes: Excel's own limit of a number format is 255 letters.
+/// Maximum length of a tag among the formats of cells, bytes: Excel's own limit of a number format is 255 letters.
 const STYLE_PIECE_LIMIT: u64 = 1 << 12;
 
-/// Elements within each other: a cell of rich text has ten.
+/// Maximum nesting of elements: a cell of rich text has ten levels.
 const DEPTH_LIMIT: usize = 64;
 
-/// Fewest bytes of a shared string, `<si/>`.
+/// Minimum size of a shared string in bytes, `<si/>`.
 const SHARED_STRING_BYTES: u64 = 5;
 
-/// Which parts are looked into: calamine bounds nothing in them.
+/// Kinds of parts that are checked: calamine limits none of them.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Sheet,
@@ -61,7 +61,7 @@ impl Kind {
     }
 }
 
-/// Refuses what would unpack to more than there is memory for.
+/// Refuses a workbook that would exceed the memory when unpacked.
 pub(super) fn check(file: &LogFile) -> Result<(), LogError> {
     let refused = |message: String| file.content(NAME, message);
     let wrong = |error: zip::result::ZipError| refused(error.to_string());
@@ -82,7 +82,7 @@ pub(super) fn check(file: &LogFile) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Bytes that a part unpacks to, or what is wrong with it.
+/// The unpacked size of a part in bytes, or its error.
 fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
     let limit = kind.limit().min(left);
     let read = Rc::new(Cell::new(0));
@@ -91,7 +91,7 @@ fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
     if kind == Kind::Other {
         io::copy(&mut counted, &mut io::sink()).map_err(|error| error.to_string())?;
     } else {
-        // What the buffer takes ahead belongs to no piece.
+        // Bytes read ahead by the buffer belong to no piece.
         let buffer = 1 << 13;
         let pieces = Pieces { kind, read: read.clone(), piece, buffer: buffer as u64 };
         let found = pieces.check(Reader::from_reader(BufReader::with_capacity(buffer, counted)));
@@ -105,11 +105,11 @@ fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
     Ok(read.get())
 }
 
-/// Counts what is read, and ends the reading where one piece is too long.
+/// Counts bytes, and stops reading if one piece is too long.
 struct Counted<R> {
     inner: R,
     read: Rc<Cell<u64>>,
-    /// How far a piece may reach, bytes from the start; 0 for no bound.
+    /// Maximum end of the current piece, bytes from the start; 0 for no limit.
     piece: Rc<Cell<u64>>,
 }
 
@@ -136,11 +136,11 @@ impl Pieces {
         let piece_limit = match self.kind {
             Kind::Sheet => PIECE_LIMIT,
             Kind::Styles => STYLE_PIECE_LIMIT,
-            // Shared strings are cut where they are used.
+            // Shared strings are truncated where they are used.
             Kind::SharedStrings | Kind::Other => PART_LIMIT,
         };
         let (mut buffer, mut depth) = (Vec::new(), 0usize);
-        // Depth of the cell that is being read: texts of several pieces become one there.
+        // Depth of the current cell: texts of several pieces are joined there.
         let mut cell: Option<usize> = None;
         let mut strings = 0;
         loop {
@@ -178,7 +178,7 @@ impl Pieces {
         Ok(())
     }
 
-    /// The largest number of shared strings that is declared: the library makes room for as many.
+    /// The maximum declared number of shared strings, which the library reserves memory for.
     fn declared_strings(&self, tag: &BytesStart<'_>, before: u64) -> Result<u64, String> {
         if self.kind != Kind::SharedStrings || tag.local_name().as_ref() != "sst" {
             return Ok(before);

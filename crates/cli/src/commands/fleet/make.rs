@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::fleet_place::on_this_machine;
-use crate::{output_options, output};
+use crate::{output, output_options};
 use clap::Args;
 use mapper_fleet::{Made, kind_of, open_study};
 use mapper_studies::program;

@@ -4,7 +4,7 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::channel_map;
 use crate::output::Replace;
-use crate::{output_options, output, registry};
+use crate::{output, output_options, registry};
 use clap::Args;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::Diagnosed;

@@ -3,7 +3,7 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::output::Replace;
-use crate::{interrupt, output_options, output, registry};
+use crate::{interrupt, output, output_options, registry};
 use clap::Args;
 use mapper_blind::calibrate::{Plan, calibrate};
 use mapper_blind::reliability::{calibrated_text, reliabilities};

@@ -1,7 +1,7 @@
 //! `mapper gap blind make`.
 
 use crate::failure::Failure;
-use crate::{output_options, output, registry};
+use crate::{output, output_options, registry};
 use clap::Args;
 use mapper_blind::{CaseKind, Draw, Laboratory, OutsideUse};
 use serde_json::json;

@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::{interrupt, output_options, output};
+use crate::{interrupt, output, output_options};
 use clap::Args;
 use mapper_blind::{MANIFEST_NAME, Manifest};
 use mapper_fleet::{Engine, cores};

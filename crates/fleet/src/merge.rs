@@ -19,8 +19,8 @@ impl Fleet {
     /// Merges all parts into `result`; with missing or failed parts only if `partial` is set. Only one part is in memory at a
     /// time. Two concurrent merges write the same bytes.
     ///
+    /// # Errors
     /// [`FleetError`] if a file cannot be written, or a part's result is not what the kind makes.
-    /// [`FleetError`] where a file cannot be written, or a part's result is not what the kind makes.
     pub fn merge(&self, kind: &dyn Kind, partial: bool, machine: &Machine<'_>) -> Result<Merged, FleetError> {
         let mut status = self.status();
         if status.lacking() > 0 && !partial {
@@ -42,7 +42,7 @@ impl Fleet {
             };
             (item.name.clone(), result)
         });
-        let said = kind.merge(&self.study.settings, &mut parts, &output);
+        let description = kind.merge(&self.study.settings, &mut parts, &output);
         drop(parts);
         // Content that was changed, which the first lines do not show.
         for lacking in spoilt.into_inner() {
@@ -53,8 +53,8 @@ impl Fleet {
             }
         }
         let whole = partial || status.lacking() == 0;
-        let said = match said {
-            Ok(said) if whole => said,
+        let description = match description {
+            Ok(description) if whole => description,
             other => {
                 let _ = std::fs::remove_dir_all(&new);
                 // Report damaged parts first: they may be why the merge failed.
@@ -68,7 +68,7 @@ impl Fleet {
         let installed = install(&new, &result);
         let _ = std::fs::remove_dir_all(&new);
         installed?;
-        Ok(Merged { status, result: Some((result, said)) })
+        Ok(Merged { status, result: Some((result, description)) })
     }
 }
 

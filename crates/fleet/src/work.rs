@@ -166,9 +166,9 @@ fn done(kind: &dyn Kind, item: &Item, stop: &AtomicBool) -> Result<String, WorkE
     })?;
     let work = |path: &Path| kind.work(&item.payload, At { scratch: path, stop });
     let result = catch_unwind(AssertUnwindSafe(|| work(scratch.path()))).unwrap_or_else(|panic| {
-        let said = panic.downcast_ref::<String>().map(String::as_str);
-        let said = said.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-        Err(WorkError::Failed(format!("the program is at fault, it panicked: {said}")))
+        let message = panic.downcast_ref::<String>().map(String::as_str);
+        let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        Err(WorkError::Failed(format!("the program is at fault, it panicked: {message}")))
     });
     match result {
         // Whatever it returns after a stop, it counts as stopped.

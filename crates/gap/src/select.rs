@@ -35,6 +35,8 @@ const HALVED: f64 = 0.5;
 
 /// What one more iteration may promise in the cost of a fit that is at its best: well below what any cause is named for.
 const UNFINISHED: f64 = 1.0;
+/// Linearisations of the tolerances at their fit: bounds the time. Judgement.
+const MAX_RELINEARISATIONS: usize = 3;
 
 const QUICK: Effort = Effort { iterations: 3, enough: 1.0, most_sigmas: 3.0 };
 const EFFORT: Effort = Effort { iterations: 6, enough: 0.3, most_sigmas: crate::fit::MAX_SIGMAS };
@@ -56,15 +58,18 @@ pub struct SearchResult {
 /// [`PredictError`] where the nominal model cannot follow the recording.
 pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<SearchResult, PredictError> {
     let Search { study, selection, .. } = search;
-    let first = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
-    // Tolerances that act otherwise at the fit than where they were linearised stop it short.
-    let short =
-        if first.promised > UNFINISHED { search.linearised.at(study, &first.hypothesis).ok() } else { None };
-    let linearised = short.as_ref().unwrap_or(search.linearised);
-    let null = match short {
-        Some(_) => fit(study, linearised, &first.hypothesis, selection, Effort::default())?,
-        None => first,
-    };
+    let mut null = fit(study, search.linearised, &study.nothing(), selection, Effort::default())?;
+    // Tolerances that act differently at the fit than where they were linearised stop it short.
+    let mut at_null = None;
+    for _ in 0..MAX_RELINEARISATIONS {
+        if null.promised < UNFINISHED {
+            break;
+        }
+        let Ok(there) = search.linearised.at(study, &null.hypothesis) else { break };
+        null = fit(study, &there, &null.hypothesis, selection, Effort::default())?;
+        at_null = Some(there);
+    }
+    let linearised = at_null.as_ref().unwrap_or(search.linearised);
     let search = Search { linearised, ..search };
     progress(0.15, "single effects");
     // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for an effect.
@@ -90,7 +95,7 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     progress(0.4, "several effects");
     extend(&search, &mut known, LIMITS);
     let fits = known.ranked(&search);
-    Ok(SearchResult { null, fits, refound: refound.or(short.map(|linearised| (linearised, Vec::new()))) })
+    Ok(SearchResult { null, fits, refound: refound.or(at_null.map(|linearised| (linearised, Vec::new()))) })
 }
 
 /// Adds sets with effects that begin with a step, for which the study has candidates by now.

@@ -155,7 +155,7 @@ impl Sink for RigSink<'_> {
     }
 
     fn read(&self, channel_id: u16, data: &[u8]) -> Option<SinkMessage> {
-        let told = match self.topics.get(&channel_id)? {
+        let content = match self.topics.get(&channel_id)? {
             Topic::Mapped(mapped, _) => {
                 let mut values = Vec::new();
                 read_fields(data, &mapped.fields, &mut values).then(|| {
@@ -173,12 +173,12 @@ impl Sink for RigSink<'_> {
                 serde_json::from_slice(data).map(|event| SinkMessage::Event(event, data.len())).ok()
             }
         };
-        Some(told.unwrap_or(SinkMessage::Damaged))
+        Some(content.unwrap_or(SinkMessage::Damaged))
     }
 
-    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: SinkMessage) {
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, content: SinkMessage) {
         let Some(topic) = self.topics.get(&channel_id) else { return };
-        match (told, topic) {
+        match (content, topic) {
             (SinkMessage::Samples(values), Topic::Mapped(_, builders)) => {
                 for (value, builder) in values.iter().zip(builders) {
                     let Some((_, builder)) = self.series.get_mut(*builder) else { continue };

@@ -12,7 +12,7 @@ pub(crate) trait Sink: Sync {
     /// Reads a message on a defined topic; `None` if the topic is not wanted. Several are read in parallel.
     fn read(&self, channel_id: u16, data: &[u8]) -> Option<Self::SinkMessage>;
     /// Receives the content of a message, in the order of the file.
-    fn take(&mut self, channel_id: u16, log_time_ns: u64, told: Self::SinkMessage);
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, content: Self::SinkMessage);
     /// A metadata record.
     fn metadata(&mut self, name: String, pairs: BTreeMap<String, String>);
     /// An attachment.

@@ -16,18 +16,18 @@ pub struct Doubt<'a> {
 /// All remarks on the points, in order of the first step of each. Sentences that differ only in their numbers are merged into one, with
 /// the range of each number. The exact sentence of a step is shown with its point.
 pub fn doubts<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Vec<Doubt<'a>> {
-    let mut said: Vec<DoubtText<'a>> = Vec::new();
+    let mut merged: Vec<DoubtText<'a>> = Vec::new();
     for point in points {
         let step = step_number(point.step);
         for warning in &point.warnings {
             let (code, pieces) = (warning.code.as_ref(), pieces(&warning.message));
-            match said.iter_mut().find(|known| known.code == code && are_alike(&known.pieces, &pieces)) {
+            match merged.iter_mut().find(|known| known.code == code && are_alike(&known.pieces, &pieces)) {
                 Some(known) => known.add(step, &pieces),
-                None => said.push(DoubtText { steps: vec![step], code, pieces }),
+                None => merged.push(DoubtText { steps: vec![step], code, pieces }),
             }
         }
     }
-    said.into_iter().map(DoubtText::doubt).collect()
+    merged.into_iter().map(DoubtText::doubt).collect()
 }
 
 /// A sentence in pieces, and the steps that it applies to.
@@ -163,30 +163,30 @@ mod tests {
     }
 
     /// The merged sentence of all steps.
-    fn said(sentences: &[&'static str]) -> Vec<String> {
-        let mut said: Vec<DoubtText<'_>> = Vec::new();
+    fn merged(sentences: &[&'static str]) -> Vec<String> {
+        let mut merged: Vec<DoubtText<'_>> = Vec::new();
         for (step, sentence) in sentences.iter().enumerate() {
             let pieces = pieces(sentence);
-            match said.iter_mut().find(|known| are_alike(&known.pieces, &pieces)) {
+            match merged.iter_mut().find(|known| are_alike(&known.pieces, &pieces)) {
                 Some(known) => known.add(step, &pieces),
-                None => said.push(DoubtText { steps: vec![step], code: "", pieces }),
+                None => merged.push(DoubtText { steps: vec![step], code: "", pieces }),
             }
         }
-        said.into_iter().map(|said| said.doubt().message).collect()
+        merged.into_iter().map(|merged| merged.doubt().message).collect()
     }
 
     #[test]
     fn sentences_that_differ_in_numbers_are_one_with_their_range() {
         let moved = ["T2 moves by -21.4 K, 95 % of it in 3 s", "T2 moves by +9.5 K, 95 % of it in 12 s"];
-        assert_eq!(said(&moved), ["T2 moves by -21.4 to +9.5 K, 95 % of it in 3 to 12 s"]);
-        assert_eq!(said(&["flow is 1.5.", "flow is 2."]), ["flow is 1.5 to 2."]);
+        assert_eq!(merged(&moved), ["T2 moves by -21.4 to +9.5 K, 95 % of it in 3 to 12 s"]);
+        assert_eq!(merged(&["flow is 1.5.", "flow is 2."]), ["flow is 1.5 to 2."]);
     }
 
     /// Names are not numbers: T2 is not T1, and 95krpm@1 is one place.
     #[test]
     fn names_keep_sentences_apart() {
         for pair in [["T1 is off", "T2 is off"], ["at 95krpm@1", "at 50krpm@1"], ["by µ 2K", "by µ 3K"]] {
-            assert_eq!(said(&pair), pair);
+            assert_eq!(merged(&pair), pair);
         }
     }
 }

@@ -16,8 +16,9 @@ const COLUMNS: usize = 80;
 pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units: &DisplayUnits) -> String {
     let display = Display::new(units);
     let table = markdown::table(&surge_heads(marks, &display), Align::Right, surge_rows(marks, &display));
-    let said: String = surge_remarks(remarks, surges).iter().map(|said| format!("\n{said}\n")).collect();
-    format!("{table}{said}")
+    let remarks_text: String =
+        surge_remarks(remarks, surges).iter().map(|remark| format!("\n{remark}\n")).collect();
+    format!("{table}{remarks_text}")
 }
 
 /// The number of surge events, and the lines without a mark, a sentence each.
@@ -81,8 +82,8 @@ pub fn surge_columns_text(
     if with_truth(marks) {
         text.push_str("off: from the simulator's truth.\n");
     }
-    for said in surge_remarks(remarks, surges) {
-        text.push_str(&wrapped(&said, COLUMNS, 2));
+    for remark in surge_remarks(remarks, surges) {
+        text.push_str(&wrapped(&remark, COLUMNS, 2));
     }
     text
 }

@@ -61,7 +61,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     for pair in &thermal.entangled {
         let _ = writeln!(
             text,
-            "  {} and {} can hardly be fitted apart (correlation {:+.2})",
+            "  {} and {} can hardly be told apart (correlation {:+.2})",
             pair.first, pair.second, pair.correlation
         );
     }
@@ -148,7 +148,7 @@ mod tests {
         assert!(!text.contains("before the wheel"), "nothing is said of what makes no difference: {text}");
         assert!(text.contains("the recording cannot tell"), "{text}");
         assert!(text.contains("flat: 0.0 to 0.2"), "{text}");
-        assert!(text.contains("alpha_A and direction factor can hardly be fitted apart"), "{text}");
+        assert!(text.contains("alpha_A and direction factor can hardly be told apart"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["alpha_area_profile"][3]["value"], 0.3);
         assert_eq!(json["entangled"][0]["correlation"], 0.97);

@@ -27,7 +27,9 @@ pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
     rule(&mut readings);
     let mut left =
         Panel::new(Axis::new("time, s"), Axis::new("read less predicted, K")).title("(b) what is left");
-    let off = |said: &[f64]| over(&mut course.read_k.iter().zip(said).map(|(read, said)| read - said));
+    let off = |predicted: &[f64]| {
+        over(&mut course.read_k.iter().zip(predicted).map(|(read, predicted)| read - predicted))
+    };
     left.add(Line::new(off(&course.before_k), palette::INK).label("without a cause"));
     left.add(Line::new(off(&course.after_k), palette::BLUE).label(named(found)));
     rule(&mut left);

@@ -27,9 +27,28 @@ const MAX_REACH: f64 = 3.0;
 /// Minimum start offset from neutral, as a share of a step: some effects have zero slope at neutral.
 const OFF_NEUTRAL: f64 = 0.1;
 
-/// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts. Effects
-/// with an onset are treated as if nothing before the onset changed and nothing persisted.
+/// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts.
 pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
+    of_kind(study, linearised, selection, base, false)
+}
+
+/// The same for the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
+pub(crate) fn onset_additions(
+    study: &Study,
+    linearised: &Linearised,
+    selection: &Selection,
+    base: &Fit,
+) -> Vec<Addition> {
+    of_kind(study, linearised, selection, base, true)
+}
+
+fn of_kind(
+    study: &Study,
+    linearised: &Linearised,
+    selection: &Selection,
+    base: &Fit,
+    onsets: bool,
+) -> Vec<Addition> {
     let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
         return Vec::new();
     };
@@ -44,7 +63,9 @@ pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, 
     let used: Vec<usize> = members(&base.hypothesis).iter().map(|member| study.family(*member)).collect();
     let effects: Vec<usize> = (0..study.catalogue).filter(|effect| !used.contains(effect)).collect();
     let found = parallel::map(&effects, |effect| match study.effects[*effect].info().parameters.as_slice() {
-        [parameter] => look.at_one(*effect, parameter),
+        [parameter] if onsets => look.with_onsets(*effect, parameter),
+        [parameter] => look.at_one(*effect, parameter).into_iter().collect(),
+        _ if onsets => Vec::new(),
         several => corners(several).into_iter().filter_map(|corner| look.at(*effect, corner)).collect(),
     });
     found.into_iter().flatten().collect()
@@ -90,30 +111,18 @@ impl FitNeighbourhood<'_> {
         Some(Addition { effect, gain, start: self.with(effect, values) })
     }
 
-    /// An effect with one parameter, throughout and with each possible onset.
-    fn at_one(&self, effect: usize, parameter: &EffectParameter) -> Vec<Addition> {
-        let step_to =
-            |by: f64| (parameter.neutral + by).clamp(parameter.low, parameter.high) - parameter.neutral;
-        let step = step_to(parameter.typical_step);
-        let looked = self.change(effect, vec![parameter.neutral + step]).map(|change| {
-            let products = self.products(&change);
-            (step, change, products)
-        });
-        let Some((mut step, mut change, mut products)) = looked else { return Vec::new() };
-        let opposite = step_to(-step);
-        // Linearise on the side that the gradient points to.
-        if products.1 < -OFF_NEUTRAL * products.0
-            && opposite != 0.0
-            && let Some(other) = self.change(effect, vec![parameter.neutral + opposite])
-        {
-            let of_other = self.products(&other);
-            if of_other.1 > 0.0 {
-                (step, change, products) = (opposite, other, of_other);
-            }
-        }
-        let mut found = vec![self.along(effect, parameter, step, products)];
+    /// An effect with one parameter.
+    fn at_one(&self, effect: usize, parameter: &EffectParameter) -> Option<Addition> {
+        let (step, _, products) = self.line(effect, parameter)?;
+        Some(self.along(effect, parameter, step, products))
+    }
+
+    /// The same effect from each onset.
+    fn with_onsets(&self, effect: usize, parameter: &EffectParameter) -> Vec<Addition> {
+        let Some((step, change, _)) = self.line(effect, parameter) else { return Vec::new() };
         let steps = self.rows.len();
         let mut masked = vec![0.0; change.len()];
+        let mut found = Vec::new();
         for late in self.study.onsets_of(effect) {
             let course = self.study.courses[late];
             for (step, rows) in self.rows.iter().enumerate() {
@@ -128,6 +137,26 @@ impl FitNeighbourhood<'_> {
             }
         }
         found
+    }
+
+    /// A step of the parameter to the side that the data suggest, with its change and products.
+    fn line(&self, effect: usize, parameter: &EffectParameter) -> Option<(f64, Vec<f64>, (f64, f64))> {
+        let step_to =
+            |by: f64| (parameter.neutral + by).clamp(parameter.low, parameter.high) - parameter.neutral;
+        let step = step_to(parameter.typical_step);
+        let change = self.change(effect, vec![parameter.neutral + step])?;
+        let products = self.products(&change);
+        let opposite = step_to(-step);
+        if products.1 < -OFF_NEUTRAL * products.0
+            && opposite != 0.0
+            && let Some(other) = self.change(effect, vec![parameter.neutral + opposite])
+        {
+            let of_other = self.products(&other);
+            if of_other.1 > 0.0 {
+                return Some((opposite, other, of_other));
+            }
+        }
+        Some((step, change, products))
     }
 
     /// The optimum along the line through a step.

@@ -1,6 +1,6 @@
 //! Which effects explain a recording best: the causes of [`mapper_inference::search`], fitted by runs of the model.
 
-use crate::additions::{Addition, additions};
+use crate::additions::{Addition, additions, onset_additions};
 use crate::calibration::Calibration;
 use crate::fit::{Effort, Fit, fit};
 use crate::selection::Selection;
@@ -157,10 +157,8 @@ impl Causes for Search<'_> {
                 start: (addition.start, EFFORT),
             }
         };
-        let asked =
-            |addition: &Addition| self.onsets == self.study.courses[addition.effect].onset().is_some();
-        let additions = additions(self.study, self.linearised, self.selection, base);
-        additions.into_iter().filter(asked).map(offer).collect()
+        let look = if self.onsets { onset_additions } else { additions };
+        look(self.study, self.linearised, self.selection, base).into_iter().map(offer).collect()
     }
 
     fn without(&self, fit: &Fit, cause: usize) -> Start {

@@ -410,7 +410,7 @@ fn a_driver_that_is_started_by_hand_says_what_it_is() {
         build_driver(&file);
         // However wide its lines are.
         let help = said(&file, &["--help"]).exits(0).stdout.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(help.contains("`mapper` starts it") && help.contains("docs/"), "{help}");
+        assert!(help.contains("`mapper` starts") && help.contains("docs/"), "{help}");
         let version = said(&file, &["--version"]).exits(0).stdout;
         assert_eq!(version.trim(), format!("{file} {}", env!("CARGO_PKG_VERSION")));
         let wrong = said(&file, &["--hlep"]).exits(2);

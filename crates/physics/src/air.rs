@@ -46,7 +46,7 @@ pub fn isentropic_exponent(temperature_k: f64) -> f64 {
     GAS_CONSTANT_J_KGK / heat_capacity_j_kgk(temperature_k)
 }
 
-/// Air in the cell, a perfect gas: viscosity and conductivity are those of dry air (40 g/kg change them by 1 %).
+/// Air in the cell, a perfect gas: viscosity and conductivity are those of dry air (40 g/kg lower them by 2.5 % and 1 %).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Air {
     /// Water per dry air, kg/kg, 0 to about 0.06.

@@ -47,6 +47,7 @@ pub fn assemble(
         machine: machine.to_owned(),
         reference,
         method,
+        efficiency: None,
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -9,6 +9,7 @@
 
 mod assemble;
 mod compare;
+mod efficiency;
 mod error;
 mod grouping;
 mod heat_correction;
@@ -18,6 +19,7 @@ mod repeats;
 
 pub use assemble::assemble;
 pub use compare::{ComparedLine, ComparedPlace, MapComparison, compare};
+pub use efficiency::convert_efficiency;
 pub use error::AssembleError;
 pub use grouping::Grouping;
 pub use heat_correction::{CorrectedLine, HeatCorrection, HeatCorrectionError, correct_for_heat};

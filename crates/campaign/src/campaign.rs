@@ -4,6 +4,7 @@
 use crate::elements::backend::backend;
 use crate::elements::boundary::BoundaryFile;
 use crate::elements::drift::DriftFile;
+use crate::elements::efficiency::EfficiencyFile;
 use crate::elements::grid::GridFile;
 use crate::elements::guards::{GuardedBy, GuardsFile};
 use crate::elements::identification::IdentificationFile;
@@ -206,6 +207,9 @@ pub(crate) struct CampaignFile {
     /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE if none is given.
     #[schemars(example = &"SAE")]
     reference: Option<ReferenceFile>,
+    /// Definition of the isentropic efficiency, of the nominal map and of the results: `enthalpy`, the default, is the ratio of the rises of specific enthalpy; `kappa_of_T1` takes temperatures with the heat capacity at T1 (Burke et al., eq. 2), `constant_gamma` with a ratio of heat capacities of your own.
+    #[schemars(example = &"enthalpy")]
+    efficiency: Option<EfficiencyFile>,
     /// Formats and directory of the results.
     #[serde(default)]
     outputs: Outputs,
@@ -246,6 +250,7 @@ impl CampaignFile {
             speed_is_held: speed_control.is_some(),
         };
         let guards = self.guards.map(|guards| guards.guards(&by));
+        machine.params.compressor.efficiency = self.efficiency.map(Into::into).unwrap_or_default();
         machine.params.compressor.humidity_kg_kg = self.report.air(&boundary).humidity_kg_kg;
         let campaign = Campaign {
             name: self.campaign,

@@ -4,7 +4,7 @@
 
 use mapper_campaign::campaign::MapSource;
 use mapper_campaign::{CampaignError, load};
-use mapper_core::{Channel, Dwell, ReferenceState, VisitOrder, WindowRule};
+use mapper_core::{Channel, Dwell, EfficiencyDefinition, ReferenceState, VisitOrder, WindowRule};
 use mapper_physics::params::{BoundaryConditions, Params};
 use std::path::{Path, PathBuf};
 
@@ -31,9 +31,11 @@ fn every_shipped_campaign_is_right() {
 fn turbo_a_is_the_machine_of_appendix_a() {
     let campaign = load(&directory().join("turbo_a.yaml")).unwrap();
     let mut params = campaign.machine.params;
-    // The campaign is run at 50 % of humidity, Appendix A's machine in dry air.
+    // The campaign is run at 50 % of humidity with efficiencies by enthalpy, Appendix A's machine in dry air with those of eq. 2.
     assert!((params.compressor.humidity_kg_kg - 0.01).abs() < 1e-3);
     params.compressor.humidity_kg_kg = 0.0;
+    assert_eq!(params.compressor.efficiency, EfficiencyDefinition::Enthalpy);
+    params.compressor.efficiency = EfficiencyDefinition::KappaOfT1;
     assert_eq!(params, Params::default());
     assert_eq!(campaign.boundary, BoundaryConditions::default());
     assert_eq!(campaign.machine.map, MapSource::ClosedForm);

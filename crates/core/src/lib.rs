@@ -14,6 +14,7 @@ mod channel;
 mod clock;
 mod common_errors;
 mod declared_uncertainty;
+mod efficiency_definition;
 mod event;
 mod fitted_map;
 mod guard;
@@ -59,6 +60,7 @@ pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChann
 pub use clock::{Clock, PacedClock, UnpacedClock, Wall};
 pub use common_errors::CommonErrors;
 pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
+pub use efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
 pub use event::{Event, EventKind};
 pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
 pub use guard::{

@@ -1,6 +1,6 @@
 //! The result: a compressor map in corrected quantities.
 
-use crate::{FittedMap, IdentifiedPoint, Method, ReferenceState, SurgeMark};
+use crate::{EfficiencyDefinition, FittedMap, IdentifiedPoint, Method, ReferenceState, SurgeMark};
 use serde::{Deserialize, Serialize};
 
 /// One measured point of the map, converted to corrected quantities.
@@ -53,6 +53,9 @@ pub struct CompressorMap {
     pub reference: ReferenceState,
     /// How the points were identified.
     pub method: Method,
+    /// Definition of the efficiencies; `None` if a map file does not name it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub efficiency: Option<EfficiencyDefinition>,
     /// Speed lines in order of speed.
     pub lines: Vec<SpeedLine>,
     /// Measured surge-side ends, in order of speed; empty if none were measured.

@@ -6,6 +6,7 @@ use crate::parameters::{COUNT, PARAMETERS, Parameter};
 use crate::{Declared, DrivenError, Predicted, Readings, Values, predict};
 use mapper_numerics::statistics::{mean, quantile, rms};
 use mapper_physics::air::Air;
+use mapper_physics::compression::apparent_efficiency;
 use mapper_physics::params::Params;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -128,7 +129,7 @@ pub fn identify(
     let predicted: Vec<Predicted> =
         sample.iter().map(|values| predict(rows, &declared, values, rows.len())).collect();
     let noisy = with_noise(&sample, &predicted, rows, seed);
-    let trace = trace(rows, &predicted, &noisy);
+    let trace = trace(params.compressor.air(), rows, &predicted, &noisy);
     let judged = |from: usize, until: usize| judged(rows, &trace, &noisy, from, until);
     let without = |name: &str| moves(&sample, &predicted, rows, &declared, fitted, name);
     Ok(DrivenOutcome {
@@ -181,17 +182,14 @@ fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Readings, seed:
         .collect()
 }
 
-fn trace(rows: &Readings, predicted: &[Predicted], noisy: &[Vec<f64>]) -> Trace {
+fn trace(air: Air, rows: &Readings, predicted: &[Predicted], noisy: &[Vec<f64>]) -> Trace {
     let over = |i: usize, pick: &dyn Fn(&Predicted) -> &[f64]| {
         mean(predicted.iter().map(|one| pick(one)[i])).unwrap_or(f64::NAN)
     };
     let end = |i: usize, share: f64| quantile(noisy.iter().map(|one| one[i]), share).unwrap_or(f64::NAN);
     let every = || 0..rows.len();
-    let apparent = |i: usize| {
-        let (t1_k, ratio) = (rows.t1_k[i], rows.p2_pa[i] / rows.p1_pa[i]);
-        t1_k * mapper_physics::compression::isentropic_rise_ratio(ratio, t1_k, Air::DRY)
-            / (rows.t2_k[i] - t1_k)
-    };
+    let apparent =
+        |i: usize| apparent_efficiency(rows.p2_pa[i] / rows.p1_pa[i], rows.t1_k[i], rows.t2_k[i], air);
     Trace {
         t_s: rows.t_s.clone(),
         read_k: rows.t2_k.clone(),

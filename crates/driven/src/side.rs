@@ -1,7 +1,7 @@
 //! Compressor side driven by its measured neighbours: eqs. 1-3, one housing node, and the probe.
 
 use crate::{Readings, Values};
-use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_ratio};
+use mapper_physics::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
 use mapper_physics::housing::compressor_capacity_j_k;
 use mapper_physics::params::Params;
 use mapper_physics::{nusselt, thermocouple};
@@ -90,7 +90,7 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
                 compressor.nusselt_exponent,
                 compressor.outlet_diameter_m,
                 flow_kg_s,
-                t1_k * (1.0 + rise / efficiency),
+                compressed_k(t1_k, rise, efficiency, compressor.air()),
                 tc_k,
             );
         let gas = compress(

@@ -13,6 +13,35 @@ static double largest(double a, double b) { return a > b ? a : b; }
 /* ---- air ---- */
 
 static double heat_capacity(double t_k) { return 1002.5 + 275e-6 * (t_k - 200.0) * (t_k - 200.0); }
+
+/* Of dry air between two temperatures, J/(kg K). */
+static double mean_heat_capacity(double from_k, double to_k) {
+    const double a = from_k - 200.0, b = to_k - 200.0;
+    return 1002.5 + 275e-6 / 3.0 * (a * a + a * b + b * b);
+}
+
+/* After a rise of the enthalpy of dry air by `rise` J/kg, K: Newton's method. */
+static double heated_k(double from_k, double rise) {
+    double to_k = from_k + rise / heat_capacity(from_k);
+    int i;
+    for (i = 0; i < 2; i++) to_k += (rise - mean_heat_capacity(from_k, to_k) * (to_k - from_k)) / heat_capacity(to_k);
+    return to_k;
+}
+
+/* After isentropic compression, K; `gas` is the gas constant over the moist ratio of heat capacities. */
+static double isentropic_k(double from_k, double pressure_ratio, double gas) {
+    const double ln_pressure = log(pressure_ratio);
+    double ln_ratio = gas / heat_capacity(from_k) * ln_pressure, to_k = from_k * exp(ln_ratio);
+    int i;
+    for (i = 0; i < 2; i++) {
+        const double entropy = (1002.5 + 275e-6 * 200.0 * 200.0) * ln_ratio
+                               + 275e-6 * (to_k - from_k) * (0.5 * (to_k + from_k) - 400.0);
+        const double step = (gas * ln_pressure - entropy) / heat_capacity(to_k);
+        ln_ratio += step;
+        to_k *= 1.0 + step * (1.0 + step * (0.5 + step / 6.0));
+    }
+    return to_k;
+}
 static double viscosity(double t_k) { return 1.458e-6 * t_k * sqrt(t_k) / (t_k + 110.4); }
 static double conductivity(double t_k) { return 0.02624 * pow(t_k / 300.0, 0.8646); }
 
@@ -87,14 +116,20 @@ static double probe_time_constant(double tip_m, double pipe_m, double flow_kg_s,
 static double outputs(double *r, const int *switches, const double *y, double *valve_kg_s, double *inner_heat_w) {
     const double t1_k = r[VR_T1], p1_pa = r[VR_P1];
     const double humidity = r[VR_compressor_humidity];
-    const double moist_cp = 1.0 + 0.84 * humidity, gas = GAS_CONSTANT * (1.0 + 0.6078 * humidity);
+    const double vapour = humidity / (1.0 + humidity);
+    const double moist_cp = 1.0 + 0.865 * vapour, gas = GAS_CONSTANT * (1.0 + (1.0 / 0.62198 - 1.0) * vapour);
     const double moist_flow = sqrt(GAS_CONSTANT / gas);
     const double cp1 = moist_cp * heat_capacity(t1_k);
     const double pressure_ratio = y[OUTLET] / p1_pa;
     const int inner = r[VR_compressor_inner_capacity_ratio] > 0.0;
     const double wall_k = inner ? y[INNER_WALL] : y[COMPRESSOR_HOUSING];
     const double speed_rpm = y[SPEED] * 30.0 / PI;
-    const double rise = pow(pressure_ratio, gas / cp1) - 1.0;
+    const double gamma = r[VR_compressor_efficiency_gamma];
+    const int by_enthalpy = switches[SW_compressor_efficiency_by_enthalpy] && gamma <= 0.0;
+    const double rise = by_enthalpy
+                        ? mean_heat_capacity(t1_k, isentropic_k(t1_k, pressure_ratio, gas / moist_cp))
+                              / heat_capacity(t1_k) * (isentropic_k(t1_k, pressure_ratio, gas / moist_cp) / t1_k - 1.0)
+                        : pow(pressure_ratio, gamma > 0.0 ? (gamma - 1.0) / gamma : gas / cp1) - 1.0;
     const double circle = r[VR_compressor_recirculation_ratio];
     const double pipe_m = r[VR_compressor_outlet_diameter];
     MapPoint point = map_at(r[VR_compressor_wheel_diameter], speed_rpm * sqrt(MAP_T_REF_K / t1_k), pressure_ratio,
@@ -102,11 +137,12 @@ static double outputs(double *r, const int *switches, const double *y, double *v
     const double flow = largest(point.flow_kg_s * (p1_pa / MAP_P_REF_PA) / sqrt(t1_k / MAP_T_REF_K) * moist_flow / (1.0 + circle),
                                 LOWEST_FLOW_KG_S);
     const double efficiency = point.efficiency * r[VR_compressor_efficiency_scale];
-    const double bulk_k = t1_k * (1.0 + rise / efficiency);
+    const double warm_k = t1_k * (1.0 + rise / efficiency);
+    const double bulk_k = by_enthalpy ? heated_k(t1_k, heat_capacity(t1_k) * (warm_k - t1_k)) : warm_k;
     const double h = convection(r[VR_compressor_nusselt_coefficient], r[VR_compressor_nusselt_exponent], pipe_m, flow, bulk_k, wall_k)
                      * cbrt(moist_cp);
     const double conductance = h * r[VR_compressor_internal_area], alpha = r[VR_compressor_alpha_area];
-    double before_w_k, after_w_k, q1_w, units, target_k;
+    double before_w_k, after_w_k, q1_w, units, target_k, equivalent_k;
 
     before_w_k = conductance * (wall_k > t1_k ? r[VR_compressor_hot_metal_h_ratio] : 1.0) * r[VR_compressor_inlet_h_ratio];
     if (switches[SW_compressor_own_inlet_convection]) {
@@ -117,7 +153,8 @@ static double outputs(double *r, const int *switches, const double *y, double *v
     before_w_k = before_w_k * alpha + r[VR_compressor_inlet_conductance];
     q1_w = before_w_k * (t1_k - wall_k);
     r[VR_T1_prime] = t1_k - q1_w / (flow * cp1);
-    r[VR_T2_prime] = r[VR_T1_prime] * (1.0 + rise / efficiency) / largest(1.0 - circle * rise / efficiency, 0.1);
+    equivalent_k = r[VR_T1_prime] * (1.0 + rise / efficiency) / largest(1.0 - circle * rise / efficiency, 0.1);
+    r[VR_T2_prime] = by_enthalpy ? heated_k(r[VR_T1_prime], heat_capacity(t1_k) * (equivalent_k - r[VR_T1_prime])) : equivalent_k;
     after_w_k = conductance * (wall_k > r[VR_T2_prime] ? r[VR_compressor_hot_metal_h_ratio] : 1.0) * (1.0 - alpha);
     units = after_w_k / (flow * moist_cp * heat_capacity(bulk_k));
     r[VR_T2] = (r[VR_T2_prime] + units * wall_k) / (1.0 + units);
@@ -134,7 +171,8 @@ static double outputs(double *r, const int *switches, const double *y, double *v
     r[VR_eta] = efficiency;
     r[VR_h] = h;
     r[VR_q_c] = q1_w + after_w_k * (r[VR_T2] - wall_k);
-    r[VR_W_c] = flow * cp1 * (r[VR_T2_prime] - r[VR_T1_prime]);
+    r[VR_W_c] = gamma > 0.0 ? flow * moist_cp * mean_heat_capacity(r[VR_T1_prime], equivalent_k) * (equivalent_k - r[VR_T1_prime])
+                            : flow * cp1 * (equivalent_k - r[VR_T1_prime]);
     turbine(r, y[TURBINE_HOUSING], y[SPEED]);
 
     target_k = r[VR_T2] + r[VR_probe_stem_ratio] * (y[COMPRESSOR_HOUSING] - r[VR_T2]);

@@ -2,7 +2,7 @@
 
 use crate::machine::{FmuMachine, FmuMap};
 use crate::variable::{Causality, Switch, Variable};
-use mapper_core::InletConvection;
+use mapper_core::{EfficiencyDefinition, InletConvection};
 
 /// The real variables of a machine.
 #[rustfmt::skip]
@@ -13,6 +13,7 @@ pub fn variables(machine: &FmuMachine<'_>) -> Vec<Variable> {
         FmuMap::ClosedForm(map) => map.wheel_diameter_m,
         FmuMap::Table(_) => c.wheel_diameter_m,
     };
+    let gamma = if let EfficiencyDefinition::ConstantGamma(gamma) = c.efficiency { gamma } else { 0.0 };
     let parameter = |name, value, unit, description| Variable { name, causality: Causality::Parameter, unit, start: Some(value), description };
     let input = |name, value, unit, description| Variable { name, causality: Causality::Input, unit, start: Some(value), description };
     let output = |name, unit, description| Variable { name, causality: Causality::Output, unit, start: None, description };
@@ -39,6 +40,7 @@ pub fn variables(machine: &FmuMachine<'_>) -> Vec<Variable> {
         parameter("compressor.flow_scale", c.flow_scale_ratio, "1", "multiplies the map's flow"),
         parameter("compressor.recirculation_ratio", c.recirculation_ratio, "1", "part of the flow that comes back to the wheel's inlet"),
         parameter("compressor.humidity", c.humidity_kg_kg, "1", "water per dry air"),
+        parameter("compressor.efficiency_gamma", gamma, "1", "ratio of heat capacities of the efficiency's definition; 0: see compressor.efficiency_by_enthalpy"),
         parameter("compressor.inner_capacity_ratio", c.inner_capacity_ratio, "1", "part of the housing's capacity that is an inner wall; 0: one node"),
         parameter("compressor.inner_conductance", c.inner_conductance_w_k, "W/K", "between the inner wall and the rest"),
         parameter("turbine.internal_area", t.internal_area_m2, "m2", "internal area that exchanges heat with the gas"),
@@ -104,7 +106,7 @@ pub fn variables(machine: &FmuMachine<'_>) -> Vec<Variable> {
 }
 
 /// The boolean parameters of a machine.
-pub fn switches(machine: &FmuMachine<'_>) -> [Switch; 2] {
+pub fn switches(machine: &FmuMachine<'_>) -> [Switch; 3] {
     [
         Switch {
             name: "driven",
@@ -115,6 +117,11 @@ pub fn switches(machine: &FmuMachine<'_>) -> [Switch; 2] {
             name: "compressor.own_inlet_convection",
             start: machine.params.compressor.inlet_convection == InletConvection::Own,
             description: "h before the wheel follows the law with the inlet's own diameter and gas",
+        },
+        Switch {
+            name: "compressor.efficiency_by_enthalpy",
+            start: machine.params.compressor.efficiency == EfficiencyDefinition::Enthalpy,
+            description: "the efficiency is the ratio of enthalpy rises; otherwise that of temperature rises, with cp(T1) or a constant gamma",
         },
     ]
 }

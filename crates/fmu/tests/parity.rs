@@ -1,7 +1,7 @@
 //! The C sources, compiled as they are shipped, against the model that they were written from.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_core::{InletConvection, ReferenceState};
+use mapper_core::{EfficiencyDefinition, InletConvection, ReferenceState};
 use mapper_fmu::{FmuMachine, FmuMap, files};
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::ClosedFormMap;
@@ -158,6 +158,7 @@ fn odd() -> Params {
     compressor.flow_scale_ratio = 1.04;
     compressor.recirculation_ratio = 0.02;
     compressor.humidity_kg_kg = 0.012;
+    compressor.efficiency = EfficiencyDefinition::Enthalpy;
     compressor.inner_capacity_ratio = 0.3;
     params.t2_probe_diameter_m = 1.5e-3;
     params.t2_probe_stem_ratio = 0.03;
@@ -194,6 +195,9 @@ fn the_nominal_machine() {
 #[test]
 fn a_machine_with_everything() {
     agree(&odd(), &FmuMap::ClosedForm(CLOSED_FORM), &boundary(), start());
+    let mut constant_gamma = odd();
+    constant_gamma.compressor.efficiency = EfficiencyDefinition::ConstantGamma(1.395);
+    agree(&constant_gamma, &FmuMap::ClosedForm(CLOSED_FORM), &boundary(), start());
 }
 
 #[test]

@@ -67,7 +67,7 @@ impl Default for IdentifyConfig {
             probe_diameter_m: 0.0,
             joint: JointSettings::default(),
             reference: ReferenceState::SAE,
-            air: Air::DRY,
+            air: Air::PAPER,
             humidity_sigma_kg_kg: 0.0,
             inlet_tap: PressureTap::Total,
             outlet_tap: PressureTap::Total,

@@ -50,7 +50,7 @@ impl Geometry {
 
     /// Ratio of h before the wheel to h after it.
     fn inlet_h_ratio(&self, row: Row, eta: f64) -> f64 {
-        let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta);
+        let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta, self.air);
         self.inlet.map_or(1.0, |law| law.h_ratio(row.t1_k, bulk_k()))
     }
 }

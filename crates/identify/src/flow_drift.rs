@@ -40,7 +40,7 @@ pub(crate) fn flow_drift(fit: &Fit, samples: &Samples, end_s: f64) -> Option<Flo
 
 /// The correlation's h of a sample: gas properties at the temperature after adiabatic compression, wall viscosity at the housing temperature.
 fn relative_h(fit: &Fit, samples: &Samples, compressor: &CompressorParams, i: usize) -> f64 {
-    let bulk_k = compressed_k(samples.t1_k[i], samples.rise_ratio[i], fit.eta);
+    let bulk_k = compressed_k(samples.t1_k[i], samples.rise_ratio[i], fit.eta, compressor.air());
     coefficient_w_m2k(
         compressor.nusselt_coefficient,
         compressor.nusselt_exponent,

@@ -12,7 +12,7 @@ use crate::{IdentifyConfig, width};
 use mapper_core::{Channel, EstimateUncertainty, Recording, Window};
 use mapper_numerics::statistics::{mean, standard_deviation};
 use mapper_physics::air::Air;
-use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::compression::apparent_efficiency;
 use mapper_physics::thermocouple::time_constant_s;
 
 /// Segment at the end of a step in which temperatures must not drift, s: with noise of 0.1 K its slope is then known to better than 0.1 K/min.
@@ -29,10 +29,8 @@ pub(crate) struct Means {
 }
 
 impl Means {
-    /// `T1 (PR^kappa - 1)/(T2 - T1)` with `kappa = R/cp(T1)`.
     pub(crate) fn apparent_eta(&self) -> f64 {
-        self.t1_k * isentropic_rise_ratio(self.p2_pa / self.p1_pa, self.t1_k, self.air)
-            / (self.t2_k - self.t1_k)
+        apparent_efficiency(self.p2_pa / self.p1_pa, self.t1_k, self.t2_k, self.air)
     }
 
     fn moved(self, channel: Channel, by: f64) -> Self {

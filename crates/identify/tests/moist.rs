@@ -25,8 +25,9 @@ fn joint(air: Air, humidity_sigma_kg_kg: f64) -> IdentifyConfig {
 fn declared_humidity_gives_the_points_of_the_model() {
     let clean =
         campaign(&eighteen(), 120.0, Machine { humidity_kg_kg: HUMIDITY_KG_KG, ..Machine::default() });
-    let known = identify(&clean.recording, &joint(Air { humidity_kg_kg: HUMIDITY_KG_KG }, 0.0)).unwrap();
-    let dry = identify(&clean.recording, &joint(Air::DRY, 0.0)).unwrap();
+    let known = identify(&clean.recording, &joint(Air { humidity_kg_kg: HUMIDITY_KG_KG, ..Air::PAPER }, 0.0))
+        .unwrap();
+    let dry = identify(&clean.recording, &joint(Air::PAPER, 0.0)).unwrap();
     let mut wrong = 0;
     for ((known, dry), truth) in known.iter().zip(&dry).zip(&clean.truth) {
         assert!((known.eta.unwrap() - truth.eta).abs() < 3e-4, "eta {:?} {}", known.eta, truth.eta);
@@ -51,7 +52,7 @@ fn unknown_humidity_is_in_the_intervals() {
         let mut rng = Pcg64::seed_from_u64(seed);
         let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut rng);
         let points = |sigma_kg_kg: f64| {
-            let config = IdentifyConfig { declared: declared.clone(), ..joint(Air::DRY, sigma_kg_kg) };
+            let config = IdentifyConfig { declared: declared.clone(), ..joint(Air::PAPER, sigma_kg_kg) };
             identify(&recording, &config).unwrap()
         };
         // Saturated air has 20 g/kg.

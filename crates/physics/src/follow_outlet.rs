@@ -77,7 +77,7 @@ mod tests {
         let error = |held: &SteadyState| {
             let outputs = &held.outputs;
             let rise =
-                crate::compression::isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::DRY);
+                crate::compression::isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::PAPER);
             (boundary.t1_k * rise / (outputs.t2_k - boundary.t1_k) - outputs.efficiency).abs()
         };
         for speed_rpm in [50e3, 80e3] {

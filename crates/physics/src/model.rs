@@ -8,7 +8,6 @@ use crate::compression;
 use crate::hooks::{HookList, Hooks, Site};
 pub use crate::outputs::{Added, Outputs};
 use crate::params::Params;
-use crate::power::power;
 use crate::state::MAX_STATES;
 pub use crate::state::{State, rad_s_of_rpm};
 use crate::turbine::TurbineInlet;
@@ -41,7 +40,7 @@ pub struct PreparedModel<'a> {
     speed_correction_ratio: f64,
     /// Physical over corrected flow.
     flow_correction_ratio: f64,
-    kappa1: f64,
+    air: air::Air,
     cp1_j_kgk: f64,
     /// Heat capacity of the compressor's air over that of dry air.
     moist_cp_ratio: f64,
@@ -98,7 +97,7 @@ impl Model {
             flow_correction_ratio: reference.physical_flow_kg_s(1.0, boundary.t1_k, boundary.p1_pa)
                 * moist_flow_ratio
                 / (1.0 + self.params.compressor.recirculation_ratio),
-            kappa1: gas_constant_j_kgk / cp1_j_kgk,
+            air,
             cp1_j_kgk,
             moist_cp_ratio,
             gas_constant_j_kgk,
@@ -169,9 +168,10 @@ impl PreparedModel<'_> {
             site.efficiency = efficiency;
         }
 
-        let isentropic_rise_ratio = power(pressure_ratio, self.kappa1) - 1.0;
+        let isentropic_rise_ratio =
+            compression::isentropic_rise_ratio(pressure_ratio, boundary.t1_k, self.air);
         // Bulk temperature of the properties: compression from T1 without heat transfer.
-        let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, efficiency);
+        let bulk_k = compression::compressed_k(boundary.t1_k, isentropic_rise_ratio, efficiency, self.air);
         let mut h_w_m2k = nusselt::coefficient_w_m2k(
             compressor.nusselt_coefficient,
             compressor.nusselt_exponent,
@@ -202,13 +202,15 @@ impl PreparedModel<'_> {
             t1_prime_k = hooks.fold(&site, t1_prime_k, |hook, site, value| hook.gas_before_k(site, value));
             site.t1_prime_k = t1_prime_k;
         }
-        let mut t2_prime_k = compression::behind_wheel_k(
-            t1_prime_k,
+        let wheel = compression::Wheel {
+            t1_k: boundary.t1_k,
             isentropic_rise_ratio,
             efficiency,
-            compressor.recirculation_ratio,
-        );
-        let compressor_power_w = flow_kg_s * self.cp1_j_kgk * (t2_prime_k - t1_prime_k);
+            recirculation_ratio: compressor.recirculation_ratio,
+            air: self.air,
+        };
+        let (mut t2_prime_k, work_j_kg) = wheel.compress(t1_prime_k);
+        let compressor_power_w = flow_kg_s * work_j_kg;
         if HOOKED {
             t2_prime_k = hooks.fold(&site, t2_prime_k, |hook, site, value| hook.gas_after_k(site, value));
             site.t2_prime_k = t2_prime_k;

@@ -2,7 +2,7 @@
 
 use crate::air::Air;
 pub use crate::boundary::BoundaryConditions;
-use mapper_core::{InletConvection, ReferenceState};
+use mapper_core::{EfficiencyDefinition, InletConvection, ReferenceState};
 use serde::{Deserialize, Serialize};
 
 /// The machine: geometry, masses, conductances, probe. Effects and fits change these parameters, never the equations.
@@ -77,6 +77,9 @@ pub struct CompressorParams {
     pub recirculation_ratio: f64,
     /// Water in the air of the compressor side, kg per kg of dry air, >= 0; 0.
     pub humidity_kg_kg: f64,
+    /// Definition of the map's efficiency, and of every efficiency of this model; the paper's if it is left out.
+    #[serde(default = "paper")]
+    pub efficiency: EfficiencyDefinition,
     /// Fraction phi of the housing's heat capacity that touches the gas and has its own temperature, 0..1; 0 is one node.
     pub inner_capacity_ratio: f64,
     /// Conductance G between that inner wall and the rest, W/K, > 0; not used if the housing is one node.
@@ -137,10 +140,15 @@ pub struct OutletParams {
     pub discharge_coefficient: f64,
 }
 
+/// Eq. 2 of the paper.
+fn paper() -> EfficiencyDefinition {
+    EfficiencyDefinition::KappaOfT1
+}
+
 impl CompressorParams {
     /// The air that is compressed.
     pub fn air(&self) -> Air {
-        Air { humidity_kg_kg: self.humidity_kg_kg }
+        Air { humidity_kg_kg: self.humidity_kg_kg, efficiency: self.efficiency }
     }
 }
 
@@ -166,6 +174,7 @@ impl Default for Params {
                 flow_scale_ratio: 1.0,
                 recirculation_ratio: 0.0,
                 humidity_kg_kg: 0.0,
+                efficiency: paper(),
                 inner_capacity_ratio: 0.0,
                 inner_conductance_w_k: 20.0,
             },

@@ -19,7 +19,8 @@ use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
-    Channel, CompressorMap, DeclaredUncertainty, Event, Method, Plan, Recording, ReferenceState,
+    Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, Recording,
+    ReferenceState,
 };
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
@@ -53,6 +54,8 @@ pub struct RunReport<'a> {
     pub remarks: &'a [String],
     /// Reference state of corrected quantities.
     pub reference: ReferenceState,
+    /// Definition of the efficiencies.
+    pub efficiency: EfficiencyDefinition,
     /// How the points were identified.
     pub method: Method,
     /// Declared share of the internal area before compression.
@@ -233,7 +236,18 @@ pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
         rig.push_str(" (simulated)");
     }
     rows.push(("reference state of corrected quantities", report.reference.to_string()));
+    rows.push(("definition of efficiency", report.efficiency.description()));
+    rows.extend(report.campaign.map(|campaign| ("gas", gas(campaign))));
     rows
+}
+
+/// The compressed gas, with its humidity.
+fn gas(campaign: &Campaign) -> String {
+    let water_g_kg = 1e3 * campaign.machine.params.compressor.humidity_kg_kg;
+    match campaign.report.humidity_ratio {
+        Some(_) => format!("air, {water_g_kg:.1} g of water per kg of dry air"),
+        None => "air, taken as dry: no humidity is given".to_owned(),
+    }
 }
 
 /// Method and settings behind the numbers: name and value in words.

@@ -6,8 +6,8 @@
 //! is treated as air. Expansion is from the total inlet pressure to the outlet pressure as tapped.
 
 use mapper_core::{Channel, IdentifiedPoint, Recording, one_line};
-use mapper_physics::air::{self, Air};
-use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::air::{Air, heat_capacity_j_kgk, isentropic_exponent};
+use mapper_physics::compression::{compressed_k, isentropic_rise_ratio};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -30,12 +30,13 @@ pub struct TurbinePoint {
     pub efficiency: Option<f64>,
 }
 
-/// The turbine results of every point whose channels are present and plausible.
-pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint]) -> Vec<TurbinePoint> {
-    points.iter().filter_map(|point| turbine_point(recording, point)).collect()
+/// The turbine results of every point whose channels are present and plausible. `air`: the gas of the compressor, with the definition of the
+/// points' efficiency.
+pub fn turbine_points(recording: &Recording, points: &[IdentifiedPoint], air: Air) -> Vec<TurbinePoint> {
+    points.iter().filter_map(|point| turbine_point(recording, point, air)).collect()
 }
 
-fn turbine_point(recording: &Recording, point: &IdentifiedPoint) -> Option<TurbinePoint> {
+fn turbine_point(recording: &Recording, point: &IdentifiedPoint, air: Air) -> Option<TurbinePoint> {
     let step = recording.steps.iter().find(|step| step.index == point.step)?;
     let mean = |channel: Channel| {
         let (_, values) = recording.series.get(&channel)?.slice(step.end_s - AVERAGE_S, step.end_s);
@@ -50,12 +51,13 @@ fn turbine_point(recording: &Recording, point: &IdentifiedPoint) -> Option<Turbi
         return None;
     }
     let turbine_w = flow_kg_s
-        * air::heat_capacity_j_kgk(t3_k)
+        * heat_capacity_j_kgk(t3_k)
         * t3_k
-        * (1.0 - expansion_ratio.powf(-air::isentropic_exponent(t3_k)));
+        * (1.0 - expansion_ratio.powf(-isentropic_exponent(t3_k)));
     let compressor_w = point.eta.filter(|eta| *eta > 0.0).map(|eta| {
-        let rise_k = point.t1_k * isentropic_rise_ratio(point.pressure_ratio, point.t1_k, Air::DRY) / eta;
-        point.flow_kg_s * air::heat_capacity_j_kgk(point.t1_k + 0.5 * rise_k) * rise_k
+        let rise = isentropic_rise_ratio(point.pressure_ratio, point.t1_k, air);
+        let t2_prime_k = compressed_k(point.t1_k, rise, eta, air);
+        point.flow_kg_s * air.enthalpy_rise_j_kg(point.t1_k, t2_prime_k)
     });
     Some(TurbinePoint {
         step: point.step,

@@ -6,7 +6,7 @@ use crate::picture::{krpm, speed_colour, target_speeds_rpm};
 use crate::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Scatter};
 use mapper_physics::air::Air;
-use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::compression::apparent_efficiency;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::steady::{SteadyState, hold_speed};
@@ -34,7 +34,7 @@ impl Place {
 
 pub(crate) fn apparent_eta(steady: &SteadyState) -> f64 {
     let (t1_k, outputs) = (steady.boundary.t1_k, &steady.outputs);
-    t1_k * isentropic_rise_ratio(outputs.pressure_ratio, t1_k, Air::DRY) / (outputs.t2_k - t1_k)
+    apparent_efficiency(outputs.pressure_ratio, t1_k, outputs.t2_k, Air::PAPER)
 }
 
 /// The settled point at a turbine inlet temperature; `None` where no P3 holds the speed.

@@ -94,7 +94,7 @@ impl Session<'_> {
         let map = assemble(&points, name, config.reference, config.method, Grouping::default())
             .map_err(|error| no_map(error.to_string()))?;
         let surge = identified.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
-        let map = CompressorMap { surge: surge.collect(), ..map };
+        let map = CompressorMap { efficiency: Some(config.air.efficiency), surge: surge.collect(), ..map };
         let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
         let map = fit_map(map, &options).map_err(|error| no_map(error.to_string()))?;
         let fitted = map.fitted.as_ref().ok_or_else(|| no_map("it is not fitted".to_owned()))?;

@@ -72,6 +72,7 @@ impl Identified {
         let mut value = json!({
             "recording": recording,
             "reference": self.config.reference,
+            "efficiency": self.config.air.efficiency,
             "points": self.points,
             "thermal": self.thermal,
             "two_parameter": self.two_parameter,

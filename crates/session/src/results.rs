@@ -258,6 +258,7 @@ impl Session<'_> {
         };
         let mut points_file = json!({
             "reference": identified.config.reference,
+            "efficiency": identified.config.air.efficiency,
             "points": identified.points,
             "thermal": identified.thermal,
             "two_parameter": identified.two_parameter,
@@ -347,6 +348,7 @@ fn run_report_of<'a>(
         outcome: &origin.outcome,
         remarks,
         reference: identified.config.reference,
+        efficiency: identified.config.air.efficiency,
         method: identified.config.method,
         alpha_area_ratio: identified.config.alpha_area_ratio,
         events: &identified.recording.events,
@@ -417,7 +419,7 @@ fn compressor_map(
         .map_err(|error| remarks.push(format!("there is no map: {error}")))
         .ok()?;
     let marks = identified.surge.iter().flat_map(|surge| surge.marks.iter().map(|scored| scored.mark));
-    let map = CompressorMap { surge: marks.collect(), ..map };
+    let map = CompressorMap { efficiency: Some(config.air.efficiency), surge: marks.collect(), ..map };
     match MapFit::new(&map).and_then(|fit| fit.table(&MapFitOptions::default())) {
         Ok(table) => Some(CompressorMap { fitted: Some(table), ..map }),
         Err(error) => {

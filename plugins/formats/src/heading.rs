@@ -1,15 +1,29 @@
-//! The header of every text format: machine, reference state.
+//! The header of every text format: machine, reference state, definition of the efficiency.
 
-use mapper_core::{CompressorMap, Method, one_line};
+use mapper_core::{CompressorMap, EfficiencyDefinition, Method, one_line};
+use std::fmt::Write;
 
-/// Two comment lines that begin with `mark`.
+/// Comment lines that begin with `mark`.
 pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
     let (t_ref_k, p_ref_pa) = (map.reference.t_ref_k, map.reference.p_ref_pa);
-    format!(
+    let mut text = format!(
         "{mark} compressor map of {}\n\
          {mark} reference state of corrected flow and speed: {t_ref_k} K, {p_ref_pa} Pa\n",
         if map.machine.is_empty() { "unnamed machine".to_owned() } else { one_line(&map.machine) },
-    )
+    );
+    if let Some(definition) = map.efficiency {
+        let _ = writeln!(text, "{mark} {DEFINITION}{definition} ({})", definition.description());
+    }
+    text
+}
+
+/// Start of the comment that names the definition of the efficiency.
+const DEFINITION: &str = "definition of efficiency: ";
+
+/// The definition of the efficiency that a comment names.
+pub(crate) fn efficiency_in_comment(comment: &str) -> Option<EfficiencyDefinition> {
+    let (_, definition) = comment.split_once(DEFINITION)?;
+    definition.split('(').next()?.parse().ok()
 }
 
 /// Name of a method's efficiency.

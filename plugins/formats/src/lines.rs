@@ -132,7 +132,15 @@ pub(crate) fn map_of_rows(
             line(mean, members.iter().map(|point| on_line(point, mean)).collect())
         })
         .collect();
-    Ok(CompressorMap { machine, reference, method: Method::Imported, lines, surge: Vec::new(), fitted: None })
+    Ok(CompressorMap {
+        machine,
+        reference,
+        method: Method::Imported,
+        efficiency: None,
+        lines,
+        surge: Vec::new(),
+        fitted: None,
+    })
 }
 
 /// A line of points by rising flow.

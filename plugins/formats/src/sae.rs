@@ -6,7 +6,7 @@
 
 mod columns;
 
-use crate::heading::heading;
+use crate::heading::{efficiency_in_comment, heading};
 use crate::lines::{Row, map_of_rows, room_for_one_more};
 use crate::reference;
 use columns::Columns;
@@ -55,6 +55,7 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
 
 fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
     let (mut rows, mut found, mut machine) = (Vec::new(), None, String::new());
+    let mut efficiency = None;
     let mut columns = Columns::default();
     let mut heading_allowed = true;
     for (index, line) in text.lines().enumerate() {
@@ -69,6 +70,7 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
                 columns.read(comment, true).map_err(units)?;
             }
             found = found.or_else(|| reference::in_comment(comment));
+            efficiency = efficiency.or_else(|| efficiency_in_comment(comment));
             if let Some((_, name)) = comment.split_once("compressor map of ") {
                 machine = name.trim().chars().take(200).collect();
             }
@@ -93,7 +95,8 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
             }
         }
     }
-    map_of_rows(machine, &rows, found, given)
+    let map = map_of_rows(machine, &rows, found, given)?;
+    Ok(CompressorMap { efficiency, ..map })
 }
 
 /// Text, or two numbers as the wheel's diameters; three numbers or five are a broken row.

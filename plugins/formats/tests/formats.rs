@@ -20,6 +20,7 @@ fn empty() -> CompressorMap {
         machine: String::new(),
         reference: ReferenceState::SAE,
         method: Method::Steady,
+        efficiency: None,
         lines: vec![],
         surge: Vec::new(),
         fitted: None,

@@ -2,7 +2,7 @@
 
 use super::error::HeatCorrectionError;
 use super::estimate::estimate;
-use super::work::{isentropic_work_j_kg, work_points};
+use super::work::{air_of, isentropic_work_j_kg, work_points};
 use mapper_core::{
     CompressorMap, EstimateUncertainty, MapPoint, Method, Verdict, Warning, confidence_interval_95,
     standard_error_of,
@@ -76,7 +76,7 @@ pub fn correct_for_heat(
     let heat_w = given_w.or(found.map(|found| found.heat_w.max(0.0))).unwrap_or(0.0);
     let scatter_w = found.map_or(0.0, |found| found.standard_error_w);
     let heat_error_w = scatter_w.hypot(HEAT_ERROR_RATIO * heat_w);
-    let reference = map.reference;
+    let (reference, air) = (map.reference, air_of(&map));
     let shared = map
         .lines
         .iter()
@@ -92,7 +92,7 @@ pub fn correct_for_heat(
             let compresses = point.pressure_ratio > 1.0 && flow_kg_s > 0.0;
             let Some(apparent) = point.eta.filter(|eta| *eta > 0.0 && compresses) else { continue };
             points += 1;
-            let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio);
+            let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio, air);
             match without_heat(apparent, work_j_kg, heat_w / flow_kg_s) {
                 Some(eta) => {
                     // d eta/d heat, times the heat's error.

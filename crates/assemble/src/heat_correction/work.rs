@@ -1,7 +1,7 @@
 //! Work and flow coefficients of a map's points, with the apparent work.
 
 use mapper_core::{CompressorMap, ReferenceState};
-use mapper_physics::air;
+use mapper_physics::air::{self, Air};
 use mapper_physics::compression::isentropic_rise_ratio;
 
 /// Speed by which coefficients are made: it scales them and drops out, as the wheel's diameter does, rpm.
@@ -37,15 +37,20 @@ impl WorkPoint {
     }
 }
 
-/// Isentropic specific work at the map's reference state, J/kg.
-pub fn isentropic_work_j_kg(reference: ReferenceState, pressure_ratio: f64) -> f64 {
+/// Dry air with the map's definition of efficiency; by enthalpy if the map does not name one.
+pub fn air_of(map: &CompressorMap) -> Air {
+    Air { efficiency: map.efficiency.unwrap_or_default(), ..Air::DRY }
+}
+
+/// Isentropic specific work from the reference temperature, J/kg.
+pub fn isentropic_work_j_kg(reference: ReferenceState, pressure_ratio: f64, air: Air) -> f64 {
     let t_k = reference.t_ref_k;
-    air::heat_capacity_j_kgk(t_k) * t_k * isentropic_rise_ratio(pressure_ratio, t_k, air::Air::DRY)
+    air::heat_capacity_j_kgk(t_k) * t_k * isentropic_rise_ratio(pressure_ratio, t_k, air)
 }
 
 /// The points with an efficiency that lie outside choke.
 pub fn work_points(map: &CompressorMap) -> Vec<WorkPoint> {
-    let reference = map.reference;
+    let (reference, air) = (map.reference, air_of(map));
     let mut points = Vec::new();
     for (index, line) in map.lines.iter().enumerate() {
         let usable = || {
@@ -62,7 +67,7 @@ pub fn work_points(map: &CompressorMap) -> Vec<WorkPoint> {
                 continue;
             }
             let speed_ratio = line.speed_corrected_rpm / UNIT_SPEED_RPM;
-            let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio) / eta;
+            let work_j_kg = isentropic_work_j_kg(reference, point.pressure_ratio, air) / eta;
             let t_k = reference.t_ref_k;
             let rise_ratio = work_j_kg / (air::heat_capacity_j_kgk(t_k) * t_k);
             let inlet_flow = flow_kg_s / speed_ratio;

@@ -23,6 +23,7 @@ pub fn map_of(rows: &[Row]) -> CompressorMap {
         machine: "test".to_owned(),
         reference: ReferenceState::SAE,
         method: Method::Imported,
+        efficiency: None,
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -11,6 +11,7 @@ pub(crate) mod backend;
 pub(crate) mod boundary;
 pub(crate) mod display;
 pub(crate) mod drift;
+pub(crate) mod efficiency;
 pub(crate) mod geometry;
 pub(crate) mod grid;
 pub(crate) mod guards;

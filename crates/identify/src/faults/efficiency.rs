@@ -10,7 +10,7 @@ use crate::faults::rows::{Machine, Rows, common, own};
 use crate::faults::smooth::{At, Smooth};
 use crate::nominal_rig::NominalRig;
 use mapper_core::ReferenceState;
-use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
 use nalgebra::{DMatrix, DVector};
 
 /// Efficiencies as fitted, before the smoothness prior.
@@ -138,7 +138,7 @@ pub(crate) fn rows(
 
 /// Efficiency of a compressor without heat transfer.
 fn apparent(readings: &Readings) -> f64 {
-    isentropic_rise_k(readings) / (readings.t2_k() - readings.t1_k())
+    isentropic_rise_k(readings) / actual_rise_k(readings.t1_k(), readings.t2_k(), readings.air)
 }
 
 fn isentropic_rise_k(readings: &Readings) -> f64 {
@@ -146,16 +146,22 @@ fn isentropic_rise_k(readings: &Readings) -> f64 {
         * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k(), readings.air)
 }
 
+/// Temperature after compression without heat transfer, K.
+fn compressed(readings: &Readings, eta: f64) -> f64 {
+    let rise = isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k(), readings.air);
+    compressed_k(readings.t1_k(), rise, eta, readings.air)
+}
+
 /// Temperature loss of the gas to the housing, relative to its rise by compression.
 fn heat(readings: &Readings, eta: f64) -> f64 {
-    let rise_k = isentropic_rise_k(readings) / eta;
-    (readings.t1_k() + rise_k - readings.t2_k()) / rise_k
+    let t2_prime_k = compressed(readings, eta);
+    (t2_prime_k - readings.t2_k()) / (t2_prime_k - readings.t1_k())
 }
 
 /// Readings with the temperature at which a gain of T2 or Tc applies. Such a gain also changes the slope of T2 over Tc, which convection
 /// absorbs. The remaining effect is the error at equal temperatures, at the temperature after compression without heat.
 fn as_gains_count(readings: &Readings, eta: f64) -> Readings {
     let mut other = *readings;
-    [other.values[1], other.values[2]] = [readings.t1_k() + isentropic_rise_k(readings) / eta; 2];
+    [other.values[1], other.values[2]] = [compressed(readings, eta); 2];
     other
 }

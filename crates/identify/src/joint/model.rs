@@ -8,7 +8,10 @@ use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
 use crate::probe::{self, Lag, follow};
 use mapper_physics::air::{self, Air};
-use mapper_physics::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
+use mapper_physics::compression::{
+    CompressionInputs, actual_rise_k, compress, compressed_k, isentropic_rise_ratio,
+    rise_ratio_by_ln_pressure,
+};
 use mapper_physics::inlet_convection::InletLaw;
 use mapper_physics::nusselt;
 
@@ -84,7 +87,7 @@ struct Answer {
 impl Answer {
     /// Convection for a small change of the gas from `gas`, at the same inlet temperature.
     fn moved(&self, from: &Convection, gas: &Gas, to: &Gas) -> Convection {
-        let bulk_k = compressed_k(to.t1_k, to.rise_ratio, to.eta);
+        let bulk_k = compressed_k(to.t1_k, to.rise_ratio, to.eta, to.air);
         let by_k = bulk_k - from.bulk_k;
         let ln_h = self.ln_h_by_bulk * by_k
             + self.ln_h_by_metal * (to.tc_k - gas.tc_k)
@@ -102,7 +105,7 @@ impl Setting {
     fn answer(&self, gas: &Gas, here: &Convection, shared: &SharedVector, ln_deviation: f64) -> Answer {
         let step_k = here.bulk_k * STEP_RATIO;
         // In the law, pressure changes only the bulk temperature.
-        let rise_ratio = gas.eta * ((here.bulk_k + step_k) / gas.t1_k - 1.0);
+        let rise_ratio = gas.eta * actual_rise_k(gas.t1_k, here.bulk_k + step_k, gas.air) / gas.t1_k;
         let hotter = self.h(&Gas { rise_ratio, ..*gas }, shared, ln_deviation);
         let by_k = hotter.bulk_k - here.bulk_k;
         let metal_k = gas.tc_k * (1.0 + STEP_RATIO);
@@ -118,7 +121,7 @@ impl Setting {
 
     /// Heat-transfer coefficients from the law.
     fn h(&self, gas: &Gas, shared: &SharedVector, ln_deviation: f64) -> Convection {
-        let bulk_k = compressed_k(gas.t1_k, gas.rise_ratio, gas.eta);
+        let bulk_k = compressed_k(gas.t1_k, gas.rise_ratio, gas.eta, gas.air);
         let inlet_h_ratio = if shared[INLET] == 0.0 {
             1.0
         } else {
@@ -188,7 +191,7 @@ impl Setting {
         let offset = |index: usize| shared[OFFSETS + index];
         let t1_k = row.t1_k - offset(0);
         let pressure_ratio = (row.p2_pa - offset(4)) / (row.p1_pa - offset(3));
-        let air = Air { humidity_kg_kg: self.air.humidity_kg_kg + shared[HUMIDITY] };
+        let air = Air { humidity_kg_kg: self.air.humidity_kg_kg + shared[HUMIDITY], ..self.air };
         let slope = if self.shaped { local[SLOPE] * dot(terms, surface_of(shared)) } else { 0.0 };
         Gas {
             t1_k,
@@ -203,7 +206,7 @@ impl Setting {
     /// ln of the ratio of h before the wheel to h after it, by the inlet's own law, at a step's end.
     pub(crate) fn ln_inlet_ratio_at(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> f64 {
         let gas = self.gas(end, &[0.0; TERM_COUNT], shared, local);
-        self.ln_inlet_ratio(&gas, shared, compressed_k(gas.t1_k, gas.rise_ratio, gas.eta))
+        self.ln_inlet_ratio(&gas, shared, compressed_k(gas.t1_k, gas.rise_ratio, gas.eta, gas.air))
     }
 
     /// h at a step's end, W/(m2 K), and ln of its Reynolds number over the reference.
@@ -340,7 +343,7 @@ impl Setting {
             }
             if active[OFFSETS + 3] || active[OFFSETS + 4] {
                 let by_rise = full(Gas { rise_ratio: gas.rise_ratio + STEP_RATIO, ..gas }, STEP_RATIO);
-                let by_ln_ratio = by_rise * (1.0 + gas.rise_ratio) * gas.air.isentropic_exponent(gas.t1_k);
+                let by_ln_ratio = by_rise * rise_ratio_by_ln_pressure(gas.rise_ratio, gas.t1_k, gas.air);
                 put(OFFSETS + 3, by_ln_ratio / (row.p1_pa - shared[OFFSETS + 3]));
                 put(OFFSETS + 4, -by_ln_ratio / (row.p2_pa - shared[OFFSETS + 4]));
             }
@@ -351,7 +354,7 @@ impl Setting {
             }
             if active[HUMIDITY] {
                 let pressure_ratio = (row.p2_pa - shared[OFFSETS + 4]) / (row.p1_pa - shared[OFFSETS + 3]);
-                let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + STEP_RATIO };
+                let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + STEP_RATIO, ..gas.air };
                 let rise_ratio = isentropic_rise_ratio(pressure_ratio, gas.t1_k, air);
                 put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, STEP_RATIO));
             }

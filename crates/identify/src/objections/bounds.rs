@@ -81,7 +81,7 @@ mod tests {
     /// Five ends of an efficiency of 0.7 at a pressure ratio of 2, with this gas before the turbine.
     fn ends_with(t3_k: f64, t2_read_k: Option<f64>) -> Vec<Option<Ends>> {
         let end = Ends {
-            air: mapper_physics::air::Air::DRY,
+            air: mapper_physics::air::Air::PAPER,
             position: 0,
             end_s: 0.0,
             valve_opening_ratio: 1.0,

@@ -26,7 +26,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
             if running.into_iter().any(|(channel, value)| check_running(channel, value).is_err()) {
                 return None;
             }
-            let taken = end.flow_kg_s * end.air.heat_capacity_j_kgk(end.t1_k) * (end.t2_k - end.t1_k);
+            let taken = end.flow_kg_s * end.air.enthalpy_rise_j_kg(end.t1_k, end.t2_k);
             let given = flow_kg_s * air::heat_capacity_j_kgk(0.5 * (t3_k + t4_k)) * (t3_k - t4_k);
             (given > 0.0).then_some((taken, given))
         })

@@ -142,14 +142,14 @@ fn directional(
     tc_k: f64,
     outputs: &mapper_physics::model::Outputs,
 ) -> f64 {
-    let rise = isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::DRY);
+    let rise = isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::PAPER);
     let bulk_k = boundary.t1_k * (1.0 + rise / outputs.efficiency);
     let area_m2 = 29e-3;
     let factor = |hotter: bool| if hotter { machine.direction } else { 1.0 };
     let before_m2 = machine.alpha * area_m2 * factor(tc_k > boundary.t1_k);
     let pass = |after_m2: f64| {
         let inputs = CompressionInputs {
-            air: Air::DRY,
+            air: Air::PAPER,
             t1_k: boundary.t1_k,
             tc_k,
             flow_kg_s: outputs.flow_kg_s,

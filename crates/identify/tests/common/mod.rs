@@ -44,11 +44,11 @@ pub const STEP_S: f64 = 120.0;
 impl Transient {
     pub fn t2_k(&self, tc_k: f64) -> f64 {
         let inputs = CompressionInputs {
-            air: Air::DRY,
+            air: Air::PAPER,
             t1_k: self.t1_k,
             tc_k,
             flow_kg_s: self.flow_kg_s,
-            isentropic_rise_ratio: isentropic_rise_ratio(self.pressure_ratio, self.t1_k, Air::DRY),
+            isentropic_rise_ratio: isentropic_rise_ratio(self.pressure_ratio, self.t1_k, Air::PAPER),
             efficiency: self.eta,
             h_w_m2k: self.h_w_m2k,
             inlet_h_ratio: 1.0,

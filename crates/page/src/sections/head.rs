@@ -17,7 +17,7 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
                 @if let Some(serial) = serial { "Serial number " (serial) ". " }
                 @if let Some(when) = report.tested_at { "Tested " (when) ". " }
                 @if report.score.is_some() { strong { "Simulated rig: nothing was measured on a real machine." } " " }
-                "Efficiency is isentropic, total to total; corrected to " (report.reference) "; method " (report.method) "."
+                "Efficiency is isentropic, total to total (" (report.efficiency.description()) "); corrected to " (report.reference) "; method " (report.method) "."
             }
             section.verdict.clean[clean] aria-labelledby="verdict" {
                 h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }

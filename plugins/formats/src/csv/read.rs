@@ -2,10 +2,10 @@
 //! a map needs.
 
 use crate::lines::{Row, line, map_of_rows, room_for_one_more};
-use crate::reference;
+use crate::{heading, reference};
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
-    CommonErrors, CompressorMap, ImportError, MAP_COLUMNS, MapPoint, Method, ReferenceState, SpeedShift,
+    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, MAP_COLUMNS, MapPoint, Method, ReferenceState, SpeedShift,
     Verdict, Warning,
 };
 use mapper_yaml::units::{FoundColumn, Kind, TableText, WantedColumn, find_columns, with_units_row};
@@ -21,6 +21,7 @@ struct Head {
     reference: Option<ReferenceState>,
     machine: String,
     method: Option<Method>,
+    efficiency: Option<EfficiencyDefinition>,
     /// First step number: files of version 0.1.0 do not give it, and start at 0.
     first_step: f64,
     columns: Columns,
@@ -34,8 +35,10 @@ struct Columns {
 
 pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
     let (mut reference, mut machine, mut method, mut first_step) = (None, String::new(), None, 0.0);
+    let mut efficiency = None;
     for comment in text.lines().filter_map(|line| line.trim_start().strip_prefix('#')) {
         reference = reference.or_else(|| reference::in_comment(comment));
+        efficiency = efficiency.or_else(|| heading::efficiency_in_comment(comment));
         if let Some((_, name)) = comment.split_once("compressor map of ") {
             machine = name.trim().chars().take(200).collect();
         }
@@ -75,7 +78,7 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
             }
         }
     };
-    let head = Head { reference, machine, method, first_step, columns };
+    let head = Head { reference, machine, method, efficiency, first_step, columns };
     let mut rows: Vec<(Row, StringRecord)> = Vec::new();
     while let Some(next) = pending.take().map(Ok).or_else(|| records.next().map(record)) {
         let next = next?;
@@ -89,7 +92,8 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
         own(&head, &rows, given)
     } else {
         let rows: Vec<Row> = rows.into_iter().map(|(row, _)| row).collect();
-        map_of_rows(head.machine, &rows, head.reference, given)
+        let map = map_of_rows(head.machine, &rows, head.reference, given)?;
+        Ok(CompressorMap { efficiency: head.efficiency, ..map })
     }
 }
 
@@ -209,6 +213,7 @@ fn own(
         machine: head.machine.clone(),
         reference,
         method,
+        efficiency: head.efficiency,
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -2,8 +2,8 @@
 //! physics crate, which this crate may not depend on.
 
 use mapper_core::{
-    CommonErrors, CompressorMap, EstimateUncertainty, IdentifiedPoint, MapPoint, Method, OperatingPoint,
-    ReferenceState, SpeedLine, StepKind, Verdict, Warning, confidence_interval_95,
+    CommonErrors, CompressorMap, EfficiencyDefinition, EstimateUncertainty, IdentifiedPoint, MapPoint,
+    Method, OperatingPoint, ReferenceState, SpeedLine, StepKind, Verdict, Warning, confidence_interval_95,
 };
 
 /// Flow (kg/s), pressure ratio, efficiency at corrected speed (rpm) and x, 1 at surge, 0 at choke, below 0 beyond.
@@ -52,6 +52,7 @@ pub fn turbo_a() -> CompressorMap {
         machine: "turbo_a".to_owned(),
         reference: ReferenceState::SAE,
         method: Method::Dynamic,
+        efficiency: Some(EfficiencyDefinition::ConstantGamma(1.395)),
         lines,
         surge: Vec::new(),
         fitted: None,

@@ -1,10 +1,13 @@
 //! `mapper map convert`: a map in another format, at another reference state.
 
+use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::given::reference;
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
+use mapper_assemble::convert_efficiency;
+use mapper_core::EfficiencyDefinition;
 use mapper_session::write_map_fitted_if_needed;
 use serde_json::json;
 use std::path::PathBuf;
@@ -25,12 +28,20 @@ pub struct Convert {
     /// Reference state of the new file [default: unchanged]
     #[arg(long, value_name = "STATE")]
     pub to_reference: Option<String>,
+    /// Definition of the file's efficiencies, if the file does not name it: enthalpy, kappa_of_T1 or "constant_gamma 1.4"
+    #[arg(long, value_name = "DEFINITION")]
+    pub efficiency: Option<EfficiencyDefinition>,
+    /// Definition of the efficiencies of the new file [default: unchanged]
+    #[arg(long, value_name = "DEFINITION")]
+    pub to_efficiency: Option<EfficiencyDefinition>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
     pub replace: Replace,
 }
+
+const NO_DEFINITION: &str = "the file does not name the definition of its efficiencies: give it by `--efficiency`, e.g. `--efficiency \"constant_gamma 1.4\"`";
 
 impl Convert {
     /// Reads a map and writes it again.
@@ -42,6 +53,12 @@ impl Convert {
         if let Some(reference) = to_reference {
             map = map.at_reference(reference);
         }
+        let efficiency = map.efficiency.or(self.efficiency);
+        match (efficiency, self.to_efficiency) {
+            (Some(from), Some(to)) => map = convert_efficiency(map, from, to),
+            (None, Some(_)) => return Err(Failure::new(Code::BadInput, NO_DEFINITION)),
+            (_, None) => map.efficiency = efficiency,
+        }
         let (map, fitted_here) = write_map_fitted_if_needed(&self.out, format, map, self.replace.existing())?;
         let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
         if self.json {
@@ -49,6 +66,7 @@ impl Convert {
                 "file": self.out,
                 "format": format.name,
                 "reference": map.reference,
+                "efficiency": map.efficiency,
                 "lines": map.lines.len(),
                 "points": points,
                 "fitted": map.fitted.is_some(),

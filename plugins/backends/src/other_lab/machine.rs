@@ -119,8 +119,7 @@ pub(super) fn evaluate(
     let gas_constant_j_kgk = air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg);
     let rise_ratio =
         compression::isentropic_rise_ratio(lumped.pressure_ratio, boundary.t1_k, compressor.air());
-    let bulk_k =
-        compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency, compressor.air());
+    let bulk_k = compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency, compressor.air());
     let cp2_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(bulk_k);
     let whole_w_k = lumped.h_w_m2k * compressor.internal_area_m2;
     let directed_w_k =

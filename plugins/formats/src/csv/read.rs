@@ -5,8 +5,8 @@ use crate::lines::{Row, line, map_of_rows, room_for_one_more};
 use crate::{heading, reference};
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
-    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, MAP_COLUMNS, MapPoint, Method, ReferenceState, SpeedShift,
-    Verdict, Warning,
+    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, MAP_COLUMNS, MapPoint, Method,
+    ReferenceState, SpeedShift, Verdict, Warning,
 };
 use mapper_yaml::units::{FoundColumn, Kind, TableText, WantedColumn, find_columns, with_units_row};
 

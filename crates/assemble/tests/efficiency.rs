@@ -1,5 +1,7 @@
 //! Conversion of a map between definitions of efficiency.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod support;
 
 use mapper_assemble::convert_efficiency;

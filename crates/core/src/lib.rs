@@ -20,6 +20,7 @@ mod fitted_map;
 mod guard;
 mod held_point;
 mod identified;
+mod imported_map;
 mod inlet_convection;
 mod joined;
 mod joint_settings;
@@ -71,6 +72,7 @@ pub use identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
     half_width_95, standard_error_of,
 };
+pub use imported_map::{ImportRemark, ImportedColumn, ImportedMap};
 pub use inlet_convection::InletConvection;
 pub use joined::{StepOrigin, joined};
 pub use joint_settings::{

@@ -1,6 +1,6 @@
 //! The interface of map files: a format is a name, a writer, a reader, or both. Formats do no IO.
 
-use crate::{CompressorMap, ExportError, ImportError, ReferenceState};
+use crate::{CompressorMap, ExportError, ImportError, ImportedMap, ReferenceState};
 
 /// Largest map file that is read, bytes: a measured map has some ten thousand.
 pub const MAP_FILE_SIZE_LIMIT: usize = 32 << 20;
@@ -36,10 +36,10 @@ impl Default for MapUnits {
     }
 }
 
-/// Parses the text of a file into a map; the second argument is the reference state that the user gives.
+/// Parses the bytes of a file into a map; the second argument is the reference state that the user gives.
 ///
 /// A map without a reference state is rejected: a wrong one shifts speeds by 1.7 % and more, and goes unnoticed.
-pub type ReadMap = fn(&str, Option<ReferenceState>) -> Result<CompressorMap, ImportError>;
+pub type ReadMap = fn(&[u8], Option<ReferenceState>) -> Result<ImportedMap, ImportError>;
 
 /// One file format of compressor maps.
 #[derive(Debug, Clone, Copy)]
@@ -93,20 +93,13 @@ impl MapFormat {
     /// # Errors
     /// [`ImportError`]: the format is write-only, the file is too large, not text, not a map (with its line), or
     /// without a reference state.
-    pub fn read(&self, bytes: &[u8], given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
+    pub fn read(&self, bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
         let read = self.read.ok_or(ImportError::OnlyWritten { format: self.name })?;
         if bytes.len() > MAP_FILE_SIZE_LIMIT {
             return Err(ImportError::TooLarge { bytes: bytes.len(), limit: MAP_FILE_SIZE_LIMIT });
         }
-        let text = std::str::from_utf8(bytes)
-            .map_err(|error| ImportError::NotText { line: line_of(bytes, error.valid_up_to()) })?;
-        // Spreadsheets begin their files with a byte order mark.
-        read(text.strip_prefix('\u{feff}').unwrap_or(text), given)
+        read(bytes, given)
     }
-}
-
-fn line_of(bytes: &[u8], offset: usize) -> usize {
-    1 + bytes[..offset.min(bytes.len())].iter().filter(|byte| **byte == b'\n').count()
 }
 
 /// The formats of a program.

@@ -60,8 +60,8 @@ pub enum ImportError {
         /// Largest size read.
         limit: usize,
     },
-    /// Not UTF-8.
-    #[error("line {line} is not text (UTF-8); save the map as text")]
+    /// Not text.
+    #[error("line {line} has control characters and is not text; save the map as CSV or text")]
     NotText {
         /// Line, from 1.
         line: usize,
@@ -83,6 +83,62 @@ pub enum ImportError {
         text: String,
         /// The expected form of a row.
         form: &'static str,
+    },
+    /// The map of a turbine.
+    #[error("line {line}: `{text}` is the map of a turbine; maps of compressors are read")]
+    Turbine {
+        /// Line, from 1.
+        line: usize,
+        /// The title or heading, shortened.
+        text: String,
+    },
+    /// A table without a column that every map has.
+    #[error(
+        "line {line}: no column holds the {missing}; found: {found}; name it in the heading, with its unit (`flow [kg/s]`)"
+    )]
+    NoColumn {
+        /// Line of the heading, from 1.
+        line: usize,
+        /// The quantity that is missing.
+        missing: &'static str,
+        /// The headings, shortened.
+        found: String,
+    },
+    /// A file of tables without one of them.
+    #[error(
+        "the file has no table of the {missing}; mapper looks for the names of T-MATS (NcVec, WcArray, PRArray, EffArray), pyCycle and NPSS (NcMap, WcMap, PRmap, effMap)"
+    )]
+    NoTable {
+        /// The missing quantity.
+        missing: &'static str,
+    },
+    /// Tables whose sizes do not belong together.
+    #[error(
+        "the tables do not fit together: {speeds} speeds, {flows} flows, {pressure_ratios} pressure ratios, {efficiencies} efficiencies; each needs the same number of values per speed"
+    )]
+    TableSize {
+        /// Number of speeds.
+        speeds: usize,
+        /// Number of flows.
+        flows: usize,
+        /// Number of pressure ratios.
+        pressure_ratios: usize,
+        /// Number of efficiencies.
+        efficiencies: usize,
+    },
+    /// Speeds relative to a design point that the file does not give.
+    #[error(
+        "the speeds are relative to a design speed that the file does not give (the fastest is {fastest}); multiply them by it, in rpm, and the flows by their scale factor, if they have one"
+    )]
+    RelativeSpeed {
+        /// The largest of them.
+        fastest: f64,
+    },
+    /// A workbook that cannot be read.
+    #[error("the workbook cannot be read as a map: {problem}")]
+    Workbook {
+        /// The problem.
+        problem: String,
     },
     /// All lines slower than any turbocharger's.
     #[error(

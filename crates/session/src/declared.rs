@@ -4,6 +4,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Method, ReferenceState, WindowRule};
 use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_observe::declared_uncertainties;
+use mapper_physics::air::Air;
 use mapper_record::{ChannelMap, MachineConstants};
 use std::collections::BTreeMap;
 
@@ -77,6 +78,7 @@ pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) ->
         inlet_diameter_m: inlet_m.unwrap_or(usual.inlet_diameter_m),
         outlet_diameter_m: outlet_m.unwrap_or(usual.outlet_diameter_m),
         reference: map.reference.unwrap_or(ReferenceState::SAE),
+        air: Air::DRY,
         window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
             start_s: window.start_s,
             end_s: window.end_s,

@@ -4,7 +4,7 @@ use crate::files::{Existing, write_file};
 use crate::{Registry, SessionError};
 use mapper_assemble::{MapFitOptions, fit_map};
 use mapper_campaign::Campaign;
-use mapper_core::{CompressorMap, ExportError, MAP_FILE_SIZE_LIMIT, MapFormat, ReferenceState};
+use mapper_core::{CompressorMap, ExportError, ImportedMap, MAP_FILE_SIZE_LIMIT, MapFormat, ReferenceState};
 use std::io::Read;
 use std::path::Path;
 
@@ -18,6 +18,18 @@ impl Registry {
         path: &Path,
         given: Option<ReferenceState>,
     ) -> Result<CompressorMap, SessionError> {
+        Ok(self.inspect_map(path, given)?.map)
+    }
+
+    /// The same, with the columns and what the reader assumed.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map`].
+    pub fn inspect_map(
+        &self,
+        path: &Path,
+        given: Option<ReferenceState>,
+    ) -> Result<ImportedMap, SessionError> {
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         let format = self.formats.read_from(extension).ok_or_else(|| SessionError::UnknownExtension {
             path: path.to_owned(),

@@ -2,7 +2,7 @@
 
 use crate::lines::POINT_LIMIT;
 use crate::reference;
-use mapper_core::{CompressorMap, ExportError, ImportError, MapFormat, ReferenceState};
+use mapper_core::{CompressorMap, ExportError, ImportError, ImportedMap, MapFormat, ReferenceState};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -49,8 +49,9 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     Ok(bytes)
 }
 
-fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
-    let mut value: Value = serde_json::from_str(text)?;
+fn read(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut value: Value = serde_json::from_slice(bytes)?;
     let found: Option<ReferenceState> = match value.get("reference") {
         None | Some(Value::Null) => None,
         Some(state) => Some(serde_json::from_value(state.clone())?),
@@ -67,7 +68,7 @@ fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, Impo
     }
     let map: CompressorMap = serde_json::from_value(value)?;
     check(&map)?;
-    Ok(map)
+    Ok(map.into())
 }
 
 fn number_steps_from_one(map: &mut Value) {

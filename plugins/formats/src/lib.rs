@@ -4,6 +4,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod beta_tables;
 mod fitted_items;
 mod heading;
 mod labels;
@@ -11,6 +12,7 @@ mod lines;
 mod map_picture;
 mod reference;
 mod simulation_table;
+mod table;
 
 pub use lines::POINT_LIMIT;
 pub use map_picture::map_figure;
@@ -33,6 +35,7 @@ formats! {
     csv,
     json,
     sae,
+    xlsx,
     fitted,
     surge,
     modelica,

@@ -12,7 +12,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "NPSS tables of flow, pressure ratio and efficiency over beta and corrected speed",
     write: Some(write),
     draw: None,
-    read: None,
+    read: Some(crate::beta_tables::read_nested),
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -15,7 +15,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "Python module with a pyCycle map: [alpha][Nc][Rline]",
     write: Some(write),
     draw: None,
-    read: None,
+    read: Some(crate::beta_tables::read_arrays),
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

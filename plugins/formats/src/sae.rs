@@ -1,17 +1,11 @@
 //! SAE text, compressor (J1826, J922): `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a
 //! row, from choke to surge within a line.
 //!
-//! Manufacturers' files may begin with a title, a row of two wheel diameters and column names. These are skipped,
-//! except for the units in the names.
+//! Manufacturers' files may begin with a title, wheel diameters and column names: [`table`] reads them.
 
-mod columns;
-
-use crate::heading::{efficiency_in_comment, heading};
-use crate::lines::{Row, map_of_rows, room_for_one_more};
-use crate::reference;
-use columns::Columns;
-use mapper_core::{CompressorMap, ExportError, ImportError, MapFormat, ReferenceState};
-use mapper_yaml::units::HeadingError;
+use crate::heading::heading;
+use crate::{beta_tables, table};
+use mapper_core::{CompressorMap, ExportError, ImportError, ImportedMap, MapFormat, ReferenceState};
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
@@ -23,9 +17,6 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     draw: None,
     read: Some(read),
 };
-
-/// The form of a row.
-const ROW_FORM: &str = "four numbers: corrected rpm, corrected kg/s, pressure ratio, efficiency";
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     let mut text = heading(map, "#");
@@ -53,64 +44,13 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     Ok(text.into_bytes())
 }
 
-fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
-    let (mut rows, mut found, mut machine) = (Vec::new(), None, String::new());
-    let mut efficiency = None;
-    let mut columns = Columns::default();
-    let mut heading_allowed = true;
-    for (index, line) in text.lines().enumerate() {
-        let at = index + 1;
-        let (content, comment) = match line.split_once('#') {
-            Some((content, comment)) => (content.trim(), Some(comment)),
-            None => (line.trim(), None),
-        };
-        let units = |source: HeadingError| ImportError::Row { line: at, source: source.into() };
-        if let Some(comment) = comment {
-            if heading_allowed {
-                columns.read(comment, true).map_err(units)?;
-            }
-            found = found.or_else(|| reference::in_comment(comment));
-            efficiency = efficiency.or_else(|| efficiency_in_comment(comment));
-            if let Some((_, name)) = comment.split_once("compressor map of ") {
-                machine = name.trim().chars().take(200).collect();
-            }
-        }
-        if content.is_empty() {
-            continue;
-        }
-        match four_numbers(content) {
-            Some(numbers) => {
-                let [speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta] = columns.inside(numbers);
-                room_for_one_more(rows.len(), at)?;
-                let row =
-                    Row { at, speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, eta: Some(eta) };
-                row.check()?;
-                rows.push(row);
-                heading_allowed = false;
-            }
-            None if heading_allowed && is_heading(content) => columns.read(content, false).map_err(units)?,
-            None => {
-                let shown: String = content.chars().take(60).collect();
-                return Err(ImportError::RowForm { line: at, text: shown, form: ROW_FORM });
-            }
-        }
-    }
-    let map = map_of_rows(machine, &rows, found, given)?;
-    Ok(CompressorMap { efficiency, ..map })
-}
+/// How every table of an NPSS map begins.
+const NPSS_TABLE: &[u8] = b"Table TB_";
 
-/// Text, or two numbers as the wheel's diameters; three numbers or five are a broken row.
-fn is_heading(content: &str) -> bool {
-    let numbers = content.split_whitespace().filter(|field| field.parse::<f64>().is_ok()).count();
-    numbers < content.split_whitespace().count() || numbers == 2
-}
-
-fn four_numbers(content: &str) -> Option<[f64; 4]> {
-    let mut fields =
-        content.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|f| !f.is_empty());
-    let mut numbers = [0.0; 4];
-    for number in &mut numbers {
-        *number = fields.next()?.parse().ok()?;
+fn read(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    // Files of NPSS have the same extension.
+    if bytes.windows(NPSS_TABLE.len()).any(|window| window == NPSS_TABLE) {
+        return beta_tables::read_nested(bytes, given);
     }
-    fields.next().is_none().then_some(numbers)
+    table::read_text(&table::text_of(bytes)?, given)
 }

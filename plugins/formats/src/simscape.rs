@@ -16,7 +16,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "MATLAB script: tables over corrected speed and beta, and over corrected speed and pressure ratio",
     write: Some(write),
     draw: None,
-    read: None,
+    read: Some(crate::beta_tables::read_arrays),
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

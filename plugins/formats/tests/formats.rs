@@ -6,6 +6,7 @@ mod support;
 
 use mapper_core::{CompressorMap, ExportError, MapPoint, Method, ReferenceState, Verdict};
 use mapper_formats::FORMATS;
+use std::collections::BTreeSet;
 
 fn export(name: &str, map: &CompressorMap) -> String {
     String::from_utf8(FORMATS.find(name).unwrap().write(map).unwrap()).unwrap()
@@ -32,6 +33,9 @@ fn names_are_unique_and_every_format_takes_any_map_and_repeats_itself() {
     for (i, entry) in FORMATS.iter().enumerate() {
         assert!(FORMATS.iter().skip(i + 1).all(|other| other.name != entry.name));
         assert!(FORMATS.iter().skip(i + 1).all(|other| other.extension != entry.extension));
+        if entry.write.is_none() {
+            continue;
+        }
         for map in [empty(), support::turbo_a(), support::fitted()] {
             match entry.write(&map) {
                 Ok(bytes) => assert!(bytes == entry.write(&map).unwrap(), "{}", entry.name),
@@ -41,7 +45,7 @@ fn names_are_unique_and_every_format_takes_any_map_and_repeats_itself() {
             }
         }
     }
-    assert!(FORMATS.find("xlsx").is_none());
+    assert!(FORMATS.find("ods").is_none());
 }
 
 #[test]
@@ -78,7 +82,7 @@ fn csv_reads_back_to_the_same_numbers() {
     }
     assert!(text.contains("# reference state of corrected flow and speed: 298 K, 100000 Pa\n"));
     assert!(text.contains("# method: dynamic\n"));
-    let back = FORMATS.find("csv").unwrap().read(text.as_bytes(), None).unwrap();
+    let back = FORMATS.find("csv").unwrap().read(text.as_bytes(), None).unwrap().map;
     for (read, written) in points(&back).iter().zip(points(&map)) {
         assert_eq!(read.identified.common, written.identified.common);
     }
@@ -118,7 +122,7 @@ fn maps_of_older_versions_keep_their_steps() {
     let map = support::turbo_a();
     let written: Vec<usize> = points(&map).iter().map(|point| point.identified.step).collect();
     let read = |format: &str, text: &str| -> Vec<usize> {
-        let back = FORMATS.find(format).unwrap().read(text.as_bytes(), None).unwrap();
+        let back = FORMATS.find(format).unwrap().read(text.as_bytes(), None).unwrap().map;
         points(&back).iter().map(|point| point.identified.step).collect()
     };
     let text = export("json", &map);
@@ -238,7 +242,7 @@ fn odd_maps_give_a_picture() {
 #[test]
 fn every_text_says_its_reference_state() {
     let map = support::fitted();
-    for entry in FORMATS.iter().filter(|entry| !["json", "svg", "png"].contains(&entry.name)) {
+    for entry in FORMATS.written().filter(|entry| !["json", "svg", "png"].contains(&entry.name)) {
         let text = export(entry.name, &map);
         assert!(text.contains("298 K, 100000 Pa"), "{}", entry.name);
     }
@@ -265,4 +269,23 @@ fn the_fitted_table_marks_what_is_extrapolated() {
     let nodes = || fitted.lines.iter().flat_map(|line| &line.nodes);
     assert_eq!(marks, nodes().filter(|n| n.extrapolated).count());
     assert_eq!(text.matches(",measured\n").count(), nodes().filter(|n| !n.extrapolated).count());
+}
+
+/// Tables for simulation programs are read back to the digit: three formats, written in different orders, give the same points.
+#[test]
+fn simulation_tables_read_back() {
+    let map = support::fitted();
+    let read = ["simscape", "pycycle", "npss"].map(|name| {
+        let format = FORMATS.find(name).unwrap();
+        let back = format.read(&format.write(&map).unwrap(), None).unwrap().map;
+        assert_eq!((back.reference, back.efficiency), (map.reference, map.efficiency), "{name}");
+        let rows = points(&back).into_iter().map(|point| {
+            let p = &point.identified;
+            [p.speed_corrected_rpm, p.flow_corrected_kg_s, p.pressure_ratio, p.eta.unwrap()].map(f64::to_bits)
+        });
+        rows.collect::<BTreeSet<[u64; 4]>>()
+    });
+    assert!(read[0].len() >= 100);
+    assert_eq!(read[0], read[1]);
+    assert_eq!(read[0], read[2]);
 }

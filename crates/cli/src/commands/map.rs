@@ -13,6 +13,7 @@ pub struct Map {
 }
 
 subcommands! { MapCommand:
+    inspect::Inspect,
     fit::Fit,
     convert::Convert,
     compare::Compare,

@@ -45,16 +45,21 @@ const SPELLINGS: &[(Kind, &str, &[&str])] = &[
             "ºc",
             "deg.c",
             "*c",
+            "℃",
+            "graus",
+            "grados",
+            "gradosc",
         ],
     ),
     (Kind::Temperature, "K", &["k", "kelvin", "degk", "°k"]),
-    (Kind::Temperature, "degF", &["degf", "°f", "f", "fahrenheit"]),
+    (Kind::Temperature, "degF", &["degf", "°f", "f", "fahrenheit", "deg.f", "℉"]),
+    (Kind::Temperature, "degR", &["degr", "°r", "rankine", "deg.r"]),
     (
         Kind::Speed,
         "rpm",
         &[
             "rpm", "1/min", "min-1", "min^-1", "min⁻¹", "u/min", "upm", "rev/min", "r/min", "umin", "/min",
-            "1/m",
+            "1/m", "tr/min", "trmin", "giri/min", "t/min", "r.p.m.",
         ],
     ),
     (Kind::Speed, "krpm", &["krpm", "1000rpm", "1000/min", "k1/min", "ku/min"]),
@@ -65,7 +70,12 @@ const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (Kind::MassFlow, "kg/h", &["kg/h", "kg_h", "kg/hr", "kghr", "kgh", "kgh-1", "kg/std"]),
     (Kind::MassFlow, "kg/min", &["kg/min", "kg_min", "kgmin"]),
     (Kind::MassFlow, "lb/min", &["lb/min", "lb_min", "lbmin", "lbm/min", "lbs/min", "ppm_lb"]),
-    (Kind::MassFlow, "lb/s", &["lb/s", "lb_s", "lbm/s"]),
+    (Kind::MassFlow, "lb/s", &["lb/s", "lb_s", "lbm/s", "lbs/s", "pps", "lbps"]),
+    (Kind::MassFlow, "lb/h", &["lb/h", "lb/hr", "lbm/hr", "lbm/h", "lbs/hr", "lbs/h", "pph"]),
+    (Kind::MassFlow, "mg/s", &["mg/s", "mg_s"]),
+    (Kind::MassFlow, "t/h", &["t/h", "t_h", "t/hr"]),
+    (Kind::MassFlow, "Nm3/h", &["nm3/h", "nm³/h", "nm^3/h"]),
+    (Kind::MassFlow, "Sm3/h", &["sm3/h", "sm³/h", "sm^3/h"]),
     (Kind::Fraction, "%", &["%", "percent", "prozent", "pct"]),
     (Kind::Fraction, "1", &["1", "-", "--", "ratio"]),
     (Kind::Duration, "s", &["s", "sec", "secs", "second", "seconds", "sek", "sekunden"]),
@@ -83,8 +93,74 @@ const PRESSURES: &[(&str, &str)] = &[
     ("bar", "bar"),
     ("atm", "atm"),
     ("psi", "psia"),
+    ("lbf/in2", "psia"),
+    ("lbf/in^2", "psia"),
+    ("kgf/cm2", "kgf/cm2"),
+    ("kgf/cm^2", "kgf/cm2"),
+    ("kgf/cm²", "kgf/cm2"),
+    ("kg/cm2", "kgf/cm2"),
+    ("kg/cm²", "kgf/cm2"),
+    ("mmhg", "mmHg"),
+    ("torr", "Torr"),
+    ("inhg", "inHg"),
+    ("\"hg", "inHg"),
+    ("mmws", "mmH2O"),
+    ("mmwc", "mmH2O"),
+    ("mmh2o", "mmH2O"),
+    ("mmh₂o", "mmH2O"),
+    ("mmce", "mmH2O"),
+    ("inh2o", "inH2O"),
+    ("inh₂o", "inH2O"),
+    ("inwc", "inH2O"),
+    ("\"h2o", "inH2O"),
     ("pa", "Pa"),
 ];
+
+/// Units of flow that need one more statement before they are a mass flow, in small letters without blanks.
+const VOLUME_FLOWS: &[(VolumeFlow, &[&str])] = &[
+    (VolumeFlow::StandardFeet, &["scfm", "sft3/min", "std.cfm", "stdcfm"]),
+    (VolumeFlow::StandardLitres, &["slpm", "sl/min", "nl/min", "nlpm", "slm"]),
+    (
+        VolumeFlow::Actual,
+        &[
+            "cfm", "acfm", "icfm", "ft3/min", "ft^3/min", "ft³/min", "cfs", "ft3/s", "m3/h", "m³/h", "m^3/h",
+            "m3/hr", "m3/s", "m³/s", "m^3/s", "m3/min", "m³/min", "m^3/min", "l/min", "l/s", "lpm", "l/h",
+        ],
+    ),
+];
+
+/// A flow of volume.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VolumeFlow {
+    /// Cubic feet under standard conditions that the unit does not state.
+    StandardFeet,
+    /// Litres under standard conditions that the unit does not state.
+    StandardLitres,
+    /// The volume where it was measured.
+    Actual,
+}
+
+impl VolumeFlow {
+    /// The units of mass flow that it can be, one per standard temperature.
+    pub fn mass_flows(self) -> &'static [&'static str] {
+        match self {
+            VolumeFlow::StandardFeet => {
+                &["SCFM(60degF)", "SCFM(70degF)", "SCFM(20degC)", "SCFM(15degC)", "SCFM(0degC)"]
+            }
+            VolumeFlow::StandardLitres => &["SLPM(0degC)", "SLPM(20degC)"],
+            VolumeFlow::Actual => &[],
+        }
+    }
+}
+
+/// The flow of volume that a header's unit means.
+pub fn volume_flow(text: &str) -> Option<VolumeFlow> {
+    let lower: String =
+        text.chars().filter(|c| !c.is_whitespace() && !['[', ']', '(', ')'].contains(c)).collect();
+    let lower = lower.to_lowercase();
+    VOLUME_FLOWS.iter().find(|(_, spellings)| spellings.contains(&lower.as_str())).map(|(flow, _)| *flow)
+}
 
 const GAUGE: &[&str] =
     &["g", "(g)", "_g", "rel", "_rel", "(rel)", "r", "ü", "(ü)", "gauge", "ue", "-g", "relativ"];
@@ -129,7 +205,10 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
         let Some((name, unit)) = inside.rsplit_once(open) else { continue };
         let unit = unit.trim();
         // `bar (g)` and `[bar(g)]` hold brackets of their own.
-        if !name.trim().is_empty() && !unit.is_empty() && (any || header_unit(unit).is_some()) {
+        if !name.trim().is_empty()
+            && !unit.is_empty()
+            && (any || header_unit(unit).is_some() || volume_flow(unit).is_some())
+        {
             return (name.trim().trim_end_matches(['/', ',']).trim().to_owned(), Some(unit.to_owned()));
         }
     }
@@ -169,6 +248,20 @@ mod tests {
             ("bar abs", Kind::Pressure, "bar", Reference::Absolute),
             ("kghr", Kind::MassFlow, "kg/h", Reference::Unsaid),
             ("U/min", Kind::Speed, "rpm", Reference::Unsaid),
+            ("tr/min", Kind::Speed, "rpm", Reference::Unsaid),
+            ("℃", Kind::Temperature, "degC", Reference::Unsaid),
+            ("inHg", Kind::Pressure, "inHg", Reference::Unsaid),
+            ("in H2O", Kind::Pressure, "inH2O", Reference::Unsaid),
+            ("mmWS", Kind::Pressure, "mmH2O", Reference::Unsaid),
+            ("kgf/cm2", Kind::Pressure, "kgf/cm2", Reference::Unsaid),
+            ("kg/cm2 abs", Kind::Pressure, "kgf/cm2", Reference::Absolute),
+            ("lbf/in2 g", Kind::Pressure, "psia", Reference::Gauge),
+            ("Torr", Kind::Pressure, "Torr", Reference::Unsaid),
+            ("pps", Kind::MassFlow, "lb/s", Reference::Unsaid),
+            ("lb/hr", Kind::MassFlow, "lb/h", Reference::Unsaid),
+            ("t/h", Kind::MassFlow, "t/h", Reference::Unsaid),
+            ("mg/s", Kind::MassFlow, "mg/s", Reference::Unsaid),
+            ("degR", Kind::Temperature, "degR", Reference::Unsaid),
         ] {
             let found = header_unit(text).unwrap();
             assert_eq!(
@@ -178,6 +271,9 @@ mod tests {
             );
         }
         assert_eq!(header_unit("Nm"), None);
+        assert_eq!(volume_flow("SCFM"), Some(VolumeFlow::StandardFeet));
+        assert_eq!(volume_flow("m3/h"), Some(VolumeFlow::Actual));
+        assert_eq!(header_unit("SCFM"), None);
     }
 
     fn symbol_of(kind: Kind, symbol: &str) -> &'static str {

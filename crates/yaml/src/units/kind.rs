@@ -119,8 +119,17 @@ const PRESSURE: &[Unit] = &[
     decimal(&["bar"], 5),
     decimal(&["mbar"], 2),
     unit(&["atm"], 101_325.0, 1.0),
-    unit(&["psia"], PSI_NUMERATOR, PSI_DENOMINATOR),
+    unit(&["psia", "lbf/in2", "lbf/in^2"], PSI_NUMERATOR, PSI_DENOMINATOR),
+    unit(&["kgf/cm2", "kgf/cm^2", "kgf/cm²"], 98_066.5, 1.0),
+    unit(&["mmHg"], MMHG_PA, 1.0),
+    // 760 Torr are one atmosphere.
+    unit(&["Torr"], 101_325.0, 760.0),
+    unit(&["inHg"], 25.4 * MMHG_PA, 1.0),
+    unit(&["mmH2O", "mmWS", "mmWC", "mmCA"], 9.806_65, 1.0),
+    unit(&["inH2O", "inWC"], 25.4 * 9.806_65, 1.0),
 ];
+/// Conventional millimetre of mercury, 13595.1 kg/m3 at standard gravity (NIST SP 811, B.8), Pa.
+const MMHG_PA: f64 = 13.595_1 * 9.806_65;
 const PRESSURE_DIFFERENCE: &[Unit] = &[
     decimal(&["Pa"], 0),
     decimal(&["kPa"], 3),
@@ -142,7 +151,24 @@ const MASS_FLOW: &[Unit] = &[
     unit(&["kg/h", "kg/hr"], 1.0, 3600.0),
     unit(&["lb/s"], 0.453_592_37, 1.0),
     unit(&["lb/min"], 0.453_592_37, 60.0),
+    decimal(&["mg/s"], -6),
+    unit(&["lb/h", "lb/hr"], 0.453_592_37, 3600.0),
+    unit(&["t/h"], 1000.0, 3600.0),
+    // Volumes of dry air under standard conditions are masses once the temperature is named.
+    unit(&["SCFM(0degC)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 273.15),
+    unit(&["SCFM(15degC)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 288.15),
+    unit(&["SCFM(60degF)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 519.67 / 1.8),
+    unit(&["SCFM(20degC)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 293.15),
+    unit(&["SCFM(70degF)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 529.67 / 1.8),
+    unit(&["SLPM(0degC)"], 1e-3 * AIR_AT_1_K, 60.0 * 273.15),
+    unit(&["SLPM(20degC)"], 1e-3 * AIR_AT_1_K, 60.0 * 293.15),
+    unit(&["Nm3/h", "Nm³/h"], AIR_AT_1_K, 3600.0 * 273.15),
+    unit(&["Sm3/h", "Sm³/h"], AIR_AT_1_K, 3600.0 * 288.15),
 ];
+/// A cubic foot, m3.
+const CUBIC_FOOT: f64 = 0.3048 * 0.3048 * 0.3048;
+/// Density of dry air at 101.325 kPa times its temperature, kg K/m3; gas constant of the standard atmosphere (ISO 2533).
+const AIR_AT_1_K: f64 = 101_325.0 / 287.052_87;
 const DURATION: &[Unit] =
     &[decimal(&["s"], 0), decimal(&["ms"], -3), unit(&["min"], 60.0, 1.0), unit(&["h"], 3600.0, 1.0)];
 const LENGTH: &[Unit] = &[
@@ -304,6 +330,13 @@ mod tests {
         let printed = [
             (Kind::Pressure, "psia", 6_894.757),
             (Kind::Pressure, "atm", 101_325.0),
+            (Kind::Pressure, "kgf/cm2", 98_066.5),
+            (Kind::Pressure, "mmHg", 133.322_4),
+            (Kind::Pressure, "Torr", 133.322_4),
+            (Kind::Pressure, "inHg", 3_386.389),
+            (Kind::Pressure, "mmH2O", 9.806_65),
+            (Kind::Pressure, "inH2O", 249.088_9),
+            (Kind::MassFlow, "lb/h", 1.259_979e-4),
             (Kind::MassFlow, "lb/min", 7.559_873e-3),
             (Kind::Length, "in", 2.54e-2),
             (Kind::Mass, "lb", 4.535_924e-1),
@@ -312,6 +345,16 @@ mod tests {
         for (kind, symbol, factor) in printed {
             let ours = kind.unit(symbol).unwrap().to_inside(1.0);
             assert!((ours / factor - 1.0).abs() < 5e-7, "{symbol}: {ours} against {factor}");
+        }
+        // Density of dry air at 101.325 kPa: 1.2922 kg/m3 at 0 degC, 1.2250 at 15 degC (ISO 2533), 1.2041 at 20 degC; four digits.
+        for (symbol, kg_s) in [
+            ("Nm3/h", 1.2922 / 3600.0),
+            ("Sm3/h", 1.2250 / 3600.0),
+            ("SLPM(20degC)", 1.2041e-3 / 60.0),
+            ("SCFM(15degC)", 1.2250 * 0.028_316_85 / 60.0),
+        ] {
+            let ours = Kind::MassFlow.unit(symbol).unwrap().to_inside(1.0);
+            assert!((ours / kg_s - 1.0).abs() < 1e-4, "{symbol}: {ours} against {kg_s}");
         }
         // Water boils at 212 degF = 671.67 degR = 100 degC = 373.15 K.
         for (symbol, value) in [("degF", 212.0), ("degR", 671.67), ("degC", 100.0), ("K", 373.15)] {

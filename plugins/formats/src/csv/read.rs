@@ -1,14 +1,13 @@
-//! Reads rows of points as a map: files of `mapper` with all their columns, and tables from other programs with the four columns that
-//! a map needs.
+//! Reads files of `mapper` with all their columns; [`table`] reads those of other programs.
 
-use crate::lines::{Row, line, map_of_rows, room_for_one_more};
-use crate::{heading, reference};
+use crate::lines::{Row, line, room_for_one_more};
+use crate::{heading, reference, table};
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
-    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, MAP_COLUMNS, MapPoint, Method,
-    ReferenceState, SpeedShift, Verdict, Warning,
+    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MAP_COLUMNS, MapPoint, Method, ReferenceState, SpeedShift,
+    Verdict, Warning,
 };
-use mapper_yaml::units::{FoundColumn, Kind, TableText, WantedColumn, find_columns, with_units_row};
+use mapper_yaml::units::{FoundColumn, Kind, WantedColumn, find_columns};
 
 /// Physical quantities of the four columns.
 const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
@@ -33,7 +32,12 @@ struct Columns {
     four: [FoundColumn; 4],
 }
 
-pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
+pub(super) fn read(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    let text = &table::text_of(bytes)?;
+    if is_own(text) { read_own(text, given).map(ImportedMap::from) } else { table::read_text(text, given) }
+}
+
+fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
     let (mut reference, mut machine, mut method, mut first_step) = (None, String::new(), None, 0.0);
     let mut efficiency = None;
     for comment in text.lines().filter_map(|line| line.trim_start().strip_prefix('#')) {
@@ -49,52 +53,35 @@ pub(super) fn read(text: &str, given: Option<ReferenceState>) -> Result<Compress
             first_step = 1.0;
         }
     }
-    let table = table_text(text);
     let mut reader = ReaderBuilder::new()
         .comment(Some(b'#'))
-        .delimiter(table.separator as u8)
         .has_headers(false)
         .trim(Trim::All)
         .flexible(true)
         .from_reader(text.as_bytes());
     let mut records = reader.records();
-    let Some(first) = records.next() else {
-        return Err(ImportError::Empty);
-    };
-    let first = record(first)?;
-    let (columns, mut pending) = match numeric(&first, table) {
-        true => (Columns { names: Vec::new(), four: [0, 1, 2, 3].map(bare) }, Some(first)),
-        false => {
-            // Units may have their own row.
-            let second = records.next().map(record).transpose()?;
-            let names: Vec<&str> = first.iter().collect();
-            let below =
-                second.as_ref().and_then(|row| with_units_row(&names, &row.iter().collect::<Vec<_>>()));
-            match below {
-                Some(joined) => (named(&first, &joined)?, None),
-                None => {
-                    (named(&first, &names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>())?, second)
-                }
-            }
-        }
-    };
+    let first = records.next().ok_or(ImportError::Empty)?;
+    let columns = named(&record(first)?)?;
     let head = Head { reference, machine, method, efficiency, first_step, columns };
     let mut rows: Vec<(Row, StringRecord)> = Vec::new();
-    while let Some(next) = pending.take().map(Ok).or_else(|| records.next().map(record)) {
-        let next = next?;
+    for next in records {
+        let next = record(next)?;
         if next.iter().all(str::is_empty) {
             continue;
         }
         room_for_one_more(rows.len(), at(&next))?;
-        rows.push((row(&next, &head.columns, table)?, next));
+        rows.push((row(&next, &head.columns)?, next));
     }
-    if head.columns.find("line_speed_corrected_rpm").is_some() {
-        own(&head, &rows, given)
-    } else {
-        let rows: Vec<Row> = rows.into_iter().map(|(row, _)| row).collect();
-        let map = map_of_rows(head.machine, &rows, head.reference, given)?;
-        Ok(CompressorMap { efficiency: head.efficiency, ..map })
-    }
+    own(&head, &rows, given)
+}
+
+/// The column that only files of `mapper` have.
+const OWN_COLUMN: &str = "line_speed_corrected_rpm";
+
+/// Whether a text is a file of `mapper` with all its columns.
+fn is_own(text: &str) -> bool {
+    let heading = text.lines().find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
+    heading.is_some_and(|line| line.split(',').any(|name| name.trim() == OWN_COLUMN))
 }
 
 fn record(record: Result<StringRecord, ::csv::Error>) -> Result<StringRecord, ImportError> {
@@ -108,30 +95,15 @@ fn at(record: &StringRecord) -> usize {
     record.position().map_or(1, |position| position.line() as usize)
 }
 
-/// The separator of the first line of content.
-fn table_text(text: &str) -> TableText {
-    let line = text.lines().find(|line| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-    TableText::of(line.unwrap_or_default())
-}
-
-fn numeric(record: &StringRecord, table: TableText) -> bool {
-    record.len() >= 4 && record.iter().take(4).all(|field| table.number(field).is_some())
-}
-
-/// A column without a heading, in the internal unit.
-fn bare(index: usize) -> FoundColumn {
-    FoundColumn { index, unit: None }
-}
-
-fn named(record: &StringRecord, names: &[String]) -> Result<Columns, ImportError> {
-    let headings: Vec<&str> = names.iter().map(String::as_str).collect();
+fn named(record: &StringRecord) -> Result<Columns, ImportError> {
+    let headings: Vec<&str> = record.iter().collect();
     let wanted: [WantedColumn<'_>; 4] = std::array::from_fn(|i| {
         let (quantity, names) = MAP_COLUMNS[i];
         WantedColumn { quantity, names, kind: KINDS[i] }
     });
     let four = find_columns(&headings, wanted)
         .map_err(|source| ImportError::Row { line: at(record), source: source.into() })?;
-    Ok(Columns { names: names.to_vec(), four })
+    Ok(Columns { names: headings.iter().map(|&name| name.to_owned()).collect(), four })
 }
 
 impl Columns {
@@ -164,12 +136,12 @@ fn finite(text: &str, record: &StringRecord, name: &str) -> Result<f64, ImportEr
     })
 }
 
-fn row(record: &StringRecord, columns: &Columns, table: TableText) -> Result<Row, ImportError> {
+fn row(record: &StringRecord, columns: &Columns) -> Result<Row, ImportError> {
     let field = |index: usize, what: &str| {
         let column = columns.four[index];
         let text = record.get(column.index).unwrap_or_default();
         let shown: String = text.chars().take(40).collect();
-        table.number(text).map(|value| column.inside(value)).ok_or_else(|| ImportError::NotANumber {
+        text.parse().ok().map(|value| column.inside(value)).ok_or_else(|| ImportError::NotANumber {
             line: at(record),
             quantity: what.to_owned(),
             text: shown,
@@ -200,7 +172,7 @@ fn own(
     let mut points = Vec::with_capacity(rows.len());
     for (row, record) in rows {
         let line_rpm =
-            head.columns.number(record, "line_speed_corrected_rpm")?.unwrap_or(row.speed_corrected_rpm);
+            head.columns.number(record, OWN_COLUMN)?.unwrap_or(row.speed_corrected_rpm);
         points.push((line_rpm, own_point(head, row, record, line_rpm, reference)?));
     }
     points.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,0 +1,218 @@
+//! Reads tables over speed and an auxiliary coordinate (beta, R line) from the scripts and files of simulation programs: arrays of MATLAB and
+//! Python, nested tables of NPSS.
+
+use crate::lines::{Row, map_of_rows, room_for_one_more};
+use crate::{heading, reference, table};
+use mapper_core::{CompressorMap, ImportError, ImportedMap, ReferenceState};
+
+/// Numbers of the quantities, speed by speed.
+#[derive(Debug, Default)]
+struct BetaTables {
+    speeds: Vec<f64>,
+    flow: Vec<f64>,
+    pressure_ratio: Vec<f64>,
+    efficiency: Vec<f64>,
+}
+
+/// Maximum number of numbers in a file.
+const NUMBER_LIMIT: usize = 4 * crate::POINT_LIMIT;
+
+/// The map of a script with arrays: `name = [1 2; 3 4]` or `name = np.array([[1, 2], [3, 4]])`.
+pub(crate) fn read_arrays(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    let text = table::text_of(bytes)?;
+    let code: String = text
+        .lines()
+        .map(|line| line.split(['%', '#']).next().unwrap_or_default())
+        .collect::<Vec<_>>()
+        .join("\n");
+    let mut tables = BetaTables::default();
+    for (at, _) in code.match_indices('=') {
+        let name =
+            code[..at].trim_end().rsplit(|c: char| c.is_whitespace() || c == ';').next().unwrap_or_default();
+        let value = code[at + 1..].trim_start();
+        let value =
+            value.strip_prefix("np.array(").or_else(|| value.strip_prefix("numpy.array(")).unwrap_or(value);
+        if value.starts_with('[')
+            && let Some(place) = tables.place(name)
+            && place.is_empty()
+        {
+            *place = bracketed(value, '[', ']')?;
+        }
+    }
+    tables.map(&text, given)
+}
+
+/// The map of nested tables: `NcorrMap = 0.5 { RlineMap = {1, 2} WcMap = {0.1, 0.2} }`.
+pub(crate) fn read_nested(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    let text = table::text_of(bytes)?;
+    let code: String =
+        text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
+    let mut tables = BetaTables::default();
+    let (mut speeds, mut by_beta) = (Vec::new(), false);
+    for part in code.split("Table ").skip(1) {
+        // Of several vane angles the first counts.
+        let angles: Vec<usize> = part
+            .match_indices("alphaMap")
+            .map(|(at, _)| at)
+            .filter(|at| part[*at..].trim_start_matches("alphaMap").trim_start().starts_with('='))
+            .collect();
+        let part = &part[..angles.get(1).copied().unwrap_or(part.len())];
+        let mut of_table = Vec::new();
+        let mut is_known = false;
+        for (at, _) in part.match_indices('=') {
+            let name = part[..at]
+                .trim_end()
+                .rsplit(|c: char| !(c.is_alphanumeric() || c == '_'))
+                .next()
+                .unwrap_or_default();
+            let value = part[at + 1..].trim_start();
+            if name.to_lowercase().starts_with("nc") && value.starts_with('{') {
+                // Each value of beta has a list over all speeds.
+                by_beta = true;
+                if of_table.is_empty() {
+                    of_table = bracketed(value, '{', '}')?;
+                }
+            } else if name.to_lowercase().starts_with("nc") {
+                let end =
+                    value.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(value.len());
+                of_table.extend(value[..end].parse::<f64>().ok());
+            } else if value.starts_with('{') && tables.place(name).is_some() {
+                let numbers = bracketed(value, '{', '}')?;
+                if let Some(place) = tables.place(name) {
+                    place.extend(numbers);
+                    is_known = true;
+                }
+            }
+        }
+        if is_known && speeds.is_empty() {
+            speeds = of_table;
+        }
+    }
+    tables.speeds = speeds;
+    if by_beta {
+        tables.turn();
+    }
+    tables.map(&text, given)
+}
+
+/// The numbers between a bracket and its partner, in order.
+fn bracketed(text: &str, open: char, close: char) -> Result<Vec<f64>, ImportError> {
+    let mut depth = 0usize;
+    let mut end = text.len();
+    for (at, c) in text.char_indices() {
+        depth += usize::from(c == open);
+        if c == close {
+            depth = depth.saturating_sub(1);
+            if depth == 0 {
+                end = at;
+                break;
+            }
+        }
+    }
+    let mut numbers = Vec::new();
+    let words = text[..end].split(|c: char| c.is_whitespace() || ",;[]{}()".contains(c));
+    for word in words.filter(|word| !word.is_empty() && *word != "...") {
+        if numbers.len() >= NUMBER_LIMIT {
+            return Err(ImportError::TooMany { line: 1, limit: NUMBER_LIMIT });
+        }
+        numbers.push(word.parse().map_err(|_| ImportError::NotANumber {
+            line: 1,
+            quantity: "table".to_owned(),
+            text: word.chars().take(40).collect(),
+        })?);
+    }
+    Ok(numbers)
+}
+
+impl BetaTables {
+    /// The quantity of an array, by the names in use: T-MATS, pyCycle, NPSS, and those that `mapper` writes.
+    fn place(&mut self, name: &str) -> Option<&mut Vec<f64>> {
+        let name = name.rsplit('.').next().unwrap_or_default().to_lowercase();
+        match name.as_str() {
+            "ncvec"
+            | "ncmap"
+            | "nc"
+            | "nc_vec"
+            | "ncorr"
+            | "ncorrmap"
+            | "corrected_speed_rpm"
+            | "x_c_map_ncvec" => Some(&mut self.speeds),
+            "wcarray" | "wcmap" | "wc" | "wc_map" | "corrected_flow_kg_s" | "mc" => Some(&mut self.flow),
+            "prarray" | "prmap" | "pr" | "pr_map" | "pressure_ratio" => Some(&mut self.pressure_ratio),
+            "effarray" | "effmap" | "eff" | "eff_map" | "isentropic_efficiency" | "eta" => {
+                Some(&mut self.efficiency)
+            }
+            _ => None,
+        }
+    }
+
+    /// From beta by beta to speed by speed.
+    fn turn(&mut self) {
+        let speeds = self.speeds.len().max(1);
+        for values in [&mut self.flow, &mut self.pressure_ratio, &mut self.efficiency] {
+            *values =
+                (0..speeds).flat_map(|speed| values.iter().skip(speed).step_by(speeds).copied()).collect();
+        }
+    }
+
+    fn map(&self, text: &str, given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+        let missing = [
+            (&self.speeds, "speed"),
+            (&self.flow, "corrected flow"),
+            (&self.pressure_ratio, "pressure ratio"),
+            (&self.efficiency, "efficiency"),
+        ];
+        if let Some((_, missing)) = missing.iter().find(|(values, _)| values.is_empty()) {
+            return Err(ImportError::NoTable { missing });
+        }
+        let lines = self.speeds.len();
+        let columns = self.flow.len().min(self.pressure_ratio.len()) / lines;
+        // A map with vanes has one table per angle; the first counts.
+        let fits = |values: &[f64]| values.len() >= lines * columns && values.len().is_multiple_of(lines);
+        if columns == 0
+            || ![&self.flow, &self.pressure_ratio, &self.efficiency].into_iter().all(|values| fits(values))
+        {
+            return Err(ImportError::TableSize {
+                speeds: lines,
+                flows: self.flow.len(),
+                pressure_ratios: self.pressure_ratio.len(),
+                efficiencies: self.efficiency.len(),
+            });
+        }
+        let fastest = self.speeds.iter().copied().fold(0.0, f64::max);
+        // Programs scale maps by a design point: no shaft turns at 10 rpm.
+        if fastest < 10.0 {
+            return Err(ImportError::RelativeSpeed { fastest });
+        }
+        let columns = if self.flow.len() == lines * columns { columns } else { self.beta_count(columns) };
+        let mut rows = Vec::with_capacity(lines * columns);
+        for (line, speed_corrected_rpm) in self.speeds.iter().enumerate() {
+            for place in line * columns..(line + 1) * columns {
+                room_for_one_more(rows.len(), place + 1)?;
+                let value = |values: &[f64]| values.get(place).copied().unwrap_or(f64::NAN);
+                let row = Row {
+                    at: place + 1,
+                    speed_corrected_rpm: *speed_corrected_rpm,
+                    flow_corrected_kg_s: value(&self.flow),
+                    pressure_ratio: value(&self.pressure_ratio),
+                    eta: Some(value(&self.efficiency)),
+                };
+                row.check()?;
+                rows.push(row);
+            }
+        }
+        let found = text.lines().find_map(reference::in_comment);
+        let machine = text
+            .lines()
+            .find_map(|line| line.split_once("compressor map of "))
+            .map(|(_, name)| name.trim().chars().take(200).collect());
+        let efficiency = text.lines().find_map(heading::efficiency_in_comment);
+        let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given)?;
+        Ok(CompressorMap { efficiency, ..map }.into())
+    }
+
+    /// Number of places on a line, from a whole number of vane angles; all if the number is unknown.
+    fn beta_count(&self, all: usize) -> usize {
+        (2..=20).find(|angles| all.is_multiple_of(*angles)).map_or(all, |angles| all / angles)
+    }
+}

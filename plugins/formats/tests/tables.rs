@@ -1,0 +1,201 @@
+//! Map files as engineers have them. All files but the turbine's hold the same made-up map: four speed lines with eight points each.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, ReferenceState};
+use mapper_formats::FORMATS;
+use std::path::Path;
+
+fn read(file: &str, given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tables").join(file);
+    read_bytes(file, &std::fs::read(path).unwrap(), given)
+}
+
+fn read_bytes(name: &str, bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    let extension = name.rsplit('.').next().unwrap();
+    FORMATS.read_from(extension).unwrap().read(bytes, given)
+}
+
+/// Corrected speed, corrected flow, pressure ratio, efficiency.
+fn numbers(map: &CompressorMap) -> Vec<[Option<f64>; 4]> {
+    let points = map.lines.iter().flat_map(|line| &line.points);
+    let identified = points.map(|point| (&point.identified, point.eta));
+    identified
+        .map(|(p, eta)| {
+            [Some(p.speed_corrected_rpm), Some(p.flow_corrected_kg_s), Some(p.pressure_ratio), eta]
+        })
+        .collect()
+}
+
+/// The map as the plainest of the files has it, in the internal units.
+fn expected() -> Vec<[Option<f64>; 4]> {
+    let found =
+        numbers(&read("lines_separated_by_blank_and_minus.txt", Some(ReferenceState::SAE)).unwrap().map);
+    // Its first line, copied by hand.
+    let line = [
+        (0.14, 1.105, 0.4817),
+        (0.13724, 1.1484, 0.5032),
+        (0.12911, 1.1896, 0.5594),
+        (0.116, 1.2266, 0.6274),
+    ];
+    for (flow, ratio, eta) in line {
+        assert!(found.iter().any(|row| row[1..] == [Some(flow), Some(ratio), Some(eta)]));
+    }
+    assert_eq!(found.len(), 32);
+    found
+}
+
+/// Compares with the map; `digits` is the relative error of the rounded numbers in the file.
+fn assert_is_the_map(file: &str, read: &ImportedMap, digits: f64, with_efficiency: bool) {
+    let (found, expected) = (numbers(&read.map), expected());
+    assert_eq!((read.map.lines.len(), found.len()), (4, 32), "{file}");
+    for row in &found {
+        // Within a line the order is by flow; equal flows may stand in either order.
+        let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => (a / b - 1.0).abs() <= digits,
+            (None, _) => true,
+            (Some(_), None) => false,
+        };
+        let place = expected.iter().position(|known| row.iter().zip(known).all(|(a, b)| near(*a, *b)));
+        assert!(place.is_some(), "{file}: {row:?}");
+    }
+    assert_eq!(found.iter().any(|row| row[3].is_some()), with_efficiency, "{file}");
+}
+
+#[test]
+fn every_layout_gives_the_same_map() {
+    for (file, digits, with_efficiency) in [
+        ("german.csv", 1e-9, true),
+        ("gt_text.txt", 1e-9, true),
+        ("sae_csv_header_only.csv", 1e-4, true),
+        ("sae_csv_preamble.csv", 1e-4, true),
+        ("sae.xlsx", 1e-4, true),
+        ("sae_txt_four_numbers_in_title.txt", 1e-9, true),
+        // One speed for the line, whose rows differ by 0.4 %.
+        ("speed_only_in_first_row.csv", 5e-3, true),
+        // Five digits of lb/min.
+        ("lbmin_percent.csv", 1e-4, true),
+        ("sae_txt_lbmin_header.txt", 1e-4, true),
+        // Four and six digits of N/sqrt(T) and m sqrt(T)/p.
+        ("reduced_parameters.csv", 1e-4, true),
+        ("eta_dash.csv", 1e-9, true),
+        ("matlab_arrays.m", 5e-3, true),
+        ("no_efficiency_column.csv", 5e-3, false),
+    ] {
+        let read = read(file, Some(ReferenceState::SAE)).unwrap_or_else(|error| panic!("{file}: {error}"));
+        assert_is_the_map(file, &read, digits, with_efficiency);
+    }
+}
+
+/// A volume counts at the density of the reference state: 1.184 kg/m3 at 25 degC and 101.325 kPa (ideal gas).
+#[test]
+fn volume_flows_have_the_density_of_the_reference_state() {
+    let state = ReferenceState { t_ref_k: 298.15, p_ref_pa: 101_325.0 };
+    for (file, digits) in [("volume_flow.csv", 2e-4), ("cfm.csv", 1e-3)] {
+        assert_is_the_map(file, &read(file, Some(state)).unwrap(), digits, true);
+    }
+}
+
+#[test]
+fn what_is_assumed_is_remarked() {
+    let remarks = |file: &str| read(file, Some(ReferenceState::SAE)).unwrap().remarks;
+    assert_eq!(remarks("speed_only_in_first_row.csv"), [ImportRemark::SpeedOfRowAbove]);
+    assert_eq!(remarks("no_efficiency_column.csv"), [ImportRemark::NoEfficiency]);
+    assert_eq!(remarks("lines_separated_by_blank_and_minus.txt"), [ImportRemark::NoHeading]);
+    assert_eq!(remarks("german.csv"), []);
+    let percent = "Speed,Flow [kg/s],PR,Eff\n50000,0.05,1.3,61\n50000,0.04,1.4,66\n";
+    let found = read_bytes("x.csv", percent.as_bytes(), Some(ReferenceState::SAE)).unwrap();
+    assert_eq!(found.remarks, [ImportRemark::EfficiencyInPercent]);
+    assert_eq!(numbers(&found.map)[0][3], Some(0.66));
+}
+
+/// Reduced quantities are the same map at every reference state.
+#[test]
+fn reduced_quantities_need_no_reference() {
+    let found = read("reduced_parameters.csv", None).unwrap();
+    assert_eq!(found.map.reference, ReferenceState::SAE);
+    let garrett = read("reduced_parameters.csv", Some(ReferenceState::GARRETT)).unwrap().map;
+    let back = garrett.at_reference(ReferenceState::SAE);
+    for (a, b) in
+        numbers(&found.map).iter().flatten().flatten().zip(numbers(&back).iter().flatten().flatten())
+    {
+        // Rounding.
+        assert!((a / b - 1.0).abs() < 1e-12);
+    }
+}
+
+/// The state in the preamble of a file counts, and another one is refused.
+#[test]
+fn a_reference_in_the_preamble_is_noticed() {
+    assert_eq!(read("gt_text.txt", None).unwrap().map.reference, ReferenceState::SAE);
+    let refused = read("gt_text.txt", Some(ReferenceState::GARRETT)).unwrap_err();
+    assert!(matches!(refused, ImportError::ReferenceConflict { .. }));
+}
+
+/// Measured points are corrected: 0.135 kg/s at 20.1 degC and 96.40 kPa is 0.1389 kg/s at 298 K and 100 kPa.
+#[test]
+fn measured_points_become_a_map() {
+    let found = read("raw_points_not_corrected.csv", Some(ReferenceState::SAE)).unwrap();
+    assert_eq!(found.remarks, [ImportRemark::Measured]);
+    let first = numbers(&found.map)
+        .into_iter()
+        .find(|row| row[1].is_some_and(|flow| (flow - 0.1389).abs() < 1e-4))
+        .unwrap();
+    let [speed, _, ratio, eta] = first.map(Option::unwrap);
+    // 59880 sqrt(298/293.25), 106.52/96.40, and T1 (PR^0.2857 - 1)/(T2 - T1) within the definitions' difference.
+    assert!((speed - 60_363.0).abs() < 1.0 && (ratio - 1.104_98).abs() < 1e-5);
+    let at_constant_gamma = 293.25 * (1.104_98f64.powf(0.4 / 1.4) - 1.0) / 17.6;
+    assert!((eta - at_constant_gamma).abs() < 1e-3);
+}
+
+#[test]
+fn what_is_no_compressor_map_is_refused_by_name() {
+    let refused = |file: &str| read(file, Some(ReferenceState::SAE)).unwrap_err();
+    assert!(matches!(refused("turbine.txt"), ImportError::Turbine { line: 1, .. }));
+    assert!(matches!(refused("npss.map"), ImportError::RelativeSpeed { fastest: 1.25 }));
+    assert!(matches!(refused("pycycle.py"), ImportError::RelativeSpeed { fastest: 1.25 }));
+    // X and Y have no units: 18.5 lb/min as kg/s is impossible.
+    assert!(matches!(refused("digitiser_side_by_side.csv"), ImportError::Flow { line: 3, .. }));
+    let text = |text: &str| read_bytes("x.csv", text.as_bytes(), Some(ReferenceState::SAE)).unwrap_err();
+    assert!(matches!(text("Speed [rpm],Flow [kg/s]\n50000,0.05\n"), ImportError::NoColumn { line: 1, .. }));
+    assert!(matches!(
+        text("N/sqrt(T3);Expansion ratio;Flow [kg/s];Eff\n1800;1.2;0.012;0.55\n"),
+        ImportError::Turbine { line: 1, .. }
+    ));
+}
+
+/// Further shapes: a digitiser's lines with units, a block per speed with its title, French and Spanish headings, a percent sign in the
+/// cells, a heading that is repeated, UTF-16.
+#[test]
+fn further_shapes() {
+    let four =
+        |text: &str| numbers(&read_bytes("x.csv", text.as_bytes(), Some(ReferenceState::SAE)).unwrap().map);
+    let row = |speed: f64, flow: f64, ratio: f64, eta: f64| [Some(speed), Some(flow), Some(ratio), Some(eta)];
+    let expected = [row(50e3, 0.04, 1.4, 0.66), row(50e3, 0.05, 1.3, 0.61), row(80e3, 0.07, 1.9, 0.7)];
+    for text in [
+        "Régime [tr/min];Débit [kg/s];Taux de compression;Rendement\n50000;0,05;1,3;0,61\n50000;0,04;1,4;0,66\n80000;0,07;1,9;0,7\n",
+        "Velocidad (rpm)\tCaudal (kg/s)\tRelación de presiones\tRendimiento (%)\n50000\t0.05\t1.3\t61\n50000\t0.04\t1.4\t66\n80000\t0.07\t1.9\t70\n",
+        "Flow kg/s,PR,Eff\nN = 50000 rpm\n0.05,1.3,61 %\n0.04,1.4,66 %\nN = 80000 rpm\n0.07,1.9,70 %\n",
+        "Speed,Flow,PR,Eta\nkrpm,g/s,-,%\n50,50,1.3,61\n50,40,1.4,66\nSpeed,Flow,PR,Eta\n80,70,1.9,70\n",
+        "# corrected\n! Speed(RPM) MassFlow(kg/s) PressureRatio Efficiency(fraction)\n50000 0,05 1,3 0,61\n50000 0,04 1,4 0,66\n80000 0,07 1,9 0,7\n",
+    ] {
+        let found = four(text);
+        assert_eq!(found.len(), expected.len(), "{text}");
+        for (a, b) in found.iter().flatten().zip(expected.iter().flatten()) {
+            // Conversion of units.
+            assert!((a.unwrap() / b.unwrap() - 1.0).abs() < 1e-12, "{text}: {a:?} {b:?}");
+        }
+    }
+    let digitised =
+        "50 krpm,,80 krpm,\nFlow [lb/min],PR,Flow [lb/min],PR\n6.6139,1.3,9.2594,1.9\n5.2911,1.4,,\n";
+    let found = four(digitised);
+    assert_eq!(found.len(), 3);
+    assert!((found[0][1].unwrap() - 0.04).abs() < 1e-6 && found[2][0] == Some(80e3));
+    let utf16: Vec<u8> = [0xfeff]
+        .into_iter()
+        .chain("N;m;PR;eta\n50000;0,05;1,3;0,61\n".encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    let found = read_bytes("x.csv", &utf16, Some(ReferenceState::SAE)).unwrap();
+    assert_eq!(numbers(&found.map), [row(50e3, 0.05, 1.3, 0.61)]);
+}

@@ -4,8 +4,8 @@ use crate::lines::{Row, line, room_for_one_more};
 use crate::{heading, reference, table};
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
-    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MAP_COLUMNS, MapPoint, Method, ReferenceState, SpeedShift,
-    Verdict, Warning,
+    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MAP_COLUMNS, MapPoint,
+    Method, ReferenceState, SpeedShift, Verdict, Warning,
 };
 use mapper_yaml::units::{FoundColumn, Kind, WantedColumn, find_columns};
 
@@ -171,8 +171,7 @@ fn own(
     }
     let mut points = Vec::with_capacity(rows.len());
     for (row, record) in rows {
-        let line_rpm =
-            head.columns.number(record, OWN_COLUMN)?.unwrap_or(row.speed_corrected_rpm);
+        let line_rpm = head.columns.number(record, OWN_COLUMN)?.unwrap_or(row.speed_corrected_rpm);
         points.push((line_rpm, own_point(head, row, record, line_rpm, reference)?));
     }
     points.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -12,6 +12,7 @@ mod concern;
 mod consistency;
 mod elements;
 mod load;
+mod machine_sizes;
 mod nightly;
 mod nominal_table;
 mod prospects;
@@ -28,6 +29,7 @@ pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
     read_text, warnings,
 };
+pub use machine_sizes::{AssumedSize, similar_machine, similar_sizes};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use nominal_table::{NominalTableError, nominal_table};

@@ -3,6 +3,7 @@
 use crate::campaign::{Campaign, CampaignFile};
 use crate::concern::Concern;
 use crate::consistency;
+use crate::machine_sizes;
 use crate::prospects;
 use crate::reach::{self, Unreachable};
 use crate::resolved;
@@ -88,6 +89,10 @@ pub fn check_with(
     let source = Source::new(&DOCUMENT, origin, text);
     let mut notes = Notes::default();
     if let Some(root) = mapper_yaml::read(&source, &mut notes) {
+        if let Some(concern) = other_file(&root) {
+            note(&source, &root, &mut notes, FindingKind::WrongValue, concern);
+            return Err(Findings::new(source, notes));
+        }
         SCHEMA.check(&source, &root, &mut notes);
         if !notes.is_full() {
             consistency::check(&source, &root, files, &mut notes);
@@ -167,6 +172,31 @@ pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concer
     Findings::new(source, notes)
 }
 
+/// Files of other commands, by a key that only they have.
+const OTHER_FILES: [(&str, &str, &str); 2] = [
+    ("nightly", "this file describes nightly runs, not a campaign", "use `mapper nightly FILE`"),
+    (
+        "channels",
+        "this file maps the channels of a log, it is not a campaign",
+        "use `mapper identify LOG --channels FILE`",
+    ),
+];
+
+/// A file of another command: one mistake in place of one for each of its keys.
+fn other_file(root: &Node) -> Option<Concern> {
+    if root.get(&steps!["campaign"]).is_some() {
+        return None;
+    }
+    let (key, message, remedy) =
+        OTHER_FILES.iter().find(|(key, ..)| root.get(&[Step::from(*key)]).is_some())?;
+    Some(Concern {
+        grave: true,
+        at: vec![Step::from(*key)],
+        message: (*message).to_owned(),
+        remedy: (*remedy).to_owned(),
+    })
+}
+
 fn note(source: &Source, root: &Node, notes: &mut Notes, kind: FindingKind, concern: Concern) {
     let Concern { at, message, remedy, .. } = concern;
     notes.push(source.finding(kind, path_text(&at), root.place(&at), message, remedy));
@@ -209,6 +239,7 @@ fn finish(
             return None;
         }
     };
+    campaign.machine.assumed = machine_sizes::assumed(root, &campaign.machine.params);
     for concern in prospects::concerns(&campaign, &point_paths).into_iter().filter(|concern| concern.grave) {
         note(source, root, notes, FindingKind::Implausible, concern);
     }

@@ -13,11 +13,26 @@ use serde::Serialize;
 /// Puts the points of the lines into the campaign; mistakes are reported at their lines.
 pub(crate) fn resolve(campaign: &mut Campaign, model: &Model) -> Result<(), Vec<Concern>> {
     let (mut points, mut concerns) = (Vec::new(), Vec::new());
+    let limit_rpm = campaign.limits.speed_max_rpm;
+    let lowest_rpm =
+        campaign.lines.iter().map(|line| physical_speed_rpm(line, campaign)).fold(f64::INFINITY, f64::min);
+    if campaign.lines.len() > 1 && lowest_rpm > limit_rpm {
+        return Err(vec![Concern {
+            grave: true,
+            at: steps!["limits", "speed"].to_vec(),
+            message: format!(
+                "the limit, {} krpm, is below every line of the grid; the slowest has {:.2} krpm at T1 = {:.2} K",
+                limit_rpm / 1e3,
+                lowest_rpm / 1e3,
+                campaign.boundary.t1_k
+            ),
+            remedy: "raise the limit to what the machine allows".to_owned(),
+        }]);
+    }
     for (index, line) in campaign.lines.iter().enumerate() {
         let at = |key: &str| steps!["grid", "lines", index, key].to_vec();
         let krpm = line.speed_corrected_rpm / 1e3;
         let speed_rpm = physical_speed_rpm(line, campaign);
-        let limit_rpm = campaign.limits.speed_max_rpm;
         if speed_rpm > limit_rpm {
             concerns.push(Concern {
                 grave: true,

@@ -8,13 +8,16 @@ static double largest(double a, double b) { return a > b ? a : b; }
 #ifdef MAP_CLOSED_FORM
 
 MapPoint map_at(double wheel_diameter_m, double speed_rpm, double pressure_ratio, double flow_scale) {
-    const double n = speed_rpm / 1e5;
+    /* Compressors with another wheel are geometrically similar to turbo_a, whose wheel has 52 mm. */
+    const double wheel_ratio = wheel_diameter_m / 52e-3;
+    const double area_ratio = wheel_ratio * wheel_ratio;
+    const double n = wheel_ratio * speed_rpm / 1e5;
     const double tip_m_s = PI * wheel_diameter_m * speed_rpm / 60.0;
     const double work = 1.0 + 1.06 * tip_m_s * tip_m_s / (2.0 * 1005.0 * MAP_T_REF_K);
     const double surge_pr = work * work * work * sqrt(work);
-    const double surge_kg_s = 0.0265 * pow(n, 1.35);
+    const double surge_kg_s = area_ratio * (0.0265 * pow(n, 1.35));
     const double choke_pr = 1.0 + 0.15 * (surge_pr - 1.0);
-    const double choke_kg_s = 0.052 + 0.058 * n * sqrt(sqrt(n));
+    const double choke_kg_s = area_ratio * (0.052 + 0.058 * n * sqrt(sqrt(n)));
     const double span_kg_s = choke_kg_s - surge_kg_s;
     const double x = (pressure_ratio - choke_pr) / (surge_pr - choke_pr);
     const double fast = largest(n - 1.2, 0.0);

@@ -3,12 +3,17 @@
 //! The paper does not print its map tables; these forms replace them (flow as a function of speed and pressure
 //! ratio, an ellipse-like line between a zero-slope and a choke point; efficiency a parabola over flow). Fitted by eye to the
 //! ranges plotted in the paper: 50 to 170 krpm, corrected to SAE's reference state. Outside, the forms continue smoothly.
+//! Compressors with another wheel are geometrically similar: equal tip speed gives equal pressure ratio and efficiency, and a flow in
+//! proportion to the square of the wheel (e.g. Dixon and Hall, Fluid Mechanics and Thermodynamics of Turbomachinery, ch. 2).
 
 use crate::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use crate::power::power;
 use mapper_core::ReferenceState;
 
-/// Closed-form map of turbo_a.
+/// Wheel exit diameter of turbo_a, m (Burke et al., Appendix A).
+pub const TURBO_A_WHEEL_M: f64 = 52e-3;
+
+/// Closed-form map of turbo_a, or of a compressor similar to it.
 #[derive(Debug, Clone, Copy)]
 pub struct ClosedFormMap {
     /// Wheel exit diameter, m.
@@ -21,14 +26,16 @@ struct SpeedLineEnds {
     zero_slope_flow_kg_s: f64,
     choke_pressure_ratio: f64,
     choke_flow_kg_s: f64,
-    /// Corrected speed over 100 krpm.
+    /// Corrected speed of turbo_a at equal tip speed, over 100 krpm.
     speed_ratio: f64,
 }
 
 impl ClosedFormMap {
     #[inline]
     fn ends(&self, speed_corrected_rpm: f64) -> SpeedLineEnds {
-        let n = speed_corrected_rpm / 100_000.0;
+        let wheel_ratio = self.wheel_diameter_m / TURBO_A_WHEEL_M;
+        let area_ratio = wheel_ratio * wheel_ratio;
+        let n = wheel_ratio * speed_corrected_rpm / 100_000.0;
         let tip_speed_m_s = std::f64::consts::PI * self.wheel_diameter_m * speed_corrected_rpm / 60.0;
         let work = 1.0 + 1.06 * tip_speed_m_s * tip_speed_m_s / (2.0 * 1005.0 * ReferenceState::SAE.t_ref_k);
         // work^3.5 and n^1.25 by square roots: a third of the time of a general power.
@@ -36,9 +43,9 @@ impl ClosedFormMap {
         let n_125 = n * n.sqrt().sqrt();
         SpeedLineEnds {
             zero_slope_pressure_ratio,
-            zero_slope_flow_kg_s: 0.0265 * power(n, 1.35),
+            zero_slope_flow_kg_s: area_ratio * (0.0265 * power(n, 1.35)),
             choke_pressure_ratio: 1.0 + 0.15 * (zero_slope_pressure_ratio - 1.0),
-            choke_flow_kg_s: 0.052 + 0.058 * n_125,
+            choke_flow_kg_s: area_ratio * (0.052 + 0.058 * n_125),
             speed_ratio: n,
         }
     }
@@ -113,6 +120,16 @@ mod tests {
             prop_assert!(map.evaluate(speed, pr + step).flow_corrected_kg_s <= here);
             let inside = map.evaluate(speed, pr).surge_position_ratio < 1.0;
             prop_assert!(!inside || map.evaluate(speed * (1.0 + step), pr).flow_corrected_kg_s > here);
+        }
+
+        /// A similar compressor has the pressure ratio and efficiency of turbo_a at equal tip speed, and flow as the wheel's area.
+        #[test]
+        fn wheels_are_similar(speed in 20e3..200e3f64, pr in 1.0..4.0f64, ratio in 0.5..2.0f64) {
+            let small = ClosedFormMap { wheel_diameter_m: TURBO_A_WHEEL_M };
+            let large = ClosedFormMap { wheel_diameter_m: ratio * TURBO_A_WHEEL_M };
+            let (a, b) = (small.evaluate(speed, pr), large.evaluate(speed / ratio, pr));
+            prop_assert!((b.flow_corrected_kg_s / (ratio * ratio) - a.flow_corrected_kg_s).abs() < 1e-9);
+            prop_assert!((a.efficiency - b.efficiency).abs() < 1e-9);
         }
 
         /// The line meets its own surge and choke ends.

@@ -5,6 +5,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod assumed_text;
 mod comparison_text;
 mod conditions;
 mod corrected_points;
@@ -61,6 +62,7 @@ mod why_text;
 mod wrapped;
 mod zero_text;
 
+pub use assumed_text::{assumed_sentence, assumed_text, first_campaign_text};
 pub use comparison_text::{comparison_json, comparison_text};
 pub use conditions::{CONDITION_HEADS, condition_rows};
 pub use corrected_points::corrected_csv;

@@ -48,7 +48,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
             eta(soak_s + step.start_s + step.dwell_s),
         ]);
     }
-    format!("{steps}\n\n{}\n{}", legend(plan), summary(plan, soak_s))
+    format!("{steps}\n\n{}\n{}", legend(plan), summary(campaign, plan, soak_s))
 }
 
 /// The mark of a step that is not a point of the grid.
@@ -82,7 +82,7 @@ fn legend(plan: &Plan) -> String {
 }
 
 /// Totals of the plan, a line for each figure.
-fn summary(plan: &Plan, soak_s: f64) -> String {
+fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> String {
     let figures = &plan.figures;
     let steps_s: f64 = plan.steps.iter().map(|step| step.dwell_s).sum();
     let parts = [
@@ -122,6 +122,13 @@ fn summary(plan: &Plan, soak_s: f64) -> String {
     }
     lines.extend(plan.bound_remark.iter().map(|remark| ("bound", remark.clone())));
     lines.extend(plan.remarks.iter().map(|remark| ("note", remark.clone())));
+    if !campaign.machine.assumed.is_empty() {
+        let count = campaign.machine.assumed.len();
+        lines.push((
+            "assumed",
+            format!("{count} sizes of the machine, from its wheel: `mapper check` lists them"),
+        ));
+    }
     let made_from = &plan.made_from;
     let short = |hash: &str| hash.chars().take(12).collect::<String>();
     let hashes =

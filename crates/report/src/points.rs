@@ -65,7 +65,8 @@ pub fn score_text(score: &ScoreSummary) -> String {
 
 /// `-` if the recording does not contain it.
 pub(crate) fn opening(ratio: f64) -> String {
-    if ratio.is_finite() { ratio.to_string() } else { "-".to_owned() }
+    // Valves are set to a thousandth at best.
+    if ratio.is_finite() { ((1e3 * ratio).round() / 1e3).to_string() } else { "-".to_owned() }
 }
 
 fn points_table(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> comfy_table::Table {

@@ -1,5 +1,6 @@
 //! The test report of a run, as Markdown.
 
+use crate::assumed_text::assumed_sentence;
 use crate::conditions::{CONDITION_HEADS, condition_rows};
 use crate::disagreement::disagreement_text;
 use crate::display::Display;
@@ -285,6 +286,7 @@ fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
             report.humidity_ratio.map_or_else(missing, |ratio| format!("{:.0} %", 100.0 * ratio)),
         ),
     ];
+    rows.extend(assumed_sentence(campaign).map(|sentence| ("sizes of the machine", sentence)));
     if let Some(k) = report.cell_temperature_k {
         rows.push(("cell", format!("{} {}", display.temperature(k), campaign.display.temperature)));
     }

@@ -1,6 +1,7 @@
 //! Errors of a session.
 
 use crate::error_kind::ErrorKind;
+use crate::error_words::{in_doubt_text, word};
 use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
@@ -17,16 +18,6 @@ use mapper_runner::{RunError, StepSourceError};
 use mapper_sequence::SequenceError;
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// Quotes a name so that a shell reads it as one word.
-fn word(name: &str) -> String {
-    let plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || "-_./:@".contains(c));
-    if plain { name.to_owned() } else { format!("'{}'", name.replace('\'', r"'\''")) }
-}
-
-fn in_doubt_text(rigs: &[String]) -> String {
-    if rigs.is_empty() { "no rig is in doubt".to_owned() } else { format!("in doubt: {}", rigs.join(", ")) }
-}
 
 /// Why a session could not complete a request.
 #[derive(Debug, thiserror::Error)]
@@ -66,6 +57,9 @@ pub enum SessionError {
     /// A log without steps has too little data.
     #[error(transparent)]
     Driven(#[from] mapper_driven::DrivenError),
+    /// There is no nominal map for a first campaign.
+    #[error(transparent)]
+    FirstMap(#[from] Box<crate::first_map::FirstMapError>),
     /// No recording was given.
     #[error("no recording was given; name a run directory or a recording")]
     NoRecording,
@@ -443,6 +437,7 @@ impl SessionError {
             | E::FormatUnsaid { .. }
             | E::Fit { .. }
             | E::Fmu(_)
+            | E::FirstMap(_)
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
             | E::Script(_)

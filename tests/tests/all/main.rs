@@ -11,6 +11,7 @@ mod drift;
 mod drift_refusals;
 mod drift_watched;
 mod drivers;
+mod first_campaign;
 mod fleet;
 mod fleet_cluster;
 mod fmu;

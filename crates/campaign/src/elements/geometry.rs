@@ -1,5 +1,6 @@
-//! `machine.geometry:`, which overrides the values of Burke et al., Appendix A.
+//! `machine.geometry:`, which overrides the machine of Burke et al., Appendix A, scaled to the given wheel.
 
+use crate::machine_sizes::similar_machine;
 use crate::si::set;
 use crate::units::{Area, Conductance, Conductivity, Inertia, Length, Mass, MassFlow, Quantity, Volume};
 use mapper_core::InletConvection;
@@ -25,8 +26,15 @@ pub(crate) struct GeometryFile {
 }
 
 impl GeometryFile {
-    /// Overrides the defaults with the values of the file.
-    pub(crate) fn apply(self, params: &mut Params) {
+    /// The machine: the values of the file, and the reference machine scaled to its wheel for all others.
+    pub(crate) fn machine(self) -> Params {
+        let wheel = self.compressor.as_ref().and_then(|compressor| compressor.wheel_diameter);
+        let mut params = wheel.map_or_else(Params::default, |wheel| similar_machine(wheel.inside));
+        self.apply(&mut params);
+        params
+    }
+
+    fn apply(self, params: &mut Params) {
         self.compressor.unwrap_or_default().apply(params);
         self.turbine.unwrap_or_default().apply(params);
         self.bearing.unwrap_or_default().apply(params);
@@ -77,7 +85,7 @@ pub(crate) struct CompressorFile {
     /// Diameter of the outlet pipe.
     #[schemars(extend("x-above" = "0 mm"))]
     outlet_diameter: Option<Quantity<Length>>,
-    /// Diameter of the wheel at its exit.
+    /// Diameter of the wheel at its exit; omitted sizes are scaled to it from the 52 mm of Burke et al.
     #[schemars(extend("x-above" = "0 mm"))]
     wheel_diameter: Option<Quantity<Length>>,
     /// Mass of the housing.
@@ -218,12 +226,10 @@ mod tests {
 
     #[test]
     fn what_is_left_out_stays_as_in_the_paper() {
-        let mut params = Params::default();
-        GeometryFile::default().apply(&mut params);
-        assert_eq!(params, Params::default());
+        assert_eq!(GeometryFile::default().machine(), Params::default());
         let text =
             "{compressor: {outlet_diameter: 40 mm, nusselt: {exponent: 0.8}}, shaft_inertia: 1e-5 kg m^2}";
-        crate::testing::any::<GeometryFile>(text).unwrap().apply(&mut params);
+        let params = crate::testing::any::<GeometryFile>(text).unwrap().machine();
         assert!((params.compressor.outlet_diameter_m - 0.04).abs() < 1e-12);
         assert_eq!((params.compressor.nusselt_exponent, params.shaft_inertia_kgm2), (0.8, 1e-5));
         let default = Params::default();

@@ -271,10 +271,28 @@ fn points(check: &Check<'_>, list: &str) -> Vec<(usize, (f64, f64))> {
         .collect()
 }
 
+/// The lowest readable speed of `speeds` and `points`, rpm.
+fn lowest_speed_rpm(check: &Check<'_>) -> f64 {
+    let listed = (0..check.count(&steps!["grid", "speeds"]))
+        .filter_map(|index| Some(check.quantity(Kind::Speed, &steps!["grid", "speeds", index])?.0));
+    let of_points = points(check, "points").into_iter().map(|(_, (rpm, _))| rpm);
+    listed.chain(of_points).fold(f64::INFINITY, f64::min)
+}
+
 fn below_speed_limit(check: &mut Check<'_>, steps: &[Step], rpm: f64, text: &str) {
     if let Some((limit_rpm, limit)) = check.quantity(Kind::Speed, &steps!["limits", "speed"])
         && rpm > limit_rpm
     {
+        // A limit below every speed is one mistake, at the limit.
+        let lowest_rpm = lowest_speed_rpm(check);
+        if lowest_rpm > limit_rpm {
+            if rpm == lowest_rpm {
+                let message = format!("the limit is below every speed of the grid; the lowest is `{text}`");
+                let remedy = "raise the limit to what the machine allows";
+                check.note(FindingKind::Range, &steps!["limits", "speed"], message, remedy);
+            }
+            return;
+        }
         let message = format!("`{text}` is above `limits.speed`, `{limit}`");
         check.note(
             FindingKind::Range,

@@ -3,6 +3,7 @@
 use super::geometry::GeometryFile;
 use super::reference::ReferenceFile;
 use crate::checking::{Check, beside};
+use crate::machine_sizes::AssumedSize;
 use crate::nominal_table::nominal_table;
 use mapper_core::ReferenceState;
 use mapper_physics::params::Params;
@@ -24,6 +25,9 @@ pub struct Machine {
     pub params: Params,
     /// The nominal compressor map.
     pub map: MapSource,
+    /// Sizes that the file does not give. Not part of the canonical JSON: `params` has their values.
+    #[serde(skip)]
+    pub assumed: Vec<AssumedSize>,
 }
 
 /// Source of the nominal compressor map.
@@ -57,7 +61,7 @@ pub(crate) struct MachineFile {
     /// Serial number; put it into quotes if it is a number.
     #[schemars(example = &"TA-0001")]
     serial_number: Option<String>,
-    /// Sizes and masses; omitted values are those of Burke et al., Appendix A.
+    /// Sizes and masses; omitted values are those of Burke et al., Appendix A, scaled to `compressor.wheel_diameter`.
     geometry: Option<GeometryFile>,
     /// The nominal compressor map: `closed_form`, or a table as `file` with its `reference` state.
     #[schemars(example = &"closed_form")]
@@ -109,10 +113,9 @@ impl MachineFile {
                 MapSource::Table { path, named: table.file, text, reference: table.reference.into() }
             }
         };
-        let mut params = Params::default();
-        self.geometry.unwrap_or_default().apply(&mut params);
+        let mut params = self.geometry.unwrap_or_default().machine();
         params.t2_probe_diameter_m = probe_diameter_m;
-        Ok(Machine { name: self.name, serial_number: self.serial_number, params, map })
+        Ok(Machine { name: self.name, serial_number: self.serial_number, params, map, assumed: Vec::new() })
     }
 }
 

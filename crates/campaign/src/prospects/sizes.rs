@@ -1,66 +1,32 @@
-//! Checks sizes and masses against the wheel. Machines are geometrically similar, so that areas grow
-//! with the square of the wheel, masses with the cube, inertia with the fifth power. The reference is the machine of Burke et
-//! al., Appendix A.
+//! Checks sizes and masses against those of the reference machine scaled to the wheel.
 
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, MapSource};
 use crate::concern::{Concern, mm};
-use mapper_physics::params::Params;
+use crate::machine_sizes::{SIZES, Size, similar_machine};
+use crate::nominal_table::nominal_table;
+use mapper_physics::characteristic::CompressorCharacteristic;
+use mapper_physics::closed_form_map::ClosedFormMap;
 use mapper_yaml::{Step, steps};
 
 /// Range of compressor wheels, m: 20 mm in the smallest passenger cars, 200 mm in locomotives. Ships have larger ones, but
 /// no gas stand of this kind is known for them.
 const USUAL_WHEELS_M: (f64, f64) = (0.02, 0.2);
-/// Factors by which lengths, areas and masses, and the inertia may differ from those of the reference machine, scaled to the wheel.
-const LENGTH_RATIO: f64 = 4.0;
-const AREA_RATIO: f64 = 10.0;
-const MASS_RATIO: f64 = 10.0;
-const INERTIA_RATIO: f64 = 100.0;
+/// Range beyond which a wheel is a mistyped unit, m: a tenth of the smallest, and ten times the largest.
+const POSSIBLE_WHEELS_M: (f64, f64) = (0.002, 2.0);
+/// Factor by which the choke flow of a compressor may differ from that of the reference machine at equal tip speed, scaled to the
+/// wheel. The units that are confused are further apart: lb/min and kg/s by 132, g/s and kg/s by 1000.
+const FLOW_RATIO: f64 = 10.0;
 /// The best turbines of turbochargers reach 0.8 (Baines, Fundamentals of Turbocharging, ch. 5); above this a value was mistyped.
 const TURBINE_EFFICIENCY: f64 = 0.85;
 
-/// A size, its exponent with the wheel, and its format.
-struct Size {
-    path: [&'static str; 2],
-    name: &'static str,
-    of: fn(&Params) -> f64,
-    power: i32,
-    factor: f64,
-    unit: (f64, &'static str),
-}
-
-const MM: (f64, &str) = (1e3, "mm");
-const M2: (f64, &str) = (1.0, "m^2");
-const KG: (f64, &str) = (1.0, "kg");
-
-#[rustfmt::skip]
-const SIZES: &[Size] = &[
-    Size { path: ["compressor", "internal_area"], name: "internal area of the compressor", of: |p| p.compressor.internal_area_m2, power: 2, factor: AREA_RATIO, unit: M2 },
-    Size { path: ["compressor", "outlet_diameter"], name: "outlet of the compressor", of: |p| p.compressor.outlet_diameter_m, power: 1, factor: LENGTH_RATIO, unit: MM },
-    Size { path: ["compressor", "housing_mass"], name: "housing of the compressor", of: |p| p.compressor.housing_mass_kg, power: 3, factor: MASS_RATIO, unit: KG },
-    Size { path: ["compressor", "external_area"], name: "external area of the compressor", of: |p| p.compressor.external_area_m2, power: 2, factor: AREA_RATIO, unit: M2 },
-    Size { path: ["turbine", "internal_area"], name: "internal area of the turbine", of: |p| p.turbine.internal_area_m2, power: 2, factor: AREA_RATIO, unit: M2 },
-    Size { path: ["turbine", "inlet_diameter"], name: "inlet of the turbine", of: |p| p.turbine.inlet_diameter_m, power: 1, factor: LENGTH_RATIO, unit: MM },
-    Size { path: ["turbine", "wheel_radius"], name: "radius of the turbine's wheel", of: |p| p.turbine.wheel_radius_m, power: 1, factor: LENGTH_RATIO, unit: MM },
-    Size { path: ["turbine", "housing_mass"], name: "housing of the turbine", of: |p| p.turbine.housing_mass_kg, power: 3, factor: MASS_RATIO, unit: KG },
-    Size { path: ["turbine", "external_area"], name: "external area of the turbine", of: |p| p.turbine.external_area_m2, power: 2, factor: AREA_RATIO, unit: M2 },
-    Size { path: ["turbine", "choked_flow"], name: "choked flow of the turbine", of: |p| p.turbine.choked_flow_kg_s, power: 2, factor: AREA_RATIO, unit: (1.0, "kg/s") },
-    Size { path: ["bearing", "section_area"], name: "section of the bearing housing", of: |p| p.bearing.section_area_m2, power: 2, factor: AREA_RATIO, unit: M2 },
-    Size { path: ["bearing", "length"], name: "length of the bearing housing", of: |p| p.bearing.length_m, power: 1, factor: LENGTH_RATIO, unit: MM },
-    Size { path: ["outlet", "valve_area"], name: "area of the valve", of: |p| p.outlet.valve_area_m2, power: 2, factor: AREA_RATIO, unit: M2 },
-];
-
 pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
-    let (params, measure) = (&campaign.machine.params, Params::default());
-    let geometry = |rest: &[&'static str]| -> Vec<Step> {
-        let rest = rest.iter().map(|key| Step::from(*key));
-        steps!["machine", "geometry"].iter().cloned().chain(rest).collect()
-    };
+    let params = &campaign.machine.params;
     let mut concerns = Vec::new();
     let wheel_m = params.compressor.wheel_diameter_m;
     if !(USUAL_WHEELS_M.0..=USUAL_WHEELS_M.1).contains(&wheel_m) {
         concerns.push(Concern {
-            grave: false,
-            at: geometry(&["compressor", "wheel_diameter"]),
+            grave: !(POSSIBLE_WHEELS_M.0..=POSSIBLE_WHEELS_M.1).contains(&wheel_m),
+            at: steps!["machine", "geometry", "compressor", "wheel_diameter"].to_vec(),
             message: format!(
                 "a compressor wheel of {} mm is no turbocharger's: they have {:.0} to {:.0} mm",
                 mm(wheel_m),
@@ -72,15 +38,14 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
         // Such a wheel cannot serve as a reference for the other sizes.
         return concerns;
     }
-    let scale = wheel_m / measure.compressor.wheel_diameter_m;
-    let judged = |size: &Size, at: Vec<Step>| {
-        let (value, usual) = ((size.of)(params), (size.of)(&measure) * scale.powi(size.power));
-        let ((low, high), (by, unit)) = ((usual / size.factor, usual * size.factor), size.unit);
-        // Omitted values are those of the paper.
-        let written = value != (size.of)(&measure);
-        (written && !(low..=high).contains(&value)).then(|| Concern {
+    let reference = similar_machine(wheel_m);
+    let judged = |size: &Size| {
+        let usual_ratio = size.usual_ratio?;
+        let (value, usual) = (size.value(params), size.value(&reference));
+        let ((low, high), (by, unit)) = ((usual / usual_ratio, usual * usual_ratio), size.unit);
+        (!(low..=high).contains(&value)).then(|| Concern {
             grave: false,
-            at,
+            at: size.steps(),
             message: format!(
                 "the {} is {} {unit}; with a compressor wheel of {} mm {} to {} {unit} would be usual",
                 size.name,
@@ -92,20 +57,12 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
             remedy: "check the value and its unit, and the wheel's diameter".to_owned(),
         })
     };
-    concerns.extend(SIZES.iter().filter_map(|size| judged(size, geometry(&size.path))));
-    let inertia = Size {
-        path: ["", ""],
-        name: "inertia of shaft and wheels",
-        of: |params| params.shaft_inertia_kgm2,
-        power: 5,
-        factor: INERTIA_RATIO,
-        unit: (1.0, "kg m^2"),
-    };
-    concerns.extend(judged(&inertia, geometry(&["shaft_inertia"])));
+    concerns.extend(SIZES.iter().filter_map(judged));
+    concerns.extend(map_flow(campaign));
     if params.turbine.peak_efficiency > TURBINE_EFFICIENCY {
         concerns.push(Concern {
             grave: false,
-            at: geometry(&["turbine", "peak_efficiency"]),
+            at: steps!["machine", "geometry", "turbine", "peak_efficiency"].to_vec(),
             message: format!(
                 "a peak efficiency of {} is more than any turbocharger's turbine has; {TURBINE_EFFICIENCY} would be the best",
                 params.turbine.peak_efficiency
@@ -114,6 +71,45 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
         });
     }
     concerns
+}
+
+/// A nominal map with a flow that no compressor of this wheel has: its unit is not the assumed one, and no point would be reached.
+fn map_flow(campaign: &Campaign) -> Option<Concern> {
+    let MapSource::Table { named, text, reference, .. } = &campaign.machine.map else { return None };
+    let map = nominal_table(text, *reference).ok()?;
+    let speed_rpm = *map.speeds_corrected_rpm().last()?;
+    let wheel_diameter_m = campaign.machine.params.compressor.wheel_diameter_m;
+    let (found_kg_s, usual_kg_s) = (
+        map.choke_flow_corrected_kg_s(speed_rpm),
+        ClosedFormMap { wheel_diameter_m }.choke_flow_corrected_kg_s(speed_rpm),
+    );
+    let ratio = found_kg_s / usual_kg_s;
+    let (factor, direction) = if ratio > 1.0 { (ratio, "large") } else { (1.0 / ratio, "small") };
+    (factor > FLOW_RATIO).then(|| {
+        let at: &[Step] = &steps!["machine", "map", "file"];
+        Concern {
+            grave: true,
+            at: at.to_vec(),
+            message: format!(
+                "the flow of the map `{named}` is about {} times too {direction} for a wheel of {} mm: it is read as {} kg/s at choke and \
+                 {:.1} krpm, where {} kg/s would be usual",
+                leading(factor),
+                mm(wheel_diameter_m),
+                short(found_kg_s),
+                speed_rpm / 1e3,
+                short(usual_kg_s)
+            ),
+            remedy: "name the unit in the heading of the flow's column, e.g. `flow [lb/min]`; or correct \
+                     `machine.geometry.compressor.wheel_diameter`"
+                .to_owned(),
+        }
+    })
+}
+
+/// One significant digit.
+fn leading(value: f64) -> f64 {
+    let unit = 10f64.powi(value.log10().floor() as i32);
+    (value / unit).round() * unit
 }
 
 /// Two significant digits.

@@ -42,7 +42,9 @@ fn tips(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
     ];
     let one = |(side, key, diameter_m): (&'static str, &'static str, f64)| {
         let tip_m_s = PI * diameter_m * speed_rpm / 60.0;
-        (tip_m_s > USUAL_M_S).then(|| Concern {
+        // A wheel that is scaled from the other one repeats its mistake.
+        let is_assumed = campaign.machine.assumed.iter().any(|size| size.key == format!("{side}.{key}"));
+        (tip_m_s > USUAL_M_S && !is_assumed).then(|| Concern {
             grave: tip_m_s > BURST_M_S,
             at: steps!["machine", "geometry", side, key].to_vec(),
             message: format!(

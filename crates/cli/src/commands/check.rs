@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::{interrupt, output, output_options, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
-use mapper_report::{declared_sensors_text, duration, lines_text};
+use mapper_report::{assumed_text, declared_sensors_text, duration, lines_text};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::path::PathBuf;
@@ -56,6 +56,7 @@ impl Check {
                 "campaign": campaign.name,
                 "points": campaign.points.len(),
                 "lines": lines,
+                "assumed": campaign.machine.assumed,
                 "steps": steps,
                 "minutes": duration_s / 60.0,
                 "backend": campaign.backend.name,
@@ -78,12 +79,13 @@ impl Check {
             count => format!(", {count} warnings"),
         };
         output::print(&format!(
-            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}",
+            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}{}",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,
             duration(duration_s),
             declared_sensors_text(&campaign),
+            assumed_text(&campaign),
             lines_text(&campaign, &lines),
         ))
     }

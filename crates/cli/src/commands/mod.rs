@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use crate::subcommands::subcommands;
 
 subcommands! { Command:
+    init::Init,
     check::Check,
     schema::Schema,
     plan::Plan,

@@ -1,0 +1,147 @@
+//! `mapper init`.
+
+use crate::exit_code::Code;
+use crate::failure::Failure;
+use crate::output;
+use clap::{Args, ValueEnum};
+use mapper_campaign::units::{Kind, parse};
+use mapper_core::{NAMED_REFERENCES, NamedReference};
+use mapper_report::first_campaign_text;
+use mapper_session::{FirstCampaignRequest, FirstRig, first_campaign};
+use std::io::{BufRead, IsTerminal, Read};
+use std::path::PathBuf;
+
+/// Write the first campaign of a machine: a commented campaign, its nominal map, a channel map
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  mapper init my_turbo --wheel 60mm
+  mapper init my_turbo --wheel 60mm --map map.csv --reference Garrett --rig gas-stand
+Then: mapper check my_turbo.yaml, and mapper run my_turbo.yaml")]
+pub struct Init {
+    /// Name of the campaign and of its files
+    #[arg(default_value = "my_turbo")]
+    pub name: String,
+    /// Diameter of the compressor's wheel at its exit, e.g. 60mm; asked for on a terminal if it is not given
+    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    pub wheel: Option<f64>,
+    /// Diameter of the compressor's inlet pipe
+    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    pub inlet_pipe: Option<f64>,
+    /// Diameter of the compressor's outlet pipe
+    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    pub outlet_pipe: Option<f64>,
+    /// P1 and P2 are measured at the wall, not as total pressures
+    #[arg(long)]
+    pub static_taps: bool,
+    /// Diameter of the T2 probe
+    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    pub probe: Option<f64>,
+    /// The machine's own map: a table with speed, flow, pressure ratio and efficiency, units in its heading
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
+    /// Reference state of the map and the results: SAE, Garrett, BorgWarner
+    #[arg(long, value_name = "NAME", default_value = "SAE", value_parser = reference)]
+    pub reference: &'static NamedReference,
+    /// Lowest and highest corrected speed, e.g. 45krpm 140krpm; those of the map if they are not given
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], value_parser = speed_rpm)]
+    pub speeds: Vec<f64>,
+    /// Source of the recordings
+    #[arg(long, value_enum, default_value = "virtual-lab")]
+    pub rig: Rig,
+    /// Directory of the files
+    #[arg(short, long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Source of the recordings.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Rig {
+    /// The simulated stand
+    VirtualLab,
+    /// A stand behind a PLC
+    GasStand,
+    /// A log of another program
+    Log,
+}
+
+impl Init {
+    /// Writes the files.
+    pub fn run(&self) -> Result<(), Failure> {
+        let named = self.name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
+        if !named || self.name.is_empty() || self.name.len() > 64 || self.name.starts_with(['-', '_']) {
+            let message = "the name is part of file names: write letters, digits, `_` and `-`, at most 64";
+            return Err(Failure::new(Code::BadInput, message));
+        }
+        let request = FirstCampaignRequest {
+            name: self.name.clone(),
+            directory: self.out.clone(),
+            rig: match self.rig {
+                Rig::VirtualLab => FirstRig::VirtualLab,
+                Rig::GasStand => FirstRig::GasStand,
+                Rig::Log => FirstRig::Log,
+            },
+            wheel_diameter_m: self.wheel.map_or_else(asked_wheel_m, Ok)?,
+            inlet_diameter_m: self.inlet_pipe,
+            outlet_diameter_m: self.outlet_pipe,
+            has_static_taps: self.static_taps,
+            probe_diameter_m: self.probe,
+            map: self.map.clone(),
+            reference: self.reference,
+            speeds_rpm: match self.speeds.as_slice() {
+                [low, high] if low < high => Some((*low, *high)),
+                [] => None,
+                _ => return Err(Failure::new(Code::BadInput, "--speeds takes the lower speed first")),
+            },
+        };
+        let written = first_campaign(&request)?;
+        match self.json {
+            true => output::print_json(&written),
+            false => output::print(&first_campaign_text(
+                &written.campaign,
+                &written.map,
+                written.channels.as_deref(),
+                written.points,
+                &written.assumed,
+            )),
+        }
+    }
+}
+
+/// The wheel's diameter, asked for on a terminal.
+fn asked_wheel_m() -> Result<f64, Failure> {
+    let missing = |why: &str| Failure::new(Code::BadInput, format!("{why}; give it with `--wheel 60mm`"));
+    if !std::io::stdin().is_terminal() {
+        return Err(missing("the diameter of the compressor's wheel is needed"));
+    }
+    output::warn("Diameter of the compressor's wheel at its exit, e.g. 60mm: ");
+    let mut line = String::new();
+    // A diameter has a few characters; a terminal that sends more sends no diameter.
+    let read = std::io::stdin().lock().take(64).read_line(&mut line);
+    read.map_err(|error| missing(&format!("failed to read the diameter: {error}")))?;
+    length_m(&line).map_err(|error| missing(&error))
+}
+
+/// A quantity whose unit may follow the number without a blank, which a shell would need quotes for.
+fn quantity(kind: Kind, text: &str) -> Result<f64, String> {
+    let unit = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let spaced = format!("{} {}", text[..unit].trim(), text[unit..].trim());
+    let value = parse(kind, spaced.trim()).map_err(|error| format!("{error}: {}", error.remedy(kind)))?;
+    if value > 0.0 { Ok(value) } else { Err("it must be above 0".to_owned()) }
+}
+
+fn length_m(text: &str) -> Result<f64, String> {
+    quantity(Kind::Length, text)
+}
+
+fn speed_rpm(text: &str) -> Result<f64, String> {
+    quantity(Kind::Speed, text)
+}
+
+fn reference(name: &str) -> Result<&'static NamedReference, String> {
+    let found = NAMED_REFERENCES.iter().find(|row| row.name.eq_ignore_ascii_case(name));
+    found.ok_or_else(|| "it is not one of SAE, Garrett, BorgWarner".to_owned())
+}

@@ -1,0 +1,78 @@
+//! From a wheel's diameter to a map: `mapper init`, and the files that it writes.
+
+use mapper_tests::{Finished, mapper_in, scratch};
+use std::path::Path;
+
+fn init(directory: &Path, further: &[&str]) -> Finished {
+    mapper_in(directory, ["init", "own"].iter().chain(further).copied().collect::<Vec<_>>())
+}
+
+/// The first campaign of a machine runs on the virtual lab, and at least 80 % of its points are good.
+#[test]
+fn a_wheel_is_enough_for_a_map() {
+    for wheel in ["35mm", "60mm", "90mm"] {
+        let scratch = scratch();
+        init(scratch.path(), &["--wheel", wheel]).exits(0);
+        mapper_in(scratch.path(), ["check", "own.yaml"]).exits(0);
+        let run =
+            mapper_in(scratch.path(), ["run", "own.yaml", "--json", "--progress", "off"]).exits(0).json();
+        let points = run["points"].as_array().unwrap();
+        let good = points.iter().filter(|point| point["verdict"] == "good").count();
+        assert!(points.len() >= 48 && 5 * good >= 4 * points.len(), "{wheel}: {good} of {}", points.len());
+    }
+}
+
+#[test]
+fn every_template_passes_its_check_and_nothing_is_overwritten() {
+    for rig in ["virtual-lab", "gas-stand", "log"] {
+        let scratch = scratch();
+        init(scratch.path(), &["--wheel", "52mm", "--rig", rig]).exits(0);
+        let checked = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(0).json();
+        // All sizes but the wheel's are assumed.
+        assert!(checked["assumed"].as_array().unwrap().len() >= 20, "{checked}");
+        let before = std::fs::read(scratch.path().join("own.yaml")).unwrap();
+        init(scratch.path(), &["--wheel", "60mm", "--rig", rig]).exits(1);
+        assert_eq!(std::fs::read(scratch.path().join("own.yaml")).unwrap(), before);
+        assert_eq!(scratch.path().join("own_channels.yaml").exists(), rig != "virtual-lab");
+    }
+    let scratch = scratch();
+    // No terminal to ask on.
+    init(scratch.path(), &[]).exits(3);
+    assert!(!scratch.path().join("own.yaml").exists());
+}
+
+/// A map in lb/min that claims kg/s, and a limit in the wrong unit, are one mistake each.
+#[test]
+fn a_wrong_unit_is_one_mistake() {
+    let scratch = scratch();
+    init(scratch.path(), &["--wheel", "60mm"]).exits(0);
+    let (campaign, map) = (scratch.path().join("own.yaml"), scratch.path().join("own_map.csv"));
+    let (text, table) = (std::fs::read_to_string(&campaign).unwrap(), std::fs::read_to_string(&map).unwrap());
+    let mistakes = || {
+        let found = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(3).json();
+        found["findings"].as_array().unwrap().len()
+    };
+    let scaled = table.lines().map(|line| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Some(flow) = fields.get(1).and_then(|field| field.parse::<f64>().ok()) {
+            // lb/min of a flow in kg/s.
+            fields[1] = (132.277 * flow).to_string();
+        }
+        fields.join(",")
+    });
+    std::fs::write(&map, scaled.collect::<Vec<_>>().join("\n")).unwrap();
+    assert_eq!(mistakes(), 1);
+    std::fs::write(&map, table).unwrap();
+    let limit = text.lines().find(|line| line.starts_with("  speed: ") && line.ends_with("krpm")).unwrap();
+    std::fs::write(&campaign, text.replace(limit, "  speed: 100 rpm")).unwrap();
+    assert_eq!(mistakes(), 1);
+}
+
+/// A file of another command is one mistake, too.
+#[test]
+fn a_nightly_file_is_named_as_such() {
+    let file = mapper_tests::repository().join("campaigns/nightly.yaml");
+    let found =
+        mapper_in(&mapper_tests::repository(), ["check".as_ref(), file.as_os_str(), "--json".as_ref()]);
+    assert_eq!(found.exits(3).json()["findings"].as_array().unwrap().len(), 1);
+}

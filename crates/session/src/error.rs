@@ -59,7 +59,7 @@ pub enum SessionError {
     Driven(#[from] mapper_driven::DrivenError),
     /// There is no nominal map for a first campaign.
     #[error(transparent)]
-    FirstMap(#[from] Box<crate::first_map::FirstMapError>),
+    FirstMap(#[from] Box<crate::first_map_error::FirstMapError>),
     /// No recording was given.
     #[error("no recording was given; name a run directory or a recording")]
     NoRecording,

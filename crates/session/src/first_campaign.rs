@@ -1,10 +1,10 @@
 //! The first campaign of a machine: a commented file, its nominal map and a channel map, from the wheel's diameter.
 
-use crate::SessionError;
 use crate::files::write_new;
 use crate::first_map::{FirstMap, MapLines};
+use crate::first_request::{FirstCampaignRequest, FirstRig, digits};
+use crate::{Registry, SessionError};
 use mapper_campaign::{AssumedSize, Campaign, CampaignError, similar_sizes};
-use mapper_core::NamedReference;
 use serde::Serialize;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -23,17 +23,6 @@ const SPEED_LIMIT_RATIO: f64 = 1.1;
 /// Points of a speed line.
 const POINTS: usize = 6;
 
-/// Source of the recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FirstRig {
-    /// The simulated stand.
-    VirtualLab,
-    /// A stand behind a PLC.
-    GasStand,
-    /// A log of another program.
-    Log,
-}
-
 impl FirstRig {
     fn backend(self) -> &'static str {
         match self {
@@ -50,33 +39,6 @@ impl FirstRig {
             FirstRig::Log => "The map of a compressor from a log of another program.",
         }
     }
-}
-
-/// What is known of a machine.
-#[derive(Debug, Clone)]
-pub struct FirstCampaignRequest {
-    /// Name of the campaign, and of its files.
-    pub name: String,
-    /// Directory of the files.
-    pub directory: PathBuf,
-    /// Source of the recordings.
-    pub rig: FirstRig,
-    /// Diameter of the compressor's wheel at its exit, m.
-    pub wheel_diameter_m: f64,
-    /// Diameter of the compressor's inlet pipe, m; scaled from the wheel if `None`.
-    pub inlet_diameter_m: Option<f64>,
-    /// Diameter of the compressor's outlet pipe, m; scaled from the wheel if `None`.
-    pub outlet_diameter_m: Option<f64>,
-    /// Whether P1 and P2 are measured at the wall.
-    pub has_static_taps: bool,
-    /// Diameter of the T2 probe, m; an ideal probe if `None`.
-    pub probe_diameter_m: Option<f64>,
-    /// The machine's own map; that of a similar compressor if `None`.
-    pub map: Option<PathBuf>,
-    /// Reference state of the map and of the results.
-    pub reference: &'static NamedReference,
-    /// Lowest and highest corrected speed, rpm; those of the map if `None`.
-    pub speeds_rpm: Option<(f64, f64)>,
 }
 
 /// The files that were written.
@@ -98,9 +60,12 @@ pub struct FirstCampaign {
 ///
 /// # Errors
 /// [`SessionError::Campaign`] with the mistakes that the campaign would have, e.g. a map that does not fit the wheel;
-/// [`SessionError::FirstMap`] for a map that cannot be read; [`SessionError::Exists`] and [`SessionError::File`] for its files.
-pub fn first_campaign(request: &FirstCampaignRequest) -> Result<FirstCampaign, SessionError> {
-    let map = FirstMap::of(request)?;
+/// [`SessionError::FirstMap`] for a map without enough points; as [`Registry::read_map`] for one that cannot be read; [`SessionError::Exists`] and [`SessionError::File`] for its files.
+pub fn first_campaign(
+    registry: &Registry,
+    request: &FirstCampaignRequest,
+) -> Result<FirstCampaign, SessionError> {
+    let map = FirstMap::of(registry, request)?;
     let file = |ending: &str| request.directory.join(format!("{}{ending}", request.name));
     let (campaign_path, map_path) = (file(".yaml"), request.directory.join(&map.file_name));
     let text = campaign_text(request, &map);
@@ -113,9 +78,7 @@ pub fn first_campaign(request: &FirstCampaignRequest) -> Result<FirstCampaign, S
             return Err(SessionError::Exists { path: path.clone() });
         }
     }
-    if map.is_written {
-        write_new(&map_path, map.text.as_bytes())?;
-    }
+    write_new(&map_path, map.text.as_bytes())?;
     if let Some(path) = &channels {
         write_new(path, filled(CHANNELS, &[("reference", request.reference.name.to_owned())]).as_bytes())?;
     }
@@ -240,10 +203,4 @@ fn filled(template: &str, values: &[(&str, String)]) -> String {
     values
         .iter()
         .fold(template.to_owned(), |text, (key, value)| text.replace(&format!("{{{{{key}}}}}"), value))
-}
-
-/// A number with at most this many significant digits, without trailing zeros.
-pub(crate) fn digits(value: f64, count: usize) -> String {
-    let rounded: f64 = format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value);
-    if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
 }

@@ -1,56 +1,26 @@
 //! The nominal map of a first campaign: the machine's own, or that of a similar compressor.
 
-use crate::SessionError;
-use crate::first_campaign::{FirstCampaignRequest, digits};
-use mapper_campaign::{NominalTableError, nominal_table};
-use mapper_core::ReferenceState;
+use crate::first_map_error::FirstMapError;
+use crate::first_request::{FirstCampaignRequest, digits};
+use crate::{Registry, SessionError};
+use mapper_assemble::{MapFit, MapFitOptions};
+use mapper_campaign::nominal_table;
+use mapper_core::{ReferenceState, one_line};
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::{ClosedFormMap, TURBO_A_WHEEL_M};
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Lowest and highest corrected speed of campaigns/turbo_a.yaml, rpm: tip speeds of 136 and 422 m/s.
 const TURBO_A_SPEEDS_RPM: (f64, f64) = (50e3, 155e3);
 /// Speed lines of a grid that is not taken from a map.
 const LINES: usize = 8;
-/// Numbers of lines of a map that are all measured; fewer give too small a map, more too long a night.
-const MAP_LINES: std::ops::RangeInclusive<usize> = 4..=10;
+/// Numbers of lines of a map that are all measured. Fewer have too few steps to determine alpha_A and the probe: 24 steps of four lines are
+/// doubtful by their forecast. More take too long a night.
+const MAP_LINES: std::ops::RangeInclusive<usize> = 7..=10;
+/// Lines of the smooth surface between two measured ones: straight lines between them then depart by a sixteenth of what they did.
+const LINES_BETWEEN: usize = 3;
 /// Points of a line in the table of a similar compressor; a straight line between two departs by less than 0.3 % in flow.
 const TABLE_POINTS: usize = 13;
-
-/// Why there is no nominal map.
-#[derive(Debug, thiserror::Error)]
-pub enum FirstMapError {
-    /// The file cannot be read.
-    #[error("failed to read the map {}: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is not a map.
-    #[error(
-        "the file {} is not a map: {source}; write a table with corrected speed, corrected flow, pressure ratio and efficiency, with \
-         units in its heading, or convert it with `mapper map convert`", .path.display()
-    )]
-    NotAMap {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: NominalTableError,
-    },
-    /// The speed range does not overlap with the map.
-    #[error(
-        "the speeds {:.1} to {:.1} krpm leave no line of the map, which has {:.1} to {:.1} krpm; choose speeds within it",
-        .asked_rpm.0 / 1e3, .asked_rpm.1 / 1e3, .map_rpm.0 / 1e3, .map_rpm.1 / 1e3
-    )]
-    NoLines {
-        /// The speeds asked for, rpm.
-        asked_rpm: (f64, f64),
-        /// The lowest and highest line of the map, rpm.
-        map_rpm: (f64, f64),
-    },
-}
 
 /// Corrected speeds of a grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,8 +50,6 @@ pub(crate) struct FirstMap {
     pub file_name: String,
     /// The file's text.
     pub text: String,
-    /// Whether the file is to be written: the machine's own may already be in the directory.
-    pub is_written: bool,
     /// Speeds of the grid.
     pub lines: MapLines,
     /// Choke flow of the machine's own map over that of a similar compressor at equal speed; `None` without an own map.
@@ -93,20 +61,59 @@ impl FirstMap {
     ///
     /// # Errors
     /// [`FirstMapError`] if the machine's own map cannot be read, or has no line in the speed range.
-    pub fn of(request: &FirstCampaignRequest) -> Result<Self, SessionError> {
+    pub fn of(registry: &Registry, request: &FirstCampaignRequest) -> Result<Self, SessionError> {
         match &request.map {
-            Some(path) => Ok(own(request, path).map_err(Box::new)?),
+            Some(path) => own(registry, request, path),
             None => Ok(similar(request)),
         }
     }
 }
 
-fn own(request: &FirstCampaignRequest, path: &PathBuf) -> Result<FirstMap, FirstMapError> {
-    let text = mapper_campaign::read_text(path)
-        .map_err(|source| FirstMapError::Read { path: path.clone(), source })?;
+/// The table of a nominal map: the smooth surface through the file's map, or its points if they do not determine one. Straight lines between
+/// few points have kinks, which no compressor has and which a transient would show as heat transfer.
+fn own_text(registry: &Registry, path: &Path, reference: ReferenceState) -> Result<String, SessionError> {
+    let map = registry.read_map(path, Some(reference))?;
+    let mut text = format!(
+        "# Smooth surface through the points of {}.\nspeed [rpm],flow [kg/s],pressure ratio,efficiency\n",
+        one_line(&path.display().to_string())
+    );
+    let mut row = |rpm: f64, flow_kg_s: f64, pressure_ratio: f64, eta: f64| {
+        text += &format!("{rpm:.1},{flow_kg_s:.6},{pressure_ratio:.5},{eta:.5}\n");
+    };
+    let speeds: Vec<f64> = map.lines.iter().map(|line| line.speed_corrected_rpm).collect();
+    let between = speeds.windows(2).flat_map(|pair| {
+        let step_rpm = (pair[1] - pair[0]) / (LINES_BETWEEN + 1) as f64;
+        (1..=LINES_BETWEEN).map(move |index| pair[0] + step_rpm * index as f64)
+    });
+    let options = MapFitOptions {
+        further_speeds_rpm: Some(between.collect()),
+        leave_one_out: false,
+        ..MapFitOptions::default()
+    };
+    match MapFit::new(&map).and_then(|fit| fit.table(&options)) {
+        Ok(fitted) => {
+            for line in &fitted.lines {
+                for node in line.nodes.iter().filter(|node| !node.extrapolated) {
+                    row(line.speed_corrected_rpm, node.flow_corrected_kg_s, node.pressure_ratio, node.eta);
+                }
+            }
+        }
+        Err(_) => {
+            for line in &map.lines {
+                for (point, eta) in line.points.iter().filter_map(|point| Some((point, point.eta?))) {
+                    row(line.speed_corrected_rpm, point.flow_corrected_kg_s, point.pressure_ratio, eta);
+                }
+            }
+        }
+    }
+    Ok(text)
+}
+
+fn own(registry: &Registry, request: &FirstCampaignRequest, path: &Path) -> Result<FirstMap, SessionError> {
     let reference = request.reference.state;
+    let text = own_text(registry, path, reference)?;
     let map = nominal_table(&text, reference)
-        .map_err(|source| FirstMapError::NotAMap { path: path.clone(), source })?;
+        .map_err(|source| Box::new(FirstMapError::NotAMap { path: path.to_owned(), source }))?;
     let in_map = map.speeds_corrected_rpm();
     let map_rpm = (in_map.first().copied().unwrap_or(0.0), in_map.last().copied().unwrap_or(0.0));
     let asked_rpm = request.speeds_rpm.unwrap_or(map_rpm);
@@ -115,18 +122,12 @@ fn own(request: &FirstCampaignRequest, path: &PathBuf) -> Result<FirstMap, First
     let lines = match (within.first(), within.last()) {
         _ if MAP_LINES.contains(&within.len()) => MapLines { speeds_rpm: within },
         (Some(low), Some(high)) if low < high => MapLines::even((*low, *high)),
-        _ => return Err(FirstMapError::NoLines { asked_rpm, map_rpm }),
+        _ => return Err(Box::new(FirstMapError::NoLines { asked_rpm, map_rpm }).into()),
     };
     let similar = ClosedFormMap { wheel_diameter_m: request.wheel_diameter_m };
     let choke = |map: &dyn CompressorCharacteristic| map.choke_flow_corrected_kg_s(map_rpm.1);
-    let named = path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let in_place = named.as_ref().filter(|name| {
-        let there = std::fs::canonicalize(request.directory.join(name)).ok();
-        there.is_some() && there == std::fs::canonicalize(path).ok()
-    });
     Ok(FirstMap {
-        is_written: in_place.is_none(),
-        file_name: in_place.cloned().unwrap_or_else(|| format!("{}_map.csv", request.name)),
+        file_name: format!("{}_map.csv", request.name),
         flow_ratio: Some(choke(&map) / choke(&similar)),
         text,
         lines,
@@ -162,11 +163,5 @@ fn similar(request: &FirstCampaignRequest) -> FirstMap {
             text += &format!("{rpm:.0},{flow_kg_s:.6},{pressure_ratio:.5},{:.5}\n", point.efficiency);
         }
     }
-    FirstMap {
-        file_name: format!("{}_map.csv", request.name),
-        text,
-        is_written: true,
-        lines,
-        flow_ratio: None,
-    }
+    FirstMap { file_name: format!("{}_map.csv", request.name), text, lines, flow_ratio: None }
 }

@@ -68,6 +68,23 @@ fn a_wrong_unit_is_one_mistake() {
     assert_eq!(mistakes(), 1);
 }
 
+/// Suppliers' maps become nominal maps: a workbook, and German text with units in its headings.
+#[test]
+fn a_suppliers_map_is_converted() {
+    for file in ["sae.xlsx", "german.csv"] {
+        let scratch = scratch();
+        let map = mapper_tests::repository().join("plugins/formats/tests/tables").join(file);
+        init(scratch.path(), &["--wheel", "70mm", "--map", map.to_str().unwrap()]).exits(0);
+        let checked = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(0).json();
+        assert_eq!(checked["points"], 48);
+        // The surface stays within the map, 0.03 to 0.301 kg/s.
+        let table = std::fs::read_to_string(scratch.path().join("own_map.csv")).unwrap();
+        let flow = |row: &str| row.split(',').nth(1).unwrap().parse::<f64>().unwrap();
+        let flows: Vec<f64> = table.lines().skip(2).map(flow).collect();
+        assert!(flows.len() >= 100 && flows.iter().all(|flow| (0.029..0.304).contains(flow)));
+    }
+}
+
 /// A file of another command is one mistake, too.
 #[test]
 fn a_nightly_file_is_named_as_such() {

@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::output;
+use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{NAMED_REFERENCES, NamedReference};
@@ -37,7 +37,7 @@ pub struct Init {
     /// Diameter of the T2 probe
     #[arg(long, value_name = "LENGTH", value_parser = length_m)]
     pub probe: Option<f64>,
-    /// The machine's own map: a table with speed, flow, pressure ratio and efficiency, units in its heading
+    /// The machine's own map, in any layout that `mapper map inspect` understands
     #[arg(long, value_name = "FILE")]
     pub map: Option<PathBuf>,
     /// Reference state of the map and the results: SAE, Garrett, BorgWarner
@@ -97,7 +97,7 @@ impl Init {
                 _ => return Err(Failure::new(Code::BadInput, "--speeds takes the lower speed first")),
             },
         };
-        let written = first_campaign(&request)?;
+        let written = first_campaign(&registry::registry(), &request)?;
         match self.json {
             true => output::print_json(&written),
             false => output::print(&first_campaign_text(

@@ -4,7 +4,7 @@ const zoomed = { map: null };
 
 function words(p) {
   const lines = [
-    `step ${p.name}: ${p.line} ${page.units.speed}` + (p.valve == null ? "" : `, opening ${p.valve}`),
+    `step ${p.name}: ${p.line} ${page.units.speed}` + (p.valve == null ? "" : `, opening ${shown(p.valve, 3)}`),
     `flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}`,
     `pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}`,
     p.eta == null ? "efficiency not known" : `efficiency ${shown(p.eta, 2)} ± ${shown(half(p.eta_low, p.eta_high), 2)} %`,

@@ -12,13 +12,13 @@ function stepWords(step, p) {
   const both = p.eta_common == null ? "" : `; of it common to all points ± ${shown(p.eta_common, 2)}, its own ± ${shown(p.eta_own, 2)}`;
   const model = step.model;
   return [
-    `Step ${p.name}, ${p.verdict}: ${p.line} ${page.units.speed} corrected` + (p.valve == null ? "" : `, opening ${p.valve}`),
+    `Step ${p.name}, ${p.verdict}: ${p.line} ${page.units.speed} corrected` + (p.valve == null ? "" : `, opening ${shown(p.valve, 3)}`),
     (p.eta == null ? "efficiency not known" : `efficiency ${shown(p.eta, 2)} ± ${shown(half(p.eta_low, p.eta_high), 2)} %${both}`) +
       (p.dynamic ? `; by the two-parameter method ${shown(p.dynamic[0], 2)} %` : ""),
     `corrected flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}, pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}` +
       (p.h == null ? "" : `, h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`),
     p.raw.length ? `read at the end: ${p.raw.join(", ")}` : null,
-    model ? `the model of T2 with these numbers leaves ${shown(model.rms_k, 3)} K rms, after its mean was shifted by ${shown(model.shift_k, 3)} K` : null,
+    model ? `T2 residual ${shown(model.rms_k, 3)} K rms, after a shift of the mean by ${shown(model.shift_k, 3)} K` : null,
     ...p.said.map(sentence),
   ].filter(Boolean);
 }
@@ -45,7 +45,7 @@ function drawStep() {
   };
   box.replaceChildren();
   add(["T2"], "T2 as read (dots) and by the point's numbers (line); the window is shaded", "model");
-  if (model) add(["T2"], "What the numbers leave of T2, K", "left");
+  if (model) add(["T2"], "T2 residual, K", "left");
   add(["Tc"], "Housing temperature Tc");
   add(["N"], "Shaft speed N");
   add(["m"], "Compressor flow, as read");

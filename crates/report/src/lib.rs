@@ -98,7 +98,7 @@ pub use paint::{Paint, paint_verdict};
 pub use plan_picture::plan_svg;
 pub use plan_text::plan_text;
 pub use point_table::{PointCell, PointGroup, point_cells, point_groups, point_heads};
-pub use points::{points_text, score_text, step_name, truth_text, verdict_word};
+pub use points::{opening, points_text, score_text, step_name, truth_text, verdict_word};
 pub use production_text::production_text;
 pub use recordings_text::recordings_text;
 pub use repeated_jumps::repeated_jumps_text;

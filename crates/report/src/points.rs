@@ -63,8 +63,8 @@ pub fn score_text(score: &ScoreSummary) -> String {
     text
 }
 
-/// `-` if the recording does not contain it.
-pub(crate) fn opening(ratio: f64) -> String {
+/// A valve opening with three decimals; `-` if the recording does not contain it.
+pub fn opening(ratio: f64) -> String {
     // Valves are set to a thousandth at best.
     if ratio.is_finite() { ((1e3 * ratio).round() / 1e3).to_string() } else { "-".to_owned() }
 }

@@ -31,7 +31,7 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
                 }
             }
             nav aria-label="Sections" {
-                @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("conditions", "Conditions and instruments"), ("points", "Points"), ("plan", "Plan as flown"),
+                @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("conditions", "Conditions and instruments"), ("points", "Points"), ("plan", "Executed plan"),
                     ("gap", "Gap"), ("notes", "Notes"), ("provenance", "Provenance")] {
                     @if to != "gap" || page.gap.is_some() { a href=(format!("#{to}")) { (name) } }
                 }

@@ -10,7 +10,7 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
     let Some(plan) = page.report.plan else {
         return html! {
             section #plan aria-labelledby="plan-head" {
-                h2 #plan-head { "Plan as flown" }
+                h2 #plan-head { "Executed plan" }
                 p { "Nobody planned this here: the steps are those that were found in the recording." }
             }
         };
@@ -30,7 +30,7 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
     let missing = plan.steps.iter().filter(|step| !flown(page, step)).count();
     html! {
         section #plan aria-labelledby="plan-head" {
-            h2 #plan-head { "Plan as flown" }
+            h2 #plan-head { "Executed plan" }
             p {
                 "Order " code { (plan.objective) } ", " (duration(plan.duration_s())) " planned"
                 @if missing > 0 { "; " (missing) " of " (plan.steps.len()) " steps were not flown" } "."

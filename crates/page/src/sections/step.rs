@@ -2,7 +2,7 @@
 
 use crate::run_page::RunPage;
 use mapper_core::step_number;
-use mapper_report::{Display, step_name};
+use mapper_report::{Display, opening, step_name};
 use maud::{Markup, html};
 
 pub(crate) fn step(page: &RunPage<'_>) -> Markup {
@@ -17,7 +17,7 @@ pub(crate) fn step(page: &RunPage<'_>) -> Markup {
                     @for point in page.report.points.iter().map(|scored| &scored.point) {
                         option value=(step_number(point.step)) {
                             (step_name(point)) " · " (display.speed(point.speed_rpm)) " " (display.units().speed)
-                            @if point.valve_opening_ratio.is_finite() { " · opening " (point.valve_opening_ratio) }
+                            @if point.valve_opening_ratio.is_finite() { " · opening " (opening(point.valve_opening_ratio)) }
                         }
                     }
                 }

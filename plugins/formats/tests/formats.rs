@@ -4,7 +4,7 @@
 
 mod support;
 
-use mapper_core::{CompressorMap, ExportError, MapPoint, Method, ReferenceState, Verdict};
+use mapper_core::{CompressorMap, ExportError, ImportRemark, MapPoint, Method, ReferenceState, Verdict};
 use mapper_formats::FORMATS;
 use std::collections::BTreeSet;
 
@@ -288,4 +288,18 @@ fn simulation_tables_read_back() {
     assert!(read[0].len() >= 100);
     assert_eq!(read[0], read[1]);
     assert_eq!(read[0], read[2]);
+}
+
+/// Nodes that the fit extrapolated are not measured points.
+#[test]
+fn extrapolated_nodes_are_not_read_as_points() {
+    let map = support::fitted();
+    let format = FORMATS.find("fitted").unwrap();
+    let read = FORMATS.find("csv").unwrap().read(&format.write(&map).unwrap(), None).unwrap();
+    let nodes = || map.fitted.as_ref().unwrap().lines.iter().flat_map(|line| &line.nodes);
+    let extrapolated = nodes().filter(|node| node.extrapolated).count();
+    assert!(
+        extrapolated > 0 && read.remarks.contains(&ImportRemark::ExtrapolatedNodes { count: extrapolated })
+    );
+    assert_eq!(points(&read.map).len(), nodes().count() - extrapolated);
 }

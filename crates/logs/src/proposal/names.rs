@@ -136,7 +136,7 @@ fn rows() -> Vec<Row> {
         (
             Channel::ValveCommand,
             6,
-            "(valve|ventil|klappe|drossel|throttle|bpv|opening|backpressure|back_pressure)".to_owned(),
+            "(valve|ventil|klappe|drossel|bpv|opening|backpressure|back_pressure)".to_owned(),
         ),
     ] {
         add(channel, weight, &pattern);

@@ -14,6 +14,15 @@ const AGREEMENT: f64 = 0.9;
 /// Correlation below which flow does not follow speed. Along a line of constant speed flow moves alone.
 const FOLLOWS: f64 = 0.3;
 
+/// Lowest speed limit of turbochargers: those of ships' engines reach 10 krpm.
+const SLOWEST_TOP_SPEED_RPM: f64 = 1e4;
+
+/// Channels whose names are station numbers in most logs.
+const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::T3, Channel::P4, Channel::T4];
+
+/// Gas turbines and some engine programs number the compressor 2 and 3, the turbine 4 and 5.
+const ENGINE_NUMBERS: &str = "its stations may be numbered as in a gas turbine: 2 before and 3 behind the compressor, 4 before and 5 behind the turbine";
+
 /// Judges the proposal and remarks what it found.
 pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
     let course = |proposal: &Proposal, channel: Channel| Course::of(proposal, channel, layout, survey);
@@ -22,6 +31,7 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
         (Channel::P2, Channel::P1, "P2 is above P1"),
         (Channel::T2, Channel::T1, "T2 is above T1"),
         (Channel::P3, Channel::P4, "P3 is above P4"),
+        (Channel::T3, Channel::T4, "T3 is above T4"),
     ];
     for (higher, lower, words) in raised {
         let (Some(high), Some(low)) = (course(proposal, higher), course(proposal, lower)) else { continue };
@@ -44,7 +54,16 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
         } else {
             let message = format!("{words} in only {:.0} % of the time that the shaft turns", 100.0 * share);
             doubt(proposal, &[higher, lower], &message);
+            if higher == Channel::T3 {
+                doubt(proposal, &NUMBERED, ENGINE_NUMBERS);
+            }
         }
+    }
+    let fastest_rpm = running.as_ref().map(|speed| speed.samples().map(|(_, rpm)| rpm).fold(0.0, f64::max));
+    if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < SLOWEST_TOP_SPEED_RPM) {
+        let message =
+            format!("{rpm:.0} rpm at most: an engine turns that fast, and no turbocharger so slowly");
+        doubt(proposal, &[Channel::ShaftSpeed], &message);
     }
     if let (Some(speed), Some(flow)) = (running, course(proposal, Channel::CompressorFlow)) {
         let pairs: Vec<(f64, f64)> =

@@ -19,7 +19,7 @@ const LINES: usize = 8;
 const MAP_LINES: std::ops::RangeInclusive<usize> = 7..=10;
 /// Lines of the smooth surface between two measured ones: straight lines between them then depart by a sixteenth of what they did.
 const LINES_BETWEEN: usize = 3;
-/// Points of a line in the table of a similar compressor; a straight line between two departs by less than 0.3 % in flow.
+/// Points of a line in the table of a similar compressor, closest to each other near surge, where the flow changes most with pressure.
 const TABLE_POINTS: usize = 13;
 
 /// Corrected speeds of a grid.

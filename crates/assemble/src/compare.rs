@@ -1,5 +1,6 @@
 //! Where two maps differ, in units and in their uncertainty.
 
+use crate::efficiency::convert_efficiency;
 use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
 use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95};
 use mapper_numerics::polyline::NearestOnPolyline;
@@ -81,12 +82,17 @@ pub struct MapComparison {
 }
 
 /// Compares two maps, each by its own fit, at every measured speed that lies within both; the second is brought to the
-/// first's reference state. Extrapolated places are left out.
+/// first's reference state and definition of efficiency, if both files name theirs. Extrapolated places are left out.
 ///
 /// # Errors
 /// [`MapFitError`] where one of the maps cannot be fitted.
 pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapComparison, MapFitError> {
     let second = second.clone().at_reference(first.reference);
+    // A difference of definitions is none of the machines.
+    let second = match (second.efficiency, first.efficiency) {
+        (Some(from), Some(to)) => convert_efficiency(second, from, to),
+        _ => second,
+    };
     let fits = [MapFit::new(first)?, MapFit::new(&second)?];
     let speeds = [speeds_of(first), speeds_of(&second)];
     let bounds =

@@ -4,7 +4,7 @@
 
 mod support;
 
-use mapper_assemble::convert_efficiency;
+use mapper_assemble::{compare, convert_efficiency};
 use mapper_core::EfficiencyDefinition::{ConstantGamma, Enthalpy, KappaOfT1};
 use support::map_of;
 
@@ -35,4 +35,27 @@ fn the_papers_efficiency_is_higher() {
     };
     assert!(change(1.01).abs() < 1e-4);
     assert!(change(2.0) > change(1.5) && change(4.0) > change(2.0));
+}
+
+/// Two files of one map differ in nothing, whatever their definitions.
+#[test]
+fn definitions_are_no_difference_between_maps() {
+    let rows = [60e3, 90e3, 120e3].into_iter().flat_map(|speed: f64| {
+        (0..6).map(move |place| {
+            let (x, n) = (f64::from(place) / 5.0, speed / 60e3);
+            [
+                speed,
+                n * (0.03 + 0.03 * x),
+                1.0 + 0.3 * n * n * (1.0 - 0.6 * x * x),
+                0.7 - 0.4 * (x - 0.4) * (x - 0.4),
+            ]
+        })
+    });
+    let mut first = map_of(&rows.collect::<Vec<_>>());
+    first.efficiency = Some(KappaOfT1);
+    let second = convert_efficiency(first.clone(), KappaOfT1, Enthalpy);
+    // Rounding, once there and back.
+    assert!(compare(&first, &second).unwrap().eta_difference_rms < 1e-9);
+    let unnamed = mapper_core::CompressorMap { efficiency: None, ..second };
+    assert!(compare(&first, &unnamed).unwrap().eta_difference_rms > 1e-3);
 }

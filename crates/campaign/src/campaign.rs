@@ -22,8 +22,8 @@ use crate::elements::timing::TimingFile;
 use crate::elements::tolerances::TolerancesElement;
 use crate::elements::zero::ZeroFile;
 use mapper_core::{
-    Channel, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint, ReferenceState, Repeats,
-    SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
+    Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint,
+    ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
 };
 use mapper_physics::follow_outlet::FollowOutlet;
 use mapper_physics::line_points::LineRequest;
@@ -207,7 +207,7 @@ pub(crate) struct CampaignFile {
     /// State to which corrected flow and speed refer: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa), or `temperature` and `pressure`. SAE if none is given.
     #[schemars(example = &"SAE")]
     reference: Option<ReferenceFile>,
-    /// Definition of the isentropic efficiency, of the nominal map and of the results: `enthalpy`, the default, is the ratio of the rises of specific enthalpy; `kappa_of_T1` takes temperatures with the heat capacity at T1 (Burke et al., eq. 2), `constant_gamma` with a ratio of heat capacities of your own.
+    /// Definition of the isentropic efficiency, of the nominal map and of the results: `enthalpy` is the ratio of the rises of specific enthalpy, and the default for a map from a table; `kappa_of_T1` takes temperatures with the heat capacity at T1 (Burke et al., eq. 2), and is the default for `closed_form`; `constant_gamma` with a ratio of heat capacities of your own.
     #[schemars(example = &"enthalpy")]
     efficiency: Option<EfficiencyFile>,
     /// Formats and directory of the results.
@@ -250,7 +250,12 @@ impl CampaignFile {
             speed_is_held: speed_control.is_some(),
         };
         let guards = self.guards.map(|guards| guards.guards(&by));
-        machine.params.compressor.efficiency = self.efficiency.map(Into::into).unwrap_or_default();
+        // The closed form is that of the paper's machine, whose efficiency is eq. 2's; a table has the usual definition.
+        let usual = match machine.map {
+            MapSource::ClosedForm => EfficiencyDefinition::KappaOfT1,
+            MapSource::Table { .. } => EfficiencyDefinition::default(),
+        };
+        machine.params.compressor.efficiency = self.efficiency.map_or(usual, Into::into);
         machine.params.compressor.humidity_kg_kg = self.report.air(&boundary).humidity_kg_kg;
         let campaign = Campaign {
             name: self.campaign,

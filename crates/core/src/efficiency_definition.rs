@@ -49,7 +49,7 @@ impl std::fmt::Display for EfficiencyDefinition {
 /// A text that names no definition.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no definition of efficiency: write `enthalpy`, `kappa_of_T1`, or `constant_gamma 1.4` with a value between 1 and 2"
+    "`{0}` is not a definition of efficiency; write `enthalpy`, `kappa_of_T1`, or `constant_gamma 1.4` with a value between 1 and 2"
 )]
 pub struct UnknownEfficiency(String);
 

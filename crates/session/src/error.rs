@@ -57,7 +57,7 @@ pub enum SessionError {
     /// A log without steps has too little data.
     #[error(transparent)]
     Driven(#[from] mapper_driven::DrivenError),
-    /// There is no nominal map for a first campaign.
+    /// A first campaign cannot get its nominal map.
     #[error(transparent)]
     FirstMap(#[from] Box<crate::first_map_error::FirstMapError>),
     /// No recording was given.

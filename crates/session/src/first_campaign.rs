@@ -5,6 +5,7 @@ use crate::first_map::{FirstMap, MapLines};
 use crate::first_request::{FirstCampaignRequest, FirstRig, digits};
 use crate::{Registry, SessionError};
 use mapper_campaign::{AssumedSize, Campaign, CampaignError, similar_sizes};
+use mapper_physics::closed_form_map::TURBO_A_WHEEL_M;
 use serde::Serialize;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -13,10 +14,8 @@ use std::path::{Path, PathBuf};
 const CAMPAIGN: &str = include_str!("../templates/campaign.yaml");
 const CHANNELS: &str = include_str!("../templates/channels.yaml");
 const ZERO: &str = include_str!("../templates/zero.yaml");
-/// Noise of a flow meter for the 52 mm machine of campaigns/turbo_a.yaml, kg/s; meters are chosen by their full scale.
+/// Noise of the flow meter of campaigns/turbo_a.yaml, whose wheel has 52 mm, kg/s; meters are chosen by their full scale.
 const FLOW_NOISE_KG_S: f64 = 1.5e-4;
-/// Wheel of that machine, m (Burke et al., Appendix A).
-const REFERENCE_WHEEL_M: f64 = 52e-3;
 /// Speed limit over the highest speed of the grid. Judgement: room for the overshoot of a jump; your machine's own limit replaces it.
 const SPEED_LIMIT_RATIO: f64 = 1.1;
 /// Points of a speed line.
@@ -102,7 +101,7 @@ fn checked(text: &str, path: &Path, map: &FirstMap) -> Result<Campaign, SessionE
 }
 
 fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
-    let wheel_ratio = request.wheel_diameter_m / REFERENCE_WHEEL_M;
+    let wheel_ratio = request.wheel_diameter_m / TURBO_A_WHEEL_M;
     let name = &request.name;
     let commands = match request.rig {
         FirstRig::VirtualLab | FirstRig::GasStand => format!(

@@ -1,9 +1,9 @@
-//! Why a machine has no nominal map.
+//! Errors of the nominal map of a first campaign.
 
 use mapper_campaign::NominalTableError;
 use std::path::PathBuf;
 
-/// Why there is no nominal map.
+/// Why a first campaign cannot get its nominal map.
 #[derive(Debug, thiserror::Error)]
 pub enum FirstMapError {
     /// It is not a map.

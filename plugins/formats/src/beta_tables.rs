@@ -9,6 +9,8 @@ use mapper_core::{CompressorMap, ImportError, ImportedMap, ReferenceState};
 #[derive(Debug, Default)]
 struct BetaTables {
     speeds: Vec<f64>,
+    /// Auxiliary coordinate of the columns.
+    beta: Vec<f64>,
     flow: Vec<f64>,
     pressure_ratio: Vec<f64>,
     efficiency: Vec<f64>,
@@ -36,7 +38,7 @@ pub(crate) fn read_arrays(bytes: &[u8], given: Option<ReferenceState>) -> Result
             && let Some(place) = tables.place(name)
             && place.is_empty()
         {
-            *place = bracketed(value, '[', ']')?;
+            *place = bracketed(value, ('[', ']'), line_of(&code, at))?;
         }
     }
     tables.map(&text, given)
@@ -49,7 +51,9 @@ pub(crate) fn read_nested(bytes: &[u8], given: Option<ReferenceState>) -> Result
         text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
     let mut tables = BetaTables::default();
     let (mut speeds, mut by_beta) = (Vec::new(), false);
-    for part in code.split("Table ").skip(1) {
+    let starts: Vec<usize> = code.match_indices("Table ").map(|(at, _)| at).collect();
+    for (index, start) in starts.iter().enumerate() {
+        let part = &code[*start..starts.get(index + 1).copied().unwrap_or(code.len())];
         // Of several vane angles the first counts.
         let angles: Vec<usize> = part
             .match_indices("alphaMap")
@@ -60,25 +64,27 @@ pub(crate) fn read_nested(bytes: &[u8], given: Option<ReferenceState>) -> Result
         let mut of_table = Vec::new();
         let mut is_known = false;
         for (at, _) in part.match_indices('=') {
-            let name = part[..at]
-                .trim_end()
-                .rsplit(|c: char| !(c.is_alphanumeric() || c == '_'))
-                .next()
-                .unwrap_or_default();
+            let line = line_of(&code, start + at);
+            let is_name = |c: char| c.is_alphanumeric() || c == '_';
+            let name = part[..at].trim_end().rsplit(|c: char| !is_name(c)).next().unwrap_or_default();
             let value = part[at + 1..].trim_start();
-            if name.to_lowercase().starts_with("nc") && value.starts_with('{') {
+            let (is_speed, is_list) = (name.to_lowercase().starts_with("nc"), value.starts_with('{'));
+            if is_speed && is_list {
                 // Each value of beta has a list over all speeds.
                 by_beta = true;
                 if of_table.is_empty() {
-                    of_table = bracketed(value, '{', '}')?;
+                    of_table = bracketed(value, ('{', '}'), line)?;
                 }
-            } else if name.to_lowercase().starts_with("nc") {
+            } else if is_speed {
                 let end =
                     value.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(value.len());
                 of_table.extend(value[..end].parse::<f64>().ok());
-            } else if value.starts_with('{') && tables.place(name).is_some() {
-                let numbers = bracketed(value, '{', '}')?;
-                if let Some(place) = tables.place(name) {
+            } else if is_list && let Some(place) = tables.place(name) {
+                let numbers = bracketed(value, ('{', '}'), line)?;
+                // The coordinate of the columns is repeated at every speed.
+                if name.to_lowercase().starts_with("rline") {
+                    *place = numbers;
+                } else {
                     place.extend(numbers);
                     is_known = true;
                 }
@@ -95,8 +101,13 @@ pub(crate) fn read_nested(bytes: &[u8], given: Option<ReferenceState>) -> Result
     tables.map(&text, given)
 }
 
-/// The numbers between a bracket and its partner, in order.
-fn bracketed(text: &str, open: char, close: char) -> Result<Vec<f64>, ImportError> {
+/// Line of a place in a text, from 1.
+fn line_of(text: &str, at: usize) -> usize {
+    1 + text[..at].matches('\n').count()
+}
+
+/// The numbers between a bracket and its partner, in order. `line`: the line of the file at which they begin.
+fn bracketed(text: &str, (open, close): (char, char), line: usize) -> Result<Vec<f64>, ImportError> {
     let mut depth = 0usize;
     let mut end = text.len();
     for (at, c) in text.char_indices() {
@@ -113,10 +124,10 @@ fn bracketed(text: &str, open: char, close: char) -> Result<Vec<f64>, ImportErro
     let words = text[..end].split(|c: char| c.is_whitespace() || ",;[]{}()".contains(c));
     for word in words.filter(|word| !word.is_empty() && *word != "...") {
         if numbers.len() >= NUMBER_LIMIT {
-            return Err(ImportError::TooMany { line: 1, limit: NUMBER_LIMIT });
+            return Err(ImportError::TooMany { line, limit: NUMBER_LIMIT });
         }
         numbers.push(word.parse().map_err(|_| ImportError::NotANumber {
-            line: 1,
+            line,
             quantity: "table".to_owned(),
             text: word.chars().take(40).collect(),
         })?);
@@ -137,6 +148,7 @@ impl BetaTables {
             | "ncorrmap"
             | "corrected_speed_rpm"
             | "x_c_map_ncvec" => Some(&mut self.speeds),
+            "rlinevec" | "rlinemap" | "rline" | "beta" => Some(&mut self.beta),
             "wcarray" | "wcmap" | "wc" | "wc_map" | "corrected_flow_kg_s" | "mc" => Some(&mut self.flow),
             "prarray" | "prmap" | "pr" | "pr_map" | "pressure_ratio" => Some(&mut self.pressure_ratio),
             "effarray" | "effmap" | "eff" | "eff_map" | "isentropic_efficiency" | "eta" => {
@@ -166,12 +178,11 @@ impl BetaTables {
             return Err(ImportError::NoTable { missing });
         }
         let lines = self.speeds.len();
-        let columns = self.flow.len().min(self.pressure_ratio.len()) / lines;
         // A map with vanes has one table per angle; the first counts.
-        let fits = |values: &[f64]| values.len() >= lines * columns && values.len().is_multiple_of(lines);
-        if columns == 0
-            || ![&self.flow, &self.pressure_ratio, &self.efficiency].into_iter().all(|values| fits(values))
-        {
+        let columns = if self.beta.is_empty() { self.flow.len() / lines } else { self.beta.len() };
+        let table = lines * columns;
+        let fits = |values: &[f64]| table > 0 && values.len().is_multiple_of(table) && !values.is_empty();
+        if ![&self.flow, &self.pressure_ratio, &self.efficiency].into_iter().all(|values| fits(values)) {
             return Err(ImportError::TableSize {
                 speeds: lines,
                 flows: self.flow.len(),
@@ -184,7 +195,6 @@ impl BetaTables {
         if fastest < 10.0 {
             return Err(ImportError::RelativeSpeed { fastest });
         }
-        let columns = if self.flow.len() == lines * columns { columns } else { self.beta_count(columns) };
         let mut rows = Vec::with_capacity(lines * columns);
         for (line, speed_corrected_rpm) in self.speeds.iter().enumerate() {
             for place in line * columns..(line + 1) * columns {
@@ -209,10 +219,5 @@ impl BetaTables {
         let efficiency = text.lines().find_map(heading::efficiency_in_comment);
         let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given)?;
         Ok(CompressorMap { efficiency, ..map }.into())
-    }
-
-    /// Number of places on a line, from a whole number of vane angles; all if the number is unknown.
-    fn beta_count(&self, all: usize) -> usize {
-        (2..=20).find(|angles| all.is_multiple_of(*angles)).map_or(all, |angles| all / angles)
     }
 }

@@ -199,3 +199,56 @@ fn further_shapes() {
     let found = read_bytes("x.csv", &utf16, Some(ReferenceState::SAE)).unwrap();
     assert_eq!(numbers(&found.map), [row(50e3, 0.05, 1.3, 0.61)]);
 }
+
+/// A map with two vane angles has its tables twice; the first counts.
+#[test]
+fn the_first_vane_angle_counts() {
+    let text = "m.NcMap = np.array([50000, 80000])\nm.RlineMap = np.array([1, 2, 3])\n\
+        m.WcMap = np.array([[[0.03, 0.04, 0.05], [0.05, 0.07, 0.08]], [[0.02, 0.03, 0.04], [0.04, 0.06, 0.07]]])\n\
+        m.PRmap = np.array([[[1.4, 1.35, 1.2], [2.1, 1.9, 1.5]], [[1.4, 1.35, 1.2], [2.1, 1.9, 1.5]]])\n\
+        m.effMap = np.array([[[0.6, 0.7, 0.6], [0.6, 0.72, 0.6]], [[0.5, 0.6, 0.5], [0.5, 0.6, 0.5]]])\n";
+    let found = read_bytes("x.py", text.as_bytes(), Some(ReferenceState::SAE)).unwrap();
+    let row = |speed: f64, flow: f64, ratio: f64, eta: f64| [Some(speed), Some(flow), Some(ratio), Some(eta)];
+    let expected = [
+        row(50e3, 0.03, 1.4, 0.6),
+        row(50e3, 0.04, 1.35, 0.7),
+        row(50e3, 0.05, 1.2, 0.6),
+        row(80e3, 0.05, 2.1, 0.6),
+        row(80e3, 0.07, 1.9, 0.72),
+        row(80e3, 0.08, 1.5, 0.6),
+    ];
+    assert_eq!(numbers(&found.map), expected);
+    // A table that is cut short is named, and so is a word in one, with its line.
+    let cut = text.replace(", [[1.4, 1.35, 1.2], [2.1, 1.9, 1.5]]])", "])").replace("0.06, 0.07", "0.06");
+    assert!(matches!(
+        read_bytes("x.py", cut.as_bytes(), Some(ReferenceState::SAE)),
+        Err(ImportError::TableSize { flows: 11, .. })
+    ));
+    let word = text.replace("0.72", "much");
+    assert!(matches!(
+        read_bytes("x.py", word.as_bytes(), Some(ReferenceState::SAE)),
+        Err(ImportError::NotANumber { line: 5, .. })
+    ));
+}
+
+/// Reduced flows in every spelling of their unit: 1 bar is 100 kPa.
+#[test]
+fn units_of_reduced_flow() {
+    let flow = |unit: &str, value: f64| {
+        let text = format!(
+            "N/sqrt(T) [rpm/K^0.5],m*sqrt(T)/p [{unit}],PR,eta\n3000,{value},1.3,0.6\n4000,{value},1.5,0.6\n"
+        );
+        numbers(&read_bytes("x.csv", text.as_bytes(), None).unwrap().map)[0][1].unwrap()
+    };
+    let expected = 0.02 * 100e3 / 1e3 / 298f64.sqrt();
+    for (unit, value) in [
+        ("kg/s*K^0.5/kPa", 0.02),
+        ("kg/s*K^0.5/MPa", 20.0),
+        ("kg/s*K^0.5/bar", 2.0),
+        ("kg/s*K^0.5/mbar", 0.002),
+        ("kg-sqrt(K)/s-kPa", 0.02),
+        ("kg*sqrt(K)/(s*kPa)", 0.02),
+    ] {
+        assert!((flow(unit, value) / expected - 1.0).abs() < 1e-12, "{unit}");
+    }
+}

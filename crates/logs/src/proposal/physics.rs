@@ -14,8 +14,8 @@ const AGREEMENT: f64 = 0.9;
 /// Correlation below which flow does not follow speed. Along a line of constant speed flow moves alone.
 const FOLLOWS: f64 = 0.3;
 
-/// Lowest speed limit of turbochargers: those of ships' engines reach 10 krpm.
-const SLOWEST_TOP_SPEED_RPM: f64 = 1e4;
+/// Speed that engines of road vehicles hardly exceed, rpm; the largest turbochargers, on ships, reach some 9000.
+const FASTEST_ENGINE_RPM: f64 = 8e3;
 
 /// Channels whose names are station numbers in most logs.
 const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::T3, Channel::P4, Channel::T4];
@@ -60,9 +60,8 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
         }
     }
     let fastest_rpm = running.as_ref().map(|speed| speed.samples().map(|(_, rpm)| rpm).fold(0.0, f64::max));
-    if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < SLOWEST_TOP_SPEED_RPM) {
-        let message =
-            format!("{rpm:.0} rpm at most: an engine turns that fast, and no turbocharger so slowly");
+    if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < FASTEST_ENGINE_RPM) {
+        let message = format!("at most {rpm:.0} rpm: this may be the speed of the engine");
         doubt(proposal, &[Channel::ShaftSpeed], &message);
     }
     if let (Some(speed), Some(flow)) = (running, course(proposal, Channel::CompressorFlow)) {

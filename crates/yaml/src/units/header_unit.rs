@@ -1,5 +1,6 @@
 //! Units as the headers of logs and tables write them.
 
+use super::kind::CUBIC_FOOT_M3;
 use super::{BARE_RATIO, Kind, Unit};
 use serde::Serialize;
 
@@ -116,50 +117,25 @@ const PRESSURES: &[(&str, &str)] = &[
     ("pa", "Pa"),
 ];
 
-/// Units of flow that need one more statement before they are a mass flow, in small letters without blanks.
-const VOLUME_FLOWS: &[(VolumeFlow, &[&str])] = &[
-    (VolumeFlow::StandardFeet, &["scfm", "sft3/min", "std.cfm", "stdcfm"]),
-    (VolumeFlow::StandardLitres, &["slpm", "sl/min", "nl/min", "nlpm", "slm"]),
-    (
-        VolumeFlow::Actual,
-        &[
-            "cfm", "acfm", "icfm", "ft3/min", "ft^3/min", "ft³/min", "cfs", "ft3/s", "m3/h", "m³/h", "m^3/h",
-            "m3/hr", "m3/s", "m³/s", "m^3/s", "m3/min", "m³/min", "m^3/min", "l/min", "l/s", "lpm", "l/h",
-        ],
-    ),
+/// Units of volume flow in small letters without blanks, and their value in m3/s; `None` for a volume under standard conditions, which the
+/// unit does not state.
+const VOLUME_FLOWS: &[(Option<f64>, &[&str])] = &[
+    (None, &["scfm", "sft3/min", "std.cfm", "stdcfm", "slpm", "sl/min", "nl/min", "nlpm", "slm"]),
+    (Some(1.0), &["m3/s", "m³/s", "m^3/s", "cbm/s"]),
+    (Some(1.0 / 60.0), &["m3/min", "m³/min", "m^3/min"]),
+    (Some(1.0 / 3600.0), &["m3/h", "m³/h", "m^3/h", "m3/hr"]),
+    (Some(1e-3), &["l/s"]),
+    (Some(1e-3 / 60.0), &["l/min", "lpm"]),
+    (Some(1e-3 / 3600.0), &["l/h"]),
+    (Some(CUBIC_FOOT_M3 / 60.0), &["cfm", "acfm", "icfm", "ft3/min", "ft^3/min", "ft³/min"]),
+    (Some(CUBIC_FOOT_M3), &["cfs", "ft3/s", "ft^3/s", "ft³/s"]),
 ];
 
-/// A flow of volume.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum VolumeFlow {
-    /// Cubic feet under standard conditions that the unit does not state.
-    StandardFeet,
-    /// Litres under standard conditions that the unit does not state.
-    StandardLitres,
-    /// The volume where it was measured.
-    Actual,
-}
-
-impl VolumeFlow {
-    /// The units of mass flow that it can be, one per standard temperature.
-    pub fn mass_flows(self) -> &'static [&'static str] {
-        match self {
-            VolumeFlow::StandardFeet => {
-                &["SCFM(60degF)", "SCFM(70degF)", "SCFM(20degC)", "SCFM(15degC)", "SCFM(0degC)"]
-            }
-            VolumeFlow::StandardLitres => &["SLPM(0degC)", "SLPM(20degC)"],
-            VolumeFlow::Actual => &[],
-        }
-    }
-}
-
-/// The flow of volume that a header's unit means.
-pub fn volume_flow(text: &str) -> Option<VolumeFlow> {
-    let lower: String =
-        text.chars().filter(|c| !c.is_whitespace() && !['[', ']', '(', ')'].contains(c)).collect();
-    let lower = lower.to_lowercase();
-    VOLUME_FLOWS.iter().find(|(_, spellings)| spellings.contains(&lower.as_str())).map(|(flow, _)| *flow)
+/// Whether a unit is one of volume flow, and its value in m3/s; `Some(None)` under standard conditions, which the unit does not state.
+pub fn volume_flow_m3_s(text: &str) -> Option<Option<f64>> {
+    let plain: String = text.chars().filter(|c| !c.is_whitespace() && !"[]()".contains(*c)).collect();
+    let lower = plain.to_lowercase();
+    VOLUME_FLOWS.iter().find(|(_, spellings)| spellings.contains(&lower.as_str())).map(|(m3_s, _)| *m3_s)
 }
 
 const GAUGE: &[&str] =
@@ -207,7 +183,7 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
         // `bar (g)` and `[bar(g)]` hold brackets of their own.
         if !name.trim().is_empty()
             && !unit.is_empty()
-            && (any || header_unit(unit).is_some() || volume_flow(unit).is_some())
+            && (any || header_unit(unit).is_some() || volume_flow_m3_s(unit).is_some())
         {
             return (name.trim().trim_end_matches(['/', ',']).trim().to_owned(), Some(unit.to_owned()));
         }
@@ -271,8 +247,8 @@ mod tests {
             );
         }
         assert_eq!(header_unit("Nm"), None);
-        assert_eq!(volume_flow("SCFM"), Some(VolumeFlow::StandardFeet));
-        assert_eq!(volume_flow("m3/h"), Some(VolumeFlow::Actual));
+        assert_eq!(volume_flow_m3_s("SCFM"), Some(None));
+        assert_eq!(volume_flow_m3_s("m3/h"), Some(Some(1.0 / 3600.0)));
         assert_eq!(header_unit("SCFM"), None);
     }
 

@@ -155,18 +155,18 @@ const MASS_FLOW: &[Unit] = &[
     unit(&["lb/h", "lb/hr"], 0.453_592_37, 3600.0),
     unit(&["t/h"], 1000.0, 3600.0),
     // Volumes of dry air under standard conditions are masses once the temperature is named.
-    unit(&["SCFM(0degC)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 273.15),
-    unit(&["SCFM(15degC)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 288.15),
-    unit(&["SCFM(60degF)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 519.67 / 1.8),
-    unit(&["SCFM(20degC)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 293.15),
-    unit(&["SCFM(70degF)"], CUBIC_FOOT * AIR_AT_1_K, 60.0 * 529.67 / 1.8),
+    unit(&["SCFM(0degC)"], CUBIC_FOOT_M3 * AIR_AT_1_K, 60.0 * 273.15),
+    unit(&["SCFM(15degC)"], CUBIC_FOOT_M3 * AIR_AT_1_K, 60.0 * 288.15),
+    unit(&["SCFM(60degF)"], CUBIC_FOOT_M3 * AIR_AT_1_K, 60.0 * 519.67 / 1.8),
+    unit(&["SCFM(20degC)"], CUBIC_FOOT_M3 * AIR_AT_1_K, 60.0 * 293.15),
+    unit(&["SCFM(70degF)"], CUBIC_FOOT_M3 * AIR_AT_1_K, 60.0 * 529.67 / 1.8),
     unit(&["SLPM(0degC)"], 1e-3 * AIR_AT_1_K, 60.0 * 273.15),
     unit(&["SLPM(20degC)"], 1e-3 * AIR_AT_1_K, 60.0 * 293.15),
     unit(&["Nm3/h", "Nm³/h"], AIR_AT_1_K, 3600.0 * 273.15),
     unit(&["Sm3/h", "Sm³/h"], AIR_AT_1_K, 3600.0 * 288.15),
 ];
 /// A cubic foot, m3.
-const CUBIC_FOOT: f64 = 0.3048 * 0.3048 * 0.3048;
+pub(super) const CUBIC_FOOT_M3: f64 = 0.3048 * 0.3048 * 0.3048;
 /// Density of dry air at 101.325 kPa times its temperature, kg K/m3; gas constant of the standard atmosphere (ISO 2533).
 const AIR_AT_1_K: f64 = 101_325.0 / 287.052_87;
 const DURATION: &[Unit] =

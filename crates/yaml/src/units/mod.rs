@@ -12,7 +12,7 @@ mod parse;
 mod quantity;
 mod table_text;
 
-pub use header_unit::{HeaderUnit, Reference, VolumeFlow, header_unit, split_unit, volume_flow};
+pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit, volume_flow_m3_s};
 pub use heading::{FoundColumn, HeadingError, WantedColumn, find_columns};
 pub use kind::{BARE_RATIO, Kind, Unit};
 pub use parse::{UnitError, parse, parse_with};

@@ -111,7 +111,7 @@ impl Grid {
     /// The cells of the first sheet with a table of numbers.
     ///
     /// # Errors
-    /// [`ImportError::Workbook`] if it is no workbook, unpacks to more than a map needs, or has no such sheet.
+    /// [`ImportError::Workbook`] if it is not a workbook, unpacks to more than a map needs, or has no such sheet.
     pub(super) fn of_workbook(bytes: &[u8]) -> Result<Grid, ImportError> {
         let failed = |error: &dyn std::fmt::Display| ImportError::Workbook { problem: error.to_string() };
         check_size(bytes)?;

@@ -2,7 +2,7 @@
 
 use mapper_core::ReferenceState;
 use mapper_physics::air::GAS_CONSTANT_J_KGK;
-use mapper_yaml::units::{Kind, header_unit, split_unit};
+use mapper_yaml::units::{Kind, Reference, Unit, header_unit, split_unit, volume_flow_m3_s};
 
 /// Quantities of a table of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +75,7 @@ pub(super) struct Column {
 /// How a value becomes SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
-    Unit(&'static mapper_yaml::units::Unit),
+    Unit(&'static Unit),
     Factor(f64),
 }
 
@@ -115,17 +115,6 @@ pub(super) enum ColumnError {
     Turbine { heading: String },
 }
 
-/// Units of volume flow and their value in m3/s.
-const VOLUME_FLOWS: [(&[&str], f64); 6] = [
-    (&["m3/s", "m³/s", "m^3/s", "cbm/s"], 1.0),
-    (&["m3/min", "m³/min", "m^3/min"], 1.0 / 60.0),
-    (&["m3/h", "m³/h", "m^3/h", "m3/hr"], 1.0 / 3600.0),
-    (&["l/s"], 1e-3),
-    (&["cfm", "acfm", "icfm", "ft3/min", "ft^3/min", "ft³/min"], CUBIC_FOOT_M3 / 60.0),
-    (&["cfs", "ft3/s", "ft³/s", "ft^3/s"], CUBIC_FOOT_M3),
-];
-const CUBIC_FOOT_M3: f64 = 0.3048 * 0.3048 * 0.3048;
-
 /// The column of a heading; `None` if it holds none of the quantities.
 pub(super) fn column(index: usize, heading: &str) -> Result<Option<Column>, ColumnError> {
     let (name, unit) = parts(heading);
@@ -161,13 +150,10 @@ fn parts(heading: &str) -> (String, Option<String>) {
     if !heading.contains(['[', '(']) && quantity_of_unit(heading).is_some() {
         return (String::new(), Some(heading.to_owned()));
     }
-    if let Some(open) = heading.rfind(['[', '(']).filter(|at| *at > 0) {
-        // The last bracket; `N/sqrt(T) [rpm/K^0.5]` has one in its name.
-        let inside = heading[open + 1..].trim_end_matches([']', ')', ' ']).trim().to_owned();
-        let name = heading[..open].trim().to_owned();
-        if heading.trim_end().ends_with([']', ')']) && !in_name(&name, &inside) {
-            return (name, (!is_kind(&inside)).then_some(inside));
-        }
+    if let Some((name, inside)) = last_bracket(heading)
+        && !in_name(name, inside)
+    {
+        return (name.to_owned(), (!is_kind(inside)).then(|| inside.to_owned()));
     }
     // `MASSc-kg/s`, `Flow kg/s`, `m / kg/h`, `flow_kg_s`.
     let known = |unit: &str| quantity_of_unit(unit).is_some();
@@ -186,6 +172,23 @@ fn parts(heading: &str) -> (String, Option<String>) {
         }
     }
     (heading.to_owned(), None)
+}
+
+/// What is before the bracket that ends a heading, and what is inside. Name and unit may hold brackets of their own.
+fn last_bracket(heading: &str) -> Option<(&str, &str)> {
+    let inside = heading.strip_suffix([']', ')'])?;
+    let mut depth = 1;
+    for (at, c) in inside.char_indices().rev() {
+        match c {
+            ']' | ')' => depth += 1,
+            '[' | '(' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return (at > 0).then(|| (inside[..at].trim(), inside[at + 1..].trim()));
+        }
+    }
+    None
 }
 
 /// `sqrt(T)`: the bracket belongs to the name.
@@ -231,7 +234,7 @@ fn is_turbine(plain: &str) -> bool {
 /// What a unit measures.
 fn quantity_of_unit(unit: &str) -> Option<Quantity> {
     let lower = unit.trim().to_lowercase();
-    if VOLUME_FLOWS.iter().any(|(names, _)| names.contains(&lower.as_str())) {
+    if volume_flow_m3_s(unit).is_some() {
         return Some(Quantity::VolumeFlow);
     }
     if lower == "%" {
@@ -361,42 +364,27 @@ fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option<Quantity> 
 
 fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
     let lower = unit.trim().to_lowercase();
-    let of_kind = |kind: Kind| {
-        let named = || {
-            header_unit(unit)
-                .filter(|found| found.kind == kind && found.reference != mapper_yaml::units::Reference::Gauge)
-        };
-        kind.unit(unit).or_else(|| Some(named()?.unit)).map(Scale::Unit)
-    };
     match quantity {
-        Quantity::VolumeFlow => {
-            let (_, m3_s) = VOLUME_FLOWS.iter().find(|(names, _)| names.contains(&lower.as_str()))?;
-            Some(Scale::Factor(*m3_s))
-        }
+        Quantity::VolumeFlow => Some(Scale::Factor(volume_flow_m3_s(unit)??)),
         Quantity::ReducedSpeed if is_root(&lower) => {
             let speed = lower.split(['/', '*', '-']).next()?;
-            Some(Scale::Factor(
-                Kind::Speed.unit(speed).or_else(|| Some(header_unit(speed)?.unit))?.to_inside(1.0),
-            ))
+            Some(Scale::Factor(unit_of(Kind::Speed, speed)?.to_inside(1.0)))
         }
         Quantity::ReducedFlow => {
-            let masses =
-                [("kg/s", 1.0), ("kg", 1.0), ("g/s", 1e-3), ("lb/s", POUND_KG), ("lb/min", POUND_KG / 60.0)];
-            let pressures = [
-                ("mpa", 1e6),
-                ("kpa", 1e3),
-                ("hpa", 1e2),
-                ("bar", 1e5),
-                ("psi", 6_894.757_293_168),
-                ("pa", 1.0),
-            ];
-            let (_, kg_s) = masses.iter().find(|(name, _)| lower.starts_with(name))?;
-            let (_, pa) = pressures.iter().find(|(name, _)| lower.contains(name))?;
-            Some(Scale::Factor(kg_s / pa))
+            // `kg/s*K^0.5/kPa`, `kg-sqrt(K)/s-kPa`, `kg*sqrt(K)/(s*kPa)`: the mass is first, the pressure last.
+            let mass = unit.split(['*', '-', ' ']).next()?;
+            let mass = if mass.contains('/') { mass.to_owned() } else { format!("{mass}/s") };
+            let pressure = unit.trim_end_matches([')', ' ']).rsplit(['/', '*', '-', ' ', '(']).next()?;
+            let kg_s = unit_of(Kind::MassFlow, &mass)?.to_inside(1.0);
+            Some(Scale::Factor(kg_s / unit_of(Kind::Pressure, pressure)?.to_inside(1.0)))
         }
-        _ => of_kind(quantity.kind()),
+        _ => unit_of(quantity.kind(), unit).map(Scale::Unit),
     }
 }
 
-/// International avoirdupois pound, kg.
-const POUND_KG: f64 = 0.453_592_37;
+/// The unit of a kind under any spelling that headings use. A map has absolute pressures.
+fn unit_of(kind: Kind, text: &str) -> Option<&'static Unit> {
+    let named =
+        || header_unit(text).filter(|found| found.kind == kind && found.reference != Reference::Gauge);
+    kind.unit(text).or_else(|| Some(named()?.unit))
+}

@@ -18,15 +18,20 @@ pub fn fits(channel: Channel, low: f64, high: f64) -> bool {
     }
 }
 
+/// Units that logs leave out: those of their program or stand. Others are written down.
+const UNWRITTEN: [&str; 15] = [
+    "K", "degC", "Pa", "kPa", "mbar", "bar", "psia", "rpm", "krpm", "kg/s", "g/s", "kg/h", "lb/min", "%", "1",
+];
+
 /// Units in which values of this course would be plausible, `over` (0, or for gauge pressures the ambient pressure in Pa) added to
 /// them.
 pub fn fitting_units(channel: Channel, low: f64, high: f64, over: f64) -> Vec<&'static Unit> {
     let kind = kind_of(channel);
-    let rare = |unit: &&Unit| !["degF", "degR", "lb/s", "atm", "rad/s", "ppm"].contains(&unit.symbol());
+    let usual = |unit: &&Unit| UNWRITTEN.contains(&unit.symbol());
     let fitting =
         |unit: &&'static Unit| fits(channel, unit.to_inside(low) + over, unit.to_inside(high) + over);
     let bare = unit(kind, "1").ok();
-    kind.units().iter().chain(bare).filter(rare).filter(fitting).collect()
+    kind.units().iter().chain(bare).filter(usual).filter(fitting).collect()
 }
 
 /// Whether absolute pressures of this course (Pa) look like readings over the ambient pressure: too low for absolute ones,

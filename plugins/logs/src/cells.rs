@@ -8,6 +8,9 @@ pub(crate) trait Cells {
     /// The number in a cell; NaN without a number.
     fn number(&self, column: usize) -> f64;
 
+    /// The number in a cell that has its unit behind it; NaN without a number and with another unit.
+    fn number_in(&self, column: usize, unit: &str) -> f64;
+
     /// The date or time of day in a cell.
     fn instant(&self, column: usize, order: DateOrder) -> Option<Instant>;
 }

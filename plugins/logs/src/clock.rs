@@ -9,8 +9,9 @@ use mapper_logs::DateOrder;
 pub(crate) enum Clock {
     /// A counter.
     Count { column: usize, unit_s: f64 },
-    /// Date and time of day, in one column or in two.
-    Instant { date: Option<usize>, time: usize, order: DateOrder },
+    /// Date and time of day, in one column or in two. A reading without a date begins again after `period_ns`: a day, or an hour
+    /// where the hours are not written.
+    Instant { date: Option<usize>, time: usize, order: DateOrder, period_ns: i64 },
     /// No clock: rows have a fixed rate.
     Rate { interval_s: f64 },
 }
@@ -23,8 +24,21 @@ pub(crate) struct GroupClock {
     pub(crate) zero_s: f64,
     /// The same for dates, ns.
     pub(crate) zero_ns: i64,
-    /// If several rows share one reading: seconds between them, and their number.
-    pub(crate) spread: Option<(f64, usize)>,
+    /// If several rows share one reading.
+    pub(crate) spread: Option<Spread>,
+    /// Whether rows are out of order and are to be sorted by time.
+    pub(crate) disordered: bool,
+}
+
+/// Rows that share a reading of the clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spread {
+    /// Seconds between them.
+    pub(crate) interval_s: f64,
+    /// Their number.
+    pub(crate) rows: usize,
+    /// How many of those that share the first reading are missing: the log began within it.
+    pub(crate) missing_at_start: usize,
 }
 
 impl Clock {
@@ -40,7 +54,7 @@ impl Clock {
 
     /// Nanoseconds of a date or a time of day.
     pub(crate) fn instant_ns(&self, cells: &dyn Cells) -> Option<i64> {
-        let Clock::Instant { date, time, order } = self else { return None };
+        let Clock::Instant { date, time, order, .. } = self else { return None };
         let mut instant = cells.instant(*time, *order)?;
         if let Some(date) = date {
             instant.day = Some(cells.instant(*date, *order)?.day?);
@@ -68,7 +82,8 @@ fn scaled(value: f64, unit_s: f64) -> f64 {
 pub(crate) struct ClockHand {
     clock: GroupClock,
     rows: u64,
-    days_ns: i64,
+    /// Time added since the start because the readings began again.
+    added_ns: i64,
     last_ns: Option<i64>,
     last_s: f64,
     shared: usize,
@@ -76,7 +91,8 @@ pub(crate) struct ClockHand {
 
 impl ClockHand {
     pub(crate) fn new(clock: GroupClock) -> Self {
-        ClockHand { clock, rows: 0, days_ns: 0, last_ns: None, last_s: f64::NAN, shared: 0 }
+        let shared = clock.spread.map_or(0, |spread| spread.missing_at_start);
+        ClockHand { clock, rows: 0, added_ns: 0, last_ns: None, last_s: f64::NAN, shared }
     }
 
     /// The row's time, s; `None` if the group has no sample in it.
@@ -87,21 +103,40 @@ impl ClockHand {
                 return Some((self.rows - 1) as f64 * interval_s);
             }
             Clock::Count { .. } => self.clock.clock.count_s(cells)? - self.clock.zero_s,
-            Clock::Instant { .. } => {
+            Clock::Instant { period_ns, .. } => {
                 let ns = self.clock.clock.instant_ns(cells)?;
-                // A time of day without a date continues after midnight.
-                if self.last_ns.is_some_and(|last| ns < last.saturating_sub(NS_PER_DAY / 2))
-                    && ns.unsigned_abs() < 2 * NS_PER_DAY.unsigned_abs()
-                {
-                    self.days_ns = self.days_ns.saturating_add(NS_PER_DAY);
-                }
-                self.last_ns = Some(ns);
-                ns.saturating_add(self.days_ns).saturating_sub(self.clock.zero_ns) as f64 / 1e9
+                let last_ns = self.last_ns.replace(ns);
+                self.added_ns = self
+                    .added_ns
+                    .saturating_add(last_ns.map_or(0, |last| begun_again_ns(last, ns, *period_ns)));
+                ns.saturating_add(self.added_ns).saturating_sub(self.clock.zero_ns) as f64 / 1e9
             }
         };
-        let Some((interval_s, rows)) = self.clock.spread else { return Some(read_s) };
-        self.shared = if read_s == self.last_s { self.shared + 1 } else { 0 };
+        let Some(spread) = self.clock.spread else { return Some(read_s) };
+        if !self.last_s.is_nan() {
+            self.shared = if read_s == self.last_s { self.shared + 1 } else { 0 };
+        }
         self.last_s = read_s;
-        Some(read_s + interval_s * self.shared.min(rows.saturating_sub(1)) as f64)
+        let rows = self.shared.min(spread.rows.saturating_sub(1)) as f64 - spread.missing_at_start as f64;
+        Some(read_s + spread.interval_s * rows)
     }
 }
+
+/// An hour, ns: by so much local time goes back when daylight saving ends.
+pub(crate) const NS_PER_HOUR: i64 = NS_PER_DAY / 24;
+
+/// What has to be added from here on because a clock's readings began again, ns: a period where the reading has no date, an hour
+/// where local time goes back by one at the end of daylight saving; else 0.
+pub(crate) fn begun_again_ns(last_ns: i64, ns: i64, period_ns: i64) -> i64 {
+    let dated = ns >= 366 * NS_PER_DAY + NS_PER_DAY;
+    let back_ns = last_ns.saturating_sub(ns);
+    match dated {
+        false if back_ns > period_ns / 2 => period_ns,
+        // Less than an hour by the time between two rows.
+        true if (NS_PER_HOUR - NS_PER_MINUTE..NS_PER_HOUR).contains(&back_ns) => NS_PER_HOUR,
+        _ => 0,
+    }
+}
+
+/// A minute, ns: logs that are sampled less often have no transients.
+const NS_PER_MINUTE: i64 = NS_PER_HOUR / 60;

@@ -1,11 +1,12 @@
 //! Finds the clocks of a table, selects the ones to read, and assigns columns to them.
 
 use crate::cells::Cells;
-use crate::clock::{Clock, GroupClock};
-use crate::instant::{guess_order, parse_instant};
-use crate::number::parse_number;
+use crate::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, begun_again_ns};
+use crate::counter::{count_unit_s, is_clock_name, unit_words};
+use crate::instant::{NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
+use crate::number::{number_in, parse_number, read_number};
 use crate::table_head::HeadColumn;
-use mapper_logs::{DateOrder, Group, Kind, LogOptions, header_unit};
+use mapper_logs::{DateOrder, Group, LogOptions};
 
 /// The clocks of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,6 +22,9 @@ pub(crate) struct Clocks {
 /// Counters above this since some epoch are actually dates, s: eleven days.
 const LONGEST_COUNT_S: f64 = 1e6;
 
+/// One row in so many may go back without more ado: a recording that was restarted.
+const BACK_SHARE: usize = 20;
+
 /// Maximum number of clocks in a table; further columns with clock names are data.
 const CLOCK_LIMIT: usize = 100;
 
@@ -35,7 +39,11 @@ struct SampleRow<'a>(&'a [String], u8);
 
 impl Cells for SampleRow<'_> {
     fn number(&self, column: usize) -> f64 {
-        self.0.get(column).and_then(|cell| parse_number(cell.as_bytes(), self.1)).unwrap_or(f64::NAN)
+        self.0.get(column).and_then(|cell| read_number(cell, self.1)).unwrap_or(f64::NAN)
+    }
+
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        self.0.get(column).map_or(f64::NAN, |cell| number_in(cell, self.1, unit))
     }
 
     fn instant(&self, column: usize, order: DateOrder) -> Option<crate::instant::Instant> {
@@ -67,13 +75,40 @@ impl Candidate {
         readings.len()
     }
 
-    /// Whether it never decreases and does increase.
+    /// Whether it hardly ever decreases and does increase, or runs once its rows are sorted.
     fn runs(&self) -> bool {
         let readings: Vec<f64> = self.present().collect();
-        let back = readings.windows(2).filter(|pair| pair[1] < pair[0]).count();
         // A clock with a resolution of seconds may be constant over these rows; a constant number is not a clock.
         let moves = readings.len() < 2 || readings.first() < readings.last();
-        20 * back <= readings.len() && (moves || matches!(self.clock, Clock::Instant { .. }))
+        let runs = BACK_SHARE * self.back() <= readings.len()
+            && (moves || matches!(self.clock, Clock::Instant { .. }));
+        runs || self.is_disordered()
+    }
+
+    /// How many readings are below the one before.
+    fn back(&self) -> usize {
+        let readings: Vec<f64> = self.present().collect();
+        readings.windows(2).filter(|pair| pair[1] < pair[0]).count()
+    }
+
+    /// Whether the rows of a clock are out of order: readings go back, no two are equal, and yet each quarter of the rows is later
+    /// than the one before it, give or take the rows at its ends.
+    fn is_disordered(&self) -> bool {
+        let readings: Vec<f64> = self.present().collect();
+        let mut distinct = readings.clone();
+        distinct.sort_by(f64::total_cmp);
+        distinct.dedup();
+        let quarter = readings.len() / 4;
+        let middle = |of: &[f64]| {
+            let mut of = of.to_vec();
+            of.sort_by(f64::total_cmp);
+            of.get(of.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        let middles: Vec<f64> = readings.chunks(quarter.max(1)).take(4).map(middle).collect();
+        quarter >= 2
+            && BACK_SHARE * self.back() > readings.len()
+            && distinct.len() == readings.len()
+            && middles.windows(2).all(|pair| pair[0] < pair[1])
     }
 
     /// Minimum step between two readings, s.
@@ -104,9 +139,10 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         ([], Some(rate_hz)) => {
             clocks.findings.push(format!("clock: none, {rate_hz} samples a second as given (rate)"));
             let clock = Clock::Rate { interval_s: 1.0 / rate_hz };
-            clocks
-                .groups
-                .push((Group::default(), GroupClock { clock, zero_s: 0.0, zero_ns: 0, spread: None }));
+            clocks.groups.push((
+                Group::default(),
+                GroupClock { clock, zero_s: 0.0, zero_ns: 0, spread: None, disordered: false },
+            ));
             return Ok(clocks);
         }
         ([], None) => found(sample, options, &mut clocks.findings),
@@ -115,7 +151,8 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
     let Some(first) = candidates.first() else {
         let names: Vec<&str> = sample.columns.iter().map(|column| column.name.as_str()).take(40).collect();
         return Err(format!(
-            "no column is a clock; name it (`time`) or give the rate (`rate: 10 Hz`); the columns are {}",
+            "no column is a clock; name it (`time`) or give the rate (`rate: 10 Hz`); if each row is a steady point, \
+             `mapper map inspect` reads the file; the columns are {}",
             names.join(", ")
         ));
     };
@@ -158,10 +195,14 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             words.push_str(&format!(", counts {}", unit_words(unit_s)));
         }
         let spread = spread(candidate);
-        if let Some((interval_s, rows)) = spread {
+        if let Some(Spread { interval_s, rows, .. }) = spread {
             words.push_str(&format!(
                 ", {rows} rows share each reading and are spread {interval_s:.3} s apart"
             ));
+        }
+        let disordered = candidate.is_disordered();
+        if disordered {
+            words.push_str(", rows are out of order and are sorted by it");
         }
         let others: Vec<String> = group
             .iter()
@@ -178,6 +219,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             zero_s,
             zero_ns: exact_zero_ns(candidate, sample, zero_ns),
             spread,
+            disordered,
         };
         clocks.groups.push((Group { name, clock: words }, clock));
         if index > 0 {
@@ -197,6 +239,8 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             } else {
                 0.0
             };
+        let before_s = first.spread.map_or(0.0, |spread| spread.interval_s * spread.missing_at_start as f64);
+        let start_s = start_s + before_s;
         clocks.start_time_ns = (start_s > 0.0).then_some((start_s * 1e9) as u64);
     }
     Ok(clocks)
@@ -221,8 +265,8 @@ fn finest<'a>(group: &[&'a Candidate]) -> &'a Candidate {
     best
 }
 
-/// If rows share a reading: the time between them, and the number of rows that share one.
-fn spread(candidate: &Candidate) -> Option<(f64, usize)> {
+/// The rows that share a reading, if several do.
+fn spread(candidate: &Candidate) -> Option<Spread> {
     let readings: Vec<f64> = candidate.present().collect();
     let runs: Vec<&[f64]> = readings.chunk_by(|a, b| a == b).collect();
     // The first and the last may be truncated.
@@ -232,17 +276,9 @@ fn spread(candidate: &Candidate) -> Option<(f64, usize)> {
     let rows = *lengths.get(lengths.len() / 2)?;
     let ticks: Vec<f64> = runs.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
     let tick_s = ticks.iter().copied().filter(|tick| *tick > 0.0).fold(f64::INFINITY, f64::min);
-    (rows >= 2 && tick_s.is_finite()).then(|| (tick_s / rows as f64, rows))
-}
-
-fn unit_words(unit_s: f64) -> String {
-    match unit_s {
-        1.0 => "seconds".to_owned(),
-        0.001 => "milliseconds".to_owned(),
-        60.0 => "minutes".to_owned(),
-        3600.0 => "hours".to_owned(),
-        other => format!("in {other} s"),
-    }
+    let missing_at_start = rows.saturating_sub(runs.first().map_or(0, |run| run.len()));
+    let interval_s = tick_s / rows as f64;
+    (rows >= 2 && tick_s.is_finite()).then_some(Spread { interval_s, rows, missing_at_start })
 }
 
 fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candidate {
@@ -252,22 +288,27 @@ fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candi
         _ => clock.count_s(&row),
     };
     let mut readings_s: Vec<Option<f64>> = rows.map(reading).collect();
-    if !dated && matches!(clock, Clock::Instant { .. }) {
-        past_midnight(&mut readings_s);
+    if let Clock::Instant { period_ns, .. } = clock {
+        count_on(&mut readings_s, period_ns);
     }
     Candidate { clock, at, readings_s, dated }
 }
 
-/// Times of day continue after midnight.
-fn past_midnight(readings_s: &mut [Option<f64>]) {
-    let (mut days_s, mut last_s) = (0.0, f64::NEG_INFINITY);
+/// Adds what [`begun_again_ns`] asks for.
+fn count_on(readings_s: &mut [Option<f64>], period_ns: i64) {
+    let (mut added_ns, mut last_ns) = (0, None);
     for reading in readings_s.iter_mut().flatten() {
-        if *reading + days_s < last_s - 43_200.0 {
-            days_s += 86_400.0;
-        }
-        *reading += days_s;
-        last_s = *reading;
+        let ns = (*reading * 1e9) as i64;
+        added_ns += last_ns.map_or(0, |last| begun_again_ns(last, ns, period_ns));
+        last_ns = Some(ns);
+        *reading += added_ns as f64 / 1e9;
     }
+}
+
+/// An hour where no cell of a column shows one, else a day, ns.
+fn period_ns(column: usize, sample: &Sample<'_>) -> i64 {
+    let hourless = cells(column, sample).all(|cell| minutes_and_seconds(cell).is_some());
+    if hourless { NS_PER_HOUR } else { NS_PER_DAY }
 }
 
 /// The clock named by the user.
@@ -285,10 +326,15 @@ fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<
     let made = match columns.as_slice() {
         [date, time] => {
             let (date, time) = if shows(*time, sample, order).0 { (*time, *date) } else { (*date, *time) };
-            candidate(Clock::Instant { date: Some(date), time, order }, date.min(time), sample, true)
+            candidate(
+                Clock::Instant { date: Some(date), time, order, period_ns: NS_PER_DAY },
+                date.min(time),
+                sample,
+                true,
+            )
         }
         [column] if share(*column, sample, order) > 0.5 => candidate(
-            Clock::Instant { date: None, time: *column, order },
+            Clock::Instant { date: None, time: *column, order, period_ns: period_ns(*column, sample) },
             *column,
             sample,
             shows(*column, sample, order).0,
@@ -328,6 +374,7 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
                 date: beside,
                 time: at,
                 order: beside.map_or(order, |date| options.date_order.unwrap_or(order_of(date, sample).0)),
+                period_ns: period_ns(at, sample),
             };
             candidates.push(candidate(clock, beside.unwrap_or(at), sample, has_date || beside.is_some()));
         } else if is_clock_name(column) {
@@ -343,7 +390,7 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
     candidates
 }
 
-fn cells<'a>(column: usize, sample: &'a Sample<'_>) -> impl Iterator<Item = &'a str> {
+pub(crate) fn cells<'a>(column: usize, sample: &'a Sample<'_>) -> impl Iterator<Item = &'a str> {
     sample
         .rows
         .iter()
@@ -372,62 +419,4 @@ fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
 fn shows(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
     let first = cells(column, sample).find_map(|cell| parse_instant(cell, order)).unwrap_or_default();
     (first.day.is_some(), first.ns_of_day.is_some())
-}
-
-/// Whether a column of numbers is labelled as a clock: by its name, unless its unit contradicts, or by its unit.
-fn is_clock_name(column: &HeadColumn) -> bool {
-    const NAMES: [&str; 22] = [
-        "t",
-        "ts",
-        "time",
-        "zeit",
-        "timestamp",
-        "timestamps",
-        "zeitstempel",
-        "uhrzeit",
-        "datetime",
-        "sec",
-        "seconds",
-        "sek",
-        "sekunden",
-        "elapsed",
-        "clock",
-        "ms",
-        "msec",
-        "t_s",
-        "t_ms",
-        "time_s",
-        "time_ms",
-        "elapsed_time",
-    ];
-    let unit = column.unit.as_deref().and_then(header_unit);
-    let duration = unit.is_some_and(|unit| unit.kind == Kind::Duration);
-    let name = column.name.to_lowercase().replace([' ', '-', '.', ':'], "_");
-    let named = NAMES.contains(&name.as_str())
-        || name.contains("time")
-        || name.contains("zeit")
-        || name.starts_with("elapsed");
-    duration || named && column.unit.is_none()
-}
-
-/// Seconds per count: by its unit, its name, or, for epochs, its magnitude.
-fn count_unit_s(column: usize, sample: &Sample<'_>) -> f64 {
-    let Some(head) = sample.columns.get(column) else { return 1.0 };
-    let unit = head.unit.as_deref().and_then(header_unit).filter(|unit| unit.kind == Kind::Duration);
-    if let Some(unit) = unit {
-        return unit.unit.to_inside(1.0);
-    }
-    let name = head.name.to_lowercase();
-    let first: Option<f64> =
-        cells(column, sample).find_map(|cell| parse_number(cell.as_bytes(), sample.decimal));
-    let first = first.unwrap_or(0.0).abs();
-    match first {
-        _ if name == "ms" || name.ends_with("_ms") || name.contains("milli") || name.ends_with("msec") => {
-            1e-3
-        }
-        first if first > 1e17 => 1e-9,
-        first if first > 1e14 => 1e-6,
-        first if first > 1e11 => 1e-3,
-        _ => 1.0,
-    }
 }

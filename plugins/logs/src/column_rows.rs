@@ -2,7 +2,7 @@
 
 use crate::cells::{Cells, Rows};
 use crate::instant::{Instant, parse_instant};
-use crate::number::parse_number;
+use crate::number::{NO_READING, number_in, parse_number};
 use crate::value::Value;
 use mapper_logs::{DateOrder, LogError};
 
@@ -60,7 +60,7 @@ impl<C: Chunks> ColumnRows<C> {
         while found.len() < rows && self.advance()? {
             found.push(match self.head_row() {
                 Some(head) => head.clone(),
-                None => self.chunk.iter().map(|chunk| chunk.value(self.at - 1).text()).collect(),
+                None => self.chunk.iter().map(|chunk| chunk.value(self.at - 1).text(b'.')).collect(),
             });
         }
         Ok(found)
@@ -78,9 +78,17 @@ impl<C: Chunks> ColumnRows<C> {
 impl<C: Chunks> Cells for ColumnRows<C> {
     fn number(&self, column: usize) -> f64 {
         let found = self.row().zip(self.chunk.get(column)).and_then(|(row, chunk)| match chunk {
-            Chunk::Numbers(values) => values.get(row).copied(),
+            Chunk::Numbers(values) => values.get(row).copied().filter(|value| value.abs() < NO_READING),
             Chunk::Texts(values) => parse_number(values.get(row)?.trim().as_bytes(), b'.'),
             Chunk::Instants(_) => None,
+        });
+        found.unwrap_or(f64::NAN)
+    }
+
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        let found = self.row().zip(self.chunk.get(column)).and_then(|(row, chunk)| match chunk {
+            Chunk::Texts(values) => Some(number_in(values.get(row)?, b'.', unit)),
+            _ => None,
         });
         found.unwrap_or(f64::NAN)
     }

@@ -2,6 +2,7 @@
 
 use crate::cells::Rows;
 use crate::encoding;
+use crate::long_table::{LongForm, LongRows};
 use crate::row_stream::{Dialect, RowStream};
 use crate::separator::{SEPARATORS, decimal, score};
 use crate::table_log::Table;
@@ -31,6 +32,8 @@ struct Delimited {
     file: LogFile,
     dialect: Dialect,
     table: Table,
+    /// Of a table in long form.
+    long: Option<LongForm>,
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
@@ -67,9 +70,16 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let (found_decimal, seen) = decimal(&rows);
     let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
     let mut table = Table::look(&rows, decimal, options).map_err(|message| file.content(NAME, message))?;
+    let long = LongForm::find(&rows, &table, decimal);
+    if let Some(form) = &long {
+        // The header of the gathered table is in its first row, wherever that of the file is.
+        let gathered = LogOptions { names_row: None, units_row: None, data_row: None, ..options.clone() };
+        table = Table::look(&form.wide(&rows), decimal, &gathered).map_err(|message| file.content(NAME, message))?;
+        table.layout.findings.insert(0, form.words(&rows));
+    }
     let dialect = Dialect { encoding, mark, separator, decimal };
     table.layout.findings.insert(0, dialect_words(dialect, seen || options.decimal.is_some()));
-    Ok(Box::new(Delimited { file: file.clone(), dialect, table }))
+    Ok(Box::new(Delimited { file: file.clone(), dialect, table, long }))
 }
 
 fn dialect_words(dialect: Dialect, decimal_seen: bool) -> String {
@@ -94,6 +104,12 @@ impl Log for Delimited {
     }
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        self.table.rows(&mut RowStream::open(&self.file, self.dialect)?, wanted, sink)
+        let mut stream = RowStream::open(&self.file, self.dialect)?;
+        match &self.long {
+            None => self.table.rows(&mut stream, wanted, sink),
+            Some(form) => {
+                self.table.rows(&mut LongRows::new(stream, form.clone(), self.dialect.decimal), wanted, sink)
+            }
+        }
     }
 }

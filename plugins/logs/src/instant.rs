@@ -6,6 +6,12 @@ use mapper_logs::DateOrder;
 /// Permitted years: the range of 64 bits in nanoseconds, and no log is older.
 const YEARS: std::ops::RangeInclusive<i64> = 1970..=2200;
 
+/// Maximum length of a date with its time and zone, bytes.
+const MAX_LENGTH: usize = 40;
+
+/// Days in [`YEARS`], which bounds durations as well.
+const MAX_DAYS: i64 = 84_371;
+
 const NS_PER_S: i64 = 1_000_000_000;
 /// Nanoseconds per day.
 pub(crate) const NS_PER_DAY: i64 = 86_400 * NS_PER_S;
@@ -27,10 +33,22 @@ impl Instant {
 }
 
 /// A date, a time of day, or both with a blank, `T` or `_` between them.
+///
+/// Also a date with the name of its month (`18-Nov-2025 10:20`), the day of the year before the time (`322:10:20:30`, as in IRIG
+/// time codes), and days before it (`0 days 00:00:10`).
 pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
     let text = text.trim();
-    if !text.starts_with(|c: char| c.is_ascii_digit()) || text.len() > 40 || !text.is_ascii() {
+    if text.len() > MAX_LENGTH {
         return None;
+    }
+    if let Some(instant) = named_month(text) {
+        return Some(instant);
+    }
+    if !text.starts_with(|c: char| c.is_ascii_digit()) || !text.is_ascii() {
+        return None;
+    }
+    if let Some(instant) = day_of_year(text).or_else(|| days_and_time(text)) {
+        return Some(instant);
     }
     let Some(end_of_first) = text.find([' ', 'T', '_']) else {
         return match date(text, order) {
@@ -43,6 +61,113 @@ pub(crate) fn parse_instant(text: &str, order: DateOrder) -> Option<Instant> {
         Some(day) => Some(Instant { day: Some(day), ns_of_day: Some(time_of_day(rest)?) }),
         None => Some(Instant { day: None, ns_of_day: Some(time_of_day(text)?) }),
     }
+}
+
+/// The first three letters of the months in English, German, French and Spanish; `jui` begins two of the French ones.
+const MONTHS: [&[&str]; 12] = [
+    &["jan", "ene"],
+    &["feb", "fev"],
+    &["mar", "mrz"],
+    &["apr", "avr", "abr"],
+    &["may", "mai"],
+    &["jun", "juin"],
+    &["jul", "juil"],
+    &["aug", "aou", "ago"],
+    &["sep"],
+    &["oct", "okt"],
+    &["nov"],
+    &["dec", "dez", "dic"],
+];
+
+/// `18-Nov-2025`, `Nov 18, 2025` or `2025 Nov 18`, with or without a time of day behind it.
+fn named_month(text: &str) -> Option<Instant> {
+    let (first, rest) = split_word(text)?;
+    let (second, rest) = split_word(rest)?;
+    let (third, rest) = split_word(rest)?;
+    let (year, month, day) = match (month_of(first), month_of(second)) {
+        (Some(month), _) => (third, month, second),
+        (None, Some(month)) if first.len() == 4 => (first, month, third),
+        (None, Some(month)) => (third, month, first),
+        _ => return None,
+    };
+    let number = |word: &str| -> Option<i64> { word.parse().ok() };
+    let (year, day) = (number(year)?, number(day)?);
+    let year = if year < 100 { year + 2000 } else { year };
+    let date = civil_day(year, month, day)?;
+    let rest = rest.trim_start_matches(['T', '_', ' ']);
+    let ns_of_day = if rest.is_empty() { None } else { Some(time_of_day(rest)?) };
+    Some(Instant { day: Some(date), ns_of_day })
+}
+
+/// The digits or the letters that a text begins with, and what follows after separators.
+fn split_word(text: &str) -> Option<(&str, &str)> {
+    let digits = text.starts_with(|c: char| c.is_ascii_digit());
+    let ends = |c: char| if digits { !c.is_ascii_digit() } else { !c.is_alphabetic() };
+    let end = text.find(ends).unwrap_or(text.len());
+    let (word, rest) = text.split_at_checked(end)?;
+    (!word.is_empty()).then(|| (word, rest.trim_start_matches([' ', '-', '/', '.', ','])))
+}
+
+fn month_of(word: &str) -> Option<i64> {
+    let plain: String = word
+        .to_lowercase()
+        .chars()
+        .map(|letter| match letter {
+            'ä' => 'a',
+            'é' => 'e',
+            'û' => 'u',
+            letter => letter,
+        })
+        .collect();
+    let known = |names: &&[&str]| names.iter().any(|name| plain.starts_with(name));
+    i64::try_from(MONTHS.iter().position(known)?).ok().map(|index| index + 1)
+}
+
+/// `322:10:20:30.5` without a year, `2025:322:10:20:30.5` and `2025-322T10:20:30.5` with one.
+fn day_of_year(text: &str) -> Option<Instant> {
+    let (date, time) = match text.matches(':').count() {
+        2 => text.split_once(['T', ' '])?,
+        3 => text.split_once(':')?,
+        4 => {
+            let (year, rest) = text.split_once(':')?;
+            let (day, _) = rest.split_once(':')?;
+            text.split_at_checked(year.len() + 1 + day.len()).map(|(date, time)| (date, &time[1..]))?
+        }
+        _ => return None,
+    };
+    let (year, day) = match date.split_once([':', '-']) {
+        Some((year, day)) => (Some(year.parse::<i16>().ok().filter(|_| year.len() == 4)?), day),
+        None => (None, date),
+    };
+    let day = day.parse::<i64>().ok().filter(|number| day.len() == 3 && (1..=366).contains(number))?;
+    let ns_of_day = time_of_day(time)?;
+    Some(match year {
+        Some(year) => {
+            Instant { day: Some(civil_day(i64::from(year), 1, 1)? + day - 1), ns_of_day: Some(ns_of_day) }
+        }
+        // Without a year it is no date: the days count on.
+        None => Instant { day: None, ns_of_day: Some(day * NS_PER_DAY + ns_of_day) },
+    })
+}
+
+/// `0 days 00:00:10.5`, as Python writes durations.
+fn days_and_time(text: &str) -> Option<Instant> {
+    let (days, rest) = text.split_once(' ')?;
+    let time = rest.strip_prefix("days").or_else(|| rest.strip_prefix("day"))?;
+    let days: i64 = days.parse().ok().filter(|days| (0..=MAX_DAYS).contains(days))?;
+    let ns = time_of_day(time.trim_start_matches([',', ' ']))?;
+    Some(Instant { day: None, ns_of_day: Some(days * NS_PER_DAY + ns) })
+}
+
+/// Minutes, and seconds with their fraction, as Excel writes times into text files (`mm:ss.0`), ns.
+pub(crate) fn minutes_and_seconds(text: &str) -> Option<i64> {
+    let (minute, rest) = text.trim().split_once(':')?;
+    let (second, fraction) = rest.split_once(['.', ','])?;
+    let whole = |part: &str| -> Option<i64> {
+        let digits = part.len() == 2 && part.bytes().all(|byte| byte.is_ascii_digit());
+        part.parse().ok().filter(|number| digits && *number < 60)
+    };
+    Some((whole(minute)? * 60 + whole(second)?) * NS_PER_S + nanoseconds(fraction)?)
 }
 
 /// The order of day, month and year in some dates, from their separators and numbers above 12.
@@ -85,7 +210,11 @@ fn date(text: &str, order: DateOrder) -> Option<i64> {
         DateOrder::DayFirst => (c, b, a),
         DateOrder::MonthFirst => (c, a, b),
     };
-    let year = if year < 100 { year + 2000 } else { year };
+    civil_day(if year < 100 { year + 2000 } else { year }, month, day)
+}
+
+/// Days from 1970-01-01 to a date.
+fn civil_day(year: i64, month: i64, day: i64) -> Option<i64> {
     if !YEARS.contains(&year) {
         return None;
     }
@@ -109,6 +238,9 @@ fn time_of_day(text: &str) -> Option<i64> {
         let digits = (1..=2).contains(&part.len()) && part.bytes().all(|byte| byte.is_ascii_digit());
         part.parse().ok().filter(|_| digits)
     };
+    if let Some(ns) = minutes_and_seconds(clock) {
+        return afternoon.is_none().then_some(ns - zone_ns);
+    }
     let (mut hour, minute) = (whole(parts.next()?)?, whole(parts.next()?)?);
     if let Some(afternoon) = afternoon {
         hour = hour % 12 + if afternoon { 12 } else { 0 };
@@ -164,9 +296,20 @@ mod tests {
             ("22.11.26_14:03:05.250000000", DateOrder::DayFirst),
             ("11/22/2026 2:03:05.25 PM", DateOrder::MonthFirst),
             ("2026-11-22 15:03:05.25+01:00", DateOrder::YearFirst),
+            ("22-Nov-2026 14:03:05.25", DateOrder::MonthFirst),
+            ("Nov 22, 2026 2:03:05.25 PM", DateOrder::DayFirst),
+            ("22 novembre 2026 14:03:05,25", DateOrder::DayFirst),
+            ("22.Nov.26 14:03:05.25", DateOrder::DayFirst),
+            ("2026-326T14:03:05.25", DateOrder::DayFirst),
+            ("2026:326:14:03:05.25", DateOrder::DayFirst),
         ] {
             assert_eq!(parse_instant(text, order).map(Instant::ns), Some(expected), "{text}");
         }
+        // 0 days, and day 2 of a year, without a date.
+        let of_day = |text: &str| parse_instant(text, DateOrder::DayFirst).map(Instant::ns);
+        assert_eq!(of_day("1 days 00:00:10.5"), Some(NS_PER_DAY + 10_500_000_000));
+        assert_eq!(of_day("002:00:00:10.5"), Some(2 * NS_PER_DAY + 10_500_000_000));
+        assert_eq!(of_day("20:30.5"), Some((20 * 60 + 30) * NS_PER_S + 500_000_000));
         assert_eq!(parse_instant("14:03", DateOrder::DayFirst).unwrap().ns(), (14 * 60 + 3) * 60 * NS_PER_S);
         for text in [
             "1.5",
@@ -178,6 +321,10 @@ mod tests {
             "9026-11-22",
             "T2",
             "1.2.3.4",
+            "31-Feb-2026",
+            "400:10:20:30",
+            "Speed 1 2026",
+            "5 days",
             "",
         ] {
             assert_eq!(parse_instant(text, DateOrder::DayFirst), None, "{text}");

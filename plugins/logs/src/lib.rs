@@ -10,12 +10,15 @@ mod clock;
 mod clock_choice;
 #[cfg(any(feature = "parquet", feature = "tdms"))]
 mod column_rows;
+mod counter;
 mod encoding;
 mod instant;
+mod long_table;
 mod number;
 mod parts;
 #[cfg(feature = "parquet")]
 mod record_batches;
+mod row_sorter;
 mod row_stream;
 mod separator;
 mod table_head;

@@ -1,20 +1,43 @@
 //! Numbers in the notations of logs.
 
+use mapper_logs::header_unit;
+
 /// Maximum length of a number's text, bytes.
 const LIMIT: usize = 48;
 
 /// Digits before the first thousands separator.
 const FIRST_GROUP: std::ops::RangeInclusive<usize> = 1..=3;
 
-/// The number in a cell; `None` for anything else, including words for infinity and not-a-number.
+/// From here on a value stands for none: instruments write 9.9e37 for an overload and 9.91e37 for no reading (SCPI-99,
+/// section 7.2.1.4 and 7.2.1.5), others 1e30 or the largest number of single precision.
+pub(crate) const NO_READING: f64 = 1e30;
+
+/// The number in a cell; `None` for anything else, including words for infinity and not-a-number and the numbers by which
+/// instruments say that there is none.
+///
+/// Blanks may follow the sign (`+   98.61`), and a Fortran `D` may mark the exponent.
 pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     let cell = cell.trim_ascii();
-    let starts = cell.iter().find(|byte| !matches!(byte, b'+' | b'-'))?;
+    let (negative, digits) = match cell.split_first()? {
+        (b'-', rest) => (true, rest.trim_ascii_start()),
+        (b'+', rest) => (false, rest.trim_ascii_start()),
+        _ => (false, cell),
+    };
+    let value = parse_digits(digits, decimal)?;
+    Some(if negative { -value } else { value }).filter(|value| value.abs() < NO_READING)
+}
+
+/// A number without a sign.
+fn parse_digits(cell: &[u8], decimal: u8) -> Option<f64> {
+    let starts = cell.first()?;
     if !(starts.is_ascii_digit() || *starts == decimal) || cell.len() > LIMIT {
         return None;
     }
-    let plain =
-        |bytes: &[u8]| std::str::from_utf8(bytes).ok()?.parse::<f64>().ok().filter(|value| value.is_finite());
+    let plain = |bytes: &[u8]| {
+        let text = std::str::from_utf8(bytes).ok()?;
+        let value = text.parse::<f64>().ok().or_else(|| fortran(text))?;
+        Some(value).filter(|value| value.is_finite())
+    };
     if decimal == b'.' && !cell.contains(&b',') {
         return plain(cell);
     }
@@ -37,7 +60,7 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
             digits_in_group = Some(0);
             continue;
         }
-        if *byte == decimal || matches!(byte, b'e' | b'E') {
+        if *byte == decimal || matches!(byte, b'e' | b'E' | b'd' | b'D') {
             fraction = true;
         } else if let Some(count) = digits_in_group.as_mut().filter(|_| !fraction) {
             *count += 1;
@@ -51,12 +74,43 @@ pub(crate) fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     plain(text.get(..length)?)
 }
 
+/// A number whose exponent follows a `D`; without a decimal sign it may be a name such as `12D3`.
+fn fortran(text: &str) -> Option<f64> {
+    let (mantissa, exponent) = text.split_once(['d', 'D'])?;
+    if !mantissa.contains('.') {
+        return None;
+    }
+    format!("{mantissa}e{exponent}").parse().ok()
+}
+
+/// A number with its unit behind it, as in `98.75 kPa`.
+pub(crate) fn number_with_unit(cell: &str, decimal: u8) -> Option<(f64, &str)> {
+    let cell = cell.trim();
+    let end = cell.rfind(|letter: char| letter.is_ascii_digit())? + 1;
+    let (number, unit) = (cell.get(..end)?, cell.get(end..)?.trim());
+    // `kg/cm2` and the like end in a digit.
+    let (number, unit) = match unit {
+        "" => number.split_once(' ').map(|(number, unit)| (number, unit.trim()))?,
+        unit => (number, unit),
+    };
+    header_unit(unit)?;
+    Some((parse_number(number.as_bytes(), decimal)?, unit))
+}
+
+/// The number in a cell, with or without a unit behind it.
+pub(crate) fn read_number(cell: &str, decimal: u8) -> Option<f64> {
+    parse_number(cell.as_bytes(), decimal)
+        .or_else(|| number_with_unit(cell, decimal).map(|(number, _)| number))
+}
+
+/// The number in front of this unit; NaN for anything else.
+pub(crate) fn number_in(cell: &str, decimal: u8, unit: &str) -> f64 {
+    number_with_unit(cell, decimal).filter(|(_, found)| *found == unit).map_or(f64::NAN, |(number, _)| number)
+}
+
 /// Whether the text before the first thousands separator is one to three digits of a number that is not 0.
 fn starts_as_thousands(text: &[u8]) -> bool {
-    let digits = text.strip_prefix(b"-").or_else(|| text.strip_prefix(b"+")).unwrap_or(text);
-    FIRST_GROUP.contains(&digits.len())
-        && digits.iter().all(u8::is_ascii_digit)
-        && digits.first() != Some(&b'0')
+    FIRST_GROUP.contains(&text.len()) && text.iter().all(u8::is_ascii_digit) && text.first() != Some(&b'0')
 }
 
 /// Whether a cell marks a missing value.
@@ -93,10 +147,33 @@ mod tests {
             ("nan", b'.', None),
             ("inf", b'.', None),
             ("1e999", b'.', None),
+            ("+   98.61", b'.', Some(98.61)),
+            ("- 0,25", b',', Some(-0.25)),
+            ("9.860732D+01", b'.', Some(98.60732)),
+            ("1,5d-2", b',', Some(0.015)),
+            ("12D3", b'.', None),
+            ("9.9e37", b'.', None),
+            ("-9.91E+37", b'.', None),
+            ("--5", b'.', None),
             ("12:30", b'.', None),
             ("", b'.', None),
         ] {
             assert_eq!(parse_number(text.as_bytes(), decimal), value, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_unit_may_follow_the_number() {
+        for (text, decimal, found) in [
+            ("98.75 kPa", b'.', Some((98.75, "kPa"))),
+            ("22,3°C", b',', Some((22.3, "°C"))),
+            ("-3 %", b'.', Some((-3.0, "%"))),
+            ("1.02 kgf/cm2", b'.', Some((1.02, "kgf/cm2"))),
+            ("12 Nov", b'.', None),
+            ("step 3", b'.', None),
+            ("98.75", b'.', None),
+        ] {
+            assert_eq!(number_with_unit(text, decimal), found, "{text}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::cells::{Cells, Rows};
 use crate::encoding::{self, Utf16Reader};
 use crate::instant::{Instant, parse_instant};
-use crate::number::parse_number;
+use crate::number::{number_in, parse_number};
 use mapper_logs::{DateOrder, Encoding, LogError, LogFile};
 use std::cell::Cell;
 use std::io::{self, Read};
@@ -102,8 +102,17 @@ impl Cells for RowStream {
         parse_number(self.cell(column), self.dialect.decimal).unwrap_or(f64::NAN)
     }
 
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        let text = encoding::text(self.cell(column), self.dialect.encoding);
+        number_in(&text, self.dialect.decimal, unit)
+    }
+
     fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
-        parse_instant(std::str::from_utf8(self.cell(column)).ok()?, order)
+        match std::str::from_utf8(self.cell(column)) {
+            Ok(text) => parse_instant(text, order),
+            // Names of months in Latin-1.
+            Err(_) => parse_instant(&encoding::text(self.cell(column), self.dialect.encoding), order),
+        }
     }
 }
 

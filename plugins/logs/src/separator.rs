@@ -1,7 +1,7 @@
 //! Separator and decimal sign of a text, found by trial.
 
 use crate::instant::parse_instant;
-use crate::number::{is_missing, parse_number};
+use crate::number::{is_missing, read_number};
 use mapper_logs::DateOrder;
 
 /// Candidate separators, in order of preference for equal scores.
@@ -31,8 +31,8 @@ pub(crate) fn typical_length(rows: &[Vec<String>]) -> usize {
 
 fn is_value(cell: &str, separator: u8) -> bool {
     let bytes = cell.as_bytes();
-    parse_number(bytes, b'.').is_some()
-        || separator != b',' && parse_number(bytes, b',').is_some()
+    read_number(cell, b'.').is_some()
+        || separator != b',' && read_number(cell, b',').is_some()
         || is_missing(bytes) && !cell.is_empty()
         || parse_instant(cell, DateOrder::DayFirst).is_some()
         || parse_instant(cell, DateOrder::MonthFirst).is_some()
@@ -42,15 +42,14 @@ fn is_value(cell: &str, separator: u8) -> bool {
 pub(crate) fn decimal(rows: &[Vec<String>]) -> (u8, bool) {
     let (mut points, mut commas) = (0usize, 0usize);
     for cell in rows.iter().flatten() {
-        let bytes = cell.as_bytes();
         let (point, comma) = (cell.rfind('.'), cell.rfind(','));
         match (point, comma) {
             (Some(point), Some(comma)) if comma > point => {
-                commas += 100 * usize::from(parse_number(bytes, b',').is_some())
+                commas += 100 * usize::from(read_number(cell, b',').is_some())
             }
-            (Some(_), Some(_)) => points += 100 * usize::from(parse_number(bytes, b'.').is_some()),
-            (Some(_), None) => points += usize::from(parse_number(bytes, b'.').is_some()),
-            (None, Some(_)) => commas += usize::from(parse_number(bytes, b',').is_some()),
+            (Some(_), Some(_)) => points += 100 * usize::from(read_number(cell, b'.').is_some()),
+            (Some(_), None) => points += usize::from(read_number(cell, b'.').is_some()),
+            (None, Some(_)) => commas += usize::from(read_number(cell, b',').is_some()),
             (None, None) => {}
         }
     }

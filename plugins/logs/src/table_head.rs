@@ -1,7 +1,7 @@
 //! Names, units and the first row of data of a table, found from its first rows.
 
 use crate::instant::parse_instant;
-use crate::number::{is_missing, parse_number};
+use crate::number::{is_missing, number_with_unit, read_number};
 use crate::separator::typical_length;
 use mapper_logs::{DateOrder, LogOptions, header_unit, split_unit};
 use std::collections::BTreeMap;
@@ -15,6 +15,8 @@ pub(crate) struct TableHead {
     pub(crate) columns: Vec<HeadColumn>,
     /// Index of the first row of data.
     pub(crate) data_row: usize,
+    /// Unit behind each number of a column, where cells have one.
+    pub(crate) cell_units: BTreeMap<usize, String>,
     pub(crate) findings: Vec<String>,
 }
 
@@ -30,6 +32,7 @@ pub(crate) struct HeadColumn {
 /// Analyses the first rows of a table.
 pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<TableHead, String> {
     let length = typical_length(rows);
+    let rows = &without_comment_signs(rows, length);
     let given_row = options.data_row.map(|row| row - 1);
     let data_row = given_row
         .or_else(|| first_data_row(rows, length, decimal))
@@ -43,7 +46,11 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
             .filter(|row| Some(*row + 1) != options.names_row)
             .find(|row| is_units_row(&rows[*row])),
     };
-    let others = || header.iter().copied().filter(|row| Some(*row) != units_row);
+    let group_row = group_row(rows, &header, length);
+    // Names have letters, unless no row has.
+    let named = header.iter().any(|row| Some(*row) != units_row && has_words(&rows[*row]));
+    let others =
+        || header.iter().copied().filter(|row| Some(*row) != units_row && (!named || has_words(&rows[*row])));
     let filled = |row: &usize| distinct(rows.get(*row));
     // The first of the rows with the most names: rows after it hold long names.
     let most = others().map(|row| filled(&row)).max().unwrap_or(0);
@@ -58,12 +65,23 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
     let cell = |row: Option<usize>, column: usize| {
         row.and_then(|row| rows.get(row)).and_then(|row| row.get(column)).map_or("", String::as_str)
     };
-    let labels: Vec<usize> = others().filter(|row| Some(*row) != names_row).collect();
+    let labels: Vec<usize> =
+        group_row.into_iter().chain(others().filter(|row| Some(*row) != names_row)).collect();
+    let distant_units = if units_row.is_none() && options.units_row.is_none() {
+        distant_units_row(rows, header.first().copied().unwrap_or(data_row), length)
+    } else {
+        None
+    };
+    let preamble = rows.get(..header.first().copied().unwrap_or(0)).unwrap_or_default();
+    let mut cell_units: BTreeMap<usize, String> = BTreeMap::new();
+    let names: Vec<String> =
+        (0..width).map(|column| split_unit(&one_line(cell(names_row, column))).0).collect();
     let mut columns: Vec<HeadColumn> = Vec::new();
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let mut repeated = 0;
     for column in 0..width {
-        let header = cell(names_row, column).split_whitespace().collect::<Vec<_>>().join(" ");
+        let header = one_line(cell(names_row, column));
+        let header_text = header.clone();
         let own_unit = cell(units_row, column).trim_matches(['[', ']', '(', ')', ' ']);
         let (mut name, mut unit) = split_unit(&header);
         if units_row.is_some() {
@@ -72,8 +90,20 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
                 if own_unit.is_empty() && unit.is_some() { (name, unit) } else { (header.clone(), None) };
             unit = unit.or(Some(own_unit.to_owned()).filter(|unit| !unit.is_empty()));
         }
+        if let Some(behind) = unit_in_cells(rows.get(data_row..).unwrap_or_default(), column, decimal) {
+            unit = unit.or(Some(behind.clone()));
+            cell_units.insert(column, behind);
+        }
+        unit = unit.or_else(|| {
+            Some(cell(distant_units, column).to_owned()).filter(|unit| header_unit(unit).is_some())
+        });
         if name.is_empty() {
             name = format!("column {}", column + 1);
+        }
+        // The group tells apart what several columns are called.
+        let group = group_row.map_or("", |row| label(rows, row, column));
+        if !group.is_empty() && names.iter().filter(|other| **other == name).count() > 1 {
+            name = format!("{group} {name}");
         }
         let count = seen.entry(name.clone()).or_default();
         *count += 1;
@@ -81,8 +111,13 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
             repeated += 1;
             name = format!("{name} ({count})");
         }
-        let description: Vec<&str> =
-            labels.iter().map(|row| label(rows, *row, column)).filter(|text| !text.is_empty()).collect();
+        let listed = listed_name(preamble, &header_text);
+        let description: Vec<&str> = labels
+            .iter()
+            .map(|row| label(rows, *row, column))
+            .chain(listed)
+            .filter(|text| !text.is_empty())
+            .collect();
         columns.push(HeadColumn { header, name, unit, description: description.join(", ") });
     }
     // Columns without a name and without a cell come from separators at the ends of lines.
@@ -106,14 +141,85 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
         units,
         data_row + 1
     ));
-    let before = header.first().copied().unwrap_or(data_row);
+    if let Some(row) = distant_units.filter(|_| columns.iter().any(|column| column.unit.is_some())) {
+        findings.push(format!("units of columns without one are in row {}", row + 1));
+    }
+    if !cell_units.is_empty() {
+        findings.push(format!("{} columns have their unit behind each number", cell_units.len()));
+    }
+    let before = group_row.or(header.first().copied()).unwrap_or(data_row);
     if before > 0 {
         findings.push(format!("{before} rows before the header are passed over"));
     }
     if repeated > 0 {
         findings.push(format!("{repeated} names stand twice; the later ones are numbered: `name (2)`"));
     }
-    Ok(TableHead { columns, data_row, findings })
+    Ok(TableHead { columns, data_row, cell_units, findings })
+}
+
+/// The long name that a list of channels above the table gives: the cell behind the one that holds the name.
+fn listed_name<'a>(preamble: &'a [Vec<String>], name: &str) -> Option<&'a str> {
+    let row =
+        preamble.iter().find(|row| !name.is_empty() && row.first().is_some_and(|first| first == name))?;
+    row.get(1).map(String::as_str).filter(|text| text.chars().any(char::is_alphabetic))
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Rows without the signs by which programs mark a header as a comment: `# time, p2`, `% t`, `// t`.
+fn without_comment_signs(rows: &[Vec<String>], length: usize) -> Vec<Vec<String>> {
+    let mut rows = rows.to_vec();
+    for row in &mut rows {
+        let Some(first) = row.first() else { continue };
+        let bare = first.trim_start_matches(['#', '%', '/']).trim_start().to_owned();
+        if bare.len() == first.len() || header_unit(first).is_some() {
+            continue;
+        }
+        if bare.is_empty() && row.len() > length {
+            row.remove(0);
+        } else if let (Some(first), false) = (row.first_mut(), bare.is_empty()) {
+            *first = bare;
+        }
+    }
+    rows
+}
+
+/// The row of groups above the header: words that stand apart, each over the first of its columns.
+fn group_row(rows: &[Vec<String>], header: &[usize], length: usize) -> Option<usize> {
+    let row = header.first()?.checked_sub(1)?;
+    let cells = rows.get(row)?;
+    let filled: Vec<usize> = (0..cells.len()).filter(|column| !cells[*column].is_empty()).collect();
+    let apart = filled.windows(2).all(|pair| pair[1] > pair[0] + 1);
+    // A row of the preamble has a name, and its value next to it.
+    let groups = filled.len() > 1 && apart || filled.len() == 1 && filled[0] > 0;
+    let words = filled.iter().all(|column| cells[*column].chars().any(char::is_alphabetic));
+    (groups && words && cells.len() <= length && 2 * filled.len() < length).then_some(row)
+}
+
+/// The last row of units above `before` that is as long as the table.
+fn distant_units_row(rows: &[Vec<String>], before: usize, length: usize) -> Option<usize> {
+    let filled = |row: &[String]| row.iter().filter(|cell| !cell.is_empty()).count();
+    (0..before.min(rows.len())).rev().find(|row| {
+        let row = &rows[*row];
+        row.len() + 2 >= length && 2 * filled(row) > length && is_units_row(row)
+    })
+}
+
+/// The unit that stands behind the numbers of a column; `None` where cells have none or several.
+fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<String> {
+    let cells = rows.iter().filter_map(|row| row.get(column)).filter(|cell| !is_missing(cell.as_bytes()));
+    let (mut unit, mut with, mut all) = (None, 0usize, 0usize);
+    for cell in cells {
+        all += 1;
+        let Some((_, found)) = number_with_unit(cell, decimal) else { continue };
+        with += 1;
+        if *unit.get_or_insert(found) != found {
+            return None;
+        }
+    }
+    unit.filter(|_| 2 * with > all).map(str::to_owned)
 }
 
 /// Cells of a row of labels; a row of groups names only the first column of each.
@@ -150,28 +256,56 @@ fn header_rows(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<usiz
         // A row of the preamble has a name and a value.
         cells.len() + 2 >= length && (filled > 2 || filled + 1 >= length)
     };
-    let mut header: Vec<usize> =
-        (0..data_row.min(rows.len())).rev().take_while(like_a_header).take(6).collect();
+    // Something may stand between the header and the data, as the title of a section.
+    let is_header = |row: &usize| like_a_header(row) && has_words(&rows[*row]);
+    let end = (0..data_row.min(rows.len())).rev().find(is_header).map_or(0, |last| last + 1);
+    let mut header: Vec<usize> = (0..end).rev().take_while(like_a_header).take(6).collect();
     header.reverse();
     header
 }
 
+fn has_words(row: &[String]) -> bool {
+    row.iter().any(|cell| cell.chars().any(char::is_alphabetic))
+}
+
 fn first_data_row(rows: &[Vec<String>], length: usize, decimal: u8) -> Option<usize> {
-    let data: Vec<bool> = rows.iter().map(|row| is_data(row, length, decimal)).collect();
+    let mut data: Vec<bool> = rows.iter().map(|row| is_data(row, length, decimal)).collect();
+    // Rows of a preamble may hold numbers behind a name, where the table's own rows have a number or a time in that place.
+    let valued: Vec<bool> = (0..length).map(|column| holds_values(rows, &data, column, decimal)).collect();
+    for (row, is) in rows.iter().zip(&mut data) {
+        let word = |(column, cell): (usize, &String)| {
+            valued.get(column) == Some(&true) && !is_missing(cell.as_bytes()) && !is_value(cell, decimal)
+        };
+        *is &= !row.iter().enumerate().any(word);
+    }
     (0..rows.len()).find(|row| {
         let following = data.get(*row..(*row + 10).min(data.len())).unwrap_or_default();
         data[*row] && 10 * following.iter().filter(|is| **is).count() >= 8 * following.len()
     })
 }
 
+/// Whether nearly all rows of data have a number or a time in a column.
+fn holds_values(rows: &[Vec<String>], data: &[bool], column: usize, decimal: u8) -> bool {
+    let cells = rows.iter().zip(data).filter(|(_, is)| **is).filter_map(|(row, _)| row.get(column));
+    let (mut values, mut all) = (0usize, 0usize);
+    for cell in cells.filter(|cell| !is_missing(cell.as_bytes())) {
+        all += 1;
+        values += usize::from(is_value(cell, decimal));
+    }
+    all >= 10 && 10 * values >= 9 * all
+}
+
+fn is_value(cell: &str, decimal: u8) -> bool {
+    read_number(cell, decimal).is_some()
+        || parse_instant(cell, DateOrder::DayFirst).is_some()
+        || parse_instant(cell, DateOrder::MonthFirst).is_some()
+}
+
 fn is_data(row: &[String], length: usize, decimal: u8) -> bool {
     let filled = row.iter().filter(|cell| !is_missing(cell.as_bytes()));
     let (mut values, mut words) = (0, 0);
     for cell in filled {
-        let value = parse_number(cell.as_bytes(), decimal).is_some()
-            || parse_instant(cell, DateOrder::DayFirst).is_some()
-            || parse_instant(cell, DateOrder::MonthFirst).is_some();
-        *(if value { &mut values } else { &mut words }) += 1;
+        *(if is_value(cell, decimal) { &mut values } else { &mut words }) += 1;
     }
     row.len() + 2 >= length && values > 0 && values >= words
 }

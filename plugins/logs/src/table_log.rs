@@ -1,10 +1,46 @@
 //! A table as a log: its clocks, its columns, and its stream of rows.
 
-use crate::cells::Rows;
+use crate::cells::{Cells, Rows};
 use crate::clock::ClockHand;
 use crate::clock_choice::{Clocks, Sample, choose};
+use crate::instant::Instant;
+use crate::row_sorter::RowSorter;
 use crate::table_head::{TableHead, look};
-use mapper_logs::{Column, Layout, LogError, LogOptions, Row, RowSink};
+use mapper_logs::{Column, DateOrder, Layout, LogError, LogOptions, Row, RowSink};
+use std::collections::BTreeMap;
+
+/// A group while its rows are read.
+struct Rolling {
+    group: usize,
+    hand: ClockHand,
+    /// Of a group whose rows are out of order.
+    sorter: Option<RowSorter>,
+    sources: Vec<usize>,
+    values: Vec<f64>,
+}
+
+/// A row some of whose columns have their unit behind each number.
+struct InUnits<'a> {
+    row: &'a dyn Rows,
+    units: &'a BTreeMap<usize, String>,
+}
+
+impl Cells for InUnits<'_> {
+    fn number(&self, column: usize) -> f64 {
+        match self.units.get(&column) {
+            None => self.row.number(column),
+            Some(unit) => self.row.number_in(column, unit),
+        }
+    }
+
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        self.row.number_in(column, unit)
+    }
+
+    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
+        self.row.instant(column, order)
+    }
+}
 
 /// The analysis of a table.
 #[derive(Debug)]
@@ -15,12 +51,14 @@ pub(crate) struct Table {
     sources: Vec<usize>,
     data_row: usize,
     missing: Vec<f64>,
+    /// Unit behind each number of a column, where cells have one.
+    cell_units: BTreeMap<usize, String>,
 }
 
 impl Table {
     /// Analyses the first rows of a table.
     pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<Table, String> {
-        let TableHead { columns, data_row, mut findings } = look(rows, decimal, options)?;
+        let TableHead { columns, data_row, cell_units, mut findings } = look(rows, decimal, options)?;
         let sample = Sample { columns: &columns, rows: rows.get(data_row..).unwrap_or_default(), decimal };
         let mut clocks = choose(&sample, options)?;
         findings.append(&mut clocks.findings);
@@ -42,7 +80,23 @@ impl Table {
                 group,
             });
         }
-        Ok(Table { layout, clocks, sources, data_row, missing: options.missing.clone() })
+        Ok(Table { layout, clocks, sources, data_row, missing: options.missing.clone(), cell_units })
+    }
+
+    /// Columns of the table with dates, times or counts.
+    pub(crate) fn clock_columns(&self) -> Vec<usize> {
+        let of = self.clocks.group_of.iter().enumerate();
+        of.filter(|(_, group)| group.is_none()).map(|(column, _)| column).collect()
+    }
+
+    /// Index of the first row of data.
+    pub(crate) fn data_row(&self) -> usize {
+        self.data_row
+    }
+
+    /// Columns of the table that are columns of the layout too, with their names.
+    pub(crate) fn named_columns(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.sources.iter().copied().zip(self.layout.columns.iter().map(|column| column.name.as_str()))
     }
 
     /// Returns the rows of the wanted columns; `rows` must be before the first row of the table.
@@ -57,7 +111,7 @@ impl Table {
                 return Ok(());
             }
         }
-        let mut groups: Vec<(usize, ClockHand, Vec<usize>, Vec<f64>)> = Vec::new();
+        let mut groups: Vec<Rolling> = Vec::new();
         for (index, (_, clock)) in self.clocks.groups.iter().enumerate() {
             let of_group = |column: &&usize| {
                 self.layout.columns.get(**column).is_some_and(|column| column.group == index)
@@ -68,18 +122,37 @@ impl Table {
                 .filter_map(|column| self.sources.get(*column).copied())
                 .collect();
             if !sources.is_empty() {
-                groups.push((index, ClockHand::new(clock.clone()), sources, Vec::new()));
+                groups.push(Rolling {
+                    group: index,
+                    sorter: clock.disordered.then(RowSorter::default),
+                    hand: ClockHand::new(clock.clone()),
+                    sources,
+                    values: Vec::new(),
+                });
             }
         }
         while rows.advance()? {
-            for (group, hand, sources, values) in &mut groups {
-                let Some(t_s) = hand.time_s(&*rows) else { continue };
-                values.clear();
-                values.extend(sources.iter().map(|source| {
-                    let value = rows.number(*source);
-                    if self.missing.contains(&value) { f64::NAN } else { value }
-                }));
-                sink(Row { group: *group, t_s, values })?;
+            let row = InUnits { row: &*rows, units: &self.cell_units };
+            for rolling in &mut groups {
+                let Some(t_s) = rolling.hand.time_s(&row) else { continue };
+                rolling.values.clear();
+                for source in &rolling.sources {
+                    let value = row.number(*source);
+                    rolling.values.push(if self.missing.contains(&value) { f64::NAN } else { value });
+                }
+                match &mut rolling.sorter {
+                    None => sink(Row { group: rolling.group, t_s, values: &rolling.values })?,
+                    Some(sorter) => {
+                        if let Some((t_s, values)) = sorter.exchange(t_s, &rolling.values) {
+                            sink(Row { group: rolling.group, t_s, values: &values })?;
+                        }
+                    }
+                }
+            }
+        }
+        for rolling in groups {
+            for (t_s, values) in rolling.sorter.unwrap_or_default().rest() {
+                sink(Row { group: rolling.group, t_s, values: &values })?;
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! A cell in a table with typed cells.
 
 use crate::instant::{Instant, NS_PER_DAY, parse_instant};
-use crate::number::parse_number;
+use crate::number::{NO_READING, parse_number};
 use jiff::ToSpan;
 use jiff::civil::{Date, Time};
 use mapper_logs::DateOrder;
@@ -24,13 +24,18 @@ impl Value {
         }
     }
 
-    /// The number in it; NaN without a number.
-    pub(crate) fn number(&self) -> f64 {
+    /// The number in it; NaN without a number, and for those that stand for none.
+    pub(crate) fn number(&self, decimal: u8) -> f64 {
         match self {
-            Value::Number(value) => *value,
-            Value::Text(text) => parse_number(text.as_bytes(), b'.').unwrap_or(f64::NAN),
+            Value::Number(value) if value.abs() < NO_READING => *value,
+            Value::Text(text) => parse_number(text.as_bytes(), decimal).unwrap_or(f64::NAN),
             _ => f64::NAN,
         }
+    }
+
+    /// Memory that its text takes, bytes.
+    pub(crate) fn size(&self) -> usize {
+        size_of::<Value>() + if let Value::Text(text) = self { text.len() } else { 0 }
     }
 
     /// The date or time of day in it.
@@ -43,9 +48,10 @@ impl Value {
     }
 
     /// Its text as in a cell of a text file.
-    pub(crate) fn text(&self) -> String {
+    pub(crate) fn text(&self, decimal: u8) -> String {
         match self {
             Value::Empty => String::new(),
+            Value::Number(value) if decimal == b',' => value.to_string().replace('.', ","),
             Value::Number(value) => value.to_string(),
             Value::Text(text) => text.clone(),
             Value::Instant(instant) => text_of(*instant).unwrap_or_default(),

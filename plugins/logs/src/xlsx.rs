@@ -6,6 +6,8 @@ use crate::cells::{Cells, Rows};
 use crate::instant::{Instant, NS_PER_DAY};
 use crate::parts::{Part, side_by_side};
 use crate::table_head::COLUMN_LIMIT;
+use crate::number::number_in;
+use crate::separator::decimal;
 use crate::table_log::Table;
 use crate::value::Value;
 use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
@@ -41,6 +43,8 @@ struct Workbook {
     file: LogFile,
     layout: Layout,
     sheets: Vec<Part>,
+    /// Decimal sign of the numbers that each sheet stores as text.
+    decimals: Vec<u8>,
 }
 
 fn failed(file: &LogFile) -> impl Fn(calamine::XlsxError) -> LogError + '_ {
@@ -60,28 +64,37 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     if let (Some(sheet), []) = (&options.sheet, wanted.as_slice()) {
         return Err(file.content(NAME, format!("it has no sheet `{sheet}`; its sheets are {}", names.join(", "))));
     }
-    let mut found: Vec<(String, Table)> = Vec::new();
+    let mut found: Vec<(String, Table, u8)> = Vec::new();
     let mut problems: Vec<String> = Vec::new();
     for name in wanted {
         let Ok(reader) = book_of.worksheet_cells_reader(&name) else { continue };
-        let mut rows = SheetRows::new(file, reader);
-        let mut head: Vec<Vec<String>> = Vec::new();
+        let mut rows = SheetRows::new(file, reader, b'.');
+        let mut cells: Vec<Vec<Value>> = Vec::new();
         let mut bytes = 0;
-        while head.len() < HEAD_ROWS && bytes < HEAD_BYTES && rows.advance()? {
-            let texts: Vec<String> = rows.row.iter().map(Value::text).collect();
-            bytes += texts.iter().map(|text| size_of::<String>() + text.len()).sum::<usize>();
-            head.push(texts);
+        while cells.len() < HEAD_ROWS && bytes < HEAD_BYTES && rows.advance()? {
+            bytes += rows.row.iter().map(Value::size).sum::<usize>();
+            cells.push(rows.row.clone());
         }
-        if head.is_empty() {
+        if cells.is_empty() {
             continue;
         }
-        match Table::look(&head, b'.', options) {
-            Ok(table) => found.push((name, table)),
+        // Numbers that are stored as text have a decimal sign.
+        let texts = |row: &Vec<Value>| row.iter().filter(|cell| matches!(cell, Value::Text(_))).map(|cell| cell.text(b'.')).collect();
+        let (decimal, _) = decimal(&cells.iter().map(texts).collect::<Vec<Vec<String>>>());
+        let head: Vec<Vec<String>> =
+            cells.iter().map(|row| row.iter().map(|cell| cell.text(decimal)).collect()).collect();
+        match Table::look(&head, decimal, options) {
+            Ok(mut table) => {
+                note_empty_columns(&mut table, &head);
+                found.push((name, table, decimal));
+            }
             Err(problem) => problems.push(format!("sheet `{name}` is passed over: {problem}")),
         }
     }
+    let decimals = found.iter().map(|(.., decimal)| *decimal).collect();
+    let found = found.into_iter().map(|(name, table, _)| (name, table)).collect();
     let (layout, sheets) = side_by_side("sheet", found, problems).map_err(|why| file.content(NAME, why))?;
-    Ok(Box::new(Workbook { file: file.clone(), layout, sheets }))
+    Ok(Box::new(Workbook { file: file.clone(), layout, sheets, decimals }))
 }
 
 impl Log for Workbook {
@@ -91,16 +104,29 @@ impl Log for Workbook {
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
         let mut book = book(&self.file)?;
-        for sheet in &self.sheets {
+        for (sheet, decimal) in self.sheets.iter().zip(&self.decimals) {
             let own = sheet.own(wanted);
             if own.is_empty() {
                 continue;
             }
             let reader = book.worksheet_cells_reader(&sheet.name).map_err(failed(&self.file))?;
             let mut of_book = |row: Row<'_>| sheet.give(row, sink);
-            sheet.table.rows(&mut SheetRows::new(&self.file, reader), &own, &mut of_book)?;
+            sheet.table.rows(&mut SheetRows::new(&self.file, reader, *decimal), &own, &mut of_book)?;
         }
         Ok(())
+    }
+}
+
+/// Remarks columns with a name and no value: formulas that were never calculated.
+fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
+    let empty = |column: usize| head.iter().skip(table.data_row()).all(|row| row.get(column).is_none_or(String::is_empty));
+    let names = table.named_columns().filter(|(column, _)| empty(*column));
+    let names: Vec<String> = names.map(|(_, name)| format!("`{name}`")).collect();
+    if !names.is_empty() {
+        table.layout.findings.push(format!(
+            "{} without a value: formulas have none until a spreadsheet program has calculated and saved them",
+            names.join(", ")
+        ));
     }
 }
 
@@ -140,11 +166,12 @@ struct SheetRows<'a> {
     /// Whether the last cell was read: the reader fails after it.
     ended: bool,
     row: Vec<Value>,
+    decimal: u8,
 }
 
 impl<'a> SheetRows<'a> {
-    fn new(file: &LogFile, reader: XlsxCellReader<'a, Box<dyn ReadSeek>>) -> Self {
-        SheetRows { file: file.clone(), reader, next: None, ended: false, row: Vec::new() }
+    fn new(file: &LogFile, reader: XlsxCellReader<'a, Box<dyn ReadSeek>>, decimal: u8) -> Self {
+        SheetRows { file: file.clone(), reader, next: None, ended: false, row: Vec::new(), decimal }
     }
 
     fn next_cell(&mut self) -> Result<Option<(u32, usize, Value)>, LogError> {
@@ -165,7 +192,16 @@ impl<'a> SheetRows<'a> {
 
 impl Cells for SheetRows<'_> {
     fn number(&self, column: usize) -> f64 {
-        self.row.get(column).map_or(f64::NAN, Value::number)
+        self.row.get(column).map_or(f64::NAN, |value| value.number(self.decimal))
+    }
+
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        match self.row.get(column) {
+            Some(Value::Text(text)) => number_in(text, self.decimal, unit),
+            // Some cells of such a column may hold the number alone.
+            Some(value) => value.number(self.decimal),
+            None => f64::NAN,
+        }
     }
 
     fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {

@@ -1,13 +1,13 @@
 //! Which column is which channel.
 
 use super::names::{Weight, channels_of, is_ambient, is_derived, plain};
-use super::physics;
 use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+use super::{physics, shared_units};
 use crate::plausible::{AMBIENT_PA, fits, fitting_units, looks_like_gauge};
 use crate::units::kind_of;
-use crate::{ColumnSurvey, Layout, Survey};
-use mapper_core::{CHANNELS, Channel};
-use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit};
+use crate::{Column, ColumnSurvey, Layout, Survey};
+use mapper_core::{CHANNELS, Channel, plausible};
+use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, volume_flow_m3_s};
 
 /// Share of a trace left out at each end when its range is judged.
 const OUTER: f64 = 0.02;
@@ -37,9 +37,14 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
         let free: Vec<&Candidate> = list.iter().filter(|candidate| !taken[candidate.column]).collect();
         let Some((best, others)) = free.split_first() else { continue };
         taken[best.column] = true;
+        let sensors = same_place(best.column, others, layout, survey, &units);
+        for sensor in &sensors {
+            taken[*sensor] = true;
+        }
         let rivals: Vec<&str> = others
             .iter()
             .filter(|other| other.fits == best.fits && other.weight + 10 > best.weight)
+            .filter(|other| !sensors.contains(&other.column))
             .map(|other| layout.columns[other.column].name.as_str())
             .take(3)
             .collect();
@@ -48,10 +53,14 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
             proposed.certainty = proposed.certainty.min(Certainty::Likely);
             proposed.remarks.push(format!("it could also be {}", rivals.join(" or ")));
         }
+        proposed.others = sensors;
         proposal.channels.push(proposed);
     }
+    note_unknown_units(&mut proposal, &taken, layout, &units);
     proposal.channels.sort_by_key(|proposed| proposed.channel);
+    shared_units::settle(&mut proposal, layout, survey);
     settle_gauge(&mut proposal, layout, survey, &units);
+    shared_units::settle_flow(&mut proposal, survey);
     physics::judge(&mut proposal, layout, survey);
     proposal
 }
@@ -65,7 +74,89 @@ fn names_of(index: usize, layout: &Layout, units: &[Option<HeaderUnit>]) -> Vec<
     }
     let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
     let kind = unit.map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
-    channels_of(&column.name, group, &column.description, kind)
+    channels_of(without_number(column), group, &column.description, kind)
+}
+
+/// A name without the number by which readers tell equal names apart: `Pressure (2)` is no pressure at station 2.
+fn without_number(column: &Column) -> &str {
+    let numbered = column
+        .name
+        .rsplit_once(" (")
+        .filter(|(_, number)| number.trim_end_matches(')').parse::<usize>().is_ok());
+    match numbered {
+        Some((name, _)) if !column.header.contains(&column.name) => name,
+        _ => &column.name,
+    }
+}
+
+/// By so much two sensors at one place may differ in the middle, as a share: wakes and stratification make some per cent.
+const SAME_PLACE: f64 = 0.1;
+
+/// The candidates that measure what `best` measures with another sensor: their names differ by the number at the end alone, and
+/// their readings agree.
+fn same_place(
+    best: usize,
+    others: &[&Candidate],
+    layout: &Layout,
+    survey: &Survey,
+    units: &[Option<HeaderUnit>],
+) -> Vec<usize> {
+    let stem = |column: usize| {
+        let name = layout.columns.get(column).map_or("", |column| column.name.as_str());
+        let stem = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
+        (stem.len() < name.len() && stem.ends_with(['_', ' ', '-', '.', '#'])).then_some((stem, column))
+    };
+    let Some((own, _)) = stem(best) else { return Vec::new() };
+    let middle = |column: usize| {
+        let value = survey.columns.get(column).map_or(f64::NAN, |data| data.quantile(0.5));
+        units.get(column).copied().flatten().map_or(value, |unit| unit.unit.to_inside(value))
+    };
+    let agrees = |column: usize| (middle(column) - middle(best)).abs() <= SAME_PLACE * middle(best).abs();
+    let same = others.iter().map(|other| other.column).filter(|column| {
+        stem(*column).is_some_and(|(stem, _)| stem == own)
+            && units.get(*column).map(|unit| unit.map(|unit| unit.unit.symbol()))
+                == units.get(best).map(|unit| unit.map(|unit| unit.unit.symbol()))
+            && agrees(*column)
+    });
+    same.take(mapper_core::MAX_ELEMENTS - 1).collect()
+}
+
+/// Remarks columns that would be channels, had they a unit that is known.
+fn note_unknown_units(
+    proposal: &mut Proposal,
+    taken: &[bool],
+    layout: &Layout,
+    units: &[Option<HeaderUnit>],
+) {
+    for (index, column) in layout.columns.iter().enumerate() {
+        let (Some(spelling), None, false) = (&column.unit, units[index], taken[index]) else { continue };
+        let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
+        let named = channels_of(without_number(column), group, &column.description, None);
+        let kind = volume_flow_m3_s(spelling).map(|_| Kind::MassFlow);
+        let fits = |channel: Channel| kind.is_none_or(|kind| kind == kind_of(channel));
+        let Some((channel, _)) = named.iter().find(|(channel, _)| fits(*channel)) else { continue };
+        if proposal.of(*channel).is_some() {
+            continue;
+        }
+        let why = match volume_flow_m3_s(spelling) {
+            Some(None) => format!(
+                "`{spelling}` is a flow at a standard temperature that differs between makers: write the unit as one of {}",
+                standard_flows()
+            ),
+            Some(Some(_)) => format!(
+                "`{spelling}` is a volume flow, which is a mass flow only with the density where it was measured: compute it first"
+            ),
+            None => format!("the unit `{spelling}` is not known: write one that is"),
+        };
+        proposal.remarks.push(format!("{channel} may be `{}`, but {why}", column.name));
+    }
+}
+
+/// The units of flows at a standard temperature.
+fn standard_flows() -> String {
+    let standard = |unit: &&Unit| unit.symbol().contains('(') || unit.symbol().contains("m3/h");
+    let symbols: Vec<&str> = Kind::MassFlow.units().iter().filter(standard).map(Unit::symbol).collect();
+    symbols.join(", ")
 }
 
 /// The columns that may be a channel, best first; `named` has the channels of each column's name.
@@ -91,9 +182,9 @@ fn candidates(
             }
             None => !fitting_units(channel, low, high, 0.0).is_empty(),
         };
-        // What was computed by the stand counts after what was measured.
-        let derived = if is_derived(&plain(&column.name)) { 15 } else { 0 };
-        let weight = (weight + if fits { 20 } else { 0 }).saturating_sub(derived);
+        let weight = weight + if fits { 20 } else { 0 };
+        // What was computed by the stand counts after all that was measured: no weight of a name is below ten.
+        let weight = if is_derived(&plain(&column.name)) { weight / 10 } else { weight };
         list.push(Candidate { column: index, weight, fits });
     }
     list.sort_by_key(|candidate| std::cmp::Reverse(candidate.weight));
@@ -110,6 +201,7 @@ fn entry(
     let mut proposed = ProposedChannel {
         channel,
         column: best.column,
+        others: Vec::new(),
         unit: None,
         gauge: false,
         certainty: Certainty::Sure,
@@ -158,6 +250,10 @@ fn entry(
             proposed.remarks.push(format!("the log gives no unit; its range fits {}", symbols(several)));
         }
     }
+    if let Some(remark) = impossible(channel, data, proposed.unit) {
+        proposed.certainty = proposed.certainty.min(Certainty::Likely);
+        proposed.remarks.push(remark);
+    }
     if is_derived(&plain(&layout.columns[best.column].name)) {
         proposed.certainty = Certainty::Unsure;
         proposed.remarks.push("by its name it was computed, not measured".to_owned());
@@ -167,6 +263,27 @@ fn entry(
         proposed.remarks.push("the name says little".to_owned());
     }
     proposed
+}
+
+/// Readings that no sensor of a channel has: marks of missing values, or faults.
+fn impossible(channel: Channel, data: &ColumnSurvey, unit: Option<&'static str>) -> Option<String> {
+    let unit = crate::units::unit(kind_of(channel), unit?).ok()?;
+    let range = plausible(channel);
+    let (low, high) = (unit.to_inside(data.min), unit.to_inside(data.max));
+    // Gauge pressures go below zero.
+    let below = kind_of(channel) == Kind::Temperature && low < *range.any.start();
+    let value = if below {
+        data.min
+    } else if high > *range.running.end() {
+        data.max
+    } else {
+        return None;
+    };
+    Some(format!(
+        "some readings are {} {}, which cannot be: if they mark missing ones, name them (`--with missing={value}`)",
+        short(value),
+        unit.symbol()
+    ))
 }
 
 /// Which pressures are gauge pressures, and where the ambient pressure is.

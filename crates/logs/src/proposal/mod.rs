@@ -4,6 +4,7 @@ mod choose;
 mod names;
 mod physics;
 mod proposed;
+mod shared_units;
 mod yaml;
 
 pub use choose::propose;

@@ -1,4 +1,4 @@
-//! What the names of columns say about what was measured, in English and German.
+//! What the names of columns say about what was measured, in English, German, French and Spanish.
 
 use crate::units::kind_of;
 use mapper_core::{CHANNELS, Channel};
@@ -12,7 +12,7 @@ pub(crate) type Weight = u32;
 /// Letters of a name that are looked at.
 const LONGEST: usize = 120;
 
-/// A name in small letters, umlauts written out, with `_` for all that is neither letter nor digit.
+/// A name in small letters, umlauts written out, accents left out, with `_` for all that is neither letter nor digit.
 pub(crate) fn plain(text: &str) -> String {
     let mut plain = String::new();
     for letter in text.to_lowercase().chars().take(LONGEST) {
@@ -21,6 +21,13 @@ pub(crate) fn plain(text: &str) -> String {
             'ö' => plain.push_str("oe"),
             'ü' => plain.push_str("ue"),
             'ß' => plain.push_str("ss"),
+            'à' | 'á' | 'â' => plain.push('a'),
+            'è' | 'é' | 'ê' => plain.push('e'),
+            'í' | 'î' => plain.push('i'),
+            'ó' | 'ô' => plain.push('o'),
+            'ú' | 'û' => plain.push('u'),
+            'ç' => plain.push('c'),
+            'ñ' => plain.push('n'),
             letter if letter.is_ascii_alphanumeric() => plain.push(letter),
             _ if plain.ends_with('_') => {}
             _ => plain.push('_'),
@@ -37,31 +44,42 @@ struct Place {
     patterns: &'static [(Weight, &'static str)],
 }
 
-const COMPRESSOR: &str = "(c|comp|compressor|verd|verdichter|v|kompressor|lader)";
-const TURBINE: &str = "(t|tur|turb|turbine)";
-const IN: &str = "(in|inlet|ein|eintritt|e|suction)";
-const OUT: &str = "(out|outlet|aus|austritt|a|discharge)";
-const BEFORE: &str = "(vor|before|upstream|upstream_of|us|pre)";
-const AFTER: &str = "(nach|hinter|after|behind|downstream|downstream_of|ds|post)";
-const HOUSING: &str = "(housing|hsg|casing|wall|skin|metal|wand|geh|gehaeuse|gehause|body|material)";
+const COMPRESSOR: &str =
+    "(c|comp|compr|cmp|compressor|verd|verdichter|v|kompressor|lader|compresseur|compresor)";
+const TURBINE: &str = "(t|tur|turb|turbine|turbina)";
+const IN: &str = "(in|inlet|ein|eintritt|e|suction|entree|entrada|admission|admision)";
+const OUT: &str = "(out|outlet|aus|austritt|a|discharge|sortie|salida)";
+const BEFORE: &str = "(vor|before|upstream|upstream_of|us|pre|avant|amont|antes)";
+const AFTER: &str = "(nach|hinter|after|behind|downstream|downstream_of|ds|post|apres|aval|despues)";
+const HOUSING: &str =
+    "(housing|hsg|casing|wall|skin|metal|wand|geh|gehaeuse|gehause|body|material|carter|carcasa|paroi|pared)";
+
+/// What may stand between a place and a machine.
+const OF: &str = "(dem_|der_|of_|of_the_|du_|de_|de_la_|de_l_|del_)?";
+/// What may stand behind a station number: the machine, or that a value is total or static.
+const KIND: &str = "(c|v|l|tot|total|stat|static|st)?";
 
 #[rustfmt::skip]
 const PLACES: &[Place] = &[
     Place { temperature: Some(Channel::T1), pressure: Some(Channel::P1), patterns: &[
-        (6, "(^|_){q}_?0?1_?(c|v|l)?(_|$)"), (6, "(^|_){q}_?{C}_?{I}(_|$)"), (6, "(^|_){B}_(dem_)?{C}(_|$)"),
+        (6, "(^|_){q}_?0?1_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{I}(_|$)"), (6, "(^|_){B}_{D}{C}(_|$)"),
         (6, "(^|_){C}_?{I}(_|$)"), (3, "^(inlet|intake|ein|ansaug)"), (3, "(^|_){q}_?vv(_|$)"), (3, "ansaug|(^|_)(inlet|intake)(_|$)"),
+        (6, "(^|_){I}_{D}{C}(_|$)"), (4, "(^|_)ci{s}(_|$)"), (3, "(^|_){q}_?[12]1(_|$)"),
     ]},
     Place { temperature: Some(Channel::T2), pressure: Some(Channel::P2), patterns: &[
-        (6, "(^|_){q}_?0?2_?(c|v|l)?(_|$)"), (6, "(^|_){q}_?{C}_?{O}(_|$)"), (6, "(^|_){A}_(dem_)?{C}(_|$)"),
+        (6, "(^|_){q}_?0?2_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{O}(_|$)"), (6, "(^|_){A}_{D}{C}(_|$)"),
         (6, "(^|_){C}_?{O}(_|$)"), (3, "(^|_){q}_?nv(_|$)"), (3, "boost|ladedruck|ladeluft"), (2, "(^|_)(outlet|discharge)(_|$)"),
+        (6, "(^|_){O}_{D}{C}(_|$)"), (4, "(^|_)co{s}(_|$)"), (3, "(^|_){q}_?2[12](_|$)"),
     ]},
     Place { temperature: Some(Channel::T3), pressure: Some(Channel::P3), patterns: &[
-        (6, "(^|_){q}_?0?3(_|$)"), (6, "(^|_){q}_?1_?t(_|$)"), (6, "(^|_){q}_?{T}_?{I}(_|$)"), (6, "(^|_){B}_(der_)?{T}(_|$)"),
+        (6, "(^|_){q}_?0?3_?{K}(_|$)"), (6, "(^|_){q}_?1_?t(_|$)"), (6, "(^|_){q}_?{T}_?{I}(_|$)"), (6, "(^|_){B}_{D}{T}(_|$)"),
         (6, "(^|_){T}_?{I}(_|$)"), (3, "(^|_){q}_?vt(_|$)"),
+        (6, "(^|_){I}_{D}{T}(_|$)"), (3, "(^|_)egt|abgas{q}|exhaust_gas_{q}|exhaust_{q}"), (4, "(^|_)ti{s}(_|$)"), (3, "(^|_){q}_?31(_|$)"),
     ]},
     Place { temperature: Some(Channel::T4), pressure: Some(Channel::P4), patterns: &[
-        (6, "(^|_){q}_?0?4(_|$)"), (6, "(^|_){q}_?2_?t(_|$)"), (6, "(^|_){q}_?{T}_?{O}(_|$)"), (6, "(^|_){A}_(der_)?{T}(_|$)"),
+        (6, "(^|_){q}_?0?4_?{K}(_|$)"), (6, "(^|_){q}_?2_?t(_|$)"), (6, "(^|_){q}_?{T}_?{O}(_|$)"), (6, "(^|_){A}_{D}{T}(_|$)"),
         (6, "(^|_){T}_?{O}(_|$)"), (3, "(^|_){q}_?nt(_|$)"),
+        (6, "(^|_){O}_{D}{T}(_|$)"), (4, "(^|_)to{s}(_|$)"), (3, "(^|_){q}_?41(_|$)"),
     ]},
     Place { temperature: Some(Channel::Tc), pressure: None, patterns: &[
         (6, "^{q}_?c$"), (7, "{C}_?{H}"), (7, "{H}_?{C}(_|$)"), (3, "(^|_){H}"),
@@ -100,37 +118,54 @@ fn rows() -> Vec<Row> {
                 .replace("{O}", OUT)
                 .replace("{B}", BEFORE)
                 .replace("{A}", AFTER)
-                .replace("{H}", HOUSING);
+                .replace("{H}", HOUSING)
+                .replace("{D}", OF)
+                .replace("{K}", KIND);
             if let Some(channel) = place.temperature {
-                add(channel, *weight, &filled.replace("{q}", "(t|tt|temp|temperature|temperatur)"));
+                add(
+                    channel,
+                    *weight,
+                    &filled
+                        .replace("{q}", "(t|tt|temp|temperature|temperatur|temperatura)")
+                        .replace("{s}", "t"),
+                );
             }
             if let Some(channel) = place.pressure {
-                add(channel, *weight, &filled.replace("{q}", "(p|pt|ps|press|pressure|druck)"));
+                add(
+                    channel,
+                    *weight,
+                    &filled
+                        .replace("{q}", "(p|pt|ps|press|pressure|druck|pression|presion)")
+                        .replace("{s}", "p"),
+                );
             }
         }
     }
-    let flow = "(m|dm|mdot|m_dot|mp|w|flow|massflow|mass_flow|massenstrom|massenfluss|durchsatz)";
+    let flow =
+        "(m|dm|mdot|m_dot|mp|w|flow|massflow|mass_flow|massenstrom|massenfluss|durchsatz|debit|caudal)";
     for (channel, weight, pattern) in [
         (Channel::ShaftSpeed, 6, "(^|_)n_?(tc|atl|turbo|tl|lader|l|shaft)(_|$)".to_owned()),
         (
             Channel::ShaftSpeed,
             6,
-            "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter).*(speed|drehzahl|rpm)".to_owned(),
+            "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter|compresseur|arbre|eje).*(speed|drehzahl|rpm)".to_owned(),
         ),
         (
             Channel::ShaftSpeed,
             6,
-            "(speed|drehzahl|rpm).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor)".to_owned(),
+            "(speed|drehzahl|rpm|vitesse|regime|velocidad).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor|compresseur|compresor|arbre|eje)".to_owned(),
         ),
-        (Channel::ShaftSpeed, 4, "^(n|shaft_speed|speed|drehzahl|speed_rpm|rpm)$".to_owned()),
+        (Channel::ShaftSpeed, 4, "^(n|shaft_speed|speed|drehzahl|speed_rpm|rpm|vitesse|regime|velocidad)$".to_owned()),
         (
             Channel::CompressorFlow,
             6,
-            format!("(^|_){flow}_?(c|comp|compressor|verd|verdichter|v|air|luft|l)(_|$)"),
+            format!("(^|_){flow}_?(c|comp|compressor|verd|verdichter|v|air|luft|l|compresseur|compresor|aire)(_|$)"),
         ),
         (Channel::CompressorFlow, 6, format!("(comp|compressor|verd|verdichter|luft|air)_?{flow}(_|$)")),
         (Channel::CompressorFlow, 6, "luftmasse|^maf|^caf(_|$)|airflow|air_flow".to_owned()),
         (Channel::CompressorFlow, 3, format!("^{flow}(_kg_s)?$")),
+        (Channel::CompressorFlow, 3, format!("^{flow}_?1$")),
+        (Channel::TurbineFlow, 3, format!("^{flow}_?3$")),
         (Channel::TurbineFlow, 7, format!("(^|_){flow}_?(t|turb|turbine|abgas|exh|exhaust|gas)(_|$)")),
         (Channel::TurbineFlow, 7, format!("(turb|turbine|abgas|exh|exhaust|hotgas|hot_gas)_?{flow}(_|$)")),
         (
@@ -149,7 +184,8 @@ static SET: LazyLock<Option<Regex>> = LazyLock::new(|| {
 });
 static DERIVED: LazyLock<Option<Regex>> = LazyLock::new(|| {
     Regex::new(
-        "(^|_)(cor|corr|korr|calc|ber|berechnet|model|sim|est|std|stdev|sigma|dev|min|max|raw|roh)(_|$)",
+        // A static temperature cannot be measured.
+        "(^|_)(cor|corr|korr|calc|ber|berechnet|model|sim|est|std|stdev|sigma|dev|min|max|raw|roh)(_|$)|(^|_)t_?[0-9]?_?(stat|static)(_|$)",
     )
     .ok()
 });
@@ -181,6 +217,22 @@ pub(crate) fn is_ambient(name: &str) -> bool {
     ["amb", "baro", "umg", "atm", "luftdruck"].iter().any(|word| name.contains(word))
 }
 
+static OF_KIND: LazyLock<Vec<(Kind, Regex)>> = LazyLock::new(|| {
+    let patterns = [
+        (Kind::Pressure, "press|druck|presion|(^|_)p(_|[0-9])|baro"),
+        (Kind::Temperature, "temp|(^|_)t(_|[0-9])"),
+        (Kind::Speed, "speed|drehzahl|rpm|(^|_)n(_|[0-9])"),
+    ];
+    patterns.into_iter().filter_map(|(kind, pattern)| Some((kind, Regex::new(pattern).ok()?))).collect()
+});
+
+/// The one kind of quantity that a name speaks of; `None` without one and with several.
+fn kind_of_name(name: &str) -> Option<Kind> {
+    let mut kinds = OF_KIND.iter().filter(|(_, pattern)| pattern.is_match(name)).map(|(kind, _)| *kind);
+    let kind = kinds.next()?;
+    kinds.next().is_none().then_some(kind)
+}
+
 /// The channels that a column may be, by its name, its group and what else is said about it, with their weights.
 pub(crate) fn channels_of(
     name: &str,
@@ -193,6 +245,7 @@ pub(crate) fn channels_of(
     if is_other(&name) {
         return Vec::new();
     }
+    let kind = kind.or_else(|| kind_of_name(&name));
     let set = is_set_value(&name) || is_set_value(&group);
     let mut found: Vec<(Channel, Weight)> = Vec::new();
     for row in ROWS.iter() {
@@ -237,8 +290,8 @@ mod tests {
                     * (usize::from(place.temperature.is_some()) + usize::from(place.pressure.is_some()))
             })
             .sum();
-        assert_eq!(ROWS.len(), places + 11);
-        assert!(SET.is_some() && DERIVED.is_some() && OTHER.is_some());
+        assert_eq!(ROWS.len(), places + 13);
+        assert!(SET.is_some() && DERIVED.is_some() && OTHER.is_some() && OF_KIND.len() == 3);
     }
 
     #[test]
@@ -273,6 +326,18 @@ mod tests {
             ("Umgebungstemperatur", "", t, "T_amb"),
             ("p3_soll", "", p, "P3_command"),
             ("Stellung Drosselklappe", "", None, "valve_command"),
+            ("Température sortie compresseur", "", t, "T2"),
+            ("Pression avant turbine", "", p, "P3"),
+            ("Régime turbo", "", n, "N"),
+            ("Débit air", "", m, "m_c"),
+            ("Temperatura entrada compresor", "", t, "T1"),
+            ("Presión salida del compresor", "", p, "P2"),
+            ("COT", "", t, "T2"),
+            ("TIP", "", p, "P3"),
+            ("T1tot", "", t, "T1"),
+            ("M1", "", m, "m_c"),
+            ("p_21", "", p, "P1"),
+            ("T_41", "", t, "T4"),
         ] {
             let found = channels_of(name, "", about, kind);
             assert_eq!(found.first().map(|(channel, _)| channel.symbol()), Some(symbol), "{name}: {found:?}");

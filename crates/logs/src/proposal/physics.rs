@@ -1,6 +1,7 @@
 //! What the proposed channels say of each other: a compressor raises pressure and temperature, and flow follows speed.
 
-use super::proposed::{Ambient, Certainty, Proposal};
+use super::names::plain;
+use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
 use crate::units::{kind_of, unit};
 use crate::{Layout, Survey};
 use mapper_core::Channel;
@@ -59,6 +60,7 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
             }
         }
     }
+    doubt_bare_housings(proposal, layout);
     let fastest_rpm = running.as_ref().map(|speed| speed.samples().map(|(_, rpm)| rpm).fold(0.0, f64::max));
     if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < FASTEST_ENGINE_RPM) {
         let message = format!("at most {rpm:.0} rpm: this may be the speed of the engine");
@@ -83,6 +85,25 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
                 }
             }
             None => {}
+        }
+    }
+}
+
+/// `T_c` and `T_t` are housings here, and gas behind compressor and turbine elsewhere: without a column for the gas they may be it.
+fn doubt_bare_housings(proposal: &mut Proposal, layout: &Layout) {
+    for (housing, gas, place) in
+        [(Channel::Tc, Channel::T2, "compressor"), (Channel::Tt, Channel::T4, "turbine")]
+    {
+        let bare = |proposed: &ProposedChannel| {
+            let column = layout.columns.get(proposed.column);
+            column.is_some_and(|column| {
+                column.description.is_empty() && plain(&column.name).len() <= "temp_c".len()
+            })
+        };
+        let gas_is_known = proposal.of(gas).is_some_and(|gas| gas.certainty > Certainty::Unsure);
+        if !gas_is_known && proposal.of(housing).is_some_and(bare) {
+            let message = format!("it may be the gas behind the {place}, for which there is no other column");
+            doubt(proposal, &[housing], &message);
         }
     }
 }

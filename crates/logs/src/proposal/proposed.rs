@@ -22,6 +22,8 @@ pub struct ProposedChannel {
     pub channel: Channel,
     /// Index of the column in the layout.
     pub column: usize,
+    /// Further columns with the same quantity: several sensors at one place.
+    pub others: Vec<usize>,
     /// Unit as a channel map writes it; `None` where it could not be found out.
     pub unit: Option<&'static str>,
     /// Whether the pressure is read over the ambient pressure.
@@ -65,6 +67,6 @@ impl Proposal {
 
     /// The channel that a column was taken for.
     pub fn of_column(&self, column: usize) -> Option<&ProposedChannel> {
-        self.channels.iter().find(|proposed| proposed.column == column)
+        self.channels.iter().find(|proposed| proposed.column == column || proposed.others.contains(&column))
     }
 }

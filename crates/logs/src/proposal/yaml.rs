@@ -57,7 +57,14 @@ pub fn channel_map_text(
 }
 
 fn source(layout: &Layout, proposed: &ProposedChannel) -> String {
-    let mut text = format!("{{{}", place(layout, proposed.column));
+    let mut text = if proposed.others.is_empty() {
+        format!("{{{}", place(layout, proposed.column))
+    } else {
+        let columns = std::iter::once(&proposed.column).chain(&proposed.others);
+        let names =
+            columns.filter_map(|column| layout.columns.get(*column)).map(|column| scalar(&column.name));
+        format!("{{{}field: [{}]", topic(layout, proposed.column), names.collect::<Vec<_>>().join(", "))
+    };
     if let Some(unit) = proposed.unit {
         let _ = write!(text, ", unit: {}", scalar(unit));
     }
@@ -70,10 +77,17 @@ fn source(layout: &Layout, proposed: &ProposedChannel) -> String {
 
 /// Topic, where there are several groups, and field.
 fn place(layout: &Layout, column: usize) -> String {
-    let Some(column) = layout.columns.get(column) else { return String::new() };
-    let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
-    let topic = if group.is_empty() { String::new() } else { format!("topic: {}, ", scalar(group)) };
-    format!("{topic}field: {}", scalar(&column.name))
+    let name = layout.columns.get(column).map_or("", |column| column.name.as_str());
+    format!("{}field: {}", topic(layout, column), scalar(name))
+}
+
+/// The topic of a column, where there are several groups.
+fn topic(layout: &Layout, column: usize) -> String {
+    let group = layout.columns.get(column).and_then(|column| layout.groups.get(column.group));
+    match group {
+        Some(group) if !group.name.is_empty() => format!("topic: {}, ", scalar(&group.name)),
+        _ => String::new(),
+    }
 }
 
 /// A text that needs no quotes where it is a plain word, and one with them else.

@@ -178,8 +178,14 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
     let whole = || (header.to_owned(), None);
     for (open, close, any) in [('[', ']', true), ('(', ')', false), ('{', '}', false), ('<', '>', false)] {
         let Some(inside) = header.strip_suffix(close) else { continue };
-        let Some((name, unit)) = inside.rsplit_once(open) else { continue };
-        let unit = unit.trim();
+        // The bracket that the last one closes: `P2 (kPa(g))`.
+        let mut depth = 1;
+        let opens = |(_, letter): &(usize, char)| {
+            depth += i32::from(*letter == close) - i32::from(*letter == open);
+            depth == 0
+        };
+        let Some((at, _)) = inside.char_indices().rev().find(opens) else { continue };
+        let (name, unit) = (&inside[..at], inside[at + open.len_utf8()..].trim());
         // `bar (g)` and `[bar(g)]` hold brackets of their own.
         if !name.trim().is_empty()
             && !unit.is_empty()

@@ -1,0 +1,341 @@
+//! Two hundred headers from names, units, languages and station conventions: what is called sure must be right.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use mapper_core::Channel::{
+    self, CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, TOil, Tc, TurbineFlow,
+};
+use mapper_log_formats::LOG_FORMATS;
+use mapper_logs::proposal::{Certainty, propose};
+use mapper_logs::{LogFile, LogOptions, survey};
+use std::path::Path;
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Holds {
+    /// A channel of the turbocharger.
+    A(Channel),
+    /// Something else with a temperature, a pressure, a speed or a flow.
+    Other(Kind, f64, f64),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Temperature,
+    Pressure,
+    Speed,
+    Flow,
+}
+
+const fn temperature(low_k: f64, high_k: f64) -> Holds {
+    Holds::Other(Kind::Temperature, low_k, high_k)
+}
+
+const fn pressure(low_pa: f64, high_pa: f64) -> Holds {
+    Holds::Other(Kind::Pressure, low_pa, high_pa)
+}
+
+/// Value at a load of 0 to 1 in SI units (speed in rpm), and the kind.
+fn value(holds: Holds, load: f64) -> (Kind, f64) {
+    let between = |low: f64, high: f64| low + (high - low) * load;
+    match holds {
+        Holds::Other(kind, low, high) => (kind, between(low, high)),
+        Holds::A(channel) => match channel {
+            P1 => (Kind::Pressure, between(98.6e3, 96.7e3)),
+            P2 => (Kind::Pressure, between(103e3, 232e3)),
+            P3 => (Kind::Pressure, between(102e3, 217e3)),
+            P4 => (Kind::Pressure, between(98.9e3, 100.2e3)),
+            T1 => (Kind::Temperature, between(295.4, 296.0)),
+            T2 => (Kind::Temperature, between(301.0, 407.0)),
+            T3 => (Kind::Temperature, between(560.0, 798.0)),
+            T4 => (Kind::Temperature, between(540.0, 720.0)),
+            Tc => (Kind::Temperature, between(299.0, 357.0)),
+            TOil => (Kind::Temperature, between(334.0, 343.0)),
+            ShaftSpeed => (Kind::Speed, between(22e3, 118e3)),
+            TurbineFlow => (Kind::Flow, between(0.011, 0.1545)),
+            _ => (Kind::Flow, between(0.0105, 0.1522)),
+        },
+    }
+}
+
+/// Units as a log writes them: name, and the number of an SI value.
+type Unit = (&'static str, fn(f64) -> f64);
+
+/// Temperature, pressure, speed, flow.
+const UNITS: [[Unit; 4]; 6] = [
+    [("degC", |k| k - 273.15), ("kPa", |pa| pa / 1e3), ("rpm", |n| n), ("kg/s", |m| m)],
+    [
+        ("°F", |k| k * 1.8 - 459.67),
+        ("psia", |pa| pa / 6894.757),
+        ("rpm", |n| n),
+        ("lb/min", |m| m / 0.453_592_37 * 60.0),
+    ],
+    [("K", |k| k), ("bar", |pa| pa / 1e5), ("1/min", |n| n), ("kg/h", |m| m * 3600.0)],
+    [("°C", |k| k - 273.15), ("mbar", |pa| pa / 100.0), ("krpm", |n| n / 1e3), ("g/s", |m| m * 1e3)],
+    [("degC", |k| k - 273.15), ("kPa(g)", |pa| pa / 1e3 - 98.6), ("U/min", |n| n), ("kg/min", |m| m * 60.0)],
+    [("", |k| k - 273.15), ("", |pa| pa / 1e3), ("", |n| n), ("", |m| m)],
+];
+
+/// Names of the measured quantities by convention.
+fn conventions() -> Vec<Vec<(&'static str, Holds)>> {
+    let a = Holds::A;
+    // Of pressures and temperatures behind an intercooler.
+    let (cooled_p, cooled_t) = (pressure(102e3, 228e3), temperature(299.0, 318.0));
+    vec![
+        vec![
+            ("P1", a(P1)),
+            ("T1", a(T1)),
+            ("P2", a(P2)),
+            ("T2", a(T2)),
+            ("P3", a(P3)),
+            ("T3", a(T3)),
+            ("P4", a(P4)),
+            ("T4", a(T4)),
+            ("n_TC", a(ShaftSpeed)),
+            ("m_dot_C", a(CompressorFlow)),
+        ],
+        vec![
+            ("P2", a(P1)),
+            ("T2", a(T1)),
+            ("P3", a(P2)),
+            ("T3", a(T2)),
+            ("P4", a(P3)),
+            ("T4", a(T3)),
+            ("P5", a(P4)),
+            ("T5", a(T4)),
+            ("N1", a(ShaftSpeed)),
+            ("W2", a(CompressorFlow)),
+        ],
+        vec![
+            ("p_21", a(P1)),
+            ("T_21", a(T1)),
+            ("p_22", a(P2)),
+            ("T_22", a(T2)),
+            ("p_31", a(P3)),
+            ("T_31", a(T3)),
+            ("p_41", a(P4)),
+            ("T_41", a(T4)),
+            ("N_ATL", a(ShaftSpeed)),
+        ],
+        vec![
+            ("p_11", a(P1)),
+            ("T_11", a(T1)),
+            ("p_21", a(P2)),
+            ("T_21", a(T2)),
+            ("p_22", cooled_p),
+            ("T_22", cooled_t),
+            ("p_31", a(P3)),
+            ("T_31", a(T3)),
+            ("p_41", a(P4)),
+            ("T_41", a(T4)),
+        ],
+        vec![
+            ("Compressor inlet pressure", a(P1)),
+            ("Compressor inlet temperature", a(T1)),
+            ("Compressor outlet pressure", a(P2)),
+            ("Compressor outlet temperature", a(T2)),
+            ("Turbine inlet pressure", a(P3)),
+            ("Turbine inlet temperature", a(T3)),
+            ("Turbine outlet pressure", a(P4)),
+            ("Turbine outlet temperature", a(T4)),
+            ("Turbo speed", a(ShaftSpeed)),
+            ("Air mass flow", a(CompressorFlow)),
+        ],
+        vec![
+            ("Druck vor Verdichter", a(P1)),
+            ("Temperatur vor Verdichter", a(T1)),
+            ("Druck nach Verdichter", a(P2)),
+            ("Temperatur nach Verdichter", a(T2)),
+            ("Druck vor Turbine", a(P3)),
+            ("Temperatur vor Turbine", a(T3)),
+            ("Druck nach Turbine", a(P4)),
+            ("Temperatur nach Turbine", a(T4)),
+            ("Drehzahl ATL", a(ShaftSpeed)),
+            ("Luftmassenstrom", a(CompressorFlow)),
+            ("Temperatur nach Ladeluftkühler", cooled_t),
+            ("Druck nach Ladeluftkühler", cooled_p),
+        ],
+        vec![
+            ("Pression entrée compresseur", a(P1)),
+            ("Température entrée compresseur", a(T1)),
+            ("Pression sortie compresseur", a(P2)),
+            ("Température sortie compresseur", a(T2)),
+            ("Pression avant turbine", a(P3)),
+            ("Température avant turbine", a(T3)),
+            ("Pression après turbine", a(P4)),
+            ("Température après turbine", a(T4)),
+            ("Régime turbo", a(ShaftSpeed)),
+            ("Débit air", a(CompressorFlow)),
+            ("Température eau", temperature(350.0, 365.0)),
+        ],
+        vec![
+            ("Presión entrada compresor", a(P1)),
+            ("Temperatura entrada compresor", a(T1)),
+            ("Presión salida compresor", a(P2)),
+            ("Temperatura salida compresor", a(T2)),
+            ("Presión entrada turbina", a(P3)),
+            ("Temperatura entrada turbina", a(T3)),
+            ("Presión salida turbina", a(P4)),
+            ("Temperatura salida turbina", a(T4)),
+            ("Velocidad turbo", a(ShaftSpeed)),
+            ("Caudal aire", a(CompressorFlow)),
+        ],
+        vec![
+            ("CIP", a(P1)),
+            ("CIT", a(T1)),
+            ("COP", a(P2)),
+            ("COT", a(T2)),
+            ("TIP", a(P3)),
+            ("TIT", a(T3)),
+            ("TOP", a(P4)),
+            ("TOT", a(T4)),
+            ("Shaft Speed", a(ShaftSpeed)),
+            ("MAF", a(CompressorFlow)),
+        ],
+        vec![
+            ("P1tot", a(P1)),
+            ("T1tot", a(T1)),
+            ("P2tot", a(P2)),
+            ("T2tot", a(T2)),
+            ("P3tot", a(P3)),
+            ("T3tot", a(T3)),
+            ("T1stat", temperature(293.0, 294.0)),
+            ("T2stat", temperature(299.0, 404.0)),
+            ("nATL", a(ShaftSpeed)),
+            ("M1", a(CompressorFlow)),
+            ("M3", a(TurbineFlow)),
+        ],
+        vec![
+            ("T_c", a(T2)),
+            ("T_t", a(T4)),
+            ("p_c", a(P2)),
+            ("T_1", a(T1)),
+            ("p_1", a(P1)),
+            ("n", a(ShaftSpeed)),
+        ],
+        vec![
+            ("RPM", Holds::Other(Kind::Speed, 900.0, 5700.0)),
+            ("Boost", a(P2)),
+            ("Intake Air Temp", temperature(305.0, 318.0)),
+            ("Charge Air Temp", cooled_t),
+            ("MAF", a(CompressorFlow)),
+            ("EGT", a(T3)),
+            ("Coolant Temp", temperature(350.0, 365.0)),
+            ("Fuel Pressure", pressure(350e3, 500e3)),
+            ("Oil Pressure", pressure(200e3, 450e3)),
+        ],
+        vec![
+            ("T_comp_in", a(T1)),
+            ("T_comp_out", a(T2)),
+            ("p_comp_in", a(P1)),
+            ("p_comp_out", a(P2)),
+            ("T_turb_in", a(T3)),
+            ("T_turb_out", a(T4)),
+            ("p_turb_in", a(P3)),
+            ("p_turb_out", a(P4)),
+            ("T_comp_housing", a(Tc)),
+            ("T_oil_in", a(TOil)),
+            ("T_oil_out", temperature(345.0, 356.0)),
+            ("p_oil_in", pressure(250e3, 300e3)),
+            ("n_turbo", a(ShaftSpeed)),
+        ],
+        vec![
+            ("T2_LP", a(T2)),
+            ("P2_LP", a(P2)),
+            ("T1_LP", a(T1)),
+            ("P1_LP", a(P1)),
+            ("T1_HP", temperature(310.0, 330.0)),
+            ("P1_HP", pressure(102e3, 225e3)),
+            ("T2_HP", temperature(320.0, 450.0)),
+            ("P2_HP", pressure(110e3, 400e3)),
+            ("n_LP", a(ShaftSpeed)),
+            ("n_HP", Holds::Other(Kind::Speed, 30e3, 150e3)),
+        ],
+    ]
+}
+
+/// What stands beside it in logs and is no channel.
+const DECOYS: [(&str, Holds); 14] = [
+    ("T2 set", temperature(300.0, 400.0)),
+    ("P2_soll", pressure(105e3, 230e3)),
+    ("n_corr", Holds::Other(Kind::Speed, 21e3, 117e3)),
+    ("mass flow corr", Holds::Other(Kind::Flow, 0.011, 0.16)),
+    ("Engine speed", Holds::Other(Kind::Speed, 1000.0, 4000.0)),
+    ("Fuel flow", Holds::Other(Kind::Flow, 0.0005, 0.006)),
+    ("EGR temperature", temperature(330.0, 420.0)),
+    ("T_cooler_out", temperature(299.0, 318.0)),
+    ("Cylinder pressure", pressure(110e3, 1.5e6)),
+    ("T2 calc", temperature(300.0, 404.0)),
+    ("Dyno speed", Holds::Other(Kind::Speed, 1000.0, 4000.0)),
+    ("Kraftstofftemperatur", temperature(300.0, 310.0)),
+    ("T_water_out", temperature(350.0, 366.0)),
+    ("p_crankcase", pressure(100e3, 101e3)),
+];
+
+/// Repeats a small sequence of numbers: the same headers in every run.
+struct Draw(u64);
+
+impl Draw {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from(self.0 >> 33).unwrap() % limit
+    }
+}
+
+#[test]
+fn what_is_called_sure_is_right() {
+    let mut draw = Draw(2026);
+    let (mut sure, mut wrong, mut found, mut present) = (0, Vec::new(), 0, 0);
+    let conventions = conventions();
+    for header in 0..200 {
+        let mut columns = conventions[header % conventions.len()].clone();
+        for _ in 0..draw.below(5) {
+            let decoy = DECOYS[draw.below(DECOYS.len())];
+            let at = draw.below(columns.len() + 1);
+            if columns.iter().all(|(name, _)| *name != decoy.0) {
+                columns.insert(at, decoy);
+            }
+        }
+        let units = UNITS[draw.below(UNITS.len())];
+        let style = draw.below(3);
+        let unit_of = |holds: Holds| units[value(holds, 0.0).0 as usize];
+        let title = |name: &str, holds: Holds| match (unit_of(holds).0, style) {
+            ("", _) => name.to_owned(),
+            (unit, 0) => format!("{name} [{unit}]"),
+            (unit, 1) => format!("{} / {unit}", name.to_uppercase()),
+            (unit, _) => format!("{name} ({unit})"),
+        };
+        let mut text = "Time [s]".to_owned();
+        for (name, holds) in &columns {
+            text += &format!(";{}", title(name, *holds));
+        }
+        for row in 0..150 {
+            // Steps of load, with some noise, so that no two columns are equal.
+            let load = f64::from(row / 15 * 15) / 149.0;
+            text += &format!("\n{row}");
+            for (_, holds) in &columns {
+                let noisy = load + 1e-3 * (draw.below(1000) as f64 / 1000.0 - 0.5);
+                text += &format!(";{:.5}", unit_of(*holds).1(value(*holds, noisy).1));
+            }
+        }
+        let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+        let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+        let survey = survey(log.as_mut()).unwrap();
+        let proposal = propose(log.layout(), &survey);
+        present += columns.iter().filter(|(_, holds)| matches!(holds, Holds::A(_))).count();
+        for proposed in &proposal.channels {
+            let (name, holds) = columns[proposed.column];
+            let right = holds == Holds::A(proposed.channel);
+            found += usize::from(right && proposed.certainty > Certainty::Unsure);
+            if proposed.certainty == Certainty::Sure {
+                sure += 1;
+                if !right {
+                    wrong.push(format!("{header}: {} taken for {}", title(name, holds), proposed.channel));
+                }
+            }
+        }
+    }
+    // Asked: at most one in a hundred.
+    assert!(100 * wrong.len() <= sure, "{} of {sure}:\n{}", wrong.len(), wrong.join("\n"));
+    // Doubting all would be no help: most of the channels are found, and half of them for sure.
+    assert!(10 * found >= 7 * present && 2 * sure >= present, "{found} and {sure} of {present}");
+}

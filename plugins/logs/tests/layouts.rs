@@ -69,9 +69,12 @@ fn clock(row: usize) -> (usize, usize, usize) {
     (second / 3600, second / 60 % 60, second % 60)
 }
 
+/// What it is, and the clock's text in a row.
+type Notation = (&'static str, fn(usize) -> String);
+
 #[test]
 fn clocks_in_the_notations_of_programs() {
-    let notations: [(&str, fn(usize) -> String); 12] = [
+    let notations: [Notation; 12] = [
         ("month by name", |row| {
             let (h, m, s) = clock(row);
             format!("18-Nov-2025 {h:02}:{m:02}:{s:02}")

@@ -4,11 +4,21 @@ use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
 use mapper_host::{Driver, KNOWN, Places};
 use serde_json::Value;
+use std::path::PathBuf;
 
-/// Where drivers are looked for: those that listen at a socket beside locks and latches, then beside this program, then on `PATH`.
+/// Where drivers are looked for: those that listen at a socket, then beside this program, then on `PATH`.
 pub fn places() -> Places {
-    let sockets = crate::rig_states::directory(None).join("drivers");
-    Places::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref(), Some(sockets))
+    let sockets = own_state().map(|state| state.join("drivers"));
+    Places::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref(), sockets)
+}
+
+/// `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`: a directory that nobody else may write to, since whoever
+/// listens at a socket in it drives the rig.
+fn own_state() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    variable("MAPPER_STATE_DIR")
+        .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
+        .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")))
 }
 
 /// The driver that a campaign asks for.

@@ -4,6 +4,7 @@ use crate::SessionError;
 use serde::Serialize;
 use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
+use tempfile::NamedTempFile;
 
 /// Treatment of an existing file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -23,12 +24,23 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
     if existing == Existing::Kept || !path.exists() {
         return write_new(path, bytes);
     }
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".new");
-    let new = path.with_file_name(name);
-    std::fs::write(&new, bytes)
-        .and_then(|()| std::fs::rename(&new, path))
+    aside(path, bytes)
+        .and_then(|file| file.persist(path).map_err(|error| error.error))
+        .map(drop)
         .map_err(SessionError::file("write", path))
+}
+
+/// Writes a file under another name in the same directory; it is removed if it does not get its own. So no half of a file ever
+/// stands under its name, even if the disk is full.
+fn aside(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".mapper-");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(directory)?;
+    file.write_all(bytes)?;
+    Ok(file)
 }
 
 /// Writes a new file.
@@ -36,8 +48,9 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
 /// # Errors
 /// [`SessionError::Exists`] if it already exists, [`SessionError::File`] if it cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
-    std::fs::File::create_new(path)
-        .and_then(|mut file| file.write_all(bytes))
+    aside(path, bytes)
+        .and_then(|file| file.persist_noclobber(path).map_err(|error| error.error))
+        .map(drop)
         .map_err(SessionError::file("write", path))
 }
 
@@ -73,6 +86,19 @@ pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, Ses
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_existing_file_is_kept_or_replaced_as_a_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        write_file(&path, b"first", Existing::Kept).unwrap();
+        assert!(matches!(write_file(&path, b"second", Existing::Kept), Err(SessionError::Exists { .. })));
+        assert_eq!(read_at_most(&path, 9).unwrap(), b"first");
+        write_file(&path, b"third", Existing::Replaced).unwrap();
+        assert_eq!(read_at_most(&path, 9).unwrap(), b"third");
+        // Nothing else is left in the directory.
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
 
     #[test]
     fn no_more_is_read_than_allowed() {

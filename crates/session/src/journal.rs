@@ -6,8 +6,8 @@ use mapper_campaign::Campaign;
 use mapper_core::{Plan, RigDescription};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::fs::{File, OpenOptions};
-use std::io::{Read, Write};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 
 /// Maximum size of a journal, bytes: some hundred thousand steps.
@@ -116,12 +116,21 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a run to append.
+    /// Opens the journal of a run to append, and locks it until it is dropped: a run has one runner.
     ///
     /// # Errors
-    /// The system's error.
+    /// The system's error; of kind `WouldBlock` if another runner has the journal.
     pub fn open(path: &Path, synced: bool) -> std::io::Result<Self> {
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(std::io::Error::new(ErrorKind::WouldBlock, "another process runs it"));
+            }
+            // A file system without locks.
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(error)) => return Err(error),
+        }
         let mut text = Vec::new();
         (&mut file).take(READ_MAX).read_to_end(&mut text)?;
         // Terminates a line that was torn by a crash.
@@ -231,6 +240,8 @@ mod tests {
             journal.write(entry).unwrap();
             ends.push(std::fs::metadata(&path).unwrap().len() as usize);
         }
+        assert_eq!(Journal::open(&path, false).unwrap_err().kind(), ErrorKind::WouldBlock);
+        drop(journal);
         let whole = std::fs::read(&path).unwrap();
         for cut in 0..=whole.len() {
             std::fs::write(&path, &whole[..cut]).unwrap();

@@ -33,10 +33,18 @@ impl BrokenOff {
     pub fn read(directory: &Path) -> Result<Self, SessionError> {
         let why = |why: String| SessionError::NotResumable { run: directory.to_owned(), why };
         let path = directory.join(run_directory::JOURNAL);
-        let parts =
+        let mut parts =
             read_journal(&path).map_err(|error| why(format!("its journal cannot be read: {error}")))?;
         if parts.is_empty() {
             return Err(why("its journal holds no run".to_owned()));
+        }
+        for part in parts.iter_mut().filter(|part| !part.saved.is_empty()) {
+            // The recording decides: a step that the journal names and the recording does not hold to its end is run again.
+            let steps =
+                read_steps(&directory.join(&part.recording), &ReadOptions::default()).unwrap_or_default();
+            let whole = steps.iter().filter(|step| step.end_s > step.start_s).map(|step| step.index);
+            let whole: BTreeSet<usize> = whole.collect();
+            part.saved.retain(|index| whole.contains(index));
         }
         Ok(BrokenOff { directory: directory.to_owned(), parts })
     }

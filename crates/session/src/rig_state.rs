@@ -4,11 +4,11 @@
 //! The owner's entry remains, so that a run that ended without releasing the rig is known.
 
 use crate::SessionError;
-use crate::files::json_text;
+use crate::files::{Existing, json_text, write_file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, Write};
+use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Maximum size of these files, bytes.
@@ -91,10 +91,18 @@ impl RigStates {
         self.directory.join(format!("rig-{name}.{extension}"))
     }
 
+    /// Opens a rig's lock; creates it, and the directory, on demand.
     fn open(&self, rig: &str) -> Result<(File, PathBuf), SessionError> {
-        std::fs::create_dir_all(&self.directory).map_err(SessionError::file("create", &self.directory))?;
+        make_shared_directory(&self.directory).map_err(SessionError::file("create", &self.directory))?;
         let path = self.file(rig, "lock");
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
+        let file = open_plain(&path).or_else(|error| match error.kind() {
+            ErrorKind::NotFound => match create_shared(&path) {
+                // Another runner was faster.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => open_plain(&path),
+                created => created,
+            },
+            _ => Err(error),
+        });
         Ok((file.map_err(SessionError::file("open", &path))?, path))
     }
 
@@ -105,19 +113,19 @@ impl RigStates {
     /// for system errors.
     pub fn claim(&self, rig: &str, resumes: Option<&Path>) -> Result<Claim, SessionError> {
         let (mut lock, path) = self.open(rig)?;
-        let locked = lock.try_lock();
-        let owner = read_json::<Owner>(&mut lock);
-        match locked {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                let owner = owner.map_or("another runner".to_owned(), |owner| owner.to_string());
-                return Err(SessionError::RigInUse { rig: rig.to_owned(), owner });
-            }
-            Err(TryLockError::Error(source)) => return Err(SessionError::file("lock", &path)(source)),
-        }
+        lock_or_name_owner(rig, &mut lock, &path)?;
         if let Some(Latch { reason, run }) = self.latch_of(rig) {
             return Err(SessionError::RigLatched { rig: rig.to_owned(), reason, run });
         }
+        let owner = match read_entry::<Owner>(&mut lock) {
+            Entry::Is(owner) => Some(owner),
+            Entry::Empty => None,
+            Entry::Unreadable(why) => {
+                let reason =
+                    format!("the entry of its last owner cannot be read ({why}: {})", path.display());
+                return Err(SessionError::RigLatched { rig: rig.to_owned(), reason, run: PathBuf::new() });
+            }
+        };
         if let Some(owner) = owner.filter(|owner| resumes.is_none_or(|run| !same_place(run, &owner.run))) {
             return Err(SessionError::RigAbandoned {
                 rig: rig.to_owned(),
@@ -128,12 +136,22 @@ impl RigStates {
         Ok(Claim { states: self.clone(), rig: rig.to_owned(), lock })
     }
 
+    /// The lockout of a rig; one that cannot be read still locks the rig out.
     fn latch_of(&self, rig: &str) -> Option<Latch> {
         let path = self.file(rig, "latch");
-        let mut file = File::open(path).ok()?;
-        // An unreadable lockout file still locks the rig out.
-        let unreadable = Latch { reason: "the latch cannot be read".to_owned(), run: PathBuf::new() };
-        Some(read_json(&mut file).unwrap_or(unreadable))
+        let unreadable = |why: String| Latch {
+            reason: format!("its lockout cannot be read ({why}: {})", path.display()),
+            run: PathBuf::new(),
+        };
+        match open_plain(&path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => None,
+            Err(error) => Some(unreadable(error.to_string())),
+            Ok(mut file) => Some(match read_entry(&mut file) {
+                Entry::Is(latch) => latch,
+                Entry::Empty => unreadable("it is empty".to_owned()),
+                Entry::Unreadable(why) => unreadable(why),
+            }),
+        }
     }
 
     /// Status of a rig.
@@ -151,8 +169,18 @@ impl RigStates {
         }
         let (mut lock, _) = self.open(rig)?;
         let in_use = matches!(lock.try_lock(), Err(TryLockError::WouldBlock));
-        let owner = read_json(&mut lock);
-        Ok(RigStatus { rig: rig.to_owned(), owner, in_use, latch: self.latch_of(rig) })
+        let (owner, unreadable) = match read_entry(&mut lock) {
+            Entry::Is(owner) => (Some(owner), None),
+            // A runner that has just begun has not signed yet.
+            Entry::Empty => (None, None),
+            Entry::Unreadable(_) if in_use => (None, None),
+            Entry::Unreadable(why) => (None, Some(why)),
+        };
+        let latch = self.latch_of(rig).or_else(|| {
+            let reason = format!("the entry of its last owner cannot be read ({})", unreadable?);
+            Some(Latch { reason, run: PathBuf::new() })
+        });
+        Ok(RigStatus { rig: rig.to_owned(), owner, in_use, latch })
     }
 
     /// All rigs used so far, by file name.
@@ -190,15 +218,17 @@ impl RigStates {
             let owner = status.owner.map_or("another runner".to_owned(), |owner| owner.to_string());
             return Err(SessionError::RigInUse { rig: rig.to_owned(), owner });
         }
-        for extension in ["latch", "lock"] {
-            let path = self.file(rig, extension);
-            match std::fs::remove_file(&path) {
-                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                    return Err(SessionError::file("remove", &path)(error));
-                }
-                _ => {}
+        // The lock is held meanwhile, so that no run begins between the look and the removal.
+        let (mut lock, path) = self.open(rig)?;
+        lock_or_name_owner(rig, &mut lock, &path)?;
+        let latch = self.file(rig, "latch");
+        match std::fs::remove_file(&latch) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(SessionError::file("remove", &latch)(error));
             }
+            _ => {}
         }
+        lock.set_len(0).and_then(|()| lock.sync_all()).map_err(SessionError::file("write", &path))?;
         Ok(status)
     }
 }
@@ -228,7 +258,7 @@ impl Claim {
     pub fn latch(&self, latch: &Latch) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "latch");
         let text = json_text(latch)?;
-        std::fs::write(&path, text).map_err(SessionError::file("write", &path))
+        write_file(&path, text.as_bytes(), Existing::Replaced)
     }
 
     /// Releases the rig in a safe state.
@@ -247,11 +277,87 @@ fn same_place(a: &Path, b: &Path) -> bool {
     resolved(a) == resolved(b)
 }
 
-fn read_json<T: for<'de> Deserialize<'de>>(file: &mut File) -> Option<T> {
+/// Locks the file of a rig.
+fn lock_or_name_owner(rig: &str, lock: &mut File, path: &Path) -> Result<(), SessionError> {
+    match lock.try_lock() {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => {
+            let owner = match read_entry::<Owner>(lock) {
+                Entry::Is(owner) => owner.to_string(),
+                Entry::Empty | Entry::Unreadable(_) => "another runner".to_owned(),
+            };
+            Err(SessionError::RigInUse { rig: rig.to_owned(), owner })
+        }
+        Err(TryLockError::Error(source)) => Err(SessionError::file("lock", path)(source)),
+    }
+}
+
+/// What a file holds.
+enum Entry<T> {
+    Empty,
+    Is(T),
+    Unreadable(String),
+}
+
+fn read_entry<T: for<'de> Deserialize<'de>>(file: &mut File) -> Entry<T> {
     let mut text = String::new();
-    file.rewind().ok()?;
-    file.take(READ_MAX).read_to_string(&mut text).ok()?;
-    serde_json::from_str(&text).ok()
+    match file.rewind().and_then(|()| file.take(READ_MAX).read_to_string(&mut text)) {
+        Err(error) => Entry::Unreadable(error.to_string()),
+        Ok(_) if text.is_empty() => Entry::Empty,
+        Ok(_) => {
+            serde_json::from_str(&text).map_or_else(|error| Entry::Unreadable(error.to_string()), Entry::Is)
+        }
+    }
+}
+
+/// Opens a file for reading and writing that is a plain file under one name: a link that somebody put there could make a run
+/// overwrite what it points to.
+fn open_plain(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        // Without waiting for the other end of a pipe.
+        let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
+        options.custom_flags(i32::try_from(flags.bits()).unwrap_or_default());
+    }
+    let file = options.open(path)?;
+    let about = file.metadata()?;
+    #[cfg(unix)]
+    let linked = std::os::unix::fs::MetadataExt::nlink(&about) > 1;
+    #[cfg(not(unix))]
+    let linked = false;
+    if !about.is_file() || linked {
+        return Err(io::Error::other("it is a link or no plain file; remove it"));
+    }
+    Ok(file)
+}
+
+/// Creates a file that every user of the machine may lock.
+fn create_shared(path: &Path) -> io::Result<File> {
+    let file = OpenOptions::new().read(true).write(true).create_new(true).open(path)?;
+    share(path, 0o666)?;
+    Ok(file)
+}
+
+/// Creates a directory in which every user may create files, and none may remove those of others.
+fn make_shared_directory(path: &Path) -> io::Result<()> {
+    if path.is_dir() {
+        return Ok(());
+    }
+    std::fs::create_dir_all(path)?;
+    share(path, 0o1777)
+}
+
+#[cfg(unix)]
+fn share(path: &Path, mode: u32) -> io::Result<()> {
+    std::fs::set_permissions(path, std::os::unix::fs::PermissionsExt::from_mode(mode))
+}
+
+#[cfg(not(unix))]
+fn share(_: &Path, _: u32) -> io::Result<()> {
+    Ok(())
 }
 
 #[cfg(test)]
@@ -307,5 +413,66 @@ mod tests {
         let again = states.acknowledge("bench").unwrap_err().to_string();
         assert!(again.contains("no rig is in doubt"), "{again}");
         assert!(states.claim("bench", None).is_ok());
+    }
+
+    #[test]
+    fn what_cannot_be_read_locks_out() {
+        let directory = tempfile::tempdir().unwrap();
+        let states = RigStates::new(directory.path());
+        for (file, bytes) in [
+            ("rig-bench.latch", &b""[..]),
+            ("rig-bench.latch", b"{\"reason\": 7}"),
+            ("rig-bench.latch", b"\xff\xfe"),
+            ("rig-bench.lock", b"{\"process\": 7"),
+            ("rig-bench.lock", b"\xff\xfe"),
+        ] {
+            states.claim("bench", None).unwrap().release().unwrap();
+            std::fs::write(directory.path().join(file), bytes).unwrap();
+            let refused = states.claim("bench", None).unwrap_err();
+            assert!(matches!(refused, SessionError::RigLatched { .. }), "{file}: {refused}");
+            assert!(states.status("bench").unwrap().latch.is_some(), "{file}");
+            states.acknowledge("bench").unwrap();
+        }
+        states.claim("bench", None).unwrap().release().unwrap();
+    }
+
+    /// A link in the place of a lock or lockout must not make a run write to its target.
+    #[cfg(unix)]
+    #[test]
+    fn links_are_not_followed() {
+        let directory = tempfile::tempdir().unwrap();
+        let victim = directory.path().join("victim");
+        for hard in [false, true] {
+            let states = RigStates::new(&directory.path().join(format!("states-{hard}")));
+            std::fs::create_dir(&states.directory).unwrap();
+            std::fs::write(&victim, "kept").unwrap();
+            let link = states.file("bench", "lock");
+            if hard { std::fs::hard_link(&victim, link) } else { std::os::unix::fs::symlink(&victim, link) }
+                .unwrap();
+            assert!(states.claim("bench", None).is_err());
+            assert_eq!(std::fs::read_to_string(&victim).unwrap(), "kept");
+            let states = RigStates::new(&directory.path().join(format!("latches-{hard}")));
+            let claim = states.claim("bench", None).unwrap();
+            let link = states.file("bench", "latch");
+            if hard { std::fs::hard_link(&victim, link) } else { std::os::unix::fs::symlink(&victim, link) }
+                .unwrap();
+            claim.latch(&Latch { reason: "overspeed".to_owned(), run: "runs/a".into() }).unwrap();
+            assert_eq!(std::fs::read_to_string(&victim).unwrap(), "kept");
+        }
+    }
+
+    /// Whoever acknowledges and whoever begins a run at the same time cannot both succeed in having the lock file.
+    #[test]
+    fn acknowledging_leaves_the_lock_in_its_place() {
+        let directory = tempfile::tempdir().unwrap();
+        let states = RigStates::new(directory.path());
+        let mut first = states.claim("bench", None).unwrap();
+        first.sign(&owner("runs/a")).unwrap();
+        drop(first);
+        states.acknowledge("bench").unwrap();
+        let second = states.claim("bench", None).unwrap();
+        assert!(matches!(states.claim("bench", None), Err(SessionError::RigInUse { .. })));
+        assert!(matches!(states.acknowledge("bench"), Err(SessionError::RigInUse { .. })));
+        second.release().unwrap();
     }
 }

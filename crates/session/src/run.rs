@@ -30,6 +30,7 @@ use mapper_core::{Clock, MadeFrom, Plan, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
 use mapper_runner::{Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -201,12 +202,16 @@ impl PreparedRun<'_> {
             before => format!("recording-{}.mcap", before + 1),
         };
         let recording = directory.join(&name);
+        let path = directory.join(run_directory::JOURNAL);
+        let mut journal = Journal::open(&path, !rig.simulated_time).map_err(|error| match error.kind() {
+            ErrorKind::WouldBlock => {
+                SessionError::NotResumable { run: directory.clone(), why: error.to_string() }
+            }
+            _ => SessionError::file("write", &path)(error),
+        })?;
         // With several sources, each has its own sample times.
         let writer = RecordingWriter::create(&recording, &self.header(plan_json))?
             .leaving_out_absent(!self.sources.read.is_empty());
-        let path = directory.join(run_directory::JOURNAL);
-        let mut journal =
-            Journal::open(&path, !rig.simulated_time).map_err(SessionError::file("write", &path))?;
         let identity = Identity::of(campaign, &self.plan, &rig)?;
         journal
             .write(&Entry::Part { identity, recording: name })

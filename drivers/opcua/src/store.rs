@@ -42,7 +42,7 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    /// In `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`, as for locks.
+    /// In `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`.
     pub(crate) fn of_environment() -> Result<Store, StoreError> {
         let variable =
             |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);

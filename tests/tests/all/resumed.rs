@@ -4,6 +4,7 @@
 use crate::interrupted::Running;
 use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, only_run};
 use serde_json::Value;
+use std::io::Write;
 use std::path::Path;
 
 fn short(more: &[(&str, &str)]) -> CampaignFile {
@@ -75,4 +76,41 @@ fn a_killed_watch_over_repeats_goes_on_where_it_stood() {
 fn a_killed_search_for_surge_begins_its_line_again() {
     let search = ("seed: 1 ", "surge_search: {}\nseed: 1 ");
     goes_on("surge_search", || short(&BY_ITSELF.iter().copied().chain([search]).collect::<Vec<_>>()));
+}
+
+/// A journal that names steps as recorded which the recording does not hold: the recording decides, and they are run.
+#[test]
+fn what_the_journal_alone_says_is_run_again() {
+    let campaign = || short(&BY_ITSELF);
+    let whole = campaign();
+    let runs = whole.runs();
+    mapper(["run".as_ref(), whole.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
+    let run = only_run(&runs);
+    let expected = points(&run);
+    let bytes = run.join("recording.mcap").metadata().unwrap().len();
+    let campaign = campaign();
+    let mut running = Running::start_with(&campaign, &[]);
+    let recording = running.recorded((0.4 * bytes as f64) as u64);
+    running.kill();
+    let run = recording.parent().unwrap();
+    let mut journal = std::fs::OpenOptions::new().append(true).open(run.join("journal.jsonl")).unwrap();
+    for step in 1..=99 {
+        writeln!(journal, "{{\"step_saved\":{step}}}").unwrap();
+    }
+    drop(journal);
+    mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(0);
+    let targets = |points: &[Value]| points.iter().map(|point| point["target"].clone()).collect::<Vec<_>>();
+    assert_eq!(targets(&points(run)), targets(&expected));
+}
+
+/// A run that is going on has one runner.
+#[test]
+fn a_run_that_goes_on_is_not_resumed() {
+    let campaign = CampaignFile::shipped_with(&[("dwell: 40 s ", "dwell: 10 min ")]);
+    let mut running = Running::start_with(&campaign, &[]);
+    let recording = running.recorded(1 << 20);
+    let run = recording.parent().unwrap();
+    mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(4);
+    assert!(!run.join("recording-2.mcap").exists());
+    running.kill();
 }

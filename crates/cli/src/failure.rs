@@ -125,7 +125,7 @@ impl Failure {
             Manner::ClosedPipe => return None,
             Manner::Told => {}
             Manner::Rendered => standard_error::say(&self.message),
-            Manner::Sentence => standard_error::say(&format!("mapper: {}\n", self.message)),
+            Manner::Sentence => standard_error::say(&format!("mapper: {}\n", shortened(&self.message))),
         }
         Some(ExitCode::from(self.code as u8))
     }
@@ -142,6 +142,18 @@ impl Failure {
             value["findings"] = findings.clone();
         }
         value
+    }
+}
+
+/// Longest message, letters: a file can bring ten thousand names into one.
+const MESSAGE_LIMIT: usize = 4000;
+
+/// A message that fits a few screens. No colour in it is ours.
+fn shortened(message: &str) -> String {
+    let message = message.replace('\u{1b}', "\u{fffd}");
+    match message.char_indices().nth(MESSAGE_LIMIT) {
+        None => message,
+        Some((end, _)) => format!("{} ... (and {} bytes more)", &message[..end], message.len() - end),
     }
 }
 

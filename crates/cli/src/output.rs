@@ -4,6 +4,7 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::standard_error;
 use clap::Args;
+use mapper_core::terminal_text;
 use mapper_session::{Existing, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
@@ -36,9 +37,11 @@ impl Replace {
 /// Writes text to standard output. A closed pipe ends the command quietly.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| match error.kind() {
-        ErrorKind::BrokenPipe => Failure::closed_pipe(),
-        _ => Failure::new(Code::Failure, format!("failed to write to standard output: {error}")),
+    out.write_all(terminal_text(text).as_bytes()).and_then(|()| out.flush()).map_err(|error| {
+        match error.kind() {
+            ErrorKind::BrokenPipe => Failure::closed_pipe(),
+            _ => Failure::new(Code::Failure, format!("failed to write to standard output: {error}")),
+        }
     })
 }
 

@@ -48,6 +48,7 @@ mod speed_response;
 mod step_marker;
 pub mod step_number;
 mod surge;
+mod terminal_text;
 mod thermal_model;
 mod timing;
 mod visit_order;
@@ -100,6 +101,7 @@ pub use speed_response::{SpeedControlSettings, SpeedResponse};
 pub use step_marker::StepMarker;
 pub use step_number::step_number;
 pub use surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
+pub use terminal_text::terminal_text;
 pub use thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };

@@ -1,5 +1,6 @@
 //! Runs a script on its own thread and synchronises with it at each step.
 
+use crate::comments::unclosed_comment;
 use crate::error::{ScriptError, SequenceError};
 use crate::names::Unknown;
 use crate::request::SequenceRequest;
@@ -165,6 +166,11 @@ fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
         let message = format!("the script has {} bytes, more than {SCRIPT_LIMIT}", script.text.len());
         let thrown = EvalAltResult::ErrorRuntime(message.into(), rhai::Position::NONE);
         return Err(Box::new(ScriptError::running(script.path.clone(), "", thrown)));
+    }
+    if let Some(at) = unclosed_comment(&script.text) {
+        let message = "this comment is never closed: all that follows is part of it".to_owned();
+        let remedy = "write `*/` where it ends".to_owned();
+        return Err(Box::new(ScriptError::at(script.path.clone(), &script.text, at, message, remedy)));
     }
     engine.compile(&script.text).map_err(|error| fail(&error))
 }

@@ -35,7 +35,14 @@ pub(crate) fn is_result(name: &str) -> bool {
 /// # Errors
 /// [`SessionError::File`] if a directory cannot be created, [`SessionError::TooManyRuns`] after 999 of the same name.
 pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, SessionError> {
-    std::fs::create_dir_all(parent).map_err(SessionError::file("create", parent))?;
+    std::fs::create_dir_all(parent).map_err(|error| match error.kind() {
+        // A file, or a link to a place that does not exist.
+        ErrorKind::AlreadyExists => {
+            let why = "something else has the name of the directory for runs; remove it, or choose another directory";
+            SessionError::file("create", parent)(std::io::Error::new(ErrorKind::NotADirectory, why))
+        }
+        _ => SessionError::file("create", parent)(error),
+    })?;
     for attempt in 1..=999 {
         let suffix = if attempt == 1 { String::new() } else { format!("-{attempt}") };
         let path = parent.join(format!("{campaign}-{time}{suffix}"));

@@ -2,7 +2,7 @@
 
 use crate::bar_text::{run_words, short};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use mapper_core::StepMarker;
+use mapper_core::{StepMarker, terminal_text};
 use mapper_report::wrapped;
 use mapper_session::SessionEvent;
 use serde_json::json;
@@ -210,7 +210,9 @@ impl Shown {
                     short(marker.end_s - marker.start_s)
                 ));
             }
-            SessionEvent::Told(event) => self.bar.println(event_line(event.t_s, &event.message)),
+            SessionEvent::Told(event) => {
+                self.bar.println(terminal_text(&event_line(event.t_s, &event.message)))
+            }
             SessionEvent::Progress { done_ratio, what } => {
                 if *done_ratio > 0.0 || state.look == Some(WORK_BAR) {
                     self.look(state, WORK_BAR, Some(1000));

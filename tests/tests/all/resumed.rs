@@ -81,7 +81,7 @@ fn a_killed_search_for_surge_begins_its_line_again() {
 /// A journal that names steps as recorded which the recording does not hold: the recording decides, and they are run.
 #[test]
 fn what_the_journal_alone_says_is_run_again() {
-    let campaign = || short(&BY_ITSELF);
+    let campaign = || short(BY_ITSELF);
     let whole = campaign();
     let runs = whole.runs();
     mapper(["run".as_ref(), whole.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);

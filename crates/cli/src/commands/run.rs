@@ -73,7 +73,7 @@ impl Run {
         if self.pace.is_some_and(|pace| !(pace.is_finite() && pace > 0.0)) {
             return Err(Failure::new(Code::BadInput, "--pace takes a number above 0"));
         }
-        let parent = self.out.clone().unwrap_or_else(|| PathBuf::from(&campaign.outputs.directory));
+        let parent = self.out.clone().unwrap_or_else(|| in_home(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
         let (registry, stop, progress) =
             (registry::registry(), interrupt::run_stop()?, output_options::progress());
@@ -221,5 +221,14 @@ impl Run {
             rig.sample_rate_hz,
             would_write.display(),
         ))
+    }
+}
+
+/// A directory of a campaign, with `~` as in a shell.
+fn in_home(directory: &str) -> PathBuf {
+    let home = std::env::var_os("HOME").filter(|home| !home.is_empty());
+    match (directory.strip_prefix("~/"), home) {
+        (Some(rest), Some(home)) => PathBuf::from(home).join(rest),
+        _ => PathBuf::from(directory),
     }
 }

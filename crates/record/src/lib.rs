@@ -13,6 +13,7 @@ mod channel_map;
 mod channel_map_schema;
 mod channel_map_yaml;
 mod chunk;
+mod clock_steps;
 mod complaints;
 mod definitions;
 mod error;

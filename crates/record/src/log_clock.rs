@@ -7,10 +7,10 @@ pub(crate) const STRAY_S: f64 = 86_400.0;
 const LONGEST_S: f64 = 3.2e9;
 
 /// Intervals by which a clock may step back: loggers write some rows out of order.
-const BACK_INTERVALS: f64 = 5.0;
+pub(crate) const BACK_INTERVALS: f64 = 5.0;
 
 /// A clock may step back by this much in any case, s: it was set by another clock.
-const BACK_S: f64 = 2.0;
+pub(crate) const BACK_S: f64 = 2.0;
 
 /// Number of intervals that are kept.
 const REMEMBERED: usize = 15;

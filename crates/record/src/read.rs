@@ -1,5 +1,6 @@
 //! Reads a recording of this or another program.
 
+use crate::clock_steps::{repair_set_back, repair_set_forward};
 use crate::complaints::Complaints;
 use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
@@ -7,7 +8,7 @@ use crate::measured_valve::{hold, turns_share};
 use crate::plausibility::Readings;
 use crate::provenance::OriginMessage;
 use crate::read_options::ReadOptions;
-use crate::rig_sink::RigSink;
+use crate::rig_sink::{Placed, RigSink};
 use crate::scan::{Scanned, scan};
 use crate::series_builder::{SeriesBuilder, run_time_s};
 use crate::steps::{steps_from_commands, steps_from_markers};
@@ -186,6 +187,10 @@ fn report(
     if !map.is_native() {
         warnings.extend(missing(map, &builders));
     }
+    repair_set_back(&mut builders, &mut sink.steps, &mut sink.events, &mut warnings);
+    if let Some(start_time_ns) = sink.start_time_ns {
+        repair_set_forward(&mut builders, &mut sink.steps, start_time_ns, &mut warnings);
+    }
     let strays: Vec<(u64, u64)> = builders.values_mut().filter_map(SeriesBuilder::drop_strays).collect();
     let first_sample_ns = builders.values().filter_map(SeriesBuilder::first_time_ns).min();
     let zero_ns = sink.start_time_ns.or(first_sample_ns).unwrap_or(0);
@@ -196,7 +201,7 @@ fn report(
     let mut gathered = gather(map, builders, zero_ns, None, &mut warnings);
     complete(map, &mut gathered, &sink.units, None)?;
     let steps = if sink.format.is_some() || !sink.steps.is_empty() {
-        let markers = sink.steps.into_iter().map(|(log_time_ns, mut message)| {
+        let markers = sink.steps.into_iter().map(|Placed { log_time_ns, mut message, .. }| {
             if sink.start_time_ns.is_none() {
                 message.t_s = run_time_s(log_time_ns, zero_ns);
             }
@@ -207,7 +212,7 @@ fn report(
     } else {
         steps_without_marks(map, &mut gathered.series, &mut warnings)
     };
-    let events = sink.events.into_iter().map(|(log_time_ns, mut event)| {
+    let events = sink.events.into_iter().map(|Placed { log_time_ns, message: mut event, .. }| {
         if sink.start_time_ns.is_none() {
             event.t_s = run_time_s(log_time_ns, zero_ns);
         }

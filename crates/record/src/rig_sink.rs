@@ -48,6 +48,15 @@ pub(crate) enum SinkMessage {
     Damaged,
 }
 
+/// A message with its place in the file.
+#[derive(Debug)]
+pub(crate) struct Placed<T> {
+    /// Number of the message.
+    pub(crate) position: u64,
+    pub(crate) log_time_ns: u64,
+    pub(crate) message: T,
+}
+
 /// See the module.
 pub(crate) struct RigSink<'a> {
     path: &'a Path,
@@ -58,8 +67,8 @@ pub(crate) struct RigSink<'a> {
     series: Vec<(Reads, SeriesBuilder)>,
     /// Unit of each field that was mapped.
     pub(crate) units: BTreeMap<Reads, &'static Unit>,
-    pub(crate) steps: Vec<(u64, StepMessage)>,
-    pub(crate) events: Vec<(u64, Event)>,
+    pub(crate) steps: Vec<Placed<StepMessage>>,
+    pub(crate) events: Vec<Placed<Event>>,
     pub(crate) origins: Vec<(u64, OriginMessage)>,
     pub(crate) metadata: BTreeMap<String, String>,
     pub(crate) format: Option<FormatVersion>,
@@ -70,6 +79,8 @@ pub(crate) struct RigSink<'a> {
     pub(crate) failure: Option<RecordError>,
     damaged: BTreeMap<String, u64>,
     kept: u64,
+    /// Messages so far.
+    position: u64,
 }
 
 impl<'a> RigSink<'a> {
@@ -93,6 +104,7 @@ impl<'a> RigSink<'a> {
             failure: None,
             damaged: BTreeMap::new(),
             kept: 0,
+            position: 0,
         }
     }
 
@@ -178,14 +190,16 @@ impl Sink for RigSink<'_> {
 
     fn take(&mut self, channel_id: u16, log_time_ns: u64, content: SinkMessage) {
         let Some(topic) = self.topics.get(&channel_id) else { return };
+        self.position += 1;
+        let position = self.position;
         match (content, topic) {
             (SinkMessage::Samples(values), Topic::Mapped(_, builders)) => {
                 for (value, builder) in values.iter().zip(builders) {
                     let Some((_, builder)) = self.series.get_mut(*builder) else { continue };
                     match value {
-                        FieldValue::Number(value) => builder.push(log_time_ns, *value),
+                        FieldValue::Number(value) => builder.push_at(position, log_time_ns, *value),
                         FieldValue::Other => {
-                            builder.push(log_time_ns, f64::NAN);
+                            builder.push_at(position, log_time_ns, f64::NAN);
                             builder.not_numbers += 1;
                         }
                         FieldValue::Absent => continue,
@@ -195,7 +209,7 @@ impl Sink for RigSink<'_> {
             }
             (SinkMessage::Step(step), _) => {
                 self.kept += values_of(size_of::<StepMessage>());
-                self.steps.push((log_time_ns, step));
+                self.steps.push(Placed { position, log_time_ns, message: step });
             }
             (SinkMessage::Origins(origins, bytes), _) => {
                 self.kept += values_of(bytes);
@@ -203,7 +217,7 @@ impl Sink for RigSink<'_> {
             }
             (SinkMessage::Event(event, bytes), _) => {
                 self.kept += values_of(size_of::<Event>() + bytes);
-                self.events.push((log_time_ns, event));
+                self.events.push(Placed { position, log_time_ns, message: event });
             }
             (SinkMessage::Damaged | SinkMessage::Samples(_), topic) => {
                 *self.damaged.entry(topic.name().to_owned()).or_default() += 1;

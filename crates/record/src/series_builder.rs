@@ -1,8 +1,30 @@
 //! Samples of one channel in the order of the file, and the series made of them.
 
 use crate::ReadWarning;
-use crate::log_clock::STRAY_S;
+use crate::log_clock::{BACK_INTERVALS, BACK_S, STRAY_S};
 use mapper_core::{Channel, Series};
+
+/// A clock that goes back by less is late messages, ns: the same limit as for the clocks of logs.
+const BACK_NS: u64 = (BACK_S * 1e9) as u64;
+
+/// Maximum number of breaks that are kept: a file whose times go back more often has no clock that was set.
+const BREAK_LIMIT: usize = 100;
+
+/// Samples before a break whose shortest interval is that of the channel.
+const RECENT: usize = 6;
+
+/// A place in the file at which the times of a channel go back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Break {
+    /// Number of the message in the file.
+    pub(crate) position: u64,
+    /// Index of the sample.
+    index: usize,
+    /// By how much, ns.
+    pub(crate) back_ns: u64,
+    /// Shortest time between the last samples before it, ns.
+    pub(crate) interval_ns: Option<u64>,
+}
 
 /// Collects the samples of one channel.
 #[derive(Debug, Default)]
@@ -10,12 +32,86 @@ pub(crate) struct SeriesBuilder {
     times_ns: Vec<u64>,
     values: Vec<f64>,
     pub(crate) not_numbers: u64,
+    breaks: Vec<Break>,
+    /// Numbers of the first and the last message.
+    positions: (u64, u64),
 }
 
 impl SeriesBuilder {
     pub(crate) fn push(&mut self, time_ns: u64, value: f64) {
         self.times_ns.push(time_ns);
         self.values.push(value);
+    }
+
+    /// Takes a sample of the message with this number.
+    pub(crate) fn push_at(&mut self, position: u64, time_ns: u64, value: f64) {
+        if let Some(last_ns) = self.times_ns.last() {
+            let back_ns = last_ns.saturating_sub(time_ns);
+            if back_ns > BACK_NS && self.breaks.len() < BREAK_LIMIT {
+                let recent =
+                    self.times_ns.get(self.times_ns.len().saturating_sub(RECENT)..).unwrap_or_default();
+                let interval_ns = recent.windows(2).filter_map(|pair| pair[1].checked_sub(pair[0])).min();
+                self.breaks.push(Break { position, index: self.times_ns.len(), back_ns, interval_ns });
+            }
+        } else {
+            self.positions.0 = position;
+        }
+        self.positions.1 = position;
+        self.push(time_ns, value);
+    }
+
+    /// Places at which the times go back.
+    pub(crate) fn breaks(&self) -> &[Break] {
+        &self.breaks
+    }
+
+    /// Whether times go on from a break without a jump forward until they have caught up: a late message or packet jumps.
+    pub(crate) fn goes_on_from(&self, found: &Break) -> bool {
+        let Some(before_ns) = found.index.checked_sub(1).and_then(|at| self.times_ns.get(at)) else {
+            return false;
+        };
+        let limit_ns = BACK_NS.max(BACK_INTERVALS as u64 * found.interval_ns.unwrap_or(0));
+        let after = self.times_ns.get(found.index..).unwrap_or_default();
+        let behind = after.iter().take_while(|time_ns| *time_ns < before_ns).count();
+        after
+            .iter()
+            .take(behind + 1)
+            .zip(after.iter().skip(1).take(behind))
+            .all(|(time, next)| next.saturating_sub(*time) <= limit_ns)
+    }
+
+    /// Numbers of the first and the last message.
+    pub(crate) fn positions(&self) -> (u64, u64) {
+        self.positions
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.times_ns.len()
+    }
+
+    /// Moves the samples from a message on, of which this channel has a break there or its first sample.
+    pub(crate) fn move_later(&mut self, position: u64, by_ns: u64) {
+        let from = match self.breaks.iter().find(|found| found.position >= position) {
+            _ if self.positions.0 >= position => 0,
+            Some(found) => found.index,
+            None => return,
+        };
+        for time_ns in self.times_ns.iter_mut().skip(from) {
+            *time_ns = time_ns.saturating_add(by_ns);
+        }
+    }
+
+    /// Moves the samples behind a gap of at least `by_ns` between two times back by it.
+    pub(crate) fn close_gap(&mut self, from_ns: u64, to_ns: u64, by_ns: u64, tolerance_ns: u64) {
+        let gap = |pair: &[u64]| {
+            pair[0] >= from_ns.saturating_sub(tolerance_ns)
+                && pair[1] <= to_ns.saturating_add(tolerance_ns)
+                && pair[1].saturating_sub(pair[0]) + tolerance_ns >= by_ns
+        };
+        let Some(before) = self.times_ns.windows(2).position(gap) else { return };
+        for time_ns in self.times_ns.iter_mut().skip(before + 1) {
+            *time_ns = time_ns.saturating_sub(by_ns);
+        }
     }
 
     pub(crate) fn is_empty(&self) -> bool {

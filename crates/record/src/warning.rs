@@ -106,6 +106,14 @@ pub enum ReadWarning {
         /// Samples with the time of another one.
         repeated: usize,
     },
+    /// The clock was set while it recorded.
+    #[error(
+        "the clock was set by {by_s:+.1} s while it recorded: the times after that were moved by as much"
+    )]
+    ClockSet {
+        /// By how much, s; positive: forward.
+        by_s: f64,
+    },
     /// More messages and other records than the reader takes.
     #[error("only the first {limit} messages and other records were read")]
     TooManyMessages {

@@ -1,0 +1,84 @@
+//! Recordings whose clock was set while they were made.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use mapper_core::Channel;
+use mapper_record::{ChannelMap, ReadOptions, ReadWarning, read_recording_from};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const S: u64 = 1_000_000_000;
+
+/// A recording of two topics at 10 Hz with these times, s, of its rows: values count the rows.
+fn read(times_ns: &[u64]) -> (BTreeMap<Channel, mapper_core::Series>, Vec<ReadWarning>) {
+    let mut file = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::WriteOptions::new().compression(None).create(&mut file).unwrap();
+    let schema = writer.add_schema("rig", "jsonschema", b"{}").unwrap();
+    let topics =
+        ["/a", "/b"].map(|topic| writer.add_channel(schema, topic, "json", &BTreeMap::new()).unwrap());
+    for (row, time_ns) in times_ns.iter().enumerate() {
+        for channel_id in topics {
+            let header = mcap::records::MessageHeader {
+                channel_id,
+                sequence: 0,
+                log_time: *time_ns + u64::from(channel_id) * 1000,
+                publish_time: *time_ns,
+            };
+            writer.write_to_known_channel(&header, format!("{{\"x\": {row}}}").as_bytes()).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    let map = "channels:\n  T2: {topic: /a, field: x, unit: K}\n  N: {topic: /b, field: x, unit: rpm}\n\
+               constants: {T_amb: 25 degC}\n";
+    let map = ChannelMap::from_yaml(map, Path::new("map.yaml")).unwrap();
+    let file = file.into_inner();
+    let report = read_recording_from(&file, Path::new("test.mcap"), &map, &ReadOptions::default()).unwrap();
+    (report.recording.series, report.warnings)
+}
+
+fn set_by(warnings: &[ReadWarning]) -> Vec<f64> {
+    let by = warnings.iter().filter_map(|warning| match warning {
+        ReadWarning::ClockSet { by_s } => Some(*by_s),
+        _ => None,
+    });
+    by.collect()
+}
+
+#[test]
+fn a_clock_that_is_set_back_loses_no_reading() {
+    for back_s in [3, 100, 3600] {
+        // Values are temperatures in K: from 300 on.
+        let times: Vec<u64> =
+            (0..4000).map(|row| (10_000 - if row < 2000 { 0 } else { back_s }) * S + row * S / 10).collect();
+        let (series, warnings) = read(&times);
+        assert_eq!(set_by(&warnings), [-(back_s as f64)]);
+        for channel in [Channel::T2, Channel::ShaftSpeed] {
+            let series = &series[&channel];
+            assert_eq!(series.t_s.len(), 4000);
+            let right = series.t_s.iter().zip(&series.values).enumerate().all(|(row, (t_s, value))| {
+                // The two topics are a microsecond apart.
+                (t_s - row as f64 / 10.0).abs() < 1e-5 && *value == row as f64
+            });
+            assert!(right, "{channel} after {back_s} s");
+        }
+    }
+}
+
+#[test]
+fn late_messages_are_no_set_clock() {
+    let even: Vec<u64> = (0..4000).map(|row| 10_000 * S + row * S / 10).collect();
+    // One message that is late, a packet of five seconds that is, and a clock that was lost for one message.
+    let mut late = even.clone();
+    late.swap(2000, 2100);
+    let mut packet = even.clone();
+    packet[2000..2100].rotate_left(50);
+    let mut lost = even.clone();
+    lost[2000] = 5_000 * S;
+    for (what, times) in [("late", late), ("packet", packet), ("lost", lost)] {
+        let (series, warnings) = read(&times);
+        assert!(set_by(&warnings).is_empty(), "{what}: {warnings:?}");
+        // The last row is where it was.
+        let series = &series[&Channel::T2];
+        assert_eq!(series.values.last(), Some(&3999.0), "{what}");
+    }
+}

@@ -36,8 +36,19 @@ class Diagnosis:
 
     @property
     def causes(self) -> pd.DataFrame:
-        """Candidate causes, best first."""
-        return _tables.table(self.json["candidates"])
+        """Candidate causes, best first: what it is, its probability, its size, and causes that cannot be distinguished from it.
+
+        The values of its parameters with their intervals are in ``json["candidates"]``.
+        """
+        columns = ["cause", "probability", "size", "effects", "equivalent"]
+        rows = []
+        for candidate in self.json["candidates"]:
+            sizes = [f"{key} {value['size']}" for key, value in candidate["parameters"].items()]
+            row = {"cause": " and ".join(candidate["names"]), "size": ", ".join(sizes)}
+            rows.append(row | {key: candidate[key] for key in ("probability", "effects", "equivalent")})
+        frame = pd.DataFrame(rows, columns=columns)
+        frame.attrs["units"] = {"probability": "1"}
+        return frame
 
     @property
     def places(self) -> pd.DataFrame:

@@ -55,16 +55,18 @@ class _Bar:
         kind = event["event"]
         if kind == "run_started":
             self._duration_s = event["duration_s"]
-            self._bar.set_description("run")
+            self._bar.set_description("run", refresh=False)
         elif kind == "rig_time" and self._duration_s > 0.0:
             self._move(event["t_s"] / self._duration_s)
         elif kind == "progress":
-            self._bar.set_description(event["what"])
+            self._bar.set_description(event["what"], refresh=False)
             self._move(event["done_ratio"])
 
     def _move(self, done_ratio: float) -> None:
-        self._bar.n = min(done_ratio, 1.0)
-        self._bar.refresh()
+        # tqdm draws at its own interval. A second phase begins at 0 again.
+        if done_ratio < self._bar.n:
+            self._bar.reset()
+        self._bar.update(min(done_ratio, 1.0) - self._bar.n)
 
 
 def observer(shown: Progress) -> Callable[[str], None] | None:

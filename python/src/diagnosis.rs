@@ -26,12 +26,12 @@ pub fn diagnose(
         let registry = registry();
         let effects = registry.effects_with(&effects)?;
         let given = Some(&campaign.campaign);
-        let read = source.read(given)?;
+        let read = source.with(given)?;
         let [recorded] = read.as_slice() else {
             let message = "a resumed run has several recordings; diagnose one of its files";
             return Err(Fault::Argument(message.to_owned()));
         };
-        let healthy = healthy.map(|source| source.read(given)).transpose()?;
+        let healthy = healthy.map(|source| source.with(given)).transpose()?;
         let healthy = healthy.as_ref().and_then(|read| read.first());
         let on_event = |event: &_| events.show(event);
         let session = Session { on_event: &on_event, ..Session::new(&registry) };

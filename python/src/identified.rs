@@ -59,7 +59,7 @@ pub fn identify(
             return Err(Fault::Argument(message.to_owned()));
         }
         let method = method.map(named_method).transpose()?;
-        let runs = sources.iter().map(|source| source.read(given)).collect::<Result<Vec<_>, _>>()?;
+        let runs = sources.iter().map(|source| source.with(given)).collect::<Result<Vec<_>, _>>()?;
         let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
         let path = recorded.first().map(|first| first.path.clone());
         let warnings: Vec<String> =

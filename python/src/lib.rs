@@ -9,6 +9,7 @@ mod attended;
 mod campaign;
 mod diagnosis;
 mod error;
+mod frame;
 mod identified;
 mod map;
 mod recording;

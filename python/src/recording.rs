@@ -4,7 +4,7 @@ use crate::attended::compute;
 use crate::error::Fault;
 use crate::registry::registry;
 use mapper_campaign::Campaign as Checked;
-use mapper_core::Channel;
+use mapper_core::{Channel, Series};
 use mapper_record::{ChannelMap, ChannelMapError};
 use mapper_session::{Recorded, SessionError, channel_map};
 use pyo3::prelude::*;
@@ -18,19 +18,39 @@ use std::sync::Arc;
 pub struct Recording {
     pub(crate) source: Arc<Source>,
     summary: String,
-    series: Vec<(Channel, Vec<f64>, Vec<f64>)>,
 }
 
-/// Where a recording comes from.
+/// Where a recording comes from, and its contents.
 pub struct Source {
     path: PathBuf,
     pub(crate) map: ChannelMap,
+    recorded: Vec<Recorded>,
 }
 
 impl Source {
-    /// Reads it as the command does.
-    pub fn read(&self, given: Option<&Checked>) -> Result<Vec<Recorded>, SessionError> {
-        Recorded::read_run(&registry(), &self.path, &self.map, given)
+    fn new(path: PathBuf, map: ChannelMap) -> Result<Self, SessionError> {
+        let recorded = Recorded::read_run(&registry(), &path, &map, None)?;
+        Ok(Source { path, map, recorded })
+    }
+
+    /// The recordings with a given campaign in place of their own.
+    pub fn with(&self, given: Option<&Checked>) -> Result<Vec<Recorded>, SessionError> {
+        // Which steps of a resumed run count depends on the campaign.
+        if given.is_some() && self.recorded.len() > 1 {
+            return Recorded::read_run(&registry(), &self.path, &self.map, given);
+        }
+        let copy = |one: &Recorded| Recorded {
+            path: one.path.clone(),
+            read: one.read.clone(),
+            campaign: given.or(one.campaign.as_ref()).cloned(),
+            approaches: one.approaches.clone(),
+        };
+        Ok(self.recorded.iter().map(copy).collect())
+    }
+
+    /// The samples of the first recording.
+    fn series(&self) -> impl Iterator<Item = (&Channel, &Series)> {
+        self.recorded.iter().take(1).flat_map(|first| &first.read.recording.series)
     }
 }
 
@@ -57,27 +77,22 @@ impl Recording {
     ) -> PyResult<Recording> {
         compute(py, None, move |_| {
             let map = map_of(channels.as_deref(), channels_text.as_deref())?;
-            let source = Source { path, map };
-            let read = source.read(None)?;
+            let source = Source::new(path, map)?;
+            let read = &source.recorded;
             let first = read.first().ok_or(SessionError::NoRecording)?;
-            let recording = &first.read.recording;
             let warnings: Vec<String> =
                 read.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();
             let steps: Vec<_> = read.iter().flat_map(|one| &one.read.recording.steps).collect();
+            let events: Vec<_> = read.iter().flat_map(|one| &one.read.recording.events).collect();
             let summary = json!({
                 "path": first.path,
                 "start_time_ns": first.read.start_time_ns,
-                "has_campaign": first.campaign.is_some(),
                 "metadata": first.read.metadata,
                 "warnings": warnings,
                 "steps": steps,
-                "events": recording.events,
+                "events": events,
             });
-            let series = recording
-                .series
-                .iter()
-                .map(|(channel, series)| (*channel, series.t_s.clone(), series.values.clone()));
-            Ok(Recording { summary: summary.to_string(), series: series.collect(), source: Arc::new(source) })
+            Ok(Recording { summary: summary.to_string(), source: Arc::new(source) })
         })
     }
 
@@ -90,7 +105,7 @@ impl Recording {
     /// Symbol and unit of each channel.
     #[getter]
     fn channels(&self) -> Vec<(&'static str, &'static str)> {
-        self.series.iter().map(|(channel, ..)| (channel.symbol(), channel.unit())).collect()
+        self.source.series().map(|(channel, _)| (channel.symbol(), channel.unit())).collect()
     }
 
     /// Times, s, and values of a channel in SI units, as native 64-bit floats.
@@ -99,16 +114,21 @@ impl Recording {
         py: Python<'py>,
         symbol: &str,
     ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
-        let found = self.series.iter().find(|(channel, ..)| channel.symbol() == symbol);
-        let (_, t_s, values) = found.ok_or_else(|| {
-            let known: Vec<&str> = self.series.iter().map(|(channel, ..)| channel.symbol()).collect();
+        let found = self.source.series().find(|(channel, _)| channel.symbol() == symbol);
+        let (_, series) = found.ok_or_else(|| {
+            let known: Vec<&str> = self.source.series().map(|(channel, _)| channel.symbol()).collect();
             Fault::Argument(format!("the recording has no channel `{symbol}`; it has {}", known.join(", ")))
         })?;
-        Ok((floats(py, t_s), floats(py, values)))
+        Ok((floats(py, &series.t_s)?, floats(py, &series.values)?))
     }
 }
 
-fn floats<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyBytes> {
-    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
-    PyBytes::new(py, &bytes)
+/// Copies numbers once, into memory of Python that NumPy then uses as it is.
+fn floats<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyBytes>> {
+    PyBytes::new_with(py, size_of_val(values), |bytes| {
+        for (cell, value) in bytes.chunks_exact_mut(size_of::<f64>()).zip(values) {
+            cell.copy_from_slice(&value.to_ne_bytes());
+        }
+        Ok(())
+    })
 }

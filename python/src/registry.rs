@@ -1,9 +1,9 @@
 //! The one place of the package that names plug-ins.
 
+use crate::frame::log_formats;
 use mapper_backends::BACKENDS;
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
-use mapper_log_formats::LOG_FORMATS;
 use mapper_physics::effect::Effect;
 use mapper_session::{Registry, SessionError};
 use std::path::Path;
@@ -17,7 +17,7 @@ pub fn registry() -> Registry {
         effects: mapper_effects::catalogue(),
         read_effect,
         formats: FORMATS,
-        logs: LOG_FORMATS,
+        logs: log_formats(),
         commit: "",
     }
 }

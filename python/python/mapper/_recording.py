@@ -10,12 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from mapper import _mapper, _tables
-
-# Name of the clock in the table that a DataFrame becomes; no channel has it.
-_CLOCK = "t"
 
 
 class Recording:
@@ -80,7 +78,8 @@ class Recording:
         RecordingError
             A column is missing, or a unit is wrong; line and caret refer to the channel map as indented JSON.
         """
-        columns: dict[str, pd.Series[float]] = {_CLOCK: _seconds(frame, time)}
+        t_s, start_time_ns = _clock(frame, time)
+        columns: dict[str, npt.NDArray[np.float64]] = {}
         sources = {}
         for symbol, source in channels.items():
             sources[symbol] = _source(frame, symbol, source, columns)
@@ -90,12 +89,12 @@ class Recording:
             mapping["ambient_pressure"] = _source(frame, "ambient", ambient_pressure, columns)
         elif ambient_pressure is not None:
             mapping["ambient_pressure"] = ambient_pressure
-        # All that looking at a log would find.
-        mapping["log"] = {"separator": ",", "decimal": ".", "names_row": 1, "units_row": 0, "data_row": 2}
-        mapping["log"].update({"time": _CLOCK, "time_unit": "s"})
         directory = TemporaryDirectory(prefix="mapper-")
-        file = Path(directory.name) / "frame.csv"
-        pd.DataFrame(columns).to_csv(file, index=False)
+        file = Path(directory.name) / "DataFrame"
+        header = json.dumps({"columns": list(columns), "start_time_ns": start_time_ns})
+        with file.open("wb") as out:
+            out.write(b"mapper DataFrame\n" + header.encode() + b"\n")
+            np.column_stack([t_s, *columns.values()]).tofile(out)
         text = json.dumps(mapping, indent=2, ensure_ascii=False)
         return cls(_mapper.Recording.read(file, Path("channels.yaml"), text), directory)
 
@@ -139,8 +138,8 @@ class Recording:
         return f"Recording({path!r}, {len(self._units)} channels, {len(self._summary['steps'])} steps)"
 
 
-def _seconds(frame: pd.DataFrame, time: str | None) -> pd.Series[float]:
-    """Return the time of each row, s."""
+def _clock(frame: pd.DataFrame, time: str | None) -> tuple[npt.NDArray[np.float64], int | None]:
+    """Return the time of each row, s, and the date of time 0, ns since 1970-01-01 UTC."""
     if time is not None:
         if time not in frame:
             raise _mapper.RecordingError(f"the DataFrame has no column `{time}` for the time")
@@ -149,11 +148,23 @@ def _seconds(frame: pd.DataFrame, time: str | None) -> pd.Series[float]:
         raise _mapper.RecordingError("the rows have numbers and no times; name the column of the time with `time=`")
     else:
         clock = frame.index.to_series().reset_index(drop=True)
+    start_time_ns = None
     if pd.api.types.is_datetime64_any_dtype(clock.dtype):
-        clock = clock - clock.iloc[0]
+        start = clock.min()
+        start_time_ns = None if pd.isna(start) else int(start.value)
+        clock = clock - start
     if pd.api.types.is_timedelta64_dtype(clock.dtype):
         clock = clock.dt.total_seconds()
-    return clock.astype("float64")
+    return _numbers(clock, "time"), start_time_ns
+
+
+def _numbers(column: pd.Series[Any], symbol: str) -> npt.NDArray[np.float64]:
+    """Return the values of a column; empty cells are NaN."""
+    try:
+        return column.to_numpy(dtype=np.float64, na_value=np.nan)
+    except (TypeError, ValueError) as error:
+        message = f"{symbol}: column `{column.name}` has values that are not numbers: {error}"
+        raise _mapper.RecordingError(message) from error
 
 
 def _column(frame: pd.DataFrame, text: object) -> tuple[str, str | None] | None:
@@ -169,7 +180,7 @@ def _column(frame: pd.DataFrame, text: object) -> tuple[str, str | None] | None:
 
 
 def _source(
-    frame: pd.DataFrame, symbol: str, source: str | Mapping[str, Any], columns: dict[str, pd.Series[float]]
+    frame: pd.DataFrame, symbol: str, source: str | Mapping[str, Any], columns: dict[str, npt.NDArray[np.float64]]
 ) -> dict[str, Any]:
     """Copy the column of a channel and return its line of the channel map."""
     rest = {} if isinstance(source, str) else {key: value for key, value in source.items() if key != "column"}
@@ -179,8 +190,5 @@ def _source(
         known = ", ".join(str(column) for column in frame.columns)
         raise _mapper.RecordingError(f"{symbol}: the DataFrame has no column `{named}`; it has {known}")
     column, unit = found
-    try:
-        columns[symbol] = frame[column].reset_index(drop=True).astype("float64")
-    except (TypeError, ValueError) as error:
-        raise _mapper.RecordingError(f"{symbol}: column `{column}` has values that are not numbers: {error}") from error
+    columns[symbol] = _numbers(frame[column], symbol)
     return {"field": symbol, **({} if unit is None else {"unit": unit}), **rest}

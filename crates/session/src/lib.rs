@@ -121,7 +121,7 @@ pub use recorded::{Recorded, channel_map};
 pub use recording_metadata::start_time_ns;
 pub use registry::{MakeDriver, ReadEffect, Registry};
 pub use rehearsal::{Rehearsal, rehearse};
-pub use results::Results;
+pub use results::{Results, compressor_map};
 pub use resume::BrokenOff;
 pub use rig_files::RigFiles;
 pub use rig_state::{Latch, Owner, RigStates, RigStatus};

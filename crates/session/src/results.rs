@@ -402,8 +402,8 @@ fn remarks_of(recorded: &Recorded, several: bool) -> Vec<String> {
     recorded.read.warnings.iter().map(named).collect()
 }
 
-/// The map of all points with map coordinates, with a fitted surface if there are enough of them.
-fn compressor_map(
+/// The map of all points with map coordinates, with a fitted surface if there are enough of them. `None` without a map; a remark says why.
+pub fn compressor_map(
     machine: &str,
     identified: &Identified,
     remarks: &mut Vec<String>,

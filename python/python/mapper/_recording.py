@@ -1,0 +1,194 @@
+"""Recordings."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from mapper import _mapper, _tables
+
+
+class Recording:
+    """Samples, steps and events of a rig, in SI units.
+
+    Made by :meth:`read` or :meth:`from_frame`.
+    """
+
+    def __init__(self, inner: _mapper.Recording, directory: TemporaryDirectory[str] | None = None) -> None:
+        self._inner = inner
+        # The file of a DataFrame lives as long as its recording.
+        self._directory = directory
+        self._summary: dict[str, Any] = json.loads(inner.summary)
+        self._units: dict[str, str] = dict(inner.channels)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], channels: str | os.PathLike[str] | None = None) -> Recording:
+        """Read a run directory, an MCAP file or a log of another program.
+
+        Parameters
+        ----------
+        path
+            Run directory, MCAP file, CSV, Excel or MDF 4 log.
+        channels
+            Channel map (YAML): which column of a log is which channel. Recordings of this program need none.
+
+        Raises
+        ------
+        RecordingError
+            The recording cannot be read, or the channel map has mistakes, shown with line and caret.
+        """
+        return cls(_mapper.Recording.read(Path(path), None if channels is None else Path(channels)))
+
+    @classmethod
+    def from_frame(
+        cls,
+        frame: pd.DataFrame,
+        channels: Mapping[str, str | Mapping[str, Any]],
+        *,
+        time: str | None = None,
+        ambient_pressure: str | Mapping[str, Any] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> Recording:
+        """Take the samples of a DataFrame, by the same import as a log file.
+
+        Parameters
+        ----------
+        frame
+            One row per sample.
+        channels
+            For each channel (``N``, ``m_c``, ``P1``, ``T1``, ``P2``, ``T2``, ``Tc``, ...) its column with its unit: ``"T_out [degC]"``. Gauge
+            pressures and other settings: ``{"column": "p2", "unit": "kPa", "gauge": True}``.
+        time
+            Column with the time: seconds, dates or durations. The index by default, if it is not a plain row number.
+        ambient_pressure
+            Reference of gauge pressures: a value (``"98.7 kPa"``), or a column as for ``channels``.
+        options
+            Further keys of a channel map: ``machine``, ``sensors``, ``window``, ``reference``.
+
+        Raises
+        ------
+        RecordingError
+            A column is missing, or a unit is wrong; line and caret refer to the channel map as indented JSON.
+        """
+        t_s, start_time_ns = _clock(frame, time)
+        columns: dict[str, npt.NDArray[np.float64]] = {}
+        sources = {}
+        for symbol, source in channels.items():
+            sources[symbol] = _source(frame, symbol, source, columns)
+        mapping: dict[str, Any] = {"channels": sources, **(options or {})}
+        if isinstance(ambient_pressure, Mapping) or _column(frame, ambient_pressure) is not None:
+            assert ambient_pressure is not None
+            mapping["ambient_pressure"] = _source(frame, "ambient", ambient_pressure, columns)
+        elif ambient_pressure is not None:
+            mapping["ambient_pressure"] = ambient_pressure
+        directory = TemporaryDirectory(prefix="mapper-")
+        file = Path(directory.name) / "DataFrame"
+        header = json.dumps({"columns": list(columns), "start_time_ns": start_time_ns})
+        with file.open("wb") as out:
+            out.write(b"mapper DataFrame\n" + header.encode() + b"\n")
+            np.column_stack([t_s, *columns.values()]).tofile(out)
+        text = json.dumps(mapping, indent=2, ensure_ascii=False)
+        return cls(_mapper.Recording.read(file, Path("channels.yaml"), text), directory)
+
+    @property
+    def channels(self) -> dict[str, str]:
+        """Unit of each channel, by symbol."""
+        return dict(self._units)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Problems of the file; empty for an intact one."""
+        return list(self._summary["warnings"])
+
+    @property
+    def events(self) -> pd.DataFrame:
+        """Events of the run: tripped guards, stops, the safe state; times in s."""
+        return _tables.table(self._summary["events"])
+
+    @property
+    def steps(self) -> pd.DataFrame:
+        """The steps: times in s, speeds in rpm, pressures in Pa."""
+        return _tables.table(self._summary["steps"], "step")
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """All channels in SI units over the run time, s."""
+        frame = pd.concat({symbol: self[symbol] for symbol in self._units}, axis=1)
+        frame.attrs["units"] = self.channels
+        return frame
+
+    def __getitem__(self, symbol: str) -> pd.Series[float]:
+        """Return the samples of a channel in its SI unit (rpm for speed) over the run time, s."""
+        t_s, values = (np.frombuffer(data) for data in self._inner.samples(symbol))
+        series = pd.Series(values, index=pd.Index(t_s, name="t_s"), name=symbol)
+        series.attrs["units"] = self._units[symbol]
+        return series
+
+    def __repr__(self) -> str:
+        """Return a line on the recording."""
+        path = "DataFrame" if self._directory is not None else self._summary["path"]
+        return f"Recording({path!r}, {len(self._units)} channels, {len(self._summary['steps'])} steps)"
+
+
+def _clock(frame: pd.DataFrame, time: str | None) -> tuple[npt.NDArray[np.float64], int | None]:
+    """Return the time of each row, s, and the date of time 0, ns since 1970-01-01 UTC."""
+    if time is not None:
+        if time not in frame:
+            raise _mapper.RecordingError(f"the DataFrame has no column `{time}` for the time")
+        clock = frame[time].reset_index(drop=True)
+    elif isinstance(frame.index, pd.RangeIndex) and frame.index.name is None:
+        raise _mapper.RecordingError("the rows have numbers and no times; name the column of the time with `time=`")
+    else:
+        clock = frame.index.to_series().reset_index(drop=True)
+    start_time_ns = None
+    if pd.api.types.is_datetime64_any_dtype(clock.dtype):
+        start = clock.min()
+        start_time_ns = None if pd.isna(start) else int(start.value)
+        clock = clock - start
+    if pd.api.types.is_timedelta64_dtype(clock.dtype):
+        clock = clock.dt.total_seconds()
+    return _numbers(clock, "time"), start_time_ns
+
+
+def _numbers(column: pd.Series[Any], symbol: str) -> npt.NDArray[np.float64]:
+    """Return the values of a column; empty cells are NaN."""
+    try:
+        return column.to_numpy(dtype=np.float64, na_value=np.nan)
+    except (TypeError, ValueError) as error:
+        message = f"{symbol}: column `{column.name}` has values that are not numbers: {error}"
+        raise _mapper.RecordingError(message) from error
+
+
+def _column(frame: pd.DataFrame, text: object) -> tuple[str, str | None] | None:
+    """Return column and unit of ``name [unit]``; None if there is no such column."""
+    if not isinstance(text, str):
+        return None
+    name, bracket, unit = text.removesuffix("]").rpartition("[")
+    if bracket:
+        for column in (text, name.strip()):
+            if column in frame:
+                return column, unit.strip()
+    return (text, None) if text in frame else None
+
+
+def _source(
+    frame: pd.DataFrame, symbol: str, source: str | Mapping[str, Any], columns: dict[str, npt.NDArray[np.float64]]
+) -> dict[str, Any]:
+    """Copy the column of a channel and return its line of the channel map."""
+    rest = {} if isinstance(source, str) else {key: value for key, value in source.items() if key != "column"}
+    named = source if isinstance(source, str) else source.get("column")
+    found = _column(frame, named)
+    if found is None:
+        known = ", ".join(str(column) for column in frame.columns)
+        raise _mapper.RecordingError(f"{symbol}: the DataFrame has no column `{named}`; it has {known}")
+    column, unit = found
+    columns[symbol] = _numbers(frame[column], symbol)
+    return {"field": symbol, **({} if unit is None else {"unit": unit}), **rest}

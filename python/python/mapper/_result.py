@@ -1,0 +1,98 @@
+"""Identification."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from mapper import _mapper, _tables
+from mapper._campaign import Campaign
+from mapper._map import Map
+from mapper._recording import Recording
+from mapper._run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Result:
+    """Identified points.
+
+    Attributes
+    ----------
+    json : dict
+        What ``mapper identify --json`` prints.
+    """
+
+    def __init__(self, inner: _mapper.Identified) -> None:
+        self._inner = inner
+        self.json: dict[str, Any] = json.loads(inner.json)
+
+    @property
+    def points(self) -> pd.DataFrame:
+        """The points, by the number of their step.
+
+        Speeds in rpm, flows in kg/s, temperatures in K, pressures in Pa; ``eta`` is the isentropic efficiency, fraction, and ``h_w_m2k``
+        the heat-transfer coefficient, W/(m^2 K), each with its 95 % interval. ``attrs["units"]`` has all units.
+        """
+        return _tables.table(self.json["points"], "step", _tables.POINT)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Remarks of the identification, and warnings of the reader."""
+        return [*self.json["recording_warnings"], *self.json["remarks"]]
+
+    @cached_property
+    def map(self) -> Map:
+        """The map of the points, with a fitted surface if there are enough of them.
+
+        Raises
+        ------
+        IdentificationError
+            The points do not make a map; the message says why.
+        """
+        return Map(self._inner.map())
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the map of the points."""
+        return self.map.plot(ax)
+
+    def __repr__(self) -> str:
+        """Return a line on the result."""
+        good = sum(point["verdict"] == "good" for point in self.json["points"])
+        return f"Result({len(self.json['points'])} points, {good} good)"
+
+    def _repr_html_(self) -> str:
+        columns = ["speed_rpm", "flow_kg_s", "pressure_ratio", "eta", "eta_low", "eta_high"]
+        return _tables.html(self.points, [*columns, "h_w_m2k", "h_low_w_m2k", "h_high_w_m2k", "verdict"], repr(self))
+
+
+def identify(
+    recordings: Recording | Run | Sequence[Recording | Run],
+    campaign: Campaign | None = None,
+    *,
+    method: str | None = None,
+) -> Result:
+    """Identify efficiency and heat transfer from recordings, as ``mapper identify`` does.
+
+    Parameters
+    ----------
+    recordings
+        A recording or run; several of the same machine are identified together.
+    campaign
+        Campaign with machine, sensors and window, instead of the one in the recording.
+    method
+        ``steady``, ``dynamic`` or ``joint``; the campaign's by default.
+
+    Raises
+    ------
+    IdentificationError
+        The recording does not contain the required data, or its machine is unknown.
+    """
+    given = [recordings] if isinstance(recordings, (Recording, Run)) else list(recordings)
+    read = [(one.recording if isinstance(one, Run) else one)._inner for one in given]
+    return Result(_mapper.identify(read, None if campaign is None else campaign._inner, method))

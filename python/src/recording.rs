@@ -1,0 +1,134 @@
+//! Recordings and how they are read.
+
+use crate::attended::compute;
+use crate::error::Fault;
+use crate::registry::registry;
+use mapper_campaign::Campaign as Checked;
+use mapper_core::{Channel, Series};
+use mapper_record::{ChannelMap, ChannelMapError};
+use mapper_session::{Recorded, SessionError, channel_map};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A run directory, an MCAP file or a log of another program, with its channel map.
+#[pyclass(frozen, module = "mapper._mapper")]
+pub struct Recording {
+    pub(crate) source: Arc<Source>,
+    summary: String,
+}
+
+/// Where a recording comes from, and its contents.
+pub struct Source {
+    path: PathBuf,
+    pub(crate) map: ChannelMap,
+    recorded: Vec<Recorded>,
+}
+
+impl Source {
+    fn new(path: PathBuf, map: ChannelMap) -> Result<Self, SessionError> {
+        let recorded = Recorded::read_run(&registry(), &path, &map, None)?;
+        Ok(Source { path, map, recorded })
+    }
+
+    /// The recordings with a given campaign in place of their own.
+    pub fn with(&self, given: Option<&Checked>) -> Result<Vec<Recorded>, SessionError> {
+        // Which steps of a resumed run count depends on the campaign.
+        if given.is_some() && self.recorded.len() > 1 {
+            return Recorded::read_run(&registry(), &self.path, &self.map, given);
+        }
+        let copy = |one: &Recorded| Recorded {
+            path: one.path.clone(),
+            read: one.read.clone(),
+            campaign: given.or(one.campaign.as_ref()).cloned(),
+            approaches: one.approaches.clone(),
+        };
+        Ok(self.recorded.iter().map(copy).collect())
+    }
+
+    /// The samples of the first recording.
+    fn series(&self) -> impl Iterator<Item = (&Channel, &Series)> {
+        self.recorded.iter().take(1).flat_map(|first| &first.read.recording.series)
+    }
+}
+
+/// The channel map from a file or a text; that of this program's recordings if there is none.
+fn map_of(file: Option<&Path>, text: Option<&str>) -> Result<ChannelMap, SessionError> {
+    match (file, text) {
+        (_, Some(text)) => ChannelMap::from_yaml(text, file.unwrap_or(Path::new("channels.yaml")))
+            .map_err(|findings| ChannelMapError::Mistakes(Box::new(findings)).into()),
+        (Some(file), None) => channel_map(file),
+        (None, None) => Ok(ChannelMap::native()),
+    }
+}
+
+#[pymethods]
+impl Recording {
+    /// Reads a recording. `channels_text`: a channel map as text, which `channels` then names in messages.
+    #[staticmethod]
+    #[pyo3(signature = (path, channels=None, channels_text=None))]
+    fn read(
+        py: Python<'_>,
+        path: PathBuf,
+        channels: Option<PathBuf>,
+        channels_text: Option<String>,
+    ) -> PyResult<Recording> {
+        compute(py, None, move |_| {
+            let map = map_of(channels.as_deref(), channels_text.as_deref())?;
+            let source = Source::new(path, map)?;
+            let read = &source.recorded;
+            let first = read.first().ok_or(SessionError::NoRecording)?;
+            let warnings: Vec<String> =
+                read.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();
+            let steps: Vec<_> = read.iter().flat_map(|one| &one.read.recording.steps).collect();
+            let events: Vec<_> = read.iter().flat_map(|one| &one.read.recording.events).collect();
+            let summary = json!({
+                "path": first.path,
+                "start_time_ns": first.read.start_time_ns,
+                "metadata": first.read.metadata,
+                "warnings": warnings,
+                "steps": steps,
+                "events": events,
+            });
+            Ok(Recording { summary: summary.to_string(), source: Arc::new(source) })
+        })
+    }
+
+    /// Steps, events, warnings and metadata, as JSON.
+    #[getter]
+    fn summary(&self) -> &str {
+        &self.summary
+    }
+
+    /// Symbol and unit of each channel.
+    #[getter]
+    fn channels(&self) -> Vec<(&'static str, &'static str)> {
+        self.source.series().map(|(channel, _)| (channel.symbol(), channel.unit())).collect()
+    }
+
+    /// Times, s, and values of a channel in SI units, as native 64-bit floats.
+    fn samples<'py>(
+        &self,
+        py: Python<'py>,
+        symbol: &str,
+    ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
+        let found = self.source.series().find(|(channel, _)| channel.symbol() == symbol);
+        let (_, series) = found.ok_or_else(|| {
+            let known: Vec<&str> = self.source.series().map(|(channel, _)| channel.symbol()).collect();
+            Fault::Argument(format!("the recording has no channel `{symbol}`; it has {}", known.join(", ")))
+        })?;
+        Ok((floats(py, &series.t_s)?, floats(py, &series.values)?))
+    }
+}
+
+/// Copies numbers once, into memory of Python that NumPy then uses as it is.
+fn floats<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyBytes>> {
+    PyBytes::new_with(py, size_of_val(values), |bytes| {
+        for (cell, value) in bytes.chunks_exact_mut(size_of::<f64>()).zip(values) {
+            cell.copy_from_slice(&value.to_ne_bytes());
+        }
+        Ok(())
+    })
+}

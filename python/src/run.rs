@@ -1,0 +1,137 @@
+//! Runs on simulated rigs.
+
+use crate::attended::{Attended, Shared, attend};
+use crate::campaign::{Campaign, Inner};
+use crate::error::Fault;
+use crate::map::Map;
+use crate::registry::registry;
+use mapper_session::{Ended, RunOutcome, RunRequest, Session, SessionError, SessionEvent};
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// Outcome of a run: the rig is safe and the recording is kept.
+#[pyclass(frozen, module = "mapper._mapper")]
+pub struct Outcome {
+    directory: PathBuf,
+    recording: PathBuf,
+    end: &'static str,
+    sentence: String,
+    json: Option<String>,
+    map: Option<mapper_core::CompressorMap>,
+}
+
+#[pymethods]
+impl Outcome {
+    /// The run's directory.
+    #[getter]
+    fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// Its recording.
+    #[getter]
+    fn recording(&self) -> &Path {
+        &self.recording
+    }
+
+    /// How it ended: completed, drifted, tripped, interrupted or failed.
+    #[getter]
+    fn end(&self) -> &'static str {
+        self.end
+    }
+
+    /// The same in a sentence.
+    #[getter]
+    fn sentence(&self) -> &str {
+        &self.sentence
+    }
+
+    /// What `mapper run --json` prints; `None` without results.
+    #[getter]
+    fn json(&self) -> Option<&str> {
+        self.json.as_deref()
+    }
+
+    /// The map; `None` without one.
+    #[getter]
+    fn map(&self) -> Option<Map> {
+        self.map.clone().map(|map| Map { map })
+    }
+}
+
+/// Runs the campaign in a new directory in `parent`. Ctrl-C stops it at the next sample, and is raised again when the rig is safe.
+#[pyfunction(name = "run")]
+#[pyo3(signature = (campaign, parent, started_name, started_ns, on_event=None))]
+pub fn run_campaign(
+    py: Python<'_>,
+    campaign: &Campaign,
+    parent: PathBuf,
+    started_name: String,
+    started_ns: u64,
+    on_event: Option<Py<PyAny>>,
+) -> PyResult<Outcome> {
+    let (inner, shared) = (campaign.inner.clone(), Shared::default());
+    shared.holds_rig.store(true, Ordering::SeqCst);
+    let of_worker = shared.clone();
+    let attended = attend(py, shared, on_event.as_ref(), move |events| {
+        let on_event = |event: &SessionEvent| events.show(event);
+        let request = RunRequest {
+            started_name: &started_name,
+            started_ns,
+            ..RunRequest::new(&inner.campaign, &inner.text, &parent)
+        };
+        run(&inner, request, &on_event, &of_worker)
+    })?;
+    match attended {
+        Attended::Ended(result, None) => Ok(result?),
+        Attended::Ended(Ok(outcome), Some(stopped_by)) => Err(noted(py, stopped_by, &outcome.recording)),
+        Attended::Ended(Err(_), Some(stopped_by)) | Attended::Left(stopped_by) => Err(stopped_by),
+    }
+}
+
+fn run(
+    inner: &Inner,
+    request: RunRequest<'_>,
+    on_event: &(dyn Fn(&SessionEvent) + Sync),
+    shared: &Shared,
+) -> Result<Outcome, Fault> {
+    let registry = registry();
+    let session = Session { on_event, stop: &shared.stop, ..Session::new(&registry) };
+    let prepared = session.prepare(request).map_err(|error| inner.fault(error))?;
+    let rig = prepared.rig();
+    if !rig.simulated_time {
+        return Err(Fault::RealTime { backend: rig.backend });
+    }
+    if shared.stop.load(Ordering::SeqCst) {
+        return Err(Fault::NotBegun);
+    }
+    let outcome = prepared.run(&session)?;
+    let sentence = outcome.sentence();
+    let RunOutcome { directory, recording, end, results } = outcome;
+    let end = match end {
+        Ended::Completed => "completed",
+        Ended::Drifted { .. } => "drifted",
+        Ended::Tripped { .. } => "tripped",
+        Ended::Interrupted { .. } => "interrupted",
+        Ended::Failed(source) => return Err(SessionError::Run { source, recording }.into()),
+    };
+    let (json, map) = match results {
+        Ok(results) => {
+            let json = serde_json::to_string(&results).map_err(SessionError::from)?;
+            (Some(json), results.compressor_map)
+        }
+        // Stopped before there was anything to identify.
+        Err(_) if end != "completed" => (None, None),
+        Err(error) => return Err(error.into()),
+    };
+    Ok(Outcome { directory, recording, end, sentence, json, map })
+}
+
+/// The exception, with a note on where the recording is (Python 3.11 and later).
+fn noted(py: Python<'_>, error: PyErr, recording: &Path) -> PyErr {
+    let note = format!("The rig is safe and the recording is kept: {}", recording.display());
+    // An older Python has no notes.
+    let _ = error.value(py).call_method1("add_note", (note,));
+    error
+}

@@ -8,10 +8,6 @@ const OWN_CODES: [&str; 11] = ["0", "1", "30", "31", "32", "33", "34", "35", "36
 /// Replaces all that a terminal would obey or that reverses the order of letters: control characters except line ends and tabs,
 /// escape sequences except colours, and the marks for writing from right to left. Names of files, channels and units come from
 /// outside, and so do the messages of drivers.
-///
-/// ```
-/// assert_eq!(mapper_core::terminal_text("T2\u{1b}]0;title\u{7}"), "T2\u{fffd}]0;title\u{fffd}");
-/// ```
 pub fn terminal_text(text: &str) -> Cow<'_, str> {
     let doubtful = |c: char| {
         c.is_control() && !matches!(c, '\n' | '\t')

@@ -124,7 +124,7 @@ pub use rehearsal::{Rehearsal, rehearse};
 pub use results::{Results, compressor_map};
 pub use resume::BrokenOff;
 pub use rig_files::RigFiles;
-pub use rig_state::{Latch, Owner, RigStates, RigStatus};
+pub use rig_state::{Latch, Owner, RigStates, RigStatus, shared_state};
 pub use run::{PreparedRun, RunOutcome, RunRequest};
 pub use run_outcome::Ended;
 pub use run_stop::{Phase, RunStop, Signalled};

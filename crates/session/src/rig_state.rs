@@ -17,6 +17,23 @@ const READ_MAX: u64 = 64 << 10;
 /// File name prefix of the lock for a rig's address.
 const PLACE: &str = "at_";
 
+/// Where an administrator may put locks and lockouts; kept over restarts and never cleaned.
+const INSTALLED: &str = "/var/lib/mapper";
+
+/// Where every user may write, and restarts leave files alone.
+const SHARED: &str = "/var/tmp/mapper";
+
+/// The directory for locks and lockouts that all users of a machine share, since several of them may drive one rig:
+/// `/var/lib/mapper` if there is one, `/var/tmp/mapper`, or, on systems without these, that for temporary files.
+pub fn shared_state() -> PathBuf {
+    let shared = Path::new(SHARED);
+    match Path::new(INSTALLED) {
+        installed if installed.is_dir() => installed.to_owned(),
+        _ if shared.parent().is_some_and(Path::is_dir) => shared.to_owned(),
+        _ => std::env::temp_dir().join("mapper"),
+    }
+}
+
 /// Current or last owner of a rig.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {

@@ -1,10 +1,10 @@
 //! Finds the clocks of a table, selects the ones to read, and assigns columns to them.
 
-use crate::cells::Cells;
 use crate::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, begun_again_ns};
 use crate::counter::{count_unit_s, is_clock_name, unit_words};
 use crate::instant::{NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
-use crate::number::{number_in, parse_number, read_number};
+use crate::number::parse_number;
+use crate::sample::{Sample, SampleRow, cells};
 use crate::table_head::HeadColumn;
 use mapper_logs::{DateOrder, Group, LogOptions};
 
@@ -27,29 +27,6 @@ const BACK_SHARE: usize = 20;
 
 /// Maximum number of clocks in a table; further columns with clock names are data.
 const CLOCK_LIMIT: usize = 100;
-
-/// The first rows of data.
-pub(crate) struct Sample<'a> {
-    pub(crate) columns: &'a [HeadColumn],
-    pub(crate) rows: &'a [Vec<String>],
-    pub(crate) decimal: u8,
-}
-
-struct SampleRow<'a>(&'a [String], u8);
-
-impl Cells for SampleRow<'_> {
-    fn number(&self, column: usize) -> f64 {
-        self.0.get(column).and_then(|cell| read_number(cell, self.1)).unwrap_or(f64::NAN)
-    }
-
-    fn number_in(&self, column: usize, unit: &str) -> f64 {
-        self.0.get(column).map_or(f64::NAN, |cell| number_in(cell, self.1, unit))
-    }
-
-    fn instant(&self, column: usize, order: DateOrder) -> Option<crate::instant::Instant> {
-        parse_instant(self.0.get(column)?, order)
-    }
-}
 
 /// A candidate clock, and its readings in the first rows, s.
 #[derive(Debug, Clone)]
@@ -388,15 +365,6 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
     candidates.retain(Candidate::runs);
     candidates.truncate(CLOCK_LIMIT);
     candidates
-}
-
-pub(crate) fn cells<'a>(column: usize, sample: &'a Sample<'_>) -> impl Iterator<Item = &'a str> {
-    sample
-        .rows
-        .iter()
-        .filter_map(move |row| row.get(column))
-        .map(String::as_str)
-        .filter(|cell| !cell.is_empty())
 }
 
 fn order_of(column: usize, sample: &Sample<'_>) -> (DateOrder, bool) {

@@ -1,7 +1,7 @@
 //! Columns that count time: their names, and the seconds of a count.
 
-use crate::clock_choice::{Sample, cells};
 use crate::number::read_number;
+use crate::sample::{Sample, cells};
 use crate::table_head::HeadColumn;
 use mapper_logs::{Kind, header_unit};
 

@@ -20,6 +20,7 @@ mod parts;
 mod record_batches;
 mod row_sorter;
 mod row_stream;
+mod sample;
 mod separator;
 mod table_head;
 mod table_log;

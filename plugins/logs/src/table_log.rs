@@ -2,9 +2,10 @@
 
 use crate::cells::{Cells, Rows};
 use crate::clock::ClockHand;
-use crate::clock_choice::{Clocks, Sample, choose};
+use crate::clock_choice::{Clocks, choose};
 use crate::instant::Instant;
 use crate::row_sorter::RowSorter;
+use crate::sample::Sample;
 use crate::table_head::{TableHead, look};
 use mapper_logs::{Column, DateOrder, Layout, LogError, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;

@@ -34,7 +34,8 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
     // Who comes second waits until it is there.
     let lock = fs::File::create(folder.join("lock")).unwrap();
     lock.lock().unwrap();
-    let (runs, printed, messages) = (folder.join("runs"), folder.join("printed.json"), folder.join("messages.txt"));
+    let (runs, printed, messages) =
+        (folder.join("runs"), folder.join("printed.json"), folder.join("messages.txt"));
     // What is printed is kept last.
     if !printed.exists() {
         let _ = fs::remove_dir_all(&runs);

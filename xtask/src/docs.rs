@@ -27,7 +27,7 @@ const SHIPPED: &str = "campaigns/turbo_a.yaml";
 /// The example that writes the page of sequences.
 pub const EXAMPLE: &str = "sequence_docs";
 
-/// Folder of the measured data that docs/real-data.md speaks of, and what `mapper transient` gets of it.
+/// Folder of the measured data that docs/real-data.md describes, with the inputs of `mapper transient`.
 const MEASURED: &str = "examples/real/turbotools";
 
 /// Writes or checks everything that is generated.

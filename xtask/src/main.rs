@@ -21,7 +21,7 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
-  quick          formatting, lints and the tests that are fast: while working; names the omitted ones
+  quick          formatting, lints and the tests that are fast: while working; lists the omitted ones
   test           run every test of the repository; installs what they need, skips nothing
   fleet-test     the tests of fleets alone, on Slurm with them: as root, which Slurm's daemons need
   fmt            format every file, those included that a macro declares and `cargo fmt` does not see

@@ -9,7 +9,7 @@ fn short(more: &[(&str, &str)]) -> CampaignFile {
     CampaignFile::shipped_with(&replacements)
 }
 
-/// A warning is on standard error with its line and a caret; the campaign is none the worse for it.
+/// A warning appears on standard error with its line and a caret; the campaign is none the worse for it.
 #[test]
 fn what_will_come_to_little_is_a_warning() {
     for (old, new, at, message) in [

@@ -51,7 +51,7 @@ fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
     write_nightly(folder, AS_SHIPPED);
     let first = night(folder, &[]).exits(0);
     assert!(first.stdout.contains("The first night"), "{}", first.stdout);
-    // A line per run in a pipe; it ends with its duration and the remaining time.
+    // A line per run in a pipe, with its duration and the remaining time at its end.
     let done: Vec<String> = first
         .stderr
         .lines()

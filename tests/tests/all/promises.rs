@@ -164,7 +164,7 @@ fn what_is_promised_is_built_and_seen() {
     let tree = patched_tree();
     let programs = target().join("promises/programs");
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    // Variables by which a test knows its own package: build scripts that look at it would make their libraries again, here and with
+    // Variables that describe the package of a test: build scripts that look at them would make their libraries again, here and with
     // the next command outside.
     for (name, _) in std::env::vars_os() {
         let text = name.to_string_lossy();

@@ -6,7 +6,7 @@
 Each campaign has a machine of its own: a map that falls by 0 to 8 points more towards low speed and drops more or less
 steeply at choke, a housing 0.7 to 1.6 times as heavy, convection by another law (exponent 0.75 to 1.15, 0.7 to 1.4 times as
 strong), tolerances of everything drawn, noise and offsets drawn; a grid of its own (five or six speeds, three to five
-openings) and, every second one, an isothermal zero. What nobody declares of it, by turns: nothing; 0.03 to 0.3 of the area
+openings) and, every second one, an isothermal zero. Undeclared in it, by turns: nothing; 0.03 to 0.3 of the area
 before the wheel; a probe of 0.7 to 2.5 mm; both.
 """
 
@@ -170,7 +170,7 @@ Generated; do not edit. The command, some ten minutes on two cores:
 
 {campaigns} campaigns, each with a machine, a grid, tolerances, noise and offsets of its own: maps that fall by 0 to 8 points more
 towards low speed and drop more or less steeply at choke, housings 0.7 to 1.6 times as heavy, convection with exponents from 0.75
-to 1.15 and 0.7 to 1.4 times as strong; every second one after an isothermal zero. What nobody declared of the machine stands in
+to 1.15 and 0.7 to 1.4 times as strong; every second one after an isothermal zero. The undeclared part of the machine is in
 the first column: nothing, 0.03 to 0.3 of the area before the wheel, a probe of 0.7 to 2.5 mm, or both. `dynamic` reads the same
 recordings as `joint`. Errors in points of efficiency; "held" is the share of 95 % intervals that hold the truth.
 
@@ -178,7 +178,7 @@ recordings as `joint`. Errors in points of efficiency; "held" is the share of 95
 The points of a recording share their offsets, and their intervals hold or miss together: a class is some {campaigns} / 8 draws
 of those, not as many as it has points.
 
-Where alpha_A is not declared a recording cannot always tell 0.03 to 0.05 from none; intervals hold both
+If alpha_A is not declared, a recording cannot always distinguish 0.03 to 0.05 from none; intervals hold both
 ([decision 0052](decisions/0052-even-odds-of-alpha-a.md)).
 """
 

@@ -56,7 +56,7 @@ def night(program, name, seed):
         file.write_text(campaign(drift, seed))
         run = subprocess.run([program, "run", file, "--out", folder + "/runs", "--json"], capture_output=True, text=True)
         if run.returncode:
-            return {"said": f"no run: {run.stderr.strip()[-200:]}"}
+            return {"conclusion": f"no run: {run.stderr.strip()[-200:]}"}
         recording = json.loads(run.stdout)["recording"]
         report = json.loads(subprocess.run([program, "drift", "--json", recording], capture_output=True, text=True, check=True).stdout)
     course = "step" if "from:" in drift else "rate_per_h"
@@ -67,7 +67,7 @@ def night(program, name, seed):
         "right": causes == ([cause] if cause else []),
         "onset": one is not None and abs(one["onset_s"] - onset_s) <= TWO_REPEATS_S,
         "size": size is not None and one is not None and course in one and one["low"] <= size <= one["high"],
-        "said": report["reason"],
+        "conclusion": report["reason"],
     }
 
 
@@ -80,7 +80,7 @@ def main():
         nights = []
         for seed in range(first, first + count):
             nights.append(night(program, name, seed))
-            print(f"{name}, seed {seed}: {nights[-1]['said']}", file=sys.stderr)
+            print(f"{name}, seed {seed}: {nights[-1]['conclusion']}", file=sys.stderr)
         run = [one for one in nights if "found" in one]
         other = sum(not one["right"] and one["found"] is not None for one in run)
         nothing = sum(one["found"] is None for one in run)

@@ -47,8 +47,8 @@ def campaign(folder, order, cause, change, unit, seed):
     return path
 
 
-def said(mapper, path):
-    """What the program says of one campaign: cause, or None; minutes; detection limits."""
+def outcome(mapper, path):
+    """The result of one campaign: cause, or None; minutes; detection limits."""
     out = path.with_suffix("")
     ran = subprocess.run([mapper, "run", str(path), "--out", str(out), "--json"], capture_output=True, text=True)
     runs = list(out.glob("*/recording.mcap"))
@@ -77,7 +77,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch, concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         folder, minutes, false, forecast = Path(scratch), {}, {}, {}
         for order in ORDERS:
-            runs = list(pool.map(lambda seed: said(mapper, campaign(folder, order, "T2", 0.0, "K", seed)), seeds))
+            runs = list(pool.map(lambda seed: outcome(mapper, campaign(folder, order, "T2", 0.0, "K", seed)), seeds))
             minutes[order] = quantile([m for _, m, _ in runs], 0.5)
             false[order] = sum(cause is not None for cause, _, _ in runs)
             forecast[order] = {cause: quantile([limits.get(cause, math.nan) for _, _, limits in runs], 0.5) for cause in CAUSES}
@@ -89,7 +89,7 @@ def main():
             if arguments.plant:
                 cells.append(f"{abs(size):.2g}")
                 for order in ORDERS:
-                    one = lambda seed: said(mapper, campaign(folder, order, cause, size, unit, seed))[0]
+                    one = lambda seed: outcome(mapper, campaign(folder, order, cause, size, unit, seed))[0]
                     causes = list(pool.map(one, seeds))
                     for count in (sum(found is not None for found in causes), sum(found == cause for found in causes)):
                         cells.append(f"{100 * count / len(causes):.0f} %")
@@ -126,7 +126,7 @@ False alarms: {facts}.
 
 **What this says of the claim.** For this method it is true of the housing's temperature and of T2, which jumps show earlier, and not of pressures,
 flow and fouling, which speed lines show as early or earlier. The difference is at most a quarter. Drift is found by the repeats of one jump, and
-both orders make the same repeats; the other points tell what is constant.
+both orders make the same repeats; the other points show what is constant.
 """
 
 

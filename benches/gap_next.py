@@ -3,11 +3,11 @@
 
     python3 benches/gap_next.py target/release/mapper DIR [--cases 60] [--seed 1] [--sizes 0.7 1.2] [--effects oil_scale,ventilation] [--jobs 2] [--minutes 60]
 
-Each case is a rig with one effect of the catalogue, about as large as what is just seen, that has run three steps. Where the diagnosis
-leaves causes open and says what the stand can do, the best experiment of each kind is run: the same rig does the same three steps and then
+Each case is a rig with one effect of the catalogue, about as large as what is just seen, that has run three steps. If the diagnosis
+leaves causes open and states what the stand can do, the best experiment of each kind is run: the same rig does the same three steps and then
 the lines that the diagnosis gives, or begins with a soak. Afterwards the true cause has 95 % of what was open, or it has not; the
-forecast said how probably. An offset that the soak tells is subtracted before anything is diagnosed: then it is told, and what
-is left of the others says whether it has been settled. A table of both is printed, and every experiment is a line of
+forecast gave the probability. An offset that the soak determines is subtracted before anything is diagnosed: then it is reported, and
+the remaining share of the others shows whether it has been settled. A table of both is printed, and every experiment is a line of
 DIR/experiments.jsonl.
 """
 import argparse, concurrent.futures, json, pathlib, random, re, subprocess, time
@@ -97,8 +97,8 @@ def case(mapper, folder, number, seed, sizes, candidates):
         share = after.get((name,), 0.0) / total if total > 0 else 0.0
         if kind == "soak" and name in AT_REST:
             total = sum(after.get(tuple(c), 0.0) for c in is_open)
-            told = any(w.startswith(f"{AT_REST[name].capitalize()} reads") for w in then["off_at_rest"])
-            share = 1.0 - total if told else 0.0
+            reported = any(w.startswith(f"{AT_REST[name].capitalize()} reads") for w in then["off_at_rest"])
+            share = 1.0 - total if reported else 0.0
         rows.append({"case": number, "effect": name, "kind": kind, "forecast": suggestion["probability_settled"],
                      "bit": suggestion["entropy_drop_bit"], "share": share, "settled": share >= SETTLED,
                      "outside": then["probability_outside"], "outside_before": first["probability_outside"]})

@@ -1,4 +1,4 @@
-"""Hot maps corrected by `mapper map correct`, beside the apparent ones and the joint method, on the virtual lab: errors against its truth.
+"""Hot maps corrected by `mapper map correct`, compared with the apparent ones and the joint method, on the virtual lab: errors against its truth.
 
     cargo build --release
     python3 benches/heat_correction.py --mapper target/release/mapper --write docs/maps.md

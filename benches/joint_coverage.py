@@ -4,10 +4,10 @@
     target/release/mapper gap blind make --out cases --seed 1 --cases 40
     python3 benches/joint_coverage.py cases --mapper target/release/mapper
 
-The directory holds what `mapper gap blind make` writes (`answers.json`, native recordings), or NAME.mcap beside
+The directory holds what `mapper gap blind make` writes (`answers.json`, native recordings), or NAME.mcap next to
 NAME.truth.json with a channel map: `--channels examples/channels/gap_rig.yaml`. For each recording and for all together:
 root mean square of the efficiency's error (points) of both methods, of the part that no common temperature offset
-explains, share of the points whose 95 % intervals of eta and h hold the truth, and verdicts. Recordings are told apart
+explains, share of the points whose 95 % intervals of eta and h hold the truth, and verdicts. Recordings are classified
 by what was put into the rig: nothing that touches eqs. 1-3 or a reading that enters them; something that `joint` looks
 for; something that it does not know.
 """
@@ -124,7 +124,7 @@ def main():
 
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         found = list(pool.map(one, wanted))
-    print("| recording | eta dynamic | eta joint | said | dynamic holds | joint holds | h dynamic, % | h joint, % | h holds | good | of these hold | |")
+    print("| recording | eta dynamic | eta joint | stated | dynamic holds | joint holds | h dynamic, % | h joint, % | h holds | good | of these hold | |")
     print("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---|")
     pooled, worse = {}, {}
     for which in ("untouched", "sought", "unknown"):
@@ -144,7 +144,7 @@ def main():
             line(name, dynamic, joint, held, causes or "none")
             if options.points:
                 print("   eta joint  ", " ".join(f"{e:+.2f}" for e in joint.eta))
-                print("   eta said   ", " ".join(f"{e:.2f}" for e in joint.sigma))
+                print("   eta stated ", " ".join(f"{e:.2f}" for e in joint.sigma))
                 print("   eta dynamic", " ".join(f"{e:+.2f}" for e in dynamic.eta))
                 print("   h joint %  ", " ".join(f"{e:+.1f}" for e in joint.h))
             if options.shared and together["thermal"]:

@@ -5,7 +5,7 @@
 
 Runs `campaigns/turbo_a.yaml` with its points in the order in which they are listed (planning would take most of the time that kills are
 drawn from), kills it with SIGKILL at a random moment, goes on with `mapper run --resume` until it is through,
-and compares with the run that nobody killed: steps whose journal entry holds but whose samples are not in the recording, points
+and compares with the uninterrupted run: steps whose journal entry holds but whose samples are not in the recording, points
 that are there twice or not at all, and how far efficiencies lie apart, in their own standard errors. A resumed run warms up again and
 draws other noise: differences of about one standard error are noise.
 """
@@ -156,7 +156,7 @@ def main():
     print(f"steps that the journal promised and the recording does not hold: {sum(one.get('lost', 0) for one in found)}")
     print(f"of the resumed, with a point missing or twice or another exit code: {wrong}")
     if apart:
-        print(f"efficiency beside the run nobody killed, in standard errors of the difference: median {quantile(apart, 0.5):.2f}, "
+        print(f"efficiency compared with the uninterrupted run, in standard errors of the difference: median {quantile(apart, 0.5):.2f}, "
               f"99 % {quantile(apart, 0.99):.2f}, worst {max(apart):.2f}")
 
 

@@ -1,4 +1,4 @@
-"""How fast and in how much memory a long log becomes points, beside polars on the same file.
+"""How fast and in how much memory a long log becomes points, compared with polars on the same file.
 
 usage: python benches/log_speed.py MAPPER [HOURS]
 

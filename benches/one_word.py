@@ -85,10 +85,10 @@ def main():
                                    stderr=subprocess.PIPE, text=True, env=environment, cwd=ROOT) for name, file in files.items()}
     results = {}
     for name, process in runs.items():
-        said, errors = process.communicate()
+        printed, errors = process.communicate()
         if process.returncode:
             print(f"{name}: exit {process.returncode}\n{errors[-2000:]}")
-        results[name] = {"points": [], **json.loads(said)}
+        results[name] = {"points": [], **json.loads(printed)}
     for server in servers:
         server.kill()
     (out / "results.json").write_text(json.dumps(results))

@@ -150,7 +150,7 @@ def main():
     parser.add_argument("--machines", default=",".join(MACHINES))
     parser.add_argument("--orders", default=";".join(ORDERS))
     parser.add_argument("--dwell", help="another dwell than the campaign's, s")
-    parser.add_argument("--dwells", help="hold stated errors against realised ones for each order with each of these dwells, s: 20,30,40,60,80")
+    parser.add_argument("--dwells", help="compare stated errors with realised ones for each order with each of these dwells, s: 20,30,40,60,80")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--write", help="the page to write")
     arguments = parser.parse_args()

@@ -7,7 +7,7 @@ server, ms: from the answer that carries a speed above the guard's limit, to the
 server, s: from kill -9 of the runner to that command, and from the return of a server that was killed to its first answered read.
 
 With --security basic256_sha256 OPC UA alone, signed and encrypted: a relay cannot read it, so the servers stamp inside, before they encrypt the answer and after they have decrypted
-the command. Their own cryptography (asyncua's in Python) is part of the figure then. `none (inside)`: in the clear, from the same place, to be held against it.
+the command. Their own cryptography (asyncua's in Python) is part of the figure then. `none (inside)`: in the clear, from the same place, for comparison.
 """
 
 import argparse
@@ -26,6 +26,8 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 LIMIT_RPM = 60e3
+# The word by which a server marks a written set-point.
+COMMANDED = "told"
 # What makes four points of the shipped campaign, with a guard that its first point trips.
 PARTS = [
     ("speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]", "speeds: [80 krpm, 125 krpm]"),
@@ -102,7 +104,7 @@ class Relay:
             if asked and function in (6, 16):
                 register = struct.unpack(">H", frame[8:10])[0]
                 if register != 111:
-                    self.seen.append((now, "told", register))
+                    self.seen.append((now, COMMANDED, register))
             elif not asked and function == 3 and len(frame) > 40:
                 self.seen.append((now, "read", struct.unpack(">f", frame[9:13])[0]))
         return data
@@ -115,7 +117,7 @@ class Relay:
                 continue
             kind = struct.unpack("<H", frame[26:28])[0]
             if asked and kind == 673 and b"\x09\x00\x00\x00heartbeat" not in frame:
-                self.seen.append((now, "told", 0))
+                self.seen.append((now, COMMANDED, 0))
             elif not asked and kind == 634:
                 at = frame.find(b"\x0b", 52)
                 if at > 0 and len(frame) > 300:
@@ -135,7 +137,7 @@ class Inside:
     def listen(self):
         for line in self.process.stdout:
             words = line.split()
-            if len(words) == 3 and words[1] in ("read", "told"):
+            if len(words) == 3 and words[1] in ("read", COMMANDED):
                 at, word, what = words
                 self.seen.append((float(at), word, float(what) if word == "read" else what))
 
@@ -200,10 +202,10 @@ def violation(bins, directory, driver, watch):
     process = run(bins, driver, watch, directory, True)
     try:
         above = wait(watch, lambda seen: first(seen, "read", holds=lambda rpm: rpm > LIMIT_RPM), "the violation")
-        told = wait(watch, lambda seen: first(seen, "told", above), "the command")
+        commanded = wait(watch, lambda seen: first(seen, COMMANDED, above), "the command")
     finally:
         process.wait()
-    return 1e3 * (told - above)
+    return 1e3 * (commanded - above)
 
 
 def killed(bins, directory, driver, watch):
@@ -212,9 +214,9 @@ def killed(bins, directory, driver, watch):
     at = time.monotonic()
     process.send_signal(signal.SIGKILL)
     process.wait()
-    told = wait(watch, lambda seen: first(seen, "told", at), "the command")
+    commanded = wait(watch, lambda seen: first(seen, COMMANDED, at), "the command")
     silent(watch)
-    return told - at
+    return commanded - at
 
 
 def silent(watch):

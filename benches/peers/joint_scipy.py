@@ -1,12 +1,12 @@
-"""The joint fit of mapper-identify beside scipy.optimize.least_squares on the same samples.
+"""The joint fit of mapper-identify compared with scipy.optimize.least_squares on the same samples.
 
     python3 -m venv target/peers-venv && target/peers-venv/bin/pip install scipy numpy
     OMP_NUM_THREADS=1 target/peers-venv/bin/python benches/peers/joint_scipy.py
 
-30 points at 10 Hz with the noise of a rig, alpha_A 0.2 and a probe of 1.5 mm that neither knows. Like beside like is ONE
+30 points at 10 Hz with the noise of a rig, alpha_A 0.2 and a probe of 1.5 mm that neither knows. Like for like is ONE
 fit: the same rows (block means, smoothed), model, weights, priors, parameters and start, from ready rows to the minimum;
 scipy, vectorised over all rows, with its own differences and with differences grouped by the arrow's shape (a step's
-parameters touch no other step). Beside it mapper's whole identification: rows, fits that learn their weights, the
+parameters touch no other step). In addition mapper's whole identification: rows, fits that learn their weights, the
 correction for noise in the inputs, the weighing of the refinements, covariance, the smoothness of the map, the doubts.
 """
 

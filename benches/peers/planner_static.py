@@ -1,4 +1,4 @@
-"""The search of mapper-planner beside LKH and OR-tools on the ordering problem without memory (fixed weights).
+"""The search of mapper-planner compared with LKH and OR-tools on the ordering problem without memory (fixed weights).
 
     python3 -m venv target/peers-venv && target/peers-venv/bin/pip install elkai ortools numpy
     target/peers-venv/bin/python benches/peers/planner_static.py

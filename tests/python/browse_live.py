@@ -23,7 +23,7 @@ from playwright.sync_api import sync_playwright
 from chromium import launched, serious_findings, watched
 
 chromium, folder, command = sys.argv[1], Path(sys.argv[2]), sys.argv[3:]
-said, serious, requests, result = [], [], [], {}
+console, serious, requests, result = [], [], [], {}
 
 run = subprocess.Popen(
     [*command, "--live=127.0.0.1:0", "--progress", "json", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -34,7 +34,7 @@ url, events, heard = None, [], threading.Event()
 
 
 def listen():
-    """What the program itself says, with the time at which it was said."""
+    """The messages of the program itself, each with the time at which it was printed."""
     global url
     for line in run.stderr:
         found = re.match(r"live page: (\S+)", line)
@@ -84,7 +84,7 @@ SEEN = """() => {
 
 def opened(browser, width, height, scheme):
     context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
-    page = watched(context.new_page(), said, requests)
+    page = watched(context.new_page(), console, requests)
     page.goto(url)
     page.wait_for_selector("html[data-connected=true]")
     page.wait_for_selector("#readings tr")
@@ -111,7 +111,7 @@ with sync_playwright() as playwright:
     page.evaluate(SEEN)
     since = time.time()
     points = lambda: page.locator("#points tr").count()
-    # Rows that come while the page looks on: the program said that it had identified them at that time.
+    # Rows that come while the page looks on: the program reported at that time that it had identified them.
     until(page, f"document.querySelectorAll('#points tr').length >= {points() + 2}")
     seen = {int(step): at for step, at in page.evaluate("window.seen").items()}
     at = {event["step"]: when for when, event in events if event["event"] == "point_estimated"}
@@ -139,13 +139,13 @@ with sync_playwright() as playwright:
     until(page, f"document.querySelectorAll('#points tr').length >= {before}")
     result["points_before_reload"], result["points_after_reload"] = before, points()
     # A program that is stopped is as silent as one whose cable was pulled; complaints of that are the browser's own.
-    complaints = len(said)
+    complaints = len(console)
     run.send_signal(signal.SIGSTOP)
     page.wait_for_selector("html[data-connected=false]", timeout=20_000)
-    result["said_alone"] = page.text_content("#connection")
+    result["shown_alone"] = page.text_content("#connection")
     run.send_signal(signal.SIGCONT)
     page.wait_for_selector("html[data-connected=true]", timeout=20_000)
-    del said[complaints:]
+    del console[complaints:]
     result["points_after_loss"] = points()
     press(page, "go-on")
     until(page, f"document.querySelectorAll('#points tr').length > {before}")
@@ -162,7 +162,7 @@ with sync_playwright() as playwright:
 result["exit"] = run.wait(60)
 reader.join(10)
 listener.join(10)
-result["said"] = said
+result["console"] = console
 result["serious"] = serious
 result["elsewhere"] = [url_ for url_ in requests if not url_.startswith(url)]
 result["recorded"] = [event["message"] for _, event in events if event["event"] == "told"]

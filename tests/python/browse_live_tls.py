@@ -77,23 +77,23 @@ def started(*options):
     run = subprocess.Popen([*command, live, *options, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     # Whatever goes wrong here, the run does not outlive it.
     atexit.register(run.kill)
-    said = []
+    printed = []
     for line in run.stderr:
-        said.append(line)
+        printed.append(line)
         if line.startswith("live page:"):
             break
     for stream in [run.stderr, run.stdout]:
         threading.Thread(target=stream.read, daemon=True).start()
-    return run, re.search(r"(https?)://0\.0\.0\.0:(\d+)/#token=(\w+)", said[-1]), "".join(said)
+    return run, re.search(r"(https?)://0\.0\.0\.0:(\d+)/#token=(\w+)", printed[-1]), "".join(printed)
 
 
-# In clear: it is said loudly, once.
-run, _, said = started()
-result["said_in_clear"] = said
+# In clear: one loud warning.
+run, _, printed = started()
+result["printed_in_clear"] = printed
 run.kill()
 
-run, found, said = started("--live-cert", own[0], "--live-key", own[1])
-result["said_encrypted"], result["scheme"] = said, found[1]
+run, found, printed = started("--live-cert", own[0], "--live-key", own[1])
+result["printed_encrypted"], result["scheme"] = printed, found[1]
 port, token = int(found[2]), found[3]
 trusts = ssl.create_default_context(cafile=own[0])
 

@@ -15,13 +15,13 @@ from playwright.sync_api import sync_playwright
 from chromium import launched, serious_findings, watched
 
 chromium, page_file, folder = sys.argv[1], Path(sys.argv[2]).resolve(), Path(sys.argv[3])
-said, requests, serious = [], [], []
+console, requests, serious = [], [], []
 result = {}
 
 
 def opened(browser, width, height, scheme):
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
-    watched(page, said, requests)
+    watched(page, console, requests)
     page.goto(page_file.as_uri())
     page.wait_for_selector("html[data-drawn=true]")
     return page
@@ -99,7 +99,7 @@ with sync_playwright() as playwright:
     page.keyboard.press("ArrowDown")
     result["by_keyboard"] = page.input_value("#step-choice") != step
     page.close()
-    # Printed as it is opened, not as somebody has left it.
+    # Printed as it is opened, not as a user has left it.
     page = opened(browser, 1400, 1000, "dark")
     # A button in a head would keep the head from being repeated on the next sheet.
     page.emulate_media(media="print")
@@ -110,5 +110,5 @@ with sync_playwright() as playwright:
     page.pdf(path=folder / "report.pdf", format="A4", landscape=True)
     browser.close()
 
-result.update(said=said, serious=serious, requests=[url for url in requests if url != page_file.as_uri()])
+result.update(console=console, serious=serious, requests=[url for url in requests if url != page_file.as_uri()])
 json.dump(result, sys.stdout)

@@ -9,10 +9,10 @@ def launched(playwright, name):
     return playwright.chromium.launch(executable_path=shutil.which(name), args=["--no-sandbox", "--disable-gpu"])
 
 
-def watched(page, said, requests):
-    """The page; what it says to its console and asks of anybody is kept."""
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
+def watched(page, console, requests):
+    """The page; its console messages and its requests are kept."""
+    page.on("console", lambda message: console.append(message.text))
+    page.on("pageerror", lambda error: console.append(str(error)))
     page.on("request", lambda request: requests.append(request.url))
     return page
 

@@ -1,4 +1,4 @@
-"""What drivers/python/mapper_driver.py does when nobody is there or the rig does not obey: time is an argument, no clock is read, but where a real pipe is full.
+"""What drivers/python/mapper_driver.py does when the host is gone or the rig does not obey: time is an argument, no clock is read, except for a full real pipe.
 
 Prints {"held": [...]}, the facts that held; fails with the first that does not.
 """
@@ -23,11 +23,11 @@ SETPOINTS = {"mode": "running", "p3_pa": 180e3, "t3_k": 800.0, "valve_opening_ra
 
 
 class Stubborn(mapper_driver.Rig):
-    """Writes down what it is told; takes its safe state after so many tries, and refuses set-points from a pressure on."""
+    """Writes down its commands; takes its safe state after so many tries, and refuses set-points from a pressure on."""
 
     def __init__(self, tries=1, simulated=False, accepts=ACCEPTS, lowest_p3=0.0):
         self.tries, self.simulated, self.accepts, self.lowest_p3 = tries, simulated, accepts, lowest_p3
-        self.told, self.asked, self.polled, self.disarmed = [], 0, 0, False
+        self.commands, self.asked, self.polled, self.disarmed = [], 0, 0, False
 
     def describe(self):
         # Opens its valve further than it accepts: the way down has to keep to what is accepted.
@@ -37,10 +37,10 @@ class Stubborn(mapper_driver.Rig):
     def set(self, setpoints):
         if setpoints["p3_pa"] < self.lowest_p3:
             raise Refused("lost", "the controller does not take it", t_s=0.0)
-        self.told.append(dict(setpoints))
+        self.commands.append(dict(setpoints))
 
     def hold(self):
-        self.told.append("hold")
+        self.commands.append("hold")
 
     def make_safe(self):
         self.asked += 1
@@ -67,7 +67,7 @@ class Host:
         self.ask("arm")
         self.server.tick(self.now_s)
         assert "result" in self.ask("set", **SETPOINTS)
-        rig.told.clear()
+        rig.commands.clear()
 
     def ask(self, method, **params):
         self.id += 1
@@ -91,7 +91,7 @@ class Host:
 def the_way_down_keeps_to_what_the_rig_accepts():
     host = Host(Stubborn())
     host.run(4.0)
-    way = host.rig.told
+    way = host.rig.commands
     assert len(way) >= 7, way
     assert all(one["t3_k"] == 350.0 and one["valve_opening_ratio"] == 1.4 for one in way), way
     steps = [a["p3_pa"] - b["p3_pa"] for a, b in zip(way, way[1:])]
@@ -104,9 +104,9 @@ def the_way_down_keeps_to_what_the_rig_accepts():
 def the_lease_ends_after_two_seconds_and_not_before():
     host = Host(Stubborn())
     host.run(1.9)
-    assert not host.rig.told
+    assert not host.rig.commands
     host.run(0.4)
-    assert host.rig.told, "2.5 s are promised from the last word to the first command"
+    assert host.rig.commands, "2.5 s are promised from the last word to the first command"
 
 
 def a_lease_that_is_renewed_goes_on():
@@ -114,30 +114,30 @@ def a_lease_that_is_renewed_goes_on():
     for _ in range(20):
         host.run(0.5)
         host.server.take(host.now_s, {"method": "lease", "session": host.server.session})
-    assert not host.rig.told
+    assert not host.rig.commands
     for _ in range(5):
         host.server.take(host.now_s, {"method": "lease", "session": "another"})
         host.run(0.5)
-    assert host.rig.told, "a word of another session renews nothing"
+    assert host.rig.commands, "a word of another session renews nothing"
 
 
 def words_that_come_meanwhile_do_not_hasten_the_way_down():
     host = Host(Stubborn())
     host.run(2.2)
-    before = len(host.rig.told)
+    before = len(host.rig.commands)
     for _ in range(50):
         host.server.take(host.now_s, {"method": "lease", "session": host.server.session})
         host.server.tick(host.now_s)
-    assert len(host.rig.told) <= before + 1, host.rig.told
+    assert len(host.rig.commands) <= before + 1, host.rig.commands
 
 
 def a_set_point_that_is_refused_cuts_the_air_at_once():
     host = Host(Stubborn(lowest_p3=170e3))
     host.run(2.5)
-    assert host.rig.asked == 1 and all(one["p3_pa"] >= 170e3 for one in host.rig.told)
+    assert host.rig.asked == 1 and all(one["p3_pa"] >= 170e3 for one in host.rig.commands)
 
 
-def a_rig_that_does_not_confirm_is_told_again_and_not_polled():
+def a_rig_that_does_not_confirm_is_commanded_again_and_not_polled():
     host = Host(Stubborn(tries=40))
     host.run(3.5)
     assert 1 < host.rig.asked < 40, host.rig.asked
@@ -146,8 +146,8 @@ def a_rig_that_does_not_confirm_is_told_again_and_not_polled():
     assert host.rig.polled == polled, "its heartbeat would go on"
     rate_hz = (host.rig.asked - asked) / (host.now_s - at_s)
     assert 8.0 <= rate_hz <= 11.0, rate_hz
-    said = [words for words in host.notes() if "did not confirm" in words]
-    assert len(said) == 1, said
+    notes = [words for words in host.notes() if "did not confirm" in words]
+    assert len(notes) == 1, notes
     host.run(5.0)
     assert host.rig.asked == 40 and host.rig.polled > polled, (host.rig.asked, host.rig.polled)
 
@@ -172,13 +172,13 @@ def a_disarm_that_is_not_confirmed_fails():
 
 def what_is_held_is_what_was_set_and_nothing_else():
     host = Host(Stubborn())
-    assert "result" in host.ask("hold") and host.rig.told == ["hold"]
+    assert "result" in host.ask("hold") and host.rig.commands == ["hold"]
     host.ask("make_safe")
     assert host.ask("hold")["error"]["code"] == "out_of_order", "what was set before would bring the air back"
     host.ask("set", **SETPOINTS)
     host.run(2.2)
     assert host.ask("hold")["error"]["code"] == "lease_ended"
-    assert host.rig.told.count("hold") == 1
+    assert host.rig.commands.count("hold") == 1
 
 
 def in_simulated_time_the_way_down_stands_in_the_time_of_the_rig():
@@ -190,7 +190,7 @@ def in_simulated_time_the_way_down_stands_in_the_time_of_the_rig():
             break
         host.server.tick(host.now_s)
     assert host.server.over() and host.rig.disarmed and host.rig.asked >= 1
-    steps = [a["p3_pa"] - b["p3_pa"] for a, b in zip(host.rig.told, host.rig.told[1:])]
+    steps = [a["p3_pa"] - b["p3_pa"] for a, b in zip(host.rig.commands, host.rig.commands[1:])]
     assert len(steps) >= 5 and all(abs(step - 10e3) < 1.0 for step in steps), steps
 
 
@@ -199,7 +199,7 @@ def what_cannot_be_set_is_refused_and_changes_nothing():
     for key, value in [("p3_pa", 1e9), ("p3_pa", None), ("t3_k", float("nan")), ("valve_opening_ratio", "1"), ("oil_temperature_k", [])]:
         error = host.ask("set", **{**SETPOINTS, key: value})["error"]
         assert (error["code"], error["setpoint"]) == ("setpoint_out_of_range", key), error
-    assert not host.rig.told
+    assert not host.rig.commands
 
 
 def no_bytes_end_it_or_make_it_take_memory():
@@ -221,9 +221,9 @@ def no_bytes_end_it_or_make_it_take_memory():
 
 
 def drive_fast():
-    """A rig in real time that fills a pipe at once, five messages a hundredth of a second, and says on standard error what it is told."""
+    """A rig in real time that fills a pipe at once, five messages a hundredth of a second, and prints its commands on standard error."""
 
-    print("noise of an author, before anything is said")
+    print("noise of an author, before the first message")
 
     class Fast(mapper_driver.Rig):
         def arm(self):
@@ -250,7 +250,7 @@ def a_pipe_that_nobody_reads_holds_up_no_rig():
     child = subprocess.Popen([sys.executable, __file__, "fast"], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     session = None
 
-    def tell(number, method, **params):
+    def send(number, method, **params):
         body = json.dumps({"id": number, "method": method, "params": params, "session": session}).encode()
         child.stdin.write(struct.pack(">I", len(body)) + body)
         child.stdin.flush()
@@ -262,20 +262,20 @@ def a_pipe_that_nobody_reads_holds_up_no_rig():
             assert len(messages) < 5000, f"no answer to request {number}"
         return messages
 
-    tell(1, "hello", magic=mapper_driver.MAGIC, protocol=mapper_driver.VERSION)
+    send(1, "hello", magic=mapper_driver.MAGIC, protocol=mapper_driver.VERSION)
     session = answer(1)[-1]["result"]["session"]
     for number, method in enumerate(["configure", "describe", "arm", "set"], start=2):
-        tell(number, method, **({"settings": None} if method == "configure" else SETPOINTS if method == "set" else {}))
+        send(number, method, **({"settings": None} if method == "configure" else SETPOINTS if method == "set" else {}))
     # Nothing is read: the lease ends, and the way is flown.
-    told = []
-    while not told or told[-1] != "safe":
-        told.append(child.stderr.readline().decode().strip())
-    noise = [words for words in told if words.startswith("noise")]
-    told = [words for words in told if words not in noise]
+    commands = []
+    while not commands or commands[-1] != "safe":
+        commands.append(child.stderr.readline().decode().strip())
+    noise = [words for words in commands if words.startswith("noise")]
+    commands = [words for words in commands if words not in noise]
     assert noise == ["noise of a library in C"], noise
     # Each tenth of a second, or later where this computer is busy.
-    assert len(told) > 2 and told[0] == "set 800.0" and set(told[1:-1]) == {"set 350.0"}, told
-    tell(6, "make_safe")
+    assert len(commands) > 2 and commands[0] == "set 800.0" and set(commands[1:-1]) == {"set 350.0"}, commands
+    send(6, "make_safe")
     assert child.stderr.readline().strip() == b"safe", "it is asked again while everything is full"
     messages = answer(6)
     assert "result" in messages[-1], messages[-1]
@@ -284,12 +284,12 @@ def a_pipe_that_nobody_reads_holds_up_no_rig():
     samples = [one for one in messages if one.get("method") == "samples"]
     # Queue, pipe, one in the hand of who writes.
     assert 256 <= len(samples) <= 256 + 65536 // 1000 + 2, len(samples)
-    tell(7, "poll")
+    send(7, "poll")
     later = [one for one in answer(7) if one.get("method") == "samples"] or [json.loads(read_frame(child.stdout))]
     assert later[0]["params"]["sequence"] - samples[-1]["params"]["sequence"] > mapper_driver.ROWS, "what was dropped is missing by its number"
     child.stdin.close()
     child.stdout.read()
-    assert b"noise of an author" in child.stderr.read(), "what was printed before is no frame either"
+    assert b"noise of an author" in child.stderr.read(), "what was printed before is not a frame either"
     assert child.wait() == 0
 
 

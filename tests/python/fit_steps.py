@@ -47,7 +47,7 @@ def fit(rows, area_m2, alpha):
         eta, h = parameters[0], 1000.0 * parameters[1]
         t1_prime = t1 - h * alpha * area_m2 * (t1 - tc) / (flow * cp(t1))
         t2_prime = t1_prime * (1.0 + rise / eta)
-        # Eq. 3 solved for T2, which stands on both its sides.
+        # Eq. 3 solved for T2, which is on both sides.
         transfer = h * (1.0 - alpha) * area_m2 / (flow * cp(t2_prime))
         return (t2_prime + transfer * tc) / (1.0 + transfer) - t2
 

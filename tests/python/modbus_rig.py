@@ -2,7 +2,7 @@
 
 Usage: modbus_rig.py [PORT]. Prints the port, then serves until standard input is closed. Holding registers: readings from 0 as singles (two
 registers each, in the order of CHANNELS), setpoints from 100, air 110, heartbeat 111, tripped 112. As a PLC has to, it cuts the air by
-itself where the heartbeat stands still. Register 150 says how the server misbehaves from then on (MISDEEDS),
+itself if the heartbeat stops. Register 150 sets how the server misbehaves from then on (MISDEEDS),
 151 how it does.
 """
 

@@ -2,12 +2,12 @@
 
 Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N] [--misdeed KIND] [--answers CODE]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean); text, flag, table, whole (of other types). As a PLC has to, it cuts the
-air by itself where the heartbeat stands still. Values that no stand could bear are refused with BadOutOfRange.
+air by itself if the heartbeat stops. Values that no stand could bear are refused with BadOutOfRange.
 
-With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` if nothing else is said; the certificate is made in the directory
-where there is none yet, valid for a year or as many days as said. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
+With --secure it takes signed and encrypted sessions alone, of the user `lab` with the password `hunter2` by default; the certificate is made in the directory
+if it has none yet, valid for a year or for N days. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
 takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted. With --sessions it holds so many sessions at a time and
-refuses others with BadTooManySessions, as small PLCs do: a session, also one that nobody was let into, is held until its client closes it.
+refuses others with BadTooManySessions, as small PLCs do: a session, also one without a successful login, is held until its client closes it.
 With --misdeed, and once the air is on: `boolean`, T2 becomes a truth value; `future`, readings are stamped an hour ahead; `uncertain`, all of them are. With --answers CODE writes of
 setpoints are answered with that status.
 """
@@ -158,7 +158,7 @@ def refuse_what_is_too_much(server, index, answers):
 
 
 def stamp(server, index):
-    """What was read and told, when, as the server itself sees it: before it encrypts the answer, after it has decrypted the request."""
+    """What was read and commanded, when, as the server itself sees it: before it encrypts the answer, after it has decrypted the request."""
     service = server.iserver.attribute_service
     read, write = service.read, service.write
     speed = ua.NodeId("N", index)
@@ -173,8 +173,8 @@ def stamp(server, index):
     async def stamped_write(params, user):
         now = time.monotonic()
         names = [one.NodeId.Identifier for one in params.NodesToWrite if one.NodeId.NamespaceIndex == index]
-        if told := [name for name in names if name in SETPOINTS or name == "air"]:
-            print(f"{now:.6f} told {','.join(told)}", flush=True)
+        if commanded := [name for name in names if name in SETPOINTS or name == "air"]:
+            print(f"{now:.6f} told {','.join(commanded)}", flush=True)
         return await write(params, user)
 
     service.read, service.write = stamped_read, stamped_write
@@ -198,7 +198,7 @@ async def live(server, nodes, seed, filled, misdeed):
     beat, beaten = None, begun
     while True:
         now = time.monotonic()
-        told = {key: await nodes[name].read_value() for name, (key, _, _) in SETPOINTS.items()}
+        commanded = {key: await nodes[name].read_value() for name, (key, _, _) in SETPOINTS.items()}
         air, heartbeat = await nodes["air"].read_value(), await nodes["heartbeat"].read_value()
         if heartbeat != beat:
             beat, beaten = heartbeat, now
@@ -206,7 +206,7 @@ async def live(server, nodes, seed, filled, misdeed):
             air = False
             await put("air", False, ua.VariantType.Boolean)
             await put("tripped", True, ua.VariantType.Boolean)
-        rig.set({"mode": "running" if air else "standstill", **told})
+        rig.set({"mode": "running" if air else "standstill", **commanded})
         times, columns, _ = rig.poll(now - begun)
         if times:
             for name in CHANNELS:

@@ -1,4 +1,4 @@
-"""Validates, compiles and steps an FMU of `mapper map fmu` with FMPy, and holds it against the reference tables.
+"""Validates, compiles and steps an FMU of `mapper map fmu` with FMPy, and compares it with the reference tables.
 
 Usage: replay_fmu.py FMU REFERENCE [--as-is]. REFERENCE: the folder with steady.csv, transients.csv and variants.csv. FMPy builds the sources with
 CMake unless `--as-is` says that the FMU's own library is to be used. Prints as JSON: problems that FMPy's validation finds, rows and jumps that were
@@ -62,8 +62,8 @@ def main():
             os.environ["PATH"] = f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
             binaries = pathlib.Path(folder) / "binaries"
             assert not binaries.exists(), "an FMU to be compiled holds no library"
-            quiet, said = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-            os.dup2(said, 1)
+            quiet, sink = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+            os.dup2(sink, 1)
             build_platform_binary(folder)
             os.dup2(quiet, 1)
         held = {(row["speed_rpm"], row["valve"]): row["P3_Pa"] for row in rows("steady")}

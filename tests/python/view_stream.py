@@ -53,7 +53,7 @@ with connect(url, subprotocols=[PROTOCOL], max_size=None) as viewer:
     result["protocol"] = viewer.subprotocol
     info = json.loads(viewer.recv(timeout=20))
     result["server"] = {"op": info["op"], "name": info["name"], "capabilities": info["capabilities"]}
-    # Whatever a viewer writes is not taken: there are no topics, services or parameters of its own.
+    # Whatever a viewer writes is not taken: it has no topics, services or parameters of its own.
     viewer.send(json.dumps({"op": "setParameters", "parameters": [{"name": "stop", "value": True}]}))
     try:
         while True:
@@ -64,7 +64,7 @@ with connect(url, subprotocols=[PROTOCOL], max_size=None) as viewer:
                     for channel in message["channels"]:
                         topics[channel["id"]] = channel
                     subscribe = [{"id": channel["id"], "channelId": channel["id"]} for channel in message["channels"]]
-                    # No person is quicker, and the library knows a topic only a moment after it has told of it.
+                    # No person is quicker, and the library knows a topic only a moment after it has announced it.
                     time.sleep(0.2)
                     viewer.send(json.dumps({"op": "subscribe", "subscriptions": subscribe}))
                     slow_viewer.send(json.dumps({"op": "subscribe", "subscriptions": subscribe}))
@@ -76,8 +76,8 @@ with connect(url, subprotocols=[PROTOCOL], max_size=None) as viewer:
 
 result["exit"] = run.wait(60)
 reader.join(10)
-said = json.loads(output[0])
-recording = Path(said["recording"])
+printed = json.loads(output[0])
+recording = Path(printed["recording"])
 # The same topics, schemas, units and times stand in the recording.
 with recording.open("rb") as file:
     opened = make_reader(file)

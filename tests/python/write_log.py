@@ -16,7 +16,7 @@ FORMAT is one of
   parquet   polars: names with units in brackets, seconds
   arrow     polars: the same as Arrow's file, with dates instead of seconds
 
-No step marks, no campaign, no truth. SI units where nothing else is said. Prints the steps of the recording, and how far the log's
+No step marks, no campaign, no truth. SI units unless stated otherwise. Prints the steps of the recording, and how far the log's
 clock is ahead of the recording's, as one JSON object.
 """
 

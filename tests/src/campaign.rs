@@ -53,7 +53,7 @@ impl CampaignFile {
         CampaignFile { path, text, directory }
     }
 
-    /// A directory for runs of this campaign, beside it; not made yet.
+    /// A directory for runs of this campaign, next to it; not made yet.
     pub fn runs(&self) -> PathBuf {
         self.directory.path().join("runs")
     }

@@ -15,7 +15,7 @@ pub struct MadeOnce {
     pub run: PathBuf,
     /// What it printed with `--json`.
     pub result: Value,
-    /// What it said on standard error.
+    /// Its messages on standard error.
     pub stderr: String,
 }
 
@@ -34,7 +34,8 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
     // Who comes second waits until it is there.
     let lock = fs::File::create(folder.join("lock")).unwrap();
     lock.lock().unwrap();
-    let (runs, printed, said) = (folder.join("runs"), folder.join("printed.json"), folder.join("said.txt"));
+    let (runs, printed, messages) =
+        (folder.join("runs"), folder.join("printed.json"), folder.join("messages.txt"));
     // What is printed is kept last.
     if !printed.exists() {
         let _ = fs::remove_dir_all(&runs);
@@ -46,7 +47,7 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
         // Locks and latches of its own.
         command.env("MAPPER_STATE_DIR", folder.join("states"));
         let finished = Finished::from(command.output().unwrap()).exits(0);
-        fs::write(&said, finished.stderr).unwrap();
+        fs::write(&messages, finished.stderr).unwrap();
         let unfinished = folder.join("printing.json");
         fs::write(&unfinished, finished.stdout).unwrap();
         fs::rename(&unfinished, &printed).unwrap();
@@ -54,7 +55,7 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
     MadeOnce {
         run: only_run(&runs),
         result: serde_json::from_slice(&fs::read(&printed).unwrap()).unwrap(),
-        stderr: fs::read_to_string(&said).unwrap(),
+        stderr: fs::read_to_string(&messages).unwrap(),
     }
 }
 
@@ -64,7 +65,7 @@ fn hash(of: impl FnOnce(&mut DefaultHasher)) -> String {
     format!("{:016x}", hasher.finish())
 }
 
-/// What earlier programs have made is of no use to anybody.
+/// The results of earlier programs are of no use any more.
 fn remove_others(all: &Path, ours: &Path) {
     for entry in fs::read_dir(all).unwrap().flatten().filter(|entry| entry.path() != ours) {
         // Another test may be at it.

@@ -9,8 +9,8 @@ use std::sync::OnceLock;
 
 /// The built program.
 ///
-/// A test of one package is not told where the binary of another lies, and it may not be built yet: Cargo is asked to
-/// build it and says where. `cargo xtask test` has built it with everything else, and says where.
+/// A test of one package does not know where the binary of another is, and it may not be built yet: Cargo is asked to
+/// build it and reports where. `cargo xtask test` has built it with everything else, and says where.
 fn binary() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
@@ -39,7 +39,7 @@ fn build(what: &[&str]) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// Builds the drivers, which then lie beside the program; `cargo xtask test` has built them with everything else.
+/// Builds the drivers, which are then next to the program; `cargo xtask test` has built them with everything else.
 pub fn build_drivers() {
     static BUILT: OnceLock<()> = OnceLock::new();
     BUILT.get_or_init(|| {
@@ -87,7 +87,7 @@ impl From<Output> for Finished {
 }
 
 impl Finished {
-    /// Asserts the exit code, showing what was said where it is another.
+    /// Asserts the exit code; shows the output if it is another.
     #[track_caller]
     pub fn exits(self, code: i32) -> Self {
         assert_eq!(

@@ -27,12 +27,12 @@ const SHIPPED: &str = "campaigns/turbo_a.yaml";
 /// The example that writes the page of sequences.
 pub const EXAMPLE: &str = "sequence_docs";
 
-/// Folder of the measured data that docs/real-data.md speaks of, and what `mapper transient` is told of it.
+/// Folder of the measured data that docs/real-data.md describes, with the inputs of `mapper transient`.
 const MEASURED: &str = "examples/real/turbotools";
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
-    // Made beside the real ones, and compared by content: whether there is a git, and what it knows, does not matter.
+    // Made next to the real ones, and compared by content: whether there is a git, and what it knows, does not matter.
     let made = workspace::target_dir().join("xtask-docs");
     let docs = workspace::root().join("docs");
     if made.exists() {
@@ -126,7 +126,7 @@ struct Programs {
 /// being worked on has most of it already.
 fn build() -> Result<Programs, Error> {
     // The whole workspace and a test of it are named so that libraries have the features that they have in the tests. One
-    // test: with all of them, those that are told what the machine offers would be built again without that.
+    // test: with all of them, those that depend on what the machine offers would be built again without that.
     let arguments =
         ["build", "--quiet", "--workspace", "--all-features", "--test", "turbine", "--bin", "mapper"];
     let examples = ["--example", EXAMPLE];

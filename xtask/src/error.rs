@@ -7,7 +7,7 @@ use std::path::PathBuf;
 pub enum Error {
     /// A program could not be started.
     Start { command: String, source: std::io::Error },
-    /// A program ended with an error; it has said why.
+    /// A program ended with an error; it has printed the reason.
     Failed { command: String },
     /// A program that the tests need is missing, and this process may not install it.
     Missing { what: &'static str, used_for: &'static str, install: String },
@@ -15,7 +15,7 @@ pub enum Error {
     OldPython { found: String, needed: &'static str },
     /// A file could not be read or written.
     File { path: PathBuf, source: std::io::Error },
-    /// Some steps failed; each has said why.
+    /// Some steps failed; each has printed the reason.
     Steps { failed: Vec<&'static str> },
     /// Tests were left out that had to run.
     LeftOut { count: usize },

@@ -1,4 +1,4 @@
-//! Programs that the tests need beside Rust's own, and how a machine comes by them.
+//! Programs that the tests need in addition to Rust's own, and how a machine comes by them.
 
 use crate::error::Error;
 use crate::step::{self, say};
@@ -13,7 +13,7 @@ struct Tool {
     source: Source,
 }
 
-/// Where a program comes from.
+/// The origin of a program.
 enum Source {
     /// Debian packages; installed where this process is root.
     Debian(&'static [&'static str]),
@@ -56,7 +56,7 @@ pub fn prepare() -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether tests can be run beside each other across programs.
+/// Whether tests can run in parallel across programs.
 pub fn has_nextest() -> bool {
     step::succeeds(&workspace::cargo(), &["nextest", "--version"])
 }

@@ -21,13 +21,13 @@ use std::process::ExitCode;
 const USAGE: &str = "\
 usage: cargo xtask COMMAND
 
-  quick          formatting, lints and the tests that are fast: while working; names what it leaves out
+  quick          formatting, lints and the tests that are fast: while working; lists the omitted ones
   test           run every test of the repository; installs what they need, skips nothing
   fleet-test     the tests of fleets alone, on Slurm with them: as root, which Slurm's daemons need
   fmt            format every file, those included that a macro declares and `cargo fmt` does not see
   docs           make the generated documents again
   docs --check   fail where a generated document is not what the program makes now
-  performance    measure, beside peers where they can be built, and write docs/performance.md
+  performance    measure, with peers for comparison if they can be built, and write docs/performance.md
 ";
 
 #[allow(clippy::print_stderr)]

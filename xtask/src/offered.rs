@@ -12,7 +12,7 @@ pub struct Offered {
     pub mountable: bool,
     /// Whether Slurm's daemons can be run.
     pub slurm: bool,
-    /// Whether npm reaches its registry: the scripts of the pages are held against its packages.
+    /// Whether npm reaches its registry: the scripts of the pages are compared with its packages.
     pub npm: bool,
 }
 

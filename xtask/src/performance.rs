@@ -1,4 +1,4 @@
-//! `cargo xtask performance`: measures, beside peers where they can be built, and writes docs/performance.md.
+//! `cargo xtask performance`: measures, with peers for comparison if they can be built, and writes docs/performance.md.
 
 use crate::error::Error;
 use crate::step::{self, command, output, run, say};
@@ -129,7 +129,7 @@ fn whole_run(page: &mut String, mapper: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Wall time and peak resident memory (KiB; 0 where the system does not tell) of a command.
+/// Wall time and peak resident memory (KiB; 0 if the system does not report it) of a command.
 fn watched(mut command: Command) -> Result<(Duration, u64), Error> {
     let text = step::line(&command);
     let started = Instant::now();

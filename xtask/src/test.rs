@@ -27,7 +27,7 @@ pub fn test() -> Result<(), Error> {
     if !steps.all_well() {
         return steps.finish();
     }
-    // Made beside the first steps: it waits for the network, they for the processor.
+    // Made in parallel with the first steps: it waits for the network, they for the processor.
     let making = std::thread::spawn(python_env::prepare);
     steps.run("formatting", || formatting(Mode::Check));
     steps.run("lints", || {
@@ -93,7 +93,7 @@ fn tests(offered: &Offered) -> Result<(), Error> {
     let mut tally = Tally::default();
     let mut well = true;
     let mut programs = test_programs::tests("default");
-    // Not the examples, which lints have looked at: those that somebody needs are built.
+    // Not the examples, which lints have looked at: those that are needed are built.
     programs.arg("--tests");
     for tests in [programs, test_programs::documentation_tests()] {
         well &= test_programs::run(with_program(offered.to(tests)), &mut tally)?;

@@ -7,8 +7,8 @@ use crate::{machine, workspace};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
-/// The tests of the workspace: by nextest where it is there, which runs them beside each other across all programs, and
-/// by `cargo test` where it is not. `profile` is one of `.config/nextest.toml`.
+/// The tests of the workspace: by nextest if it is installed, which runs them in parallel across all programs, and
+/// by `cargo test` otherwise. `profile` is one of `.config/nextest.toml`.
 pub fn tests(profile: &str) -> Command {
     if machine::has_nextest() {
         let arguments =

@@ -1,6 +1,6 @@
-//! Campaigns of which nothing can come are told so before the night, not after it.
+//! Campaigns that cannot succeed are reported before the night, not after it.
 
-use crate::shipped_campaign::tells_the_time_of;
+use crate::shipped_campaign::reports_the_time_of;
 use mapper_tests::{CampaignFile, SHORT_GRID, mapper};
 
 /// The shipped campaign on a short grid, with parts replaced.
@@ -9,7 +9,7 @@ fn short(more: &[(&str, &str)]) -> CampaignFile {
     CampaignFile::shipped_with(&replacements)
 }
 
-/// A warning stands on standard error with its line and a caret; the campaign is none the worse for it.
+/// A warning appears on standard error with its line and a caret; the campaign is none the worse for it.
 #[test]
 fn what_will_come_to_little_is_a_warning() {
     for (old, new, at, message) in [
@@ -38,9 +38,9 @@ fn what_will_come_to_little_is_a_warning() {
 
 /// The same of a campaign whose steps a script makes; `shipped_campaign.rs` has the one that is planned.
 #[test]
-fn check_and_plan_tell_the_same_time() {
+fn check_and_plan_report_the_same_time() {
     let campaign = "campaigns/turbo_a_adiabatic.yaml";
     let checked = mapper(["check", campaign, "--json"]).exits(0).json();
     let plan = mapper(["plan", campaign, "--json"]).exits(0).json();
-    tells_the_time_of(&checked, &plan, plan["soak_s"].as_f64().unwrap() / 60.0);
+    reports_the_time_of(&checked, &plan, plan["soak_s"].as_f64().unwrap() / 60.0);
 }

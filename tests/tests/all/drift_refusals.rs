@@ -1,4 +1,4 @@
-//! Recordings that cannot tell whether anything drifted: a clear word and no verdict, whatever is wrong with them.
+//! Recordings that cannot show whether anything drifted: a clear reason and no verdict, whatever is wrong with them.
 
 use mapper_core::{Channel, ChannelColumn, Recording, SampleBatch};
 use mapper_record::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, StepPhase, read_recording};
@@ -58,14 +58,14 @@ fn keep(recording: &mut Recording, wanted: impl Fn(f64) -> bool) {
 struct Case<'a> {
     name: &'a str,
     change: &'a dyn Fn(&mut Recording),
-    /// A word of what is said.
+    /// Part of the expected reason.
     word: &'a str,
 }
 
 #[test]
 fn what_cannot_be_judged_gets_a_clear_word_and_no_verdict() {
     let scratch = scratch();
-    // The sound one of `drift.rs`.
+    // The fault-free one of `drift.rs`.
     let campaign = DriftCampaign { seed: 21, ..DriftCampaign::default() };
     let file = campaign.write();
     let own = campaign.recording();
@@ -130,8 +130,8 @@ fn what_cannot_be_judged_gets_a_clear_word_and_no_verdict() {
         (case.change)(&mut changed);
         let path = scratch.path().join(format!("{}.mcap", case.name));
         write(&changed, &path);
-        let said = said(&path, &file.path);
-        assert!(said.contains(case.word), "{}: {said}", case.name);
+        let reason = reason(&path, &file.path);
+        assert!(reason.contains(case.word), "{}: {reason}", case.name);
     }
     // As it was, it can be judged, whoever wrote it.
     let path = scratch.path().join("whole.mcap");
@@ -146,8 +146,8 @@ fn ask(recording: &Path, campaign: &Path) -> Finished {
     mapper(arguments.iter().map(PathBuf::as_path).chain([Path::new("--json")]))
 }
 
-/// What is said where there is no verdict: as `reason`, or as the error that ends the command.
-fn said(recording: &Path, campaign: &Path) -> String {
+/// The explanation of a missing verdict: as `reason`, or as the error that ends the command.
+fn reason(recording: &Path, campaign: &Path) -> String {
     let finished = ask(recording, campaign);
     if finished.code == Some(0) {
         let report = finished.json();

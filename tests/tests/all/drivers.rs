@@ -198,10 +198,10 @@ fn a_driver_that_is_not_there_and_a_secret_in_a_campaign_are_mistakes_at_their_p
     }
 }
 
-/// What the rig was told, as soon as `reached` holds of it; how long that took.
-fn told(file: &Path, reached: impl Fn(&str) -> bool) -> (String, Duration) {
-    let (tell, news) = channel();
-    let mut watcher = notify::recommended_watcher(tell).unwrap();
+/// The commands to the rig, as soon as `reached` holds of them; how long that took.
+fn commands(file: &Path, reached: impl Fn(&str) -> bool) -> (String, Duration) {
+    let (sender, news) = channel();
+    let mut watcher = notify::recommended_watcher(sender).unwrap();
     watcher.watch(file.parent().unwrap(), RecursiveMode::NonRecursive).unwrap();
     let begun = Instant::now();
     loop {
@@ -209,7 +209,7 @@ fn told(file: &Path, reached: impl Fn(&str) -> bool) -> (String, Duration) {
         if reached(&text) {
             return (text, begun.elapsed());
         }
-        news.recv_timeout(Duration::from_secs(60)).expect("the rig is told something").unwrap();
+        news.recv_timeout(Duration::from_secs(60)).expect("the rig receives a command").unwrap();
     }
 }
 
@@ -221,10 +221,10 @@ fn flying() -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
 fn flying_at(rate: &str) -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
     build_drivers();
     let built_in = short(&format!("  virtual_lab: {{sample_rate: {rate}}}"));
-    let file = built_in.directory().join("told.txt");
+    let file = built_in.directory().join("commands.txt");
     let campaign = lab(&built_in, &format!(", real_time: true, told: {}", file.display()));
     let running = Running::start_with(&campaign, &[]);
-    told(&file, |text| text.contains("set air on"));
+    commands(&file, |text| text.contains("set air on"));
     (running, campaign, built_in, file)
 }
 
@@ -236,26 +236,26 @@ fn flew_its_way(text: &str) {
     assert!(way[steps].contains("make safe"), "{text}");
 }
 
-/// Nobody is left to tell the rig anything. The driver does, at once: 2.5 s is what docs/safety.md promises.
+/// No host is left to command the rig. The driver does, at once: 2.5 s is what docs/safety.md promises.
 #[test]
 fn a_runner_that_is_killed_leaves_a_driver_that_makes_the_rig_safe() {
     let (running, _campaign, _built_in, file) = flying();
     running.kill();
-    let (_, began) = told(&file, |text| text.contains("T3 293 K"));
+    let (_, began) = commands(&file, |text| text.contains("T3 293 K"));
     assert!(began < Duration::from_millis(2500), "{began:?}");
-    let (text, _) = told(&file, |text| text.contains("disarm"));
+    let (text, _) = commands(&file, |text| text.contains("disarm"));
     flew_its_way(&text);
 }
 
-/// A runner that stands still holds its pipes open: the lease ends.
+/// A runner that hangs holds its pipes open: the lease ends.
 #[test]
 fn a_runner_that_stands_still_loses_its_lease() {
     let (running, _campaign, _built_in, file) = flying();
     running.signal("STOP");
-    let (text, _) = told(&file, |text| text.contains("make safe"));
+    let (text, _) = commands(&file, |text| text.contains("make safe"));
     flew_its_way(&text);
     running.kill();
-    told(&file, |text| text.contains("disarm"));
+    commands(&file, |text| text.contains("disarm"));
 }
 
 /// It goes on when more has been dropped than pipe and queue hold: the run is over, the rig safe, and the recording says why.
@@ -263,15 +263,15 @@ fn a_runner_that_stands_still_loses_its_lease() {
 fn a_runner_that_stood_still_records_what_it_missed() {
     let (running, campaign, _built_in, file) = flying_at("500 Hz");
     running.signal("STOP");
-    told(&file, |text| text.contains("make safe"));
+    commands(&file, |text| text.contains("make safe"));
     running.signal("CONT");
     let finished = running.finished();
     assert_eq!(finished.code, Some(5), "{}", finished.stderr);
     let recording = mapper_tests::only_run(&campaign.runs()).join("recording.mcap");
     let report = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
     let events: Vec<_> = report.recording.events.iter().map(|event| (event.kind, &*event.message)).collect();
-    // On a computer that is so busy that the driver filled neither queue nor pipe nothing is missing: the next set-point is refused then. That what
-    // is missing is said holds in any case: drivers/lab/tests/unread.rs.
+    // On a computer that is so busy that the driver filled neither queue nor pipe nothing is missing: the next set-point is refused then. That
+    // missing samples are reported holds in any case: drivers/lab/tests/unread.rs.
     let says_why = |words: &str| words.contains("are missing") || words.contains("the lease had ended");
     let missing = events.iter().position(|(_, words)| words.contains("the rig was lost") && says_why(words));
     let safe = events.iter().position(|(kind, _)| *kind == EventKind::SafeState);
@@ -330,8 +330,8 @@ impl Drop for Server {
     }
 }
 
-/// A controller that nobody reaches: said as that, twice alike. Nothing moved, so that no latch waits for anybody, and no empty run
-/// is left.
+/// A controller that cannot be reached: reported as that, twice alike. Nothing moved, so no latch waits for an operator, and no empty
+/// run is left.
 #[test]
 fn a_rig_that_is_never_reached_leaves_neither_latch_nor_run() {
     mapper_tests::build_driver("mapper-backend-modbus");
@@ -371,7 +371,7 @@ fn a_rig_behind_modbus_keeps_every_rule() {
     server.end();
 }
 
-/// The same over OPC UA, signed and encrypted, as a user who trusts a server; the password stands in nothing that is written.
+/// The same over OPC UA, signed and encrypted, as a user who trusts a server; the password is in nothing that is written.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_rig_behind_opcua_keeps_every_rule() {

@@ -125,8 +125,8 @@ fn a_calibration_in_pieces_is_one_machines_and_judges_its_probabilities() {
     let directory = folder.join("fleet");
     make(&study, &directory);
     mapper(fleet("work", &directory, &["--shard", "2/2"])).exits(0);
-    let said = mapper(fleet("run", &directory, &[])).exits(0).stdout;
-    assert!(said.contains("expected calibration error"), "{said}");
+    let printed = mapper(fleet("run", &directory, &[])).exits(0).stdout;
+    assert!(printed.contains("expected calibration error"), "{printed}");
     let of_fleet = |name: &str| std::fs::read(directory.join("result").join(name)).unwrap();
     let [shipped, fitted]: [Value; 2] = serde_json::from_slice(&of_fleet("reliability.json")).unwrap();
     let observed: Vec<Value> = serde_json::from_slice(&of_fleet("observed.json")).unwrap();

@@ -84,9 +84,9 @@ fn killed_and_failed_items_are_named_and_a_retry_finishes() {
     cluster.wait_for("empty queue", || done(&cluster));
 
     let merge_log = there.join(format!("log/merge-{}.txt", sent["merge"].as_str().unwrap()));
-    let said = std::fs::read_to_string(&merge_log).unwrap();
-    assert_eq!(said.matches("failed: nightly_a").count(), 2, "{said}");
-    assert!(said.contains("missing: nightly_a") && said.contains("nothing merged"), "{said}");
+    let merged = std::fs::read_to_string(&merge_log).unwrap();
+    assert_eq!(merged.matches("failed: nightly_a").count(), 2, "{merged}");
+    assert!(merged.contains("missing: nightly_a") && merged.contains("nothing merged"), "{merged}");
     let status = on(&cluster, fleet("status", &there, &["--json"])).exits(0).json();
     let lost = status["status"]["missing"].as_array().unwrap();
     assert!(lost.len() >= 3, "at least what was under way when {killed:?} were killed: {lost:?}");
@@ -94,10 +94,10 @@ fn killed_and_failed_items_are_named_and_a_retry_finishes() {
     let again = on(&cluster, fleet("retry", &there, &["--json"])).exits(0).json();
     assert_ne!(again["work"], sent["work"]);
     cluster.wait_for("empty queue", || done(&cluster));
-    let said =
+    let merged =
         std::fs::read_to_string(there.join(format!("log/merge-{}.txt", again["merge"].as_str().unwrap())))
             .unwrap();
-    assert!(said.contains("merged 24 of 24 items"), "{said}");
+    assert!(merged.contains("merged 24 of 24 items"), "{merged}");
     on(&cluster, fleet("retry", &there, &[])).exits(3);
 
     Finished::from(mapper_command(fleet("run", &here, &[])).output().unwrap()).exits(0);

@@ -77,7 +77,7 @@ fn an_identified_machine_gives_its_points_back() {
     flow.sort_by(f64::total_cmp);
     eta.sort_by(f64::total_cmp);
     // The map in the FMU is the fit through the points, not the points: 0.46 points of efficiency rms from them, most of it in choke,
-    // where the lab's closed form is no member of the fit's family; flow at given pressure is worst where a line is flat: a few
+    // where the lab's closed form is not a member of the fit's family; flow at given pressure is worst where a line is flat: a few
     // thousandths of the pressure ratio between fit and point are per cents of the flow there. From 0.5 to 0.7 at 50 krpm the pressure
     // ratio falls by 9e-4 over a quarter of the flow: one point may lie anywhere in that stretch.
     assert!(
@@ -96,7 +96,7 @@ fn an_identified_machine_gives_its_points_back() {
 fn what_is_no_machine_is_refused_in_words() {
     let scratch = scratch();
     let out = scratch.path().join("x.fmu");
-    // Four points are no map of a machine.
+    // Four points are not a map of a machine.
     let run = made_once(&CampaignFile::shipped_with(SHORT_GRID)).run;
     let refused = fmu(&run, &out, &[]).exits(3);
     assert!(refused.stderr.contains("an FMU needs a map of the whole machine"), "{}", refused.stderr);

@@ -40,8 +40,8 @@ impl Running {
     /// Starts a run with further options, with locks and latches of its own.
     pub(crate) fn start_with(campaign: &CampaignFile, more: &[&str]) -> Self {
         // Watched before it starts, so that no news is missed.
-        let (tell, news) = channel();
-        let mut watcher = notify::recommended_watcher(tell).unwrap();
+        let (sender, news) = channel();
+        let mut watcher = notify::recommended_watcher(sender).unwrap();
         watcher.watch(campaign.directory(), RecursiveMode::Recursive).unwrap();
         let child = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()])
             .arg("--out")

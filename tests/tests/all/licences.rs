@@ -4,7 +4,7 @@
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, PackageId};
 use std::collections::BTreeSet;
 
-/// With all features, or with those that a build has if nothing is said.
+/// With all features, or with the default features of a build.
 fn metadata(all_features: bool) -> Metadata {
     let manifest = mapper_tests::repository().join("Cargo.toml");
     // Of this machine alone: what others need was never downloaded.

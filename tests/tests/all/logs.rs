@@ -17,8 +17,8 @@ impl Run {
         for (old, new) in [
             ("[90 krpm, 150 krpm, 50 krpm, 130 krpm, 70 krpm, 110 krpm]", "[90 krpm, 130 krpm]"),
             ("openings: [0.5, 0.7, 1.0]", "openings: [0.7, 1.0]"),
-            // Each jump by itself: a common fit of four points ends within its own tolerance only, not to the last digit of a log, and has
-            // a say in the first step, whose begin no jump tells.
+            // Each jump by itself: a common fit of four points ends within its own tolerance only, not to the last digit of a log, and
+            // influences the first step, whose begin no jump marks.
             ("method: joint ", "method: dynamic "),
         ] {
             assert_eq!(text.matches(old).count(), 1, "`{old}` in the campaign of the gap rig");
@@ -143,7 +143,7 @@ fn a_log_in_the_manner_of_a_test_stand_becomes_points_with_two_commands() {
     }
     assert!(found.iter().filter(|point| point["eta"].is_number()).count() >= 3);
 
-    // And leaves a map that is read again, although nobody recorded the valve.
+    // And leaves a map that is read again, although the valve was not recorded.
     let out = run.file("map");
     let given = ["identify".as_ref(), log.as_os_str(), "--channels".as_ref(), channels.as_os_str()];
     let campaign = ["--campaign".as_ref(), run.campaign.path.as_os_str(), "--out".as_ref(), out.as_os_str()];

@@ -16,7 +16,7 @@ fn mistyped() -> CampaignFile {
     CampaignFile::shipped_with(&replacements)
 }
 
-/// Every mistake stands in `message` with its line number, the line, and a caret under what is wrong.
+/// Every mistake is in `message` with its line number, the line, and a caret under what is wrong.
 #[track_caller]
 fn all_are_shown(campaign: &CampaignFile, message: &str) {
     let lines: Vec<&str> = message.lines().collect();
@@ -49,9 +49,9 @@ fn a_mistyped_campaign_is_not_run_and_all_its_mistakes_are_shown() {
     ]);
     let finished = finished.exits(3);
     all_are_shown(&campaign, &finished.stderr);
-    let told = finished.json();
+    let report = finished.json();
     assert_eq!(
-        (told["code"].as_u64(), told["findings"].as_array().map(Vec::len)),
+        (report["code"].as_u64(), report["findings"].as_array().map(Vec::len)),
         (Some(3), Some(MISTAKES.len()))
     );
     assert!(!out.exists(), "a run directory was made for a campaign with mistakes");

@@ -1,4 +1,4 @@
-//! A rig that is left alone: it trips by itself, its runner is killed, two want it, somebody hands it a plan of his own.
+//! A rig that is left alone: it trips by itself, its runner is killed, two want it, a user hands it a plan of his own.
 #![cfg(unix)]
 
 use crate::interrupted::Running;
@@ -40,7 +40,7 @@ fn kinds(recording: &Path) -> Vec<EventKind> {
 }
 
 /// The lab cuts its own air at 120 krpm on the way to 125 krpm: the run ends there instead of recording a standing shaft, and a
-/// rig that can be had but once stays latched until somebody says that it was looked at.
+/// rig that can be had but once stays latched until an operator confirms that it was inspected.
 #[test]
 fn a_rig_that_trips_by_itself_ends_the_run_and_is_latched() {
     let campaign = short(&[("  virtual_lab: {}", "  virtual_lab: {trip_speed: 120 krpm, rig: bench}")]);
@@ -109,7 +109,7 @@ fn two_runners_on_one_rig_and_one_that_was_killed_with_it() {
     done(run_of(&campaign, &[])).exits(0);
 }
 
-/// SIGHUP and SIGTERM, and Ctrl-C in the soak, where there is no step to end: safe, in order, and now.
+/// SIGHUP and SIGTERM, and Ctrl-C in the soak, which has no step to end: safe, in order, and now.
 #[test]
 fn signals_make_the_rig_safe() {
     for signal in ["HUP", "TERM", "INT"] {
@@ -136,7 +136,7 @@ fn killed_at(campaign: &CampaignFile, bytes: u64) -> PathBuf {
     recording.parent().unwrap().to_owned()
 }
 
-/// Killed at several places of its steps and resumed, a run has each point once, and each as the run that nobody killed has it:
+/// Killed at several places of its steps and resumed, a run has each point once, and each as the uninterrupted run has it:
 /// within four of its standard errors, since warm-up and lead-in draw other noise.
 #[test]
 fn a_killed_run_goes_on_and_has_each_point_once() {
@@ -201,7 +201,7 @@ fn another_campaign_is_not_resumed() {
     assert!(!with_states(&campaign, &arguments).output().unwrap().status.success());
 }
 
-/// A plan is a file that anybody may have written: what no plan may ask for is refused at once, and nothing is touched.
+/// A plan is a file from an unknown author: what no plan may ask for is refused at once, and nothing is touched.
 #[test]
 fn hostile_plans_are_refused() {
     let campaign = short(&[]);
@@ -228,7 +228,7 @@ fn hostile_plans_are_refused() {
         std::fs::write(&file, plan.to_string()).unwrap();
         let refused = done(run_of(&campaign, &["--plan", file.to_str().unwrap()])).exits(4);
         assert!(refused.stderr.contains(words), "{what}: {}", refused.stderr);
-        assert!(refused.stderr.len() < 400, "{what}: nobody reads that much: {}", refused.stderr);
+        assert!(refused.stderr.len() < 400, "{what}: too long to be read: {}", refused.stderr);
     }
     let many = Value::Array(vec![made["steps"][0].clone(); 20_001]);
     let mut plan = made.clone();

@@ -51,7 +51,7 @@ fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
     write_nightly(folder, AS_SHIPPED);
     let first = night(folder, &[]).exits(0);
     assert!(first.stdout.contains("The first night"), "{}", first.stdout);
-    // A line per run in a pipe; behind it stands how long it took and what is left.
+    // A line per run in a pipe, with its duration and the remaining time at its end.
     let done: Vec<String> = first
         .stderr
         .lines()
@@ -90,7 +90,7 @@ fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
     assert!(listed.stdout.contains("eta_mean %") && listed.stdout.contains("accepted"), "{}", listed.stdout);
     let drawn = std::fs::read_to_string(svg).unwrap();
     assert!(drawn.starts_with("<svg"));
-    // The pointer says night and value, a click opens what that night said.
+    // The pointer says night and value, a click opens that night's report.
     let link = drawn.split("<a href=\"").nth(1).unwrap().split('"').next().unwrap();
     assert!(drawn.contains("; eta_mean: ") && link.starts_with("history.nights/"), "{link}");
     let report = std::fs::read_to_string(folder.join(link)).unwrap();
@@ -107,9 +107,9 @@ fn a_fifth_of_a_point_of_efficiency_is_caught_the_next_night_and_named() {
     night(folder, &[]).exits(0);
     write_nightly_on(folder, AS_SHIPPED, "virtual_lab: {effects: {efficiency_scale: 1.0028}}");
     let moved = night(folder, &[]).exits(7);
-    let said = "the true efficiency moved by +0.";
+    let moves = "the true efficiency moved by +0.";
     let conclusion =
-        moved.stdout.lines().find(|line| line.contains(said)).unwrap_or_else(|| panic!("{}", moved.stdout));
+        moved.stdout.lines().find(|line| line.contains(moves)).unwrap_or_else(|| panic!("{}", moved.stdout));
     assert!(conclusion.contains("simulated machine or its model changed"), "{conclusion}");
     let points: f64 =
         conclusion.split("moved by +").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
@@ -136,7 +136,7 @@ fn a_night_that_is_killed_leaves_the_history_whole() {
     for wait in 0..4_u64 {
         let mut killed =
             mapper_command(arguments(folder)).stdout(std::process::Stdio::null()).spawn().unwrap();
-        // Written is at the very end: the log beside the history grows from then on, and the process is killed on sight
+        // Written is at the very end: the log next to the history grows from then on, and the process is killed on sight
         // of that, or a little later each time.
         let log = folder.join("history.db-wal");
         let size = || std::fs::metadata(&log).map_or(0, |file| file.len());
@@ -170,7 +170,7 @@ fn two_nights_at_once_are_both_kept() {
     let db = scratch.path().join("history.db");
     let listed = mapper(["history", "--json", "--db", db.to_str().unwrap()]).exits(0).json();
     assert_eq!(listed["runs"].as_array().unwrap().len(), 4);
-    // A night with other seeds misses the runs of these, and is no first night.
+    // A night with other seeds misses the runs of these, and is not a first night.
     let nightly = scratch.path().join("nightly.yaml");
     let other = std::fs::read_to_string(&nightly).unwrap().replace("seeds: [1]", "seeds: [2]");
     std::fs::write(&nightly, other).unwrap();
@@ -225,7 +225,7 @@ fn the_shipped_nightly_and_its_installation_name_files_that_are_there() {
     }
 }
 
-/// Where systemd is there to ask: the units as installed, but for the program, which need not be built for release.
+/// If systemd is there to ask: the units as installed, but for the program, which need not be built for release.
 fn units_are_what_systemd_understands(folder: &Path) {
     let scratch = scratch();
     for unit in ["mapper-nightly.service", "mapper-nightly.timer"] {
@@ -240,8 +240,8 @@ fn units_are_what_systemd_understands(folder: &Path) {
         .current_dir(scratch.path())
         .output();
     let Ok(answer) = asked else { return };
-    let said = String::from_utf8_lossy(&answer.stderr);
+    let messages = String::from_utf8_lossy(&answer.stderr);
     // Other units of this machine are not ours to judge.
-    let ours: Vec<&str> = said.lines().filter(|line| line.contains("mapper-nightly")).collect();
+    let ours: Vec<&str> = messages.lines().filter(|line| line.contains("mapper-nightly")).collect();
     assert!(ours.is_empty(), "{ours:?}");
 }

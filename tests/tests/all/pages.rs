@@ -55,10 +55,10 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
         .arg(format!("file://{}", page.display()))
         .output()
         .unwrap();
-    let (dom, said) = (String::from_utf8_lossy(&browsed.stdout), String::from_utf8_lossy(&browsed.stderr));
-    assert!(browsed.status.success(), "{said}");
-    assert!(!said.contains("CONSOLE"), "the page complains: {said}");
-    // The map of where, and the traces; the parser of a browser leaves out what is no SVG.
+    let (dom, log) = (String::from_utf8_lossy(&browsed.stdout), String::from_utf8_lossy(&browsed.stderr));
+    assert!(browsed.status.success(), "{log}");
+    assert!(!log.contains("CONSOLE"), "the page complains: {log}");
+    // The map of where, and the traces; the parser of a browser leaves out what is not an SVG.
     assert_eq!(dom.matches("<svg").count(), 2, "{dom}");
     assert!(dom.matches("<polyline").count() + dom.matches("<path").count() > 8);
 
@@ -69,7 +69,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     if option_env!("MAPPER_TEST_PYTHON").is_some() {
         let pictures = pictures("gap");
         let seen = python("browse_report.py", [chromium.as_ref(), whole.as_os_str(), pictures.as_os_str()]);
-        for quiet in ["requests", "said", "serious"] {
+        for quiet in ["requests", "console", "serious"] {
             assert_eq!(seen[quiet], serde_json::json!([]), "{quiet}");
         }
         assert_eq!(seen["heads_without_sorting"], 0, "the tables of the gap are sorted too");
@@ -144,9 +144,9 @@ fn the_page_of_a_run_is_read_as_people_do() {
     };
     let pictures = pictures("report");
     let seen = python("browse_report.py", [chromium.as_ref(), page.as_os_str(), pictures.as_os_str()]);
-    // Nothing was asked of anybody, nothing was complained of, nobody is shut out.
+    // No request went out, the console is empty, and the page is accessible.
     assert_eq!(seen["requests"], serde_json::json!([]));
-    assert_eq!(seen["said"], serde_json::json!([]));
+    assert_eq!(seen["console"], serde_json::json!([]));
     assert_eq!(seen["serious"], serde_json::json!([]));
     for size in ["1400_light", "1400_dark", "390_light", "390_dark"] {
         assert_eq!(seen[format!("overflow_{size}")], 0, "{size}: the page is wider than the screen");
@@ -220,7 +220,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
     assert_eq!(seen["held_at"], seen["still_held_at"]);
     assert_eq!(seen["points_before_reload"], seen["points_after_reload"]);
     assert_eq!(seen["points_before_reload"], seen["points_after_loss"]);
-    assert!(seen["said_alone"].as_str().unwrap().contains("the run goes on"), "{}", seen["said_alone"]);
+    assert!(seen["shown_alone"].as_str().unwrap().contains("the run goes on"), "{}", seen["shown_alone"]);
     // The button has stopped the run at the end of a step, and is recorded with the other two.
     assert_eq!(seen["exit"], 130);
     let recorded = seen["recorded"].to_string();
@@ -234,7 +234,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
         "{}",
         seen["connection"]
     );
-    assert_eq!([&seen["said"], &seen["serious"], &seen["elsewhere"]], [&serde_json::json!([]); 3]);
+    assert_eq!([&seen["console"], &seen["serious"], &seen["elsewhere"]], [&serde_json::json!([]); 3]);
     for size in ["1400_light", "1400_dark", "390_light", "390_dark"] {
         assert_eq!(seen[format!("overflow_{size}")], 0, "{size}: the page is wider than the screen");
     }
@@ -282,16 +282,20 @@ fn a_run_is_looked_at_over_tls_from_another_address() {
         [chromium.as_ref(), folder.path().as_os_str()].into_iter().chain(command),
     );
     for (what, answer) in seen["refused"].as_object().unwrap() {
-        let (code, said) = (answer[0].as_i64().unwrap(), answer[1].as_str().unwrap());
+        let (code, message) = (answer[0].as_i64().unwrap(), answer[1].as_str().unwrap());
         assert!(
-            code != 0 && (said.contains(".pem") || said.contains(".key") || said.contains("--live")),
-            "{what}: {said}"
+            code != 0 && (message.contains(".pem") || message.contains(".key") || message.contains("--live")),
+            "{what}: {message}"
         );
     }
-    // In clear it is said loudly, and once; over TLS there is nothing to say.
-    let clear = seen["said_in_clear"].as_str().unwrap();
+    // In clear there is one loud warning; over TLS there is none.
+    let clear = seen["printed_in_clear"].as_str().unwrap();
     assert_eq!(clear.matches("WITHOUT encryption").count(), 1, "{clear}");
-    assert!(!seen["said_encrypted"].as_str().unwrap().contains("WITHOUT"), "{}", seen["said_encrypted"]);
+    assert!(
+        !seen["printed_encrypted"].as_str().unwrap().contains("WITHOUT"),
+        "{}",
+        seen["printed_encrypted"]
+    );
     assert_eq!(seen["scheme"], "https");
     assert_eq!(seen["page"], serde_json::json!([200, true, true]));
     assert_eq!(seen["without_token"], 401);

@@ -37,7 +37,7 @@ fn run(campaign: &CampaignFile) -> Value {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 /// Every order passes the guards (a run that trips one exits with another code), and each jump moves T2 as forecast: what
@@ -61,7 +61,7 @@ fn every_order_passes_the_guards_and_moves_t2_as_forecast() {
                 "{order}: {measured_k} K for {forecast_k} K"
             );
         }
-        // A bound is never below what was found; what is not known is said.
+        // A bound is never below what was found; an unknown bound is reported as that.
         let (figures, bound) = (&planned["figures"], &planned["bound"]);
         if bound.is_object() {
             assert!(number(&figures["sum_gradient_k"]) <= number(&bound["sum_gradient_k"]), "{order}");
@@ -93,7 +93,7 @@ fn orders_and_dwells_do_what_they_are_for() {
 }
 
 /// The standard error that the plan states is the scatter of what is found: 32 seeds draw noise and offsets again. The
-/// standard deviation of 32 is itself known to 12.7 %; three of that, beside 4 % by which the prediction may be off: over 300
+/// standard deviation of 32 is itself known to 12.7 %; three of that, in addition to 4 % by which the prediction may be off: over 300
 /// seeds the ratios were 0.95 and 0.95, which are known to 4 % themselves.
 #[test]
 fn predicted_errors_are_the_scatter_of_seeded_runs() {

@@ -41,7 +41,7 @@ fn machines_of_a_table_are_run_one_by_one() {
     // 4 % less efficiency by definition; the points move a little, since the machine runs at another pressure for the same set-points.
     assert!((eta("B-2") / eta("B-1") - 0.96).abs() < 0.005, "{} {}", eta("B-1"), eta("B-2"));
 
-    // Two seeds a machine: machines and rest are told apart, as `history fleet` says.
+    // Two seeds a machine: machines and the rest are separated, as `history fleet` reports.
     let fleet =
         mapper_in(scratch.path(), ["history", "fleet", "--db", "history.db", "--json"]).exits(0).json();
     let production = &fleet["productions"][0];
@@ -55,20 +55,20 @@ fn machines_of_a_table_are_run_one_by_one() {
 }
 
 #[test]
-fn machines_that_cannot_be_are_told_before_anything_runs() {
+fn impossible_machines_are_reported_before_anything_runs() {
     let scratch = scratch();
     write(scratch.path(), "machines: machines.csv");
-    let told = |table: &str| {
+    let refused = |table: &str| {
         std::fs::write(scratch.path().join("machines.csv"), table).unwrap();
         let night = mapper_in(scratch.path(), ["nightly", "nightly.yaml"]);
         assert!(!night.stdout.contains("eta_mean"));
         night.exits(3).stderr
     };
-    let unknown = told("serial_number,deviations.wings\nB-1,1 %\n");
+    let unknown = refused("serial_number,deviations.wings\nB-1,1 %\n");
     assert!(unknown.contains("wings") && unknown.contains("valve_area"), "{unknown}");
-    let twice = told("serial_number\nB-1\nB-1\n");
+    let twice = refused("serial_number\nB-1\nB-1\n");
     assert!(twice.contains("line 3: the machine B-1 appears twice"), "{twice}");
-    let missing = told("serial_number,deviations.valve_area\nB-1,much\n");
+    let missing = refused("serial_number,deviations.valve_area\nB-1,much\n");
     assert!(missing.contains("deviations.valve_area"), "{missing}");
     write(scratch.path(), "machines: machines.csv, drawn_machines: 3");
     let both = mapper_in(scratch.path(), ["nightly", "nightly.yaml"]).exits(3).stderr;

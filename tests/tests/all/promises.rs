@@ -14,7 +14,7 @@ struct Promise {
     shown_by: (&'static [&'static str], &'static str),
 }
 
-/// Stands for a campaign whose rig nobody knows.
+/// Stands for a campaign whose rig is unknown.
 const ELSEWHERE: &str = "ELSEWHERE";
 
 const PROMISES: &[Promise] = &[
@@ -82,7 +82,7 @@ fn patched_tree() -> PathBuf {
                 std::fs::copy(from, to).unwrap();
             }
         }
-        // A line of context on each side: what others change nearby is no matter.
+        // A line of context on each side: what others change nearby does not matter.
         git(inside, ["apply".as_ref(), "-C1".as_ref(), patch.as_os_str()]);
     }
     for package in patched() {
@@ -151,7 +151,7 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Where this test's own program was built: below it everything may be written.
+/// The build directory of this test's own program: below it everything may be written.
 fn target() -> PathBuf {
     let own = std::env::current_exe().unwrap();
     own.ancestors()
@@ -164,7 +164,7 @@ fn what_is_promised_is_built_and_seen() {
     let tree = patched_tree();
     let programs = target().join("promises/programs");
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    // What a test is told of its own package: build scripts that look at it would make their libraries again, here and with
+    // Variables that describe the package of a test: build scripts that look at them would make their libraries again, here and with
     // the next command outside.
     for (name, _) in std::env::vars_os() {
         let text = name.to_string_lossy();

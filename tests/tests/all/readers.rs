@@ -1,4 +1,4 @@
-//! Channels from several sources: the lab is driven, and something else is read beside it.
+//! Channels from several sources: the lab is driven, and something else is read in addition.
 #![cfg(unix)]
 
 use mapper_core::{Channel, EventKind, Quality};
@@ -30,7 +30,7 @@ fn read(run: &Path) -> ReadReport {
     read_recording(&run.join("recording.mcap"), &ChannelMap::native(), &ReadOptions::default()).unwrap()
 }
 
-/// T2 comes from a recording that is played beside the lab: its samples to the bit, in the lab's own steps, and all of it is identified.
+/// T2 comes from a recording that is played along with the lab: its samples to the bit, in the lab's own steps, and all of it is identified.
 #[test]
 fn a_channel_that_is_read_elsewhere_stands_in_the_recording_and_in_the_points() {
     let first = with_readers("  none: {backend: {replay: {}}}\n", &[]);
@@ -114,10 +114,10 @@ fn instrument(answers: usize) -> String {
     address
 }
 
-/// The driver of an instrument as it ships, beside the lab in real time: its readings have their own rate and arrive in the recording. One
+/// The driver of an instrument as it ships, along with the lab in real time: its readings have their own rate and arrive in the recording. One
 /// that falls silent is noted where nothing needs it, and ends the run where it does.
 #[test]
-fn an_instrument_is_read_beside_the_lab_in_real_time() {
+fn an_instrument_is_read_along_with_the_lab_in_real_time() {
     build_driver("mapper-backend-ak");
     let short = [
         ("warm_up: 60 s ", "warm_up: 1 s "),
@@ -136,7 +136,7 @@ fn an_instrument_is_read_beside_the_lab_in_real_time() {
     assert!(matches!(finished.code, Some(0 | 6)), "{}", finished.stderr);
     let report = read(&only_run(&campaign.runs()));
     let (air, t2) = (&report.recording.series[&Channel::TAmb], &report.recording.series[&Channel::T2]);
-    // 10 Hz of the lab beside 5 Hz, of which 60 answers came at most.
+    // 10 Hz of the lab and 5 Hz of the instrument, of which 60 answers came at most.
     assert!(
         (20..=60).contains(&air.values.len()) && t2.values.len() > 150,
         "{} {}",

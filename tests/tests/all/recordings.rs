@@ -203,7 +203,7 @@ fn a_stored_plan_is_run_and_a_stale_one_refused() {
     run(&campaign).exits(0);
     let stored = std::fs::read_to_string(&plan).unwrap();
     let run_by = std::fs::read_to_string(only_run(&campaign.runs()).join("plan.json")).unwrap();
-    // The same to the byte, but for what the rig said of itself, which no plan knows before a run.
+    // The same to the byte, but for the description that the rig gave of itself, which no plan knows before a run.
     let of_the_rig = |line: &&str| line.trim_start().starts_with("\"rig_sha256\"");
     assert_eq!(run_by.lines().filter(of_the_rig).count(), 1);
     let without: Vec<&str> = run_by.lines().filter(|line| !of_the_rig(line)).collect();

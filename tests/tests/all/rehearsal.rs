@@ -44,7 +44,7 @@ impl Lab {
         };
         let places = servers.iter().map(place).collect();
         let notes = servers.iter().map(|_| lines.next().unwrap().unwrap()).collect();
-        // Whatever it says later is read by nobody, and nobody ends it by not reading.
+        // Later output is read and dropped, so that a full pipe cannot end it.
         std::thread::spawn(move || lines.count());
         Lab { process, places, notes }
     }
@@ -102,7 +102,7 @@ fn a_program_of_others_drives_the_lab_over_opcua() {
     assert_eq!(seen["wrong_type"], "BadTypeMismatch");
     assert!(seen["written"].as_array().unwrap().iter().all(|code| code == "Good"), "{seen}");
     assert!(seen["rpm"].as_f64().unwrap() > 20e3 && seen["tripped_while_beating"] == false, "{seen}");
-    // The time is the stand's own: within its step and what a machine that is busy adds; nobody's would be of another day.
+    // The time is the stand's own: within its step and what a machine that is busy adds; an unset time would be of another day.
     assert!(
         seen["youngest_s"].as_f64().unwrap() > -0.01 && seen["oldest_s"].as_f64().unwrap() < 10.0,
         "{seen}"
@@ -112,7 +112,7 @@ fn a_program_of_others_drives_the_lab_over_opcua() {
 }
 
 /// A rig that cannot be armed is not judged: a server that is off, a wrong password (more often than the server has sessions), an order of words
-/// that is wrong, a unit that is not there. One sentence says why, and no rule is said to be kept.
+/// that is wrong, a unit that is not there. One sentence gives the reason, and no rule is reported as kept.
 #[test]
 fn a_rig_that_cannot_be_armed_is_not_judged() {
     let scratch = scratch();
@@ -221,7 +221,7 @@ fn the_lab_answers_as_manuals_print_it() {
 }
 
 #[test]
-fn a_lab_server_says_what_is_missing_and_serves_nobody_else_unasked() {
+fn a_lab_server_says_what_is_missing_and_serves_no_one_else_unasked() {
     build_driver("mapper-lab-server");
     let run = |arguments: &[&str], password: Option<&str>| {
         let mut command = Command::new(program("mapper-lab-server"));
@@ -240,7 +240,7 @@ fn a_lab_server_says_what_is_missing_and_serves_nobody_else_unasked() {
     assert!(half.contains("PLC_USER") && !half.contains(PASSWORD), "{half}");
 }
 
-/// What a browser that looks on is told, and the token that it has to show.
+/// What a browser receives that looks on, and the token that it has to show.
 fn live_page(url: &str) -> (Vec<u8>, String) {
     let (address, token) = url.trim_start_matches("http://").split_once("/#token=").unwrap();
     let mut all = Vec::new();
@@ -275,7 +275,7 @@ fn holds(bytes: &[u8], word: &str) -> bool {
 }
 
 /// A run against asyncua with user and password, looked at by its live page with its token, ended by a guard; then one with a wrong password. Neither
-/// name nor password is in anything that was written or said, and the token in nothing but the line that tells it.
+/// name nor password is in anything that was written or printed, and the token only in the line that announces it.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn secrets_stand_nowhere() {
@@ -296,7 +296,7 @@ fn secrets_stand_nowhere() {
         "--out".as_ref(),
         runs.as_os_str(),
     ];
-    let said = scratch.path().join("said.txt");
+    let sent = scratch.path().join("sent.txt");
     // Another state: the guard has latched the rig of the first.
     let other_state = scratch.path().join("other-state");
     trust(&format!("opc.tcp://127.0.0.1:{port}"), &other_state);
@@ -306,10 +306,10 @@ fn secrets_stand_nowhere() {
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
     };
     let mut running = start(PASSWORD, &state, &[]);
-    let mut told = BufReader::new(running.stderr.take().unwrap()).lines();
+    let mut stderr = BufReader::new(running.stderr.take().unwrap()).lines();
     let mut words = String::new();
     let url = loop {
-        let line = told.next().expect("the live page is named").unwrap();
+        let line = stderr.next().expect("the live page is named").unwrap();
         words += &line;
         if let Some(url) = line.strip_prefix("live page: ") {
             words = words.replace(url, "");
@@ -318,7 +318,7 @@ fn secrets_stand_nowhere() {
     };
     let (page, token) = live_page(&url);
     assert!(holds(&page, "event-stream") && page.len() > 10_000, "{}", page.len());
-    words.extend(told.map(|line| line.unwrap() + "\n"));
+    words.extend(stderr.map(|line| line.unwrap() + "\n"));
     let output = running.wait_with_output().unwrap();
     words += &String::from_utf8(output.stdout).unwrap();
     assert!(words.contains("above its limit of 40.00 krpm"), "the guard has ended it: {words}");
@@ -328,22 +328,22 @@ fn secrets_stand_nowhere() {
     assert!(holds(&refused, "does not let this program in"), "{}", String::from_utf8_lossy(&refused));
     server.end();
 
-    std::fs::write(&said, [page, words.into_bytes(), refused].concat()).unwrap();
+    std::fs::write(&sent, [page, words.into_bytes(), refused].concat()).unwrap();
     // Recordings are packed: what is in them is read as another program reads it.
     let recordings: Vec<PathBuf> =
         files(&runs).into_iter().filter(|path| path.extension().is_some_and(|end| end == "mcap")).collect();
     assert!(!recordings.is_empty());
     for recording in &recordings {
         let read = python("unpack_recording.py", [recording]);
-        std::fs::write(&said, [std::fs::read(&said).unwrap(), read.to_string().into_bytes()].concat())
+        std::fs::write(&sent, [std::fs::read(&sent).unwrap(), read.to_string().into_bytes()].concat())
             .unwrap();
     }
-    // The names of the variables are no secret: what was looked at has the campaign in it.
-    assert!(holds(&std::fs::read(&said).unwrap(), "PLC_PASSWORD"));
+    // The names of the variables are not secret: what was looked at has the campaign in it.
+    assert!(holds(&std::fs::read(&sent).unwrap(), "PLC_PASSWORD"));
     let mut looked_at = files(&runs);
     looked_at.extend(files(&state));
     looked_at.extend(files(&other_state));
-    looked_at.push(said);
+    looked_at.push(sent);
     assert!(looked_at.iter().any(|path| path.ends_with("plan.json")), "{looked_at:?}");
     for path in looked_at {
         let bytes = std::fs::read(&path).unwrap();
@@ -373,7 +373,7 @@ fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
     let kept = std::fs::read_to_string(&plan).unwrap();
     assert!(kept.contains("\"rig_sha256\""));
     run(&["--plan", plan.to_str().unwrap()]).exits(0);
-    // The campaign is the same to the letter; what stands behind the driver is not.
+    // The campaign is the same to the letter; the rig behind the driver is not.
     std::fs::copy(&other.path, &built_in.path).unwrap();
     let refused = run(&["--plan", plan.to_str().unwrap()]);
     assert!(refused.stderr.contains("what the rig says of itself changed since"), "{}", refused.stderr);
@@ -396,29 +396,30 @@ fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
     assert_eq!(points, 5, "four points and the first again");
 }
 
-fn said(program_name: &str, arguments: &[&str]) -> mapper_tests::Finished {
+fn called(program_name: &str, arguments: &[&str]) -> mapper_tests::Finished {
     let mut command = Command::new(program(program_name));
     command.args(arguments).stdin(Stdio::null());
     done(command)
 }
 
-/// Whoever starts a driver by hand learns what it is; before, it said nothing at all.
+/// A driver that is started by hand prints what it is.
 #[test]
 fn a_driver_that_is_started_by_hand_says_what_it_is() {
     for name in ["modbus", "opcua", "ak", "lab"] {
         let file = format!("mapper-backend-{name}");
         build_driver(&file);
         // However wide its lines are.
-        let help = said(&file, &["--help"]).exits(0).stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+        let help =
+            called(&file, &["--help"]).exits(0).stdout.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(help.contains("`mapper` starts") && help.contains("docs/"), "{help}");
-        let version = said(&file, &["--version"]).exits(0).stdout;
+        let version = called(&file, &["--version"]).exits(0).stdout;
         assert_eq!(version.trim(), format!("{file} {}", env!("CARGO_PKG_VERSION")));
-        let wrong = said(&file, &["--hlep"]).exits(2);
+        let wrong = called(&file, &["--hlep"]).exits(2);
         assert!(wrong.stderr.contains("--hlep") && wrong.stdout.is_empty(), "{wrong:?}");
     }
 }
 
-/// A mistake in one channel of many is told at that channel, with its line.
+/// A mistake in one channel of many is reported at that channel, with its line.
 #[test]
 fn a_mistake_below_read_names_its_channel_and_its_line() {
     for (driver, old, new, at, words) in [

@@ -1,4 +1,4 @@
-//! Runs whose steps depend on what was measured, killed and gone on with: the source of the steps is told the recording again.
+//! Runs whose steps depend on what was measured, killed and gone on with: the source of the steps receives the recording again.
 #![cfg(unix)]
 
 use crate::interrupted::Running;
@@ -21,7 +21,7 @@ fn points(run: &Path) -> Vec<Value> {
     points
 }
 
-/// Killed at two places of its recording and gone on with, the run has each point once, each as the run that nobody killed has it:
+/// Killed at two places of its recording and gone on with, the run has each point once, each as the uninterrupted run has it:
 /// within the width of its interval, since warm-up and lead-in draw other noise.
 fn goes_on(what: &str, campaign: impl Fn() -> CampaignFile) {
     let whole = campaign();

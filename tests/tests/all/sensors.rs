@@ -11,7 +11,7 @@ const SINGLE: &str =
 /// Four points of the shipped campaign with these sensors of T2 and these settings of the lab.
 fn campaign(sensors: &str, lab: &str) -> CampaignFile {
     let (sensors, lab) = (format!("  T2: {sensors}\n"), format!("  virtual_lab: {lab}\n"));
-    // alpha_A known for certain: what is left of a bias is the sensors'.
+    // alpha_A known for certain: the remaining bias is the sensors'.
     let own = [
         (SINGLE, sensors.as_str()),
         ("  virtual_lab: {}\n", lab.as_str()),
@@ -38,7 +38,7 @@ fn a_faulty_thermocouple_is_named_and_left_out_by_every_way_to_the_points() {
     let [fused] = result["sensors"].as_array().unwrap().as_slice() else { panic!("{}", result["sensors"]) };
     let [out] = fused["left_out"].as_array().unwrap().as_slice() else { panic!("{fused}") };
     assert_eq!((&out["element"], &out["name"]), (&"T2/3".into(), &"T2/3".into()));
-    // 2 K less the mean of three draws of 0.25 K.
+    // 2 K minus the mean of three draws of 0.25 K.
     let by = out["fault"]["off"]["by"].as_f64().unwrap();
     assert!((by - 2.0).abs() < 3.0 * 0.25 / 3f64.sqrt(), "{by} K");
     let report = std::fs::read_to_string(result["report"].as_str().unwrap()).unwrap();
@@ -48,10 +48,10 @@ fn a_faulty_thermocouple_is_named_and_left_out_by_every_way_to_the_points() {
     let again = mapper(["identify", recording, "--json"]).exits(0).json();
     assert_eq!(again["sensors"], result["sensors"]);
     assert_eq!(again["points"], result["points"]);
-    let told = mapper(["identify", recording]).exits(0).stdout;
+    let printed = mapper(["identify", recording]).exits(0).stdout;
     // Lines end anywhere.
-    let words = told.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(words.contains("T2/3 reads") && words.contains("left out"), "{told}");
+    let words = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("T2/3 reads") && words.contains("left out"), "{printed}");
 }
 
 /// What offsets add to the interval of each efficiency.

@@ -10,7 +10,7 @@ fn run_into(campaign: &Path, out: &Path) -> Finished {
     mapper(["run".as_ref(), campaign.as_os_str(), "--json".as_ref(), "--out".as_ref(), out.as_os_str()])
 }
 
-/// The shipped campaign on a short grid, with a script beside it.
+/// The shipped campaign on a short grid, with a script next to it.
 fn scripted(script: &str, more: &[(&str, &str)]) -> CampaignFile {
     let key = ("order: thermal_gradient ", "sequence: steps.rhai\norder: thermal_gradient ");
     let replacements: Vec<_> = SHORT_GRID.iter().chain(more).copied().chain([key]).collect();
@@ -55,7 +55,7 @@ fn every_example_is_planned_and_run() {
     }
 }
 
-/// What the script was told of each step is what identification makes of the whole recording afterwards.
+/// The script receives for each step what identification later finds in the whole recording.
 #[test]
 fn a_script_sees_what_the_recording_gives() {
     let script = "for p in grid() { jump(p); }\nfor r in results() { note(`eta ${r.step} ${r.eta}`); }\n";
@@ -67,9 +67,9 @@ fn a_script_sees_what_the_recording_gives() {
     for point in points.iter().filter(|point| point["eta"].is_number()) {
         let step = point["step"].as_u64().unwrap();
         let mark = format!("eta {step} ");
-        let told = report.split(&mark).nth(1).unwrap().split_whitespace().next().unwrap();
-        let (told, eta): (f64, f64) = (told.parse().unwrap(), point["eta"].as_f64().unwrap());
-        assert!((told - eta).abs() < 1e-9, "step {step}: {told} was told, {eta} is identified");
+        let received = report.split(&mark).nth(1).unwrap().split_whitespace().next().unwrap();
+        let (received, eta): (f64, f64) = (received.parse().unwrap(), point["eta"].as_f64().unwrap());
+        assert!((received - eta).abs() < 1e-9, "step {step}: {received} was received, {eta} is identified");
     }
 }
 

@@ -161,15 +161,15 @@ fn identification_of_the_run_directory_gives_the_points_of_the_run() {
 
 /// One time, however it is asked for: soak, warm-up, repeats and the way back included. The plan is the one that the run made.
 #[test]
-fn check_tells_the_time_of_the_plan_and_has_nothing_to_warn_of() {
+fn check_reports_the_time_of_the_plan_and_has_nothing_to_warn_of() {
     let checked = mapper(["check", SHIPPED, "--json"]).exits(0).json();
     let plan = std::fs::read_to_string(shipped().run.join("plan.json")).unwrap();
     // A stored plan begins behind the soak, which is the campaign's.
-    tells_the_time_of(&checked, &serde_json::from_str(&plan).unwrap(), 30.0);
+    reports_the_time_of(&checked, &serde_json::from_str(&plan).unwrap(), 30.0);
 }
 
 /// What `mapper check --json` says of a campaign is what its plan and its soak say, without a warning.
-pub(crate) fn tells_the_time_of(checked: &Value, plan: &Value, soak_min: f64) {
+pub(crate) fn reports_the_time_of(checked: &Value, plan: &Value, soak_min: f64) {
     let planned_min = soak_min + plan["figures"]["minutes"].as_f64().unwrap();
     let minutes = checked["minutes"].as_f64().unwrap();
     assert!((minutes - planned_min).abs() < 1e-6, "{minutes} min and {planned_min} min");

@@ -68,6 +68,6 @@ fn words_stay_in_their_places() {
         }
     }
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
-    // A rule about a word that nobody writes any more would hold for ever.
+    // A rule about a word that is not in use any more would hold for ever.
     assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
 }

@@ -56,11 +56,11 @@ fn a_speed_that_cannot_be_reached_is_told_with_its_point() {
     ]);
     let campaign = CampaignFile::shipped_with(&replacements);
     let result = run_into(&campaign.path, &campaign.runs()).json();
-    let told = |point: &&Value| {
+    let missed = |point: &&Value| {
         point["warnings"].as_array().unwrap().iter().any(|warning| warning["code"] == "speed_not_reached")
     };
     let points = result["points"].as_array().unwrap();
-    let (slow, right): (Vec<&Value>, Vec<&Value>) = points.iter().partition(told);
+    let (slow, right): (Vec<&Value>, Vec<&Value>) = points.iter().partition(missed);
     assert!(!slow.is_empty() && !right.is_empty(), "{} of {}", slow.len(), points.len());
     for (points, band) in [(&slow, 0.003..0.1), (&right, -0.003..0.003)] {
         for point in points {
@@ -73,7 +73,7 @@ fn a_speed_that_cannot_be_reached_is_told_with_its_point() {
     assert!(report.contains("the speed was not reached: 125.00 krpm asked for"), "{report}");
 }
 
-/// A replayed rig gives the same speeds, and the loop asks for the same pressures: none of them is told to differ.
+/// A replayed rig gives the same speeds, and the loop asks for the same pressures: none of them is reported to differ.
 #[test]
 fn a_replayed_run_asks_for_what_was_commanded() {
     let lab = "virtual_lab: {effects: {turbine_efficiency: 0.9}}";

@@ -1,4 +1,4 @@
-//! A run that is stopped by somebody, or made ready and then not run as it was made.
+//! A run that is stopped by an operator, or made ready and then not run as it was made.
 #![cfg(unix)]
 
 use crate::interrupted::Running;

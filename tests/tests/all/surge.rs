@@ -34,7 +34,7 @@ fn value(mark: &Value, key: &str) -> f64 {
 fn surge_is_found_on_every_line_without_surging_and_again_from_the_recording() {
     let scratch = scratch();
     for seed in 1..=3 {
-        // The flow meter's gain is no part of the search.
+        // The flow meter's gain is not part of the search.
         let result = run("surge_search: {}\n", "offsets: none", seed, &scratch.path().join(seed.to_string()));
         let surge = &result["surge"];
         assert_eq!(surge["surges"], 0, "{surge}");

@@ -1,4 +1,4 @@
-//! What people and programs are told while a run goes on, when it is done, and when it fails.
+//! The output for people and programs while a run goes on, when it is done, and when it fails.
 
 use mapper_tests::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID, mapper, mapper_command, only_run, scratch};
 use serde_json::Value;
@@ -23,9 +23,9 @@ fn a_run_into_a_pipe_says_a_line_per_step_and_ends_in_eighty_columns() {
     let rows: Vec<&str> = table.lines().skip(3).take_while(|line| !line.is_empty()).collect();
     assert_eq!(rows.len(), 4, "{table}");
 
-    let told = run(&["--progress", "json", "--truth", "--full", "--color", "always"]);
-    assert!(told.stdout.contains("\u{1b}[3") && told.stdout.contains("true eta"), "{}", told.stdout);
-    let events: Vec<Value> = told.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let printed = run(&["--progress", "json", "--truth", "--full", "--color", "always"]);
+    assert!(printed.stdout.contains("\u{1b}[3") && printed.stdout.contains("true eta"), "{}", printed.stdout);
+    let events: Vec<Value> = printed.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |name: &str| events.iter().filter(|event| event["event"] == name).count();
     assert_eq!(
         [of("run_started"), of("step_started"), of("step_ended"), of("point_identified")],
@@ -97,14 +97,14 @@ fn failures_of_every_kind_are_told_alike() {
     ];
     for (code, arguments) in failures {
         let finished = mapper(arguments.iter().chain(&["--json"])).exits(code);
-        let told = finished.json();
-        assert_eq!(told["code"], code, "{arguments:?}: {told}");
-        assert!(told["message"].as_str().is_some_and(|text| !text.is_empty()), "{arguments:?}: {told}");
-        assert!(told.as_object().unwrap().contains_key("help"), "{arguments:?}: {told}");
+        let failure = finished.json();
+        assert_eq!(failure["code"], code, "{arguments:?}: {failure}");
+        assert!(failure["message"].as_str().is_some_and(|text| !text.is_empty()), "{arguments:?}: {failure}");
+        assert!(failure.as_object().unwrap().contains_key("help"), "{arguments:?}: {failure}");
     }
 }
 
-/// On a terminal, which `script` makes, mistakes are coloured unless somebody does not want it; `--color` outranks `NO_COLOR`.
+/// On a terminal, which `script` makes, mistakes are coloured unless the user switches colour off; `--color` outranks `NO_COLOR`.
 #[test]
 #[cfg(target_os = "linux")]
 fn colour_is_there_where_it_is_wanted() {
@@ -121,9 +121,9 @@ fn colour_is_there_where_it_is_wanted() {
         if no_color {
             terminal.env("NO_COLOR", "1");
         }
-        let said = String::from_utf8(terminal.output().unwrap().stdout).unwrap();
-        assert!(said.contains("there is no key"), "{said}");
-        said.contains("\u{1b}[")
+        let output = String::from_utf8(terminal.output().unwrap().stdout).unwrap();
+        assert!(output.contains("there is no key"), "{output}");
+        output.contains("\u{1b}[")
     };
     let wanted = [("auto", false), ("auto", true), ("always", true), ("never", false)];
     assert_eq!(wanted.map(|(when, no_color)| coloured(when, no_color)), [true, false, true, false]);

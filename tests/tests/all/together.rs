@@ -42,8 +42,8 @@ fn a_recording_identified_again_leaves_what_its_run_has_left() {
     assert!(refused.stderr.contains("points.json"), "{}", refused.stderr);
 }
 
-/// Two halves of a map with a line in common: each point stands on the map once, places are those of each recording alone, and
-/// intervals of points that share their law over both are no wider than with one alone.
+/// Two halves of a map with a line in common: each point is on the map once, places are those of each recording alone, and
+/// intervals of points that share their law over both are not wider than with one alone.
 #[test]
 fn two_recordings_make_one_map() {
     let half = |speeds: &str| {

@@ -5,7 +5,7 @@ use mapper_tests::{CampaignFile, made_once, mapper_in, only_run, python, reposit
 use std::fs;
 use std::path::Path;
 
-/// Commands of the tour: lines of its code blocks that call the program, without what stands behind `#`.
+/// Commands of the tour: lines of its code blocks that call the program, without the text behind `#`.
 fn commands(page: &str) -> Vec<String> {
     let mut inside = false;
     let mut commands = Vec::new();
@@ -13,7 +13,7 @@ fn commands(page: &str) -> Vec<String> {
         if line.starts_with("```") {
             inside = !inside;
         } else if let Some(command) = line.strip_prefix("mapper ").filter(|_| inside) {
-            // A comment stands behind spaces; `#` alone may be part of a name.
+            // A comment follows spaces; `#` alone may be part of a name.
             commands.push(command.split(" #").next().unwrap().trim().to_owned());
         }
     }
@@ -44,7 +44,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Eight speeds at six openings are minutes, and tell no more of a command than two at two.
+/// Eight speeds at six openings are minutes, and test no more of a command than two at two.
 const SMALLER: [(&str, &str); 2] = [
     (
         "speeds: [50 krpm, 65 krpm, 80 krpm, 95 krpm, 110 krpm, 125 krpm, 140 krpm, 155 krpm]",

@@ -20,9 +20,9 @@ fn an_engine_is_fitted_and_what_it_does_not_explain_is_said() {
     let found = transient(&given).exits(0).json();
     let rms_k = |part: &str| found[part]["rms_k"].as_f64().unwrap();
     assert!(rms_k("fitted") < 0.5 && rms_k("held_out") < 4.0, "{} {}", rms_k("fitted"), rms_k("held_out"));
-    let told = std::fs::read_to_string(out.join("transient.txt")).unwrap();
+    let text = std::fs::read_to_string(out.join("transient.txt")).unwrap();
     let beyond = rms_k("held_out") > found["held_out"]["expected_high_k"].as_f64().unwrap();
-    assert_eq!(told.contains("more is left than the fitted part allows"), beyond, "{told}");
+    assert_eq!(text.contains("more is left than the fitted part allows"), beyond, "{text}");
     // As the log's own description has it: no compressor does that.
     let apparent = found["trace"]["apparent_efficiency"].as_array().unwrap();
     assert!(apparent.iter().any(|eta| eta.as_f64().unwrap() > 1.4));

@@ -46,7 +46,7 @@ fn a_soak_takes_the_offsets_off_the_slowest_points() {
     for seed in 1..=3 {
         without.extend(slowest(&run("", seed, &scratch.path().join("without"))));
         let result = run("zero: {soak: 30 min}\n", seed, &scratch.path().join("with"));
-        // T1, T2, Tc and T_oil against each other, P1 against P2, each with what is left of it.
+        // T1, T2, Tc and T_oil against each other, P1 against P2, each with its remaining uncertainty.
         for channel in ["T1", "T2", "Tc", "T_oil", "P1", "P2"] {
             assert!(result["zero"]["offsets"][channel].is_number(), "{}", result["zero"]);
             assert!(result["zero"]["left_sigma"][channel].as_f64().unwrap() > 0.0);

@@ -10,7 +10,7 @@ use mapper_physics::similarity::at_speed;
 
 /// Makes a map of identified points.
 ///
-/// Each point is brought from its own corrected speed to the mean of its line by similarity; what that changed stands in
+/// Each point is brought from its own corrected speed to the mean of its line by similarity; this change is stored in
 /// [`MapPoint::shift`], the measured values in [`MapPoint::identified`].
 ///
 /// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed

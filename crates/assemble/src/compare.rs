@@ -1,4 +1,4 @@
-//! Where two maps differ, in units and in their uncertainty.
+//! Differences between two maps, in units and in their uncertainty.
 
 use crate::efficiency::convert_efficiency;
 use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
@@ -11,7 +11,7 @@ const NODES: usize = 25;
 /// How far apart the end lines of two maps may be and still count as one speed, ratio: a speed is held within a percent.
 const END_SLACK: f64 = 0.01;
 
-/// A place of the second map beside the nearest place of the first at equal corrected speed. Differences: second minus
+/// A place of the second map compared with the nearest place of the first at equal corrected speed. Differences: second minus
 /// first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ComparedPlace {

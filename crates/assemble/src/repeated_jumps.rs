@@ -6,9 +6,9 @@ use serde::Serialize;
 /// One jump that was made more than once.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RepeatedJump {
-    /// Where it starts.
+    /// Start of the jump.
     pub from: OperatingPoint,
-    /// Where it goes.
+    /// Target of the jump.
     pub to: OperatingPoint,
     /// Places of the steps, from 0; files have their numbers, from 1.
     #[serde(serialize_with = "mapper_core::step_number::list::serialize")]

@@ -1,4 +1,4 @@
-//! Where on a contour line its text stands.
+//! Position of the text on a contour line.
 
 /// A place for a text on a line.
 #[derive(Debug, Clone, Copy, PartialEq)]

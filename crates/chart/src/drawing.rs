@@ -74,7 +74,7 @@ pub(crate) type Px = (f64, f64);
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     OpenGroup(String),
-    /// Begins what is said of the shapes up to the next [`Shape::CloseNote`].
+    /// Begins the note on the shapes up to the next [`Shape::CloseNote`].
     OpenNote(Note),
     CloseNote(Note),
     CloseGroup,

@@ -2,7 +2,7 @@
 
 use crate::{Axis, Item};
 
-/// Where the legend stands; never inside the drawing area, so it never covers data.
+/// Position of the legend; never inside the drawing area, so it never covers data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LegendPlace {
     /// Below the axis title, in rows.
@@ -25,7 +25,7 @@ pub struct Panel {
     pub y: Axis,
     /// What is shown, in drawing order.
     pub items: Vec<Item>,
-    /// Where the legend stands.
+    /// Position of the legend.
     pub legend: LegendPlace,
 }
 

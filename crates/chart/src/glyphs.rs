@@ -17,7 +17,7 @@ pub(crate) struct Fonts {
 
 impl Fonts {
     /// # Errors
-    /// Where the font that comes along is not a font: a fault of the build.
+    /// If the built-in font is not a font: a fault of the build.
     pub(crate) fn new() -> Result<Self, ttf_parser::FaceParsingError> {
         let regular = Face::parse(dejavu::sans::regular(), 0)?;
         Ok(Fonts { regular, bold: Face::parse(dejavu::sans::bold(), 0)? })
@@ -63,7 +63,7 @@ fn kerning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> f32 {
 /// Draws glyphs one behind the other, font units.
 struct Pen {
     builder: PathBuilder,
-    /// Where the next glyph begins.
+    /// Left end of the next glyph.
     x: f32,
 }
 

@@ -29,7 +29,7 @@ pub enum PngError {
     /// The encoder failed.
     #[error("failed to encode the picture: {source}")]
     Encode {
-        /// What it said.
+        /// Its error.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }

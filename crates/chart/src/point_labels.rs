@@ -1,4 +1,4 @@
-//! Where short texts stand around their points.
+//! Positions of short texts around their points.
 
 use crate::Item;
 use crate::clip::{Rect, touches};

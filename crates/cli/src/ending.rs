@@ -9,7 +9,7 @@ use std::process::ExitCode;
 pub fn failed(failure: &Failure) -> ExitCode {
     let Some(code) = failure.say() else { return ExitCode::SUCCESS };
     if output_options::json() && !output::has_told() {
-        // A reader that has gone away is told nothing.
+        // A reader that has gone away receives nothing.
         let _ = output::print_json(&failure.json());
     }
     code

@@ -1,11 +1,11 @@
-//! Where locks and lockouts of rigs are: one place for all users of a machine, wherever the results of a run go.
+//! Place of the locks and lockouts of rigs: one place for all users of a machine, wherever the results of a run go.
 
 use std::path::{Path, PathBuf};
 
-/// Where an administrator may put them; kept over restarts and never cleaned.
+/// An administrator may put them here; kept over restarts and never cleaned.
 const INSTALLED: &str = "/var/lib/mapper";
 
-/// Where every user may write, and restarts leave files alone.
+/// Every user may write here, and restarts leave files alone.
 const SHARED: &str = "/var/tmp/mapper";
 
 /// The directory that was given, or `$MAPPER_STATE_DIR`, `/var/lib/mapper` if there is one, `/var/tmp/mapper`; on systems without these

@@ -27,7 +27,7 @@ pub struct FmuMachine<'a> {
     pub map: &'a FmuMap,
     /// Start values of the inputs.
     pub boundary: &'a BoundaryConditions,
-    /// Where it begins unless the importer says otherwise.
+    /// Its initial state unless the importer sets another.
     pub start: &'a State,
 }
 
@@ -46,7 +46,7 @@ impl FmuMachine<'_> {
 /// Why no FMU can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FmuError {
-    /// A number that C cannot be told.
+    /// A number that cannot be written in C.
     #[error("{name} = {value}: an FMU needs a finite number there")]
     NotFinite {
         /// Which number.

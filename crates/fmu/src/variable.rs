@@ -20,7 +20,7 @@ pub struct Variable {
     pub causality: Causality,
     /// Unit, a name of [`UNITS`].
     pub unit: &'static str,
-    /// Value before anybody sets one; `None` for outputs.
+    /// Value until one is set; `None` for outputs.
     pub start: Option<f64>,
     /// What it is.
     pub description: &'static str,
@@ -31,7 +31,7 @@ pub struct Variable {
 pub struct Switch {
     /// Name.
     pub name: &'static str,
-    /// Value before anybody sets one.
+    /// Value until one is set.
     pub start: bool,
     /// What it does.
     pub description: &'static str,

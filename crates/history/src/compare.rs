@@ -13,7 +13,7 @@ pub struct Moved {
     pub figure: Metric,
     /// Tonight's value; `None` where tonight has none and the nights before had.
     pub value: Option<f64>,
-    /// Where it has been.
+    /// The range that it has been in.
     pub band: Band,
 }
 
@@ -24,7 +24,7 @@ pub struct Shift {
     pub place: String,
     /// Tonight's value.
     pub value: f64,
-    /// Where it has been.
+    /// The range that it has been in.
     pub band: Band,
 }
 

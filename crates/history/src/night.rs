@@ -23,7 +23,7 @@ impl std::fmt::Display for RunKey {
     }
 }
 
-/// One identified point beside its truth.
+/// One identified point with its truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PointRow {
     /// Speed aimed at, rpm.

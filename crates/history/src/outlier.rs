@@ -140,7 +140,7 @@ fn signs(machine: usize, places: &[Deviations], lowest_rpm: f64) -> Option<Signs
     let middle_y = mean(eta.iter().map(|(_, y, _)| *y))?;
     let spread: f64 = eta.iter().map(|(x, ..)| (x - middle_x).powi(2)).sum();
     let across: f64 = eta.iter().map(|(x, y, _)| (x - middle_x) * (y - middle_y)).sum();
-    // One speed alone tells nothing of a course with speed.
+    // One speed alone does not show a dependence on speed.
     let at_lowest = if spread > 1e-6 { across / spread } else { 0.0 };
     Some(Signs {
         eta: mean(eta.iter().map(|(.., eta)| *eta))?,

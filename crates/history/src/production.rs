@@ -46,7 +46,7 @@ pub struct Place {
     pub h_w_m2k: Option<Spread>,
 }
 
-/// Where a quantity lies and how far it scatters.
+/// Mean and scatter of a quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spread {
     /// Of the average machine.
@@ -66,7 +66,7 @@ pub struct Stand {
     pub eta_drift: Option<Drift>,
     /// Drift of h, ratio a day.
     pub h_drift: Option<Drift>,
-    /// Standard deviation of the efficiency between nights beside that, fraction.
+    /// Standard deviation of the efficiency between nights in addition to the drift, fraction.
     pub eta_night_sigma: f64,
     /// The same of h, ratio.
     pub h_night_sigma: f64,
@@ -142,8 +142,8 @@ fn production(
         observed.days.push((start - first_ms) as f64 / MS_A_DAY);
     }
     let all: Vec<Observed<'_>> = by_place.into_values().collect();
-    let nobody = BTreeSet::new();
-    let measured = measure(&all, machines.len(), &nobody);
+    let none_left_out = BTreeSet::new();
+    let measured = measure(&all, machines.len(), &none_left_out);
     let outliers = outliers(&machines, &measured.deviations);
     let out: BTreeSet<usize> = outliers
         .iter()
@@ -255,7 +255,7 @@ fn fitted(
     let fixed = DMatrix::from_fn(y.len(), 1 + usize::from(with_drift), |row, column| {
         if column == 0 { 1.0 } else { days[row] - middle_day }
     });
-    // One machine a measurement: what a machine has of its own is then not told apart from the rest.
+    // With one measurement a machine, a machine's own deviation is indistinguishable from the rest.
     let with_machines = different(&machines) < y.len() && different(&machines) > 1;
     let with_nights = different(&nights) > 1 && different(&nights) < y.len();
     let mut groups: Vec<&[usize]> = Vec::new();

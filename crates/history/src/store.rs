@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Nights that make a band where nothing else is said: two weeks.
+/// Nights that make a band unless stated otherwise: two weeks.
 pub const DEFAULT_NIGHTS: usize = 14;
 
 /// Marks the file as one of ours: "mapr".

@@ -77,7 +77,7 @@ pub enum OptionError {
         key: String,
     },
     /// Not a value of the key.
-    #[error("`{value}` is no value of `{key}`; write e.g. `{example}`")]
+    #[error("`{value}` is not a value of `{key}`; write e.g. `{example}`")]
     Value {
         /// The key.
         key: &'static str,

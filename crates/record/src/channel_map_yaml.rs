@@ -197,7 +197,7 @@ impl<'a> Reader<'a> {
         );
         if gauge && kind != Kind::Pressure {
             let message =
-                format!("{channel} is no pressure, and only pressures are read over the ambient pressure");
+                format!("{channel} is not a pressure, and only pressures are read over the ambient pressure");
             self.note(FindingKind::Conflict, &of("gauge"), message, "remove `gauge`");
         }
         (topic, written, gauge)

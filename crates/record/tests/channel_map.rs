@@ -155,7 +155,7 @@ noise_color: {share: 1, time_constant: 2 s}
 #[test]
 fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
     for (text, kind, place, words) in [
-        ("channels:\n  T2: {topic: /a}\n", Kind::MissingKey, (2, 3), "lacks the key `field`"),
+        ("channels:\n  T2: {topic: /a}\n", Kind::MissingKey, (2, 3), "has no key `field`"),
         (
             "channels:\n  T2: {topic: /a, field: x}\n  T2: {topic: /a, field: x}\n",
             Kind::DuplicateKey,

@@ -217,8 +217,8 @@ fn a_single_wrong_time_is_left_out_and_told() {
     let report = read_foreign(&foreign("/daq", &rows, &[]), &map(", unit: degC")).unwrap();
     let t_s = &report.recording.series[&Channel::T2].t_s;
     assert_eq!((t_s.len(), t_s[0], t_s[99]), (100, 0.0, 99.0));
-    let told = |warning: &ReadWarning| matches!(warning, ReadWarning::StrayTimes { count: 2, .. });
-    assert!(report.warnings.iter().any(told), "{:?}", report.warnings);
+    let stray = |warning: &ReadWarning| matches!(warning, ReadWarning::StrayTimes { count: 2, .. });
+    assert!(report.warnings.iter().any(stray), "{:?}", report.warnings);
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn a_unit_comes_from_the_map_or_the_recording_and_never_from_a_guess() {
     let contradicting = read_foreign(&foreign("/daq", &rows, &[("tt2", "K")]), &map(", unit: degC")).unwrap();
     assert_eq!(contradicting.recording.series[&Channel::T2].values, [274.15]);
     assert!(contradicting.warnings.iter().any(|w| matches!(w, ReadWarning::UnitContradiction { .. })));
-    // Two spellings of one unit are no contradiction.
+    // Two spellings of one unit are not a contradiction.
     let agreeing = read_foreign(&foreign("/daq", &rows, &[("tt2", "C")]), &map(", unit: degC")).unwrap();
     assert!(!agreeing.warnings.iter().any(|w| matches!(w, ReadWarning::UnitContradiction { .. })));
 }

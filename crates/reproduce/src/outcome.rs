@@ -1,4 +1,4 @@
-//! A run identified, beside what the model used.
+//! An identified run, with the model's true values.
 
 use crate::ReproduceError;
 use crate::lab::{Jump, Run, Truth};

@@ -1,5 +1,5 @@
 //! `study: maps`: campaigns by seeds, each identified by methods and kept with all its points: coverage of intervals, tables
-//! over seeds, scatter beside what the planner foretells.
+//! over seeds, scatter compared with the prediction of the planner.
 
 use crate::error::StudyError;
 use crate::source::CampaignSource;

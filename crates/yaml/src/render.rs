@@ -43,7 +43,7 @@ impl Findings {
             out.push_str("\n\n");
         }
         let count = self.count();
-        // Warnings never stand beside mistakes: they are looked for in files without any.
+        // Warnings never occur together with mistakes: they are looked for in files without any.
         let warnings = self.list.first().is_some_and(|finding| finding.kind.is_warning());
         let noun = match (warnings, count) {
             (false, 1) => "mistake",

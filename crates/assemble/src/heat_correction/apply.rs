@@ -148,7 +148,7 @@ fn put(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: 
         ..uncertainty
     });
     let (low, high) = confidence_interval_95(eta, own.hypot(added));
-    // Entry k of every point is error k of the map: what is shared from here on stands behind all others.
+    // Entry k of every point is error k of the map: the errors shared from here on follow all others.
     identified.common.eta_changes.resize(shared, 0.0);
     identified.common.eta_changes.extend([heat_change, PREMISE_ERROR]);
     (identified.eta_low, identified.eta_high) = (Some(low), Some(high));

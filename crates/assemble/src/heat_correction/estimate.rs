@@ -39,7 +39,7 @@ pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
         return Err(HeatCorrectionError::OneSpeed { ratio });
     }
     let (heat_w, scatter_ratio) = fitted(points).ok_or(HeatCorrectionError::Singular)?;
-    // Errors of a line (its speed, its day) are shared by its points, so lines are what is left out.
+    // Errors of a line (its speed, its day) are shared by its points, so whole lines are left out.
     let without = |line: &usize| {
         let others: Vec<WorkPoint> = points.iter().filter(|point| point.line != *line).copied().collect();
         fitted(&others).map(|(heat_w, _)| heat_w)

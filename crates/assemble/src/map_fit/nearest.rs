@@ -80,7 +80,7 @@ pub(crate) fn nearest(
 fn best_of_net(squared: &impl Fn(f64) -> f64) -> (f64, f64, f64) {
     let (mut low, mut high) = ANGLE_RANGE;
     let mut best = low;
-    // The first is fine enough to tell the flat from the steep part.
+    // The first is fine enough to distinguish the flat from the steep part.
     for mesh in [48, 10] {
         let step = (high - low) / f64::from(mesh);
         let mut least = f64::INFINITY;

@@ -14,7 +14,7 @@ pub struct Step {
     pub marker: StepMarker,
     /// Time after the jump s, speed rpm, commanded P3 Pa.
     pub rows: Vec<(f64, f64, f64)>,
-    /// Whether the run told that its speed was not reached.
+    /// Whether the run reported that its speed was not reached.
     pub not_reached: bool,
 }
 

@@ -27,7 +27,7 @@ pub struct HeaderUnit {
     pub reference: Reference,
 }
 
-/// Spellings that logs use beside those of the table of units, in small letters without blanks.
+/// Spellings that logs use in addition to those of the table of units, in small letters without blanks.
 const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (
         Kind::Temperature,
@@ -202,8 +202,8 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
             // A single letter behind a blank or a line is a place more often than a unit: `T_C`, `p_a`.
             let doubtful = [" ", "_"].contains(&between) && unit.chars().count() < 2;
             let longer = best.is_none_or(|(_, known)| known.len() < unit.len());
-            let told = !name.is_empty() && !doubtful && unit != "-" && !unit.ends_with("--");
-            if told && longer && header_unit(unit).is_some() {
+            let stated = !name.is_empty() && !doubtful && unit != "-" && !unit.ends_with("--");
+            if stated && longer && header_unit(unit).is_some() {
                 best = Some((name, unit));
             }
         }

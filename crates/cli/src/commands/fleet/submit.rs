@@ -9,7 +9,7 @@ use mapper_fleet::{Limits, SubmitOptions, Template};
 use mapper_report::submission_text;
 use std::path::PathBuf;
 
-/// Submit what is left as an array job with the merge behind it; nothing is submitted that exceeds a limit
+/// Submit the remaining items as an array job with the merge behind it; nothing is submitted that exceeds a limit
 #[derive(Debug, Args)]
 pub struct Submit {
     /// Directory of the study

@@ -58,7 +58,7 @@ fn beyond(difference: f64, standard_error: f64) -> bool {
 pub struct ComparedLine {
     /// Corrected speed, rpm, at the first map's reference state.
     pub speed_corrected_rpm: f64,
-    /// Places from the choke side to the surge side; empty where the lines do not overlap.
+    /// Places from the choke side to the surge side; empty if the lines do not overlap.
     pub places: Vec<ComparedPlace>,
 }
 
@@ -85,7 +85,7 @@ pub struct MapComparison {
 /// first's reference state and definition of efficiency, if both files name theirs. Extrapolated places are left out.
 ///
 /// # Errors
-/// [`MapFitError`] where one of the maps cannot be fitted.
+/// [`MapFitError`] if one of the maps cannot be fitted.
 pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapComparison, MapFitError> {
     let second = second.clone().at_reference(first.reference);
     // A difference of definitions is none of the machines.
@@ -178,7 +178,7 @@ struct Known<'a> {
 }
 
 impl Known<'_> {
-    /// None where the nearest place is the line's very end: there the other line goes on alone.
+    /// None if the nearest place is the line's very end: there the other line goes on alone.
     fn nearest(&self, node: &FittedNode) -> Option<Nearest<'_>> {
         let scaled = |n: &FittedNode| {
             (n.flow_corrected_kg_s / self.flow_scale_kg_s, n.pressure_ratio / self.ratio_scale)

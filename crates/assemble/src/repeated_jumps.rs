@@ -17,7 +17,7 @@ pub struct RepeatedJump {
     pub eta: Vec<f64>,
     /// Last less first efficiency, fraction.
     pub eta_change: f64,
-    /// Standard error of this change from noise, fraction; fixed offsets cancel. `None` where an interval is missing.
+    /// Standard error of this change from noise, fraction; fixed offsets cancel. `None` if an interval is missing.
     pub eta_change_standard_error: Option<f64>,
 }
 

@@ -167,7 +167,7 @@ fn equal_maps_give_equal_tables_and_a_wild_point_moves_little() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_said() {
+fn a_map_that_cannot_be_fitted_is_refused_with_a_reason() {
     let few = |lines: usize, points: usize| {
         let mut map = turbo_a(0.0, 1);
         map.lines.truncate(lines);

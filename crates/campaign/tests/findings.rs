@@ -325,7 +325,7 @@ fn keys() {
 }
 
 #[test]
-fn missing_keys_are_complained_about_at_what_lacks_them() {
+fn missing_keys_are_reported_at_their_mapping() {
     let (text, _) = with("  oil_temperature: 50 degC\n", "");
     let findings = mistakes(&text);
     let finding = &findings.list[0];
@@ -812,7 +812,7 @@ proptest::proptest! {
 }
 
 #[test]
-fn a_format_that_nobody_writes_is_shown_where_it_stands() {
+fn an_unknown_format_is_reported_with_its_place() {
     let text = format!("{RIGHT}outputs: {{formats: [csv, cvs]}}\n");
     let campaign = run(&text).unwrap();
     let findings = mapper_campaign::format_mistake(

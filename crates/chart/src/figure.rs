@@ -64,7 +64,7 @@ impl Panel {
 pub struct Figure {
     /// Title.
     pub title: String,
-    /// Lines below the title, smaller; each is wrapped where it is too long.
+    /// Lines below the title, smaller; each is wrapped if it is too long.
     pub subtitles: Vec<String>,
     /// Panels, row after row.
     pub panels: Vec<Panel>,

@@ -23,7 +23,7 @@ impl Fonts {
         Ok(Fonts { regular, bold: Face::parse(dejavu::sans::bold(), 0)? })
     }
 
-    /// The outline of a text whose vertical middle is at `at`; `None` where nothing is to be seen, e.g. of blanks.
+    /// The outline of a text whose vertical middle is at `at`; `None` if nothing is to be seen, e.g. of blanks.
     pub(crate) fn outline(&self, at: Px, text: &str, style: &TextStyle) -> Option<Path> {
         let face = if style.bold { &self.bold } else { &self.regular };
         let em = style.size_px as f32 / f32::from(face.units_per_em());

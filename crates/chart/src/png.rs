@@ -96,7 +96,7 @@ impl Canvas {
         }
     }
 
-    /// Draws nothing where there is no path: of too few points, or of none that is a number.
+    /// Draws nothing without a path: from too few points, or from points that are not numbers.
     fn fill(&mut self, path: Option<Path>, colour: Colour, opacity: f64) {
         if let Some(path) = path {
             self.pixels.fill_path(&path, &paint(colour, opacity), FillRule::Winding, self.to_pixels, None);

@@ -86,7 +86,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn ticks_are_few_rising_inside_and_told_apart(low in proptest::num::f64::ANY, high in proptest::num::f64::ANY, target in 0usize..30) {
+        fn ticks_are_few_rising_inside_and_distinct(low in proptest::num::f64::ANY, high in proptest::num::f64::ANY, target in 0usize..30) {
             let ticks = nice_ticks(low, high, target);
             let (low, high) = usable_range(low, high);
             prop_assert!(low < high);

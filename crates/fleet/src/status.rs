@@ -13,7 +13,7 @@ pub struct Lacking {
     pub name: String,
     /// Its hash.
     pub hash: Hash,
-    /// Why there is no result; `None` if unknown.
+    /// Why the result is missing; `None` if unknown.
     pub why: Option<String>,
 }
 

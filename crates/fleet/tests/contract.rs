@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 const PROGRAM: &str = "mapper 1.2.3";
 
-/// Squares of numbers. 13 fails once and 17 panics once where `faults` says so.
+/// Squares of numbers. 13 fails once and 17 panics once if `faults` says so.
 #[derive(Default)]
 struct Squares {
     faults: AtomicBool,

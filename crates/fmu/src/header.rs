@@ -9,7 +9,7 @@ use mapper_physics::tabulated_map::{Line, Node, TabulatedMap};
 use mapper_physics::{air, housing, nusselt, rodas5p};
 use std::fmt::Write;
 
-/// Tolerance where the importer names none, relative to each state.
+/// Tolerance if the importer names none, relative to each state.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 
 /// The header. The GUID is written by [`with_guid`], since it depends on the rest.

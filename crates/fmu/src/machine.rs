@@ -1,4 +1,4 @@
-//! What is exported: a machine with its map, and where it begins.
+//! The exported machine with its map and its initial state.
 
 use mapper_physics::closed_form_map::ClosedFormMap;
 use mapper_physics::params::{BoundaryConditions, Params};
@@ -19,7 +19,7 @@ pub enum FmuMap {
 pub struct FmuMachine<'a> {
     /// Its name, as people wrote it.
     pub name: &'a str,
-    /// One sentence on where its numbers come from.
+    /// One sentence on the origin of its numbers.
     pub origin: &'a str,
     /// Parameters.
     pub params: &'a Params,

@@ -42,7 +42,7 @@ pub struct Switch {
 pub struct Unit {
     /// Its name.
     pub name: &'static str,
-    /// Base units and exponents, and the factor where it is not 1, as attributes of XML.
+    /// Base units and exponents, and the factor if it is not 1, as attributes of XML.
     pub base: &'static str,
 }
 

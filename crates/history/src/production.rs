@@ -27,9 +27,9 @@ pub struct Production {
     pub nights_ms: Vec<i64>,
     /// The points of the map, by speed and opening; outliers are not in them.
     pub places: Vec<Place>,
-    /// What the stand did to all machines alike, means over the points; `None` where there is one night.
+    /// What the stand did to all machines alike, means over the points; `None` if there is one night.
     pub stand: Option<Stand>,
-    /// Machines that are not like the others, farthest first; `None` where too few are there to say.
+    /// Machines that are not like the others, farthest first; `None` if too few are there to say.
     pub outliers: Option<Vec<Outlier>>,
 }
 
@@ -51,9 +51,9 @@ pub struct Place {
 pub struct Spread {
     /// Of the average machine.
     pub mean: f64,
-    /// Standard deviation between machines; `None` where each was measured once, so that it is within `rest_sigma`.
+    /// Standard deviation between machines; `None` if each was measured once, so that it is within `rest_sigma`.
     pub machine_sigma: Option<f64>,
-    /// Standard deviation between nights, a drift in time apart; `None` where there is one night.
+    /// Standard deviation between nights, a drift in time apart; `None` if there is one night.
     pub night_sigma: Option<f64>,
     /// Standard deviation of one measurement of one machine in one night.
     pub rest_sigma: f64,
@@ -62,7 +62,7 @@ pub struct Spread {
 /// What all machines share from night to night.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stand {
-    /// Drift of the efficiency, fraction a day; `None` where the nights are fewer than 3.
+    /// Drift of the efficiency, fraction a day; `None` if the nights are fewer than 3.
     pub eta_drift: Option<Drift>,
     /// Drift of h, ratio a day.
     pub h_drift: Option<Drift>,
@@ -276,7 +276,7 @@ fn fitted(
     Some(Fitted { fit, machines: of_machines, nights: of_nights, with_drift, middle_day })
 }
 
-/// How far each machine lies off the average one, what the stand did in its nights apart; `None` where it was not measured.
+/// How far each machine lies off the average one, what the stand did in its nights apart; `None` if it was not measured.
 fn deviations(
     observed: &Observed<'_>,
     quantity: PointQuantity,

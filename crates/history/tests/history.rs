@@ -87,7 +87,7 @@ fn equal_nights_are_quiet_and_a_model_that_moves_truth_too_is_caught_the_next_ni
 }
 
 #[test]
-fn an_identification_that_moves_is_told_from_a_model_that_moves() {
+fn an_identification_that_moves_is_distinguished_from_a_model_that_moves() {
     let (_scratch, path) = scratch();
     append(&path, &night(0, 0.0, 0.0));
     let conclusions = append(&path, &night(1, 0.0, -0.002)).conclusions.join("\n");
@@ -109,7 +109,7 @@ fn an_accepted_night_begins_a_new_band() {
 }
 
 #[test]
-fn failures_lost_runs_lost_points_and_other_nightlies_are_told_apart() {
+fn failures_lost_runs_lost_points_and_other_nightlies_are_distinguished() {
     let (_scratch, path) = scratch();
     append(&path, &night(0, 0.0, 0.0));
     let other = Night { name: "others".into(), ..night(1, 0.1, 0.0) };

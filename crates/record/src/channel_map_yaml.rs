@@ -20,7 +20,7 @@ const SIZE_LIMIT: usize = 1 << 20;
 pub(crate) static DOCUMENT: Document =
     Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
 
-/// Why there is no channel map.
+/// Errors of reading a channel map.
 #[derive(Debug, thiserror::Error)]
 pub enum ChannelMapError {
     /// The file cannot be read.

@@ -196,7 +196,7 @@ fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
 }
 
 #[test]
-fn a_file_that_is_not_there_and_one_that_is_not_text_are_told_apart() {
+fn a_missing_file_and_a_file_that_is_not_text_are_distinguished() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.yaml");
     assert!(matches!(ChannelMap::load(&path), Err(ChannelMapError::Read { .. })));

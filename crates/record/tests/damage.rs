@@ -141,7 +141,7 @@ fn damaged_records_are_counted_and_a_few_are_listed() {
 }
 
 #[test]
-fn what_is_no_mcap_file_is_said_to_be_none() {
+fn a_file_that_is_not_mcap_is_refused() {
     let error = read(b"time,T2\n0,300\n").unwrap_err();
     assert!(error.to_string().contains("not an MCAP file"), "{error}");
     let missing = read_recording(Path::new("/no/such.mcap"), &ChannelMap::native(), &ReadOptions::default());
@@ -207,7 +207,7 @@ fn times_out_of_order_are_sorted_and_repeats_left_out() {
 }
 
 #[test]
-fn a_single_wrong_time_is_left_out_and_told() {
+fn a_single_wrong_time_is_left_out_and_reported() {
     let second = 1_000_000_000;
     let mut rows: Vec<(u64, &str)> =
         (0..100).map(|row| (1_795_356_185 * second + row * second, "{\"tt2\": 1}")).collect();

@@ -56,7 +56,7 @@ fn a_fast_log_is_averaged_and_says_so() {
 }
 
 #[test]
-fn units_that_contradict_the_log_are_told_and_gauge_units_need_the_word() {
+fn units_that_contradict_the_log_are_reported_and_gauge_units_need_the_word() {
     let contradicting =
         read(&log(10), "channels:\n  N: {field: n, unit: rpm}\n  T2: {field: T2, unit: degF}\n").unwrap();
     let channels: Vec<Channel> = contradicting
@@ -184,7 +184,7 @@ fn two_runs_in_one_file_are_refused_where_the_second_begins() {
 }
 
 #[test]
-fn a_single_wrong_time_is_left_out_and_told() {
+fn a_single_wrong_time_is_left_out_and_reported() {
     let text = format!("{}1e9;60000;-2.5;990;45\n", log(10));
     let read = read(&text, "channels:\n  N: {field: n}\n").unwrap();
     assert!(

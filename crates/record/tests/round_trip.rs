@@ -47,9 +47,9 @@ fn a_run_reads_back_whole() {
     assert_eq!((truth.t_s, truth.columns), (batch.t_s, batch.truth));
 }
 
-/// Quality and source time are kept where they are not as usual, a bad reading is none, and a run without any has no such topic.
+/// Quality and source time are kept if they are not as usual, a bad reading is none, and a run without any has no such topic.
 #[test]
-fn where_readings_come_from_is_kept_beside_them() {
+fn the_provenance_of_readings_is_kept_with_them() {
     let folder = tempfile::tempdir().unwrap();
     let (plain, marked) = (folder.path().join("plain.mcap"), folder.path().join("marked.mcap"));
     let whole = batch(35);

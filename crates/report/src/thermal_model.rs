@@ -105,7 +105,7 @@ mod tests {
     use mapper_core::{Entangled, ProfilePoint};
 
     #[test]
-    fn of_h_before_the_wheel_the_law_and_what_speaks_for_it_are_said() {
+    fn the_correlation_of_h_before_the_wheel_and_its_evidence_are_reported() {
         let open = FoundInlet {
             convection: InletConvection::Shared,
             diameter_m: 0.04,
@@ -126,7 +126,7 @@ mod tests {
 
     /// Parameters that the recording cannot determine are reported in text and in files.
     #[test]
-    fn what_can_not_be_told_apart_is_said() {
+    fn parameters_that_are_not_identifiable_are_reported() {
         let unknown =
             SharedValue { value: None, origin: Origin::NotIdentifiable, ..SharedValue::assumed(0.0) };
         let thermal = ThermalModel {

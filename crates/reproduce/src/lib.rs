@@ -29,7 +29,7 @@ pub const FIGURES: [&str; 7] = ["5", "6", "7", "8", "9", "10", "12"];
 /// Redoes all figures; `progress` receives the figure's number before each is made.
 ///
 /// # Errors
-/// [`ReproduceError`] where the model cannot be run or a recording cannot be identified.
+/// [`ReproduceError`] if the model cannot be run or a recording cannot be identified.
 pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, ReproduceError> {
     let model = mapper_physics::model::Model::nominal();
     let mut results = Vec::with_capacity(FIGURES.len());

@@ -32,7 +32,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Identified less mean model efficiency, points; `None` where the method failed.
+    /// Identified less mean model efficiency, points; `None` if the method failed.
     pub(crate) fn eta_error_points(&self) -> Option<f64> {
         self.point.eta.map(|eta| 100.0 * (eta - self.eta_mean))
     }

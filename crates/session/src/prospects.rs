@@ -46,7 +46,7 @@ impl Session<'_> {
     /// Simulates the steps of the campaign, or rehearses its script, and looks for parts that will give no result.
     ///
     /// # Errors
-    /// [`SessionError`] if there is no plan, or the script fails.
+    /// [`SessionError`] if the plan is missing, or the script fails.
     pub fn prospects(&self, campaign: &Campaign, model: &Model) -> Result<Prospects, SessionError> {
         let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
         let plan = match &campaign.sequence {

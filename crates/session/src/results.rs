@@ -57,7 +57,7 @@ pub struct Results {
     pub surge: Option<SoughtSurge>,
     /// Other remarks.
     pub remarks: Vec<String>,
-    /// The map itself; `None` where there is none.
+    /// The map itself; `None` if there is none.
     #[serde(skip)]
     pub compressor_map: Option<CompressorMap>,
 }

@@ -168,7 +168,7 @@ mod tests {
 
     /// For a failure at any call, the error is returned once, and no later message counts as observed.
     #[test]
-    fn an_error_is_told_and_nothing_after_it_passes() {
+    fn an_error_is_reported_and_nothing_after_it_passes() {
         for fails_at in [0, 1, 50, 99] {
             let (observer, errors) = scope(|scope| {
                 let mut aside = ThreadedObserver::begin(scope, Counts { times: Vec::new(), fails_at });

@@ -38,10 +38,10 @@ struct BlindStudy {
     /// Number of cases.
     #[schemars(range(min = 1), example = 100)]
     cases: usize,
-    /// Kinds of cases (none, single, pair, outside, triple); the usual four where it is left out.
+    /// Kinds of cases (none, single, pair, outside, triple); the usual four if it is left out.
     #[schemars(with = "Option<Vec<String>>", extend("examples" = [["single", "pair"]]))]
     kinds: Option<Vec<CaseKind>>,
-    /// Simulator that makes the recordings: virtual_lab (where it is left out) or other_lab, whose equations are not the model's.
+    /// Simulator that makes the recordings: virtual_lab (if it is left out) or other_lab, whose equations are not the model's.
     #[serde(default)]
     #[schemars(with = "Option<String>", example = &"other_lab")]
     laboratory: Laboratory,

@@ -113,7 +113,7 @@ pub struct Fitted {
 /// Fits the calibration to diagnoses, and says whether its probabilities hold.
 ///
 /// # Errors
-/// [`FleetError::Kind`] where the calibration that ships was spoilt.
+/// [`FleetError::Kind`] if the calibration that ships was spoilt.
 pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, FleetError> {
     let calibration = fitted(observed, made_by).map_err(FleetError::kind)?;
     let reliabilities = reliabilities(observed).map_err(FleetError::kind)?;

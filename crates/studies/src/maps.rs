@@ -29,10 +29,10 @@ struct MapsStudy {
     /// The campaigns, from this file.
     #[schemars(length(min = 1), extend("examples" = [["../turbo_a.yaml"]]))]
     campaigns: Vec<PathBuf>,
-    /// Seeds, whole numbers from 0; each campaign's own where they are left out.
+    /// Seeds, whole numbers from 0; each campaign's own if they are left out.
     #[schemars(extend("uniqueItems" = true, "examples" = [[1, 2, 3]]))]
     seeds: Option<Vec<u64>>,
-    /// Methods by which each recording is identified; each campaign's own where they are left out.
+    /// Methods by which each recording is identified; each campaign's own if they are left out.
     #[schemars(with = "Option<Vec<String>>", extend("uniqueItems" = true, "examples" = [["joint", "dynamic"]]))]
     methods: Option<Vec<Method>>,
 }

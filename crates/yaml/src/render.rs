@@ -14,7 +14,7 @@ const LINE_LIMIT: usize = 400;
 const WIDTH: usize = 100;
 
 impl Findings {
-    /// All findings, each with its place in the file; `colours` only where a terminal reads it.
+    /// All findings, each with its place in the file; `colours` only for a terminal.
     pub fn render(&self, colours: bool) -> String {
         // ASCII characters in both: the carets are carets, and logs stay legible.
         let renderer = if colours { Renderer::styled() } else { Renderer::plain() }

@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn right_and_wrong_documents_are_told_apart_as_a_complete_validator_does() {
+    fn right_and_wrong_documents_are_judged_as_by_a_complete_validator() {
         assert!(unknown_keywords(&schema()).is_empty());
         let (schema, oracle) = (schema(), oracle());
         for (key, right, wrong) in [

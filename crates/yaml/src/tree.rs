@@ -159,7 +159,7 @@ impl Node {
     }
 
     /// The tree as a value of a type. A tree that was found right against the schema of the type fails here only
-    /// where the schema is laxer than the type.
+    /// if the schema is laxer than the type.
     ///
     /// # Errors
     /// [`ReadError`] with the place of the first value that does not fit.

@@ -18,7 +18,7 @@ const RANK: f64 = 1e-5;
 /// The heat of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Heat to the gas at the reference state, W; negative where slow lines take less work than fast ones.
+    /// Heat to the gas at the reference state, W; negative if slow lines take less work than fast ones.
     pub heat_w: f64,
     /// Its standard error: leaving each line out in turn, W.
     pub standard_error_w: f64,

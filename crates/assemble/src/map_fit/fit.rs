@@ -19,7 +19,7 @@ impl MapFit {
     /// If lines cross, the fit is made again with stiffer parameters over speed.
     ///
     /// # Errors
-    /// [`MapFitError`] where there is too little, too much or nothing sensible to fit.
+    /// [`MapFitError`] if there is too little, too much or nothing sensible to fit.
     pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
         Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
     }

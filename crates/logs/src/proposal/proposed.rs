@@ -24,7 +24,7 @@ pub struct ProposedChannel {
     pub column: usize,
     /// Further columns with the same quantity: several sensors at one place.
     pub others: Vec<usize>,
-    /// Unit as a channel map writes it; `None` where it could not be found out.
+    /// Unit as a channel map writes it; `None` if it could not be found out.
     pub unit: Option<&'static str>,
     /// Whether the pressure is read over the ambient pressure.
     pub gauge: bool,

@@ -172,7 +172,7 @@ fn unit(kind: Kind, symbol: &str) -> Option<&'static Unit> {
     kind.unit(symbol).or((symbol == BARE_RATIO.symbol()).then_some(&BARE_RATIO))
 }
 
-/// A name and its unit, where a header holds both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
+/// A name and its unit, if a header holds both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
 pub fn split_unit(header: &str) -> (String, Option<String>) {
     let header = header.trim();
     let whole = || (header.to_owned(), None);

@@ -21,7 +21,7 @@ pub struct WantedColumn<'a> {
 pub struct FoundColumn {
     /// Position, from 0.
     pub index: usize,
-    /// Unit that the heading names; `None` where it names none.
+    /// Unit that the heading names; `None` if it names none.
     pub unit: Option<&'static Unit>,
 }
 
@@ -63,7 +63,7 @@ pub enum HeadingError {
 /// `speed_krpm`.
 ///
 /// # Errors
-/// [`HeadingError`] where one is missing, or has a unit that is not known.
+/// [`HeadingError`] if one is missing, or has a unit that is not known.
 pub fn find_columns<const N: usize>(
     headings: &[&str],
     wanted: [WantedColumn<'_>; N],

@@ -50,7 +50,7 @@ pub struct Submit {
 }
 
 impl Submit {
-    /// Tries a few items where none is done, then submits.
+    /// Tries a few items if none is done, then submits.
     pub fn run(&self) -> Result<(), Failure> {
         let program = std::env::current_exe()
             .map_err(|error| Failure::new(Code::Failure, format!("failed to find this program: {error}")))?;

@@ -23,7 +23,7 @@ pub struct Predict {
     /// Run directory, MCAP file, or log of another program that the forecast is compared with
     #[arg(long, value_name = "FILE", conflicts_with = "diagnosis")]
     pub recording: Option<PathBuf>,
-    /// SHA-256 that was printed when the forecast was made; refused where the file has another
+    /// SHA-256 that was printed when the forecast was made; refused if the file has another
     #[arg(long, value_name = "HASH", requires = "recording")]
     pub seal: Option<String>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -60,7 +60,7 @@ impl Predict {
                 self.forecast.display()
             ));
         }
-        // clap asks for a recording where there is no diagnosis.
+        // clap requires a recording if no diagnosis is given.
         let Some(recording) = &self.recording else { return Ok(()) };
         let (forecast, seal) = SealedForecast::read(&self.forecast, self.seal.as_deref())?;
         let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;

@@ -220,7 +220,7 @@ impl Scatter {
     }
 }
 
-/// Course of a [`Rule`].
+/// Direction and position of a [`Rule`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RuleAt {
     /// Along x at this y.

@@ -87,7 +87,7 @@ fn value_references(text: &mut String, variables: &[Variable], switches: &[Switc
     Ok(())
 }
 
-/// A column of a table: its name in C, and its values.
+/// A column of a table: its name in C, and the function that gives its value in a row.
 type Column<T> = (&'static str, fn(&T) -> f64);
 
 fn table(text: &mut String, map: &TabulatedMap) -> Result<(), FmuError> {

@@ -255,7 +255,7 @@ fn fitted(
     let fixed = DMatrix::from_fn(y.len(), 1 + usize::from(with_drift), |row, column| {
         if column == 0 { 1.0 } else { days[row] - middle_day }
     });
-    // With one measurement a machine, a machine's own deviation is indistinguishable from the rest.
+    // With one measurement per machine, a machine's own deviation is indistinguishable from the rest.
     let with_machines = different(&machines) < y.len() && different(&machines) > 1;
     let with_nights = different(&nights) > 1 && different(&nights) < y.len();
     let mut groups: Vec<&[usize]> = Vec::new();

@@ -162,7 +162,7 @@ fn not_judged(since: &Since) -> String {
         format!("{channel} {}", with_unit(four_figures(scale * residual.size), unit))
     });
     format!(
-        "only the change since {} is reported; effects that the model already missed there are not judged: {}\n",
+        "only the change since {} is reported; the residual already present there is not judged: {}\n",
         since.recording,
         residuals.collect::<Vec<_>>().join(", ")
     )

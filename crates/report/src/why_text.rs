@@ -206,7 +206,7 @@ fn behind(beyond: &Beyond) -> String {
 
 fn verdict(beyond: &Beyond, word: Word) -> &'static str {
     match (beyond.after_k > beyond.expected_high_k, word) {
-        (false, _) => "the residual is as large as the fitted part predicts",
+        (false, _) => "the residual is within what the fitted part predicts",
         (true, Word::Named | Word::NotToldApart) => {
             "more is left than this cause lets expect: something else acts there too, or it is another one"
         }

@@ -112,7 +112,7 @@ fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &
             },
         ),
         Statement::new(
-            "One coefficient before and behind the wheel is not correct: with the right alpha_A an average is identified that is not the model's, as 8 (b) compared with 6 (b) shows.",
+            "One coefficient before and behind the wheel is not correct: with the right alpha_A an average is identified that is not the model's, as the comparison of 8 (b) with 6 (b) shows.",
             format!(
                 "Without area before the wheel (figure 6) rms {} %. With alpha_A = 0.2 right {} % on the machine that shares one h; {} % on that with its own, and {} % there once identified with the same law. The remark is that of {}.",
                 fixed(off(nothing_before), 1),

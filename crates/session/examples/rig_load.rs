@@ -343,7 +343,7 @@ fn resume(folder: &Path) {
         let mut log = LOG.lock().unwrap();
         (log.real_time, log.trips_s, log.rate_hz) = (false, f64::INFINITY, 10.0);
     }
-    for (name, more) in [("by its plan", ""), ("by its steps", "drift: {on_drift: continue}\n")] {
+    for (name, more) in [("by its plan", ""), ("replayed", "drift: {on_drift: continue}\n")] {
         let text = campaign(900, more);
         let text = match more {
             "" => text,

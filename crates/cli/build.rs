@@ -1,4 +1,4 @@
-//! Tells the program which commit it is built from, where there is a git that knows.
+//! Gives the program the commit it is built from, if git knows it.
 
 use std::path::Path;
 use std::process::Command;

@@ -10,7 +10,7 @@ use mapper_physics::similarity::at_speed;
 
 /// Makes a map of identified points.
 ///
-/// Each point is brought from its own corrected speed to the mean of its line by similarity; what that changed stands in
+/// Each point is brought from its own corrected speed to the mean of its line by similarity; this change is stored in
 /// [`MapPoint::shift`], the measured values in [`MapPoint::identified`].
 ///
 /// Points with a target form a line per target speed; points without one are grouped by gaps in corrected speed
@@ -93,7 +93,7 @@ fn line(group: &Group<'_>) -> SpeedLine {
 fn map_point(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
     let (flow_kg_s, pressure_ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
     let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
-    // Similarity holds for small shifts; where nothing turns it says nothing.
+    // Similarity holds for small shifts; it is not defined for a shaft at rest.
     let moved = shift_rpm != 0.0 && point.speed_corrected_rpm > 0.0 && pressure_ratio > 0.0;
     let (flow_at_line_kg_s, ratio_at_line) = if moved {
         at_speed(flow_kg_s, pressure_ratio, line_speed_rpm / point.speed_corrected_rpm)

@@ -1,4 +1,4 @@
-//! Where two maps differ, in units and in their uncertainty.
+//! Differences between two maps, in units and in their uncertainty.
 
 use crate::efficiency::convert_efficiency;
 use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
@@ -11,7 +11,7 @@ const NODES: usize = 25;
 /// How far apart the end lines of two maps may be and still count as one speed, ratio: a speed is held within a percent.
 const END_SLACK: f64 = 0.01;
 
-/// A place of the second map beside the nearest place of the first at equal corrected speed. Differences: second minus
+/// A place of the second map compared with the nearest place of the first at equal corrected speed. Differences: second minus
 /// first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ComparedPlace {
@@ -58,7 +58,7 @@ fn beyond(difference: f64, standard_error: f64) -> bool {
 pub struct ComparedLine {
     /// Corrected speed, rpm, at the first map's reference state.
     pub speed_corrected_rpm: f64,
-    /// Places from the choke side to the surge side; empty where the lines do not overlap.
+    /// Places from the choke side to the surge side; empty if the lines do not overlap.
     pub places: Vec<ComparedPlace>,
 }
 
@@ -85,7 +85,7 @@ pub struct MapComparison {
 /// first's reference state and definition of efficiency, if both files name theirs. Extrapolated places are left out.
 ///
 /// # Errors
-/// [`MapFitError`] where one of the maps cannot be fitted.
+/// [`MapFitError`] if one of the maps cannot be fitted.
 pub fn compare(first: &CompressorMap, second: &CompressorMap) -> Result<MapComparison, MapFitError> {
     let second = second.clone().at_reference(first.reference);
     // A difference of definitions is none of the machines.
@@ -178,7 +178,7 @@ struct Known<'a> {
 }
 
 impl Known<'_> {
-    /// None where the nearest place is the line's very end: there the other line goes on alone.
+    /// None if the nearest place is the line's very end: there the other line goes on alone.
     fn nearest(&self, node: &FittedNode) -> Option<Nearest<'_>> {
         let scaled = |n: &FittedNode| {
             (n.flow_corrected_kg_s / self.flow_scale_kg_s, n.pressure_ratio / self.ratio_scale)

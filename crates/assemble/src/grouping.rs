@@ -2,7 +2,7 @@
 
 use mapper_core::IdentifiedPoint;
 
-/// How points without a target are told apart.
+/// How points without a target are distinguished.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grouping {
     /// Two points belong to different lines where, in order of corrected speed, the step from one to the next is

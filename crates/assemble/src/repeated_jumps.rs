@@ -6,9 +6,9 @@ use serde::Serialize;
 /// One jump that was made more than once.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RepeatedJump {
-    /// Where it starts.
+    /// Start of the jump.
     pub from: OperatingPoint,
-    /// Where it goes.
+    /// Target of the jump.
     pub to: OperatingPoint,
     /// Places of the steps, from 0; files have their numbers, from 1.
     #[serde(serialize_with = "mapper_core::step_number::list::serialize")]
@@ -17,7 +17,7 @@ pub struct RepeatedJump {
     pub eta: Vec<f64>,
     /// Last less first efficiency, fraction.
     pub eta_change: f64,
-    /// Standard error of this change from noise, fraction; fixed offsets cancel. `None` where an interval is missing.
+    /// Standard error of this change from noise, fraction; fixed offsets cancel. `None` if an interval is missing.
     pub eta_change_standard_error: Option<f64>,
 }
 

@@ -6,7 +6,7 @@ use mapper_core::{IdentifiedPoint, StepKind, Verdict};
 ///
 /// A point without a usable efficiency gives its place to the repeat of the same target with the best verdict and, among
 /// these, the smallest 95 % interval. The first point of a campaign has no jump before it: its efficiency, if it has
-/// one, rests on what the points share (joint method). Where it is visited again for its own sake, the better of the two
+/// one, rests on what the points share (joint method). If it is visited again for its own sake, the better of the two
 /// by the same rule is the point; the visits share offsets and law, so that a mean of both would promise too much.
 pub fn points_for_map(points: &[IdentifiedPoint]) -> Vec<IdentifiedPoint> {
     let again = || {

@@ -137,7 +137,7 @@ fn repeats_are_kept_out_of_the_lines() {
 }
 
 #[test]
-fn what_makes_no_map_is_said() {
+fn points_that_make_no_map_are_refused_with_a_reason() {
     assert_eq!(make(&[]), Err(AssembleError::NoPoints));
     let lost = make(&[point(3, None, 5e4, f64::NAN)]).unwrap_err();
     assert!(lost.to_string().starts_with("step 4: corrected mass flow is NaN kg/s"), "{lost}");
@@ -156,7 +156,7 @@ fn what_makes_no_map_is_said() {
 
 proptest! {
     #[test]
-    fn the_shift_to_the_line_is_similarity_and_stands_on_record(speeds in proptest::collection::vec(-0.01..0.01f64, 4)) {
+    fn the_shift_to_the_line_is_similarity_and_is_recorded(speeds in proptest::collection::vec(-0.01..0.01f64, 4)) {
         let points: Vec<_> =
             speeds.iter().enumerate().map(|(i, s)| point(i, Some(1e5), 1e5 * (1.0 + s), 0.02 + 0.01 * i as f64)).collect();
         let map = make(&points).unwrap();

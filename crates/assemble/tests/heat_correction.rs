@@ -115,7 +115,7 @@ fn a_heat_below_zero_is_not_put_in() {
 }
 
 proptest! {
-    /// Whatever stands in a map: an answer or words, and efficiencies that are some.
+    /// Any map gives a result or a message, and every efficiency in the result is possible.
     #[test]
     fn any_map_is_corrected_or_refused(
         rows in prop::collection::vec((1e3..3e5f64, 1e-4..2.0f64, 0.2..9.0f64, -0.5..1.5f64), 0..40),

@@ -25,7 +25,7 @@ fn sample() -> CompressorMap {
 }
 
 /// The closed form of turbo_a, 7 points on each of 9 lines, all errors of `noise` (ratio; points of efficiency over 100)
-/// drawn by a seed.
+/// from a seed.
 fn turbo_a(noise: f64, seed: u64) -> CompressorMap {
     let mut state = seed;
     // A sum of four uniform numbers of a linear congruential generator (Knuth's constants): nearly normal, variance 1.
@@ -167,7 +167,7 @@ fn equal_maps_give_equal_tables_and_a_wild_point_moves_little() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_said() {
+fn a_map_that_cannot_be_fitted_is_refused_with_a_reason() {
     let few = |lines: usize, points: usize| {
         let mut map = turbo_a(0.0, 1);
         map.lines.truncate(lines);
@@ -231,7 +231,7 @@ fn two_maps_are_compared_in_units_and_in_their_uncertainty() {
     );
 }
 
-/// Two flow meters within their declared gain of 0.5 % measure one machine: that is no difference, and 5 % is one.
+/// Two flow meters within their declared gain of 0.5 % measure one machine: 0.5 % does not count as a difference, and 5 % does.
 #[test]
 fn a_declared_gain_explains_a_difference() {
     let with_gain = |error: f64, declared: f64| {

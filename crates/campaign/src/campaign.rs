@@ -142,7 +142,7 @@ impl Campaign {
 #[schemars(title = "mapper campaign")]
 #[schemars(extend("x-removed" = {
     "gradient_share": "leave it out and write `order: thermal_gradient`, which keeps the largest sum",
-    "replan": "leave it out: a plan is run as it stands; a script (`sequence`) can react to results",
+    "replan": "leave it out: a plan is run unchanged; a script (`sequence`) can react to results",
     "required_sigma_eta": "write it under `timing`, in place of `dwell`: `timing: {required_sigma_eta: 0.3 %}`",
 }))]
 pub(crate) struct CampaignFile {

@@ -21,7 +21,7 @@ pub const FILE_SIZE_LIMIT: usize = 1 << 20;
 /// Largest map file that is read, bytes.
 pub const MAP_SIZE_LIMIT: usize = 16 << 20;
 
-/// Why there is no campaign.
+/// Errors of loading a campaign.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     /// The file cannot be read.
@@ -72,7 +72,7 @@ pub fn check(
 /// As [`check`], with the caller's own criterion for reachable points.
 ///
 /// # Errors
-/// All mistakes of the text together; points are checked only if there are no others.
+/// All mistakes of the text together; points are checked only if nothing else is wrong.
 pub fn check_with(
     text: &str,
     origin: &Path,

@@ -17,7 +17,7 @@ const RUNS_LIMIT: usize = 10_000;
 /// Default number of nights that make a band.
 const DEFAULT_NIGHTS: usize = 14;
 
-/// Why there is no nightly campaign.
+/// Errors of loading a nightly campaign.
 #[derive(Debug, thiserror::Error)]
 pub enum NightlyError {
     /// The file cannot be read.

@@ -44,7 +44,7 @@ mod tests {
                     property.get("pattern").is_some_and(|p| p.as_str().unwrap().starts_with("^[0-9]{4}"));
                 assert!(
                     date || property.get("description").is_some(),
-                    "{key} lacks a description: {property}"
+                    "{key} has no description: {property}"
                 );
             }
         });

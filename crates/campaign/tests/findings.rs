@@ -191,12 +191,12 @@ fn doomed_campaigns_are_refused_with_their_numbers() {
 /// What few machines do is a warning at its key, and the campaign is one that can be run.
 #[test]
 fn rare_values_are_warned_of() {
-    let told = |old: &str, new: &str| {
+    let warned = |old: &str, new: &str| {
         let (text, _) = with(old, new);
         let campaign = run(&text).unwrap_or_else(|findings| panic!("{findings}"));
         (warnings(&text, Path::new("dir/short.yaml"), &campaign, Vec::new()), text)
     };
-    assert_eq!(told("campaign: short", "campaign: short").0.count(), 0);
+    assert_eq!(warned("campaign: short", "campaign: short").0.count(), 0);
     let geometry = |inside: &str| format!("machine: {{name: a, map: closed_form, geometry: {inside}}}");
     for (old, new, at, message) in [
         (
@@ -225,7 +225,7 @@ fn rare_values_are_warned_of() {
             "more than any turbocharger's turbine",
         ),
     ] {
-        let (found, text) = told(old, &new);
+        let (found, text) = warned(old, &new);
         assert_eq!(found.count(), 1, "{new}: {found}");
         let finding = &found.list[0];
         assert!(finding.kind == Kind::Unusual && finding.kind.is_warning(), "{found}");
@@ -234,7 +234,7 @@ fn rare_values_are_warned_of() {
         let shown = found.to_string();
         assert!(shown.starts_with("warning: ") && shown.ends_with("dir/short.yaml: 1 warning\n"), "{shown}");
     }
-    // What others know of the campaign stands beside it.
+    // Warnings of other checks of the campaign appear with these.
     let campaign = run(RIGHT).unwrap_or_else(|findings| panic!("{findings}"));
     let concern = Concern::warning(&["timing", "dwell"], "too long a night".to_owned(), "sleep".to_owned());
     let found = warnings(RIGHT, Path::new("dir/short.yaml"), &campaign, vec![concern]);
@@ -325,7 +325,7 @@ fn keys() {
 }
 
 #[test]
-fn missing_keys_are_complained_about_at_what_lacks_them() {
+fn missing_keys_are_reported_at_their_mapping() {
     let (text, _) = with("  oil_temperature: 50 degC\n", "");
     let findings = mistakes(&text);
     let finding = &findings.list[0];
@@ -353,7 +353,7 @@ fn missing_keys_are_complained_about_at_what_lacks_them() {
 
 #[test]
 fn units() {
-    one("dwell: 120 s", "dwell: 120", Kind::Unit, "120", "`120` lacks its unit", "write e.g. `120 s`");
+    one("dwell: 120 s", "dwell: 120", Kind::Unit, "120", "`120` has no unit", "write e.g. `120 s`");
     one("dwell: 120 s", "dwell: 120 K", Kind::Unit, "120 K", "not a unit of a time", "s, ms, min, h");
     one(
         "dwell: 120 s",
@@ -398,7 +398,7 @@ fn units() {
     );
     one("T1: {noise: 0.1 K}", "T1: {noise: -0.1 K}", Kind::Range, "-0.1 K", "too low", "at least 0 K");
     one("inlet_pressure: 100 kPa", "inlet_pressure: 1 barg", Kind::Unit, "1 barg", "`barg`", "absolute");
-    one("[90 krpm, 110 krpm]", "[90 krpm, 110]", Kind::Unit, "110", "lacks its unit", "`110 krpm`");
+    one("[90 krpm, 110 krpm]", "[90 krpm, 110]", Kind::Unit, "110", "has no unit", "`110 krpm`");
 }
 
 #[test]
@@ -812,7 +812,7 @@ proptest::proptest! {
 }
 
 #[test]
-fn a_format_that_nobody_writes_is_shown_where_it_stands() {
+fn an_unknown_format_is_reported_with_its_place() {
     let text = format!("{RIGHT}outputs: {{formats: [csv, cvs]}}\n");
     let campaign = run(&text).unwrap();
     let findings = mapper_campaign::format_mistake(
@@ -847,7 +847,7 @@ fn lines_become_points_from_choke_to_surge_at_their_corrected_speed() {
     assert!(first.windows(2).all(|pair| pair[1].valve_opening_ratio < pair[0].valve_opening_ratio));
     assert!(campaign.points[3..].iter().all(|point| point.speed_rpm > first[0].speed_rpm));
     assert_eq!(warnings(&text, Path::new("dir/short.yaml"), &campaign, Vec::new()).count(), 0);
-    // Openings beside it: nothing of this is in the campaign, nor in its hash.
+    // Openings in addition: nothing of this is in the campaign, nor in its hash.
     assert!(!serde_json::to_string(&run(RIGHT).unwrap()).unwrap().contains("\"lines\""));
 }
 

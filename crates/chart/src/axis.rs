@@ -1,6 +1,6 @@
 //! An axis as the caller describes it.
 
-/// Title with unit, and the range where it is not to follow the data.
+/// Title with unit, and the range if it is not to follow the data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// Title; say the unit in it, e.g. `corrected mass flow, kg/s`.

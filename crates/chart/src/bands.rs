@@ -39,7 +39,7 @@ pub(crate) fn band(grid: &StructuredGrid, low: f64, high: f64) -> Vec<Vec<(f64, 
     polygons
 }
 
-/// The cell itself, or four triangles around its middle where it is a saddle: cut as a whole, a saddle's bands
+/// The cell itself, or four triangles around its middle if it is a saddle: cut as a whole, a saddle's bands
 /// would overlap. The middle has the corners' mean, by which the contour lines read a saddle too.
 fn pieces(cell: &[Node; 4]) -> Vec<Vec<Node>> {
     let [a, b, c, d] = cell.map(|node| node[2]);

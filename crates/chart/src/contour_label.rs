@@ -1,4 +1,4 @@
-//! Where on a contour line its text stands.
+//! Position of the text on a contour line.
 
 /// A place for a text on a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,7 +11,7 @@ pub(crate) struct LabelPlace {
     pub gap: (f64, f64),
 }
 
-/// Finds the straightest stretch, away from `obstacles`, that holds a text `width_px` wide; `None` where the line is
+/// Finds the straightest stretch, away from `obstacles`, that holds a text `width_px` wide; `None` if the line is
 /// too short. Middles of texts already placed are obstacles too.
 pub(crate) fn place(line: &[(f64, f64)], width_px: f64, obstacles: &[(f64, f64)]) -> Option<LabelPlace> {
     let lengths = cumulative(line);
@@ -20,7 +20,7 @@ pub(crate) fn place(line: &[(f64, f64)], width_px: f64, obstacles: &[(f64, f64)]
     if !total.is_finite() || total < 2.0 * half + 16.0 {
         return None;
     }
-    // From the middle outwards, so that the middle wins where all else is equal.
+    // From the middle outwards, so that the middle wins if all else is equal.
     const SHARES: [f64; 13] = [0.5, 0.44, 0.56, 0.38, 0.62, 0.32, 0.68, 0.26, 0.74, 0.2, 0.8, 0.14, 0.86];
     let mut best: Option<(f64, LabelPlace)> = None;
     for (rank, share) in SHARES.into_iter().enumerate() {
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_stands_on_its_line_and_upright() {
+    fn a_text_is_on_its_line_and_upright() {
         for step in [(3.0, 1.0), (-3.0, 1.0), (0.0, -3.0), (-2.0, -2.0)] {
             let line: Vec<_> = (0..60).map(|i| (f64::from(i) * step.0, f64::from(i) * step.1)).collect();
             let place = place(&line, 30.0, &[]).unwrap();

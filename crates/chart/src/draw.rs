@@ -25,7 +25,7 @@ struct LateText {
     at: (f64, f64),
     text: String,
     style: TextStyle,
-    /// Whether it stands at the end of a line.
+    /// Whether it is at the end of a line.
     at_line_end: bool,
 }
 
@@ -184,7 +184,7 @@ fn end_label_at(frame: &Frame, line: &Line) -> Option<(f64, f64)> {
     // As far out as the text's box needs in this direction, but not over the frame's edge.
     let centre = (end.0 + ux * (half_width + 8.0), end.1 + uy * 14.0);
     let y = centre.1.clamp(frame.rect.top + 8.0, frame.rect.bottom - 8.0);
-    // No room above or below: beside the end instead of on it.
+    // No room above or below: next to the end instead of on it.
     let x = if y == centre.1 { centre.0 } else { end.0 - half_width - 9.0 };
     let leftmost = frame.rect.left + half_width + 2.0;
     Some((x.clamp(leftmost, leftmost.max(frame.rect.right - half_width - 2.0)), y))

@@ -74,7 +74,7 @@ pub(crate) type Px = (f64, f64);
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     OpenGroup(String),
-    /// Begins what is said of the shapes up to the next [`Shape::CloseNote`].
+    /// Begins the note on the shapes up to the next [`Shape::CloseNote`].
     OpenNote(Note),
     CloseNote(Note),
     CloseGroup,
@@ -104,7 +104,7 @@ impl Drawing {
         self.shapes.push(Shape::OpenGroup(name.to_owned()));
     }
 
-    /// Shapes with words, and a link where there is one.
+    /// Shapes with words, and a link if there is one.
     pub(crate) fn noted(&mut self, note: &Note, draw: impl FnOnce(&mut Drawing)) {
         self.shapes.push(Shape::OpenNote(note.clone()));
         draw(self);

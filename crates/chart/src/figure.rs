@@ -2,7 +2,7 @@
 
 use crate::{Axis, Item};
 
-/// Where the legend stands; never inside the drawing area, so it never covers data.
+/// Position of the legend; never inside the drawing area, so it never covers data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LegendPlace {
     /// Below the axis title, in rows.
@@ -25,7 +25,7 @@ pub struct Panel {
     pub y: Axis,
     /// What is shown, in drawing order.
     pub items: Vec<Item>,
-    /// Where the legend stands.
+    /// Position of the legend.
     pub legend: LegendPlace,
 }
 
@@ -64,7 +64,7 @@ impl Panel {
 pub struct Figure {
     /// Title.
     pub title: String,
-    /// Lines below the title, smaller; each is wrapped where it is too long.
+    /// Lines below the title, smaller; each is wrapped if it is too long.
     pub subtitles: Vec<String>,
     /// Panels, row after row.
     pub panels: Vec<Panel>,

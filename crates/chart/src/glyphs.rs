@@ -17,13 +17,13 @@ pub(crate) struct Fonts {
 
 impl Fonts {
     /// # Errors
-    /// Where the font that comes along is not a font: a fault of the build.
+    /// If the built-in font is not a font: a fault of the build.
     pub(crate) fn new() -> Result<Self, ttf_parser::FaceParsingError> {
         let regular = Face::parse(dejavu::sans::regular(), 0)?;
         Ok(Fonts { regular, bold: Face::parse(dejavu::sans::bold(), 0)? })
     }
 
-    /// The outline of a text whose vertical middle is at `at`; `None` where nothing is to be seen, e.g. of blanks.
+    /// The outline of a text whose vertical middle is at `at`; `None` if nothing is to be seen, e.g. of blanks.
     pub(crate) fn outline(&self, at: Px, text: &str, style: &TextStyle) -> Option<Path> {
         let face = if style.bold { &self.bold } else { &self.regular };
         let em = style.size_px as f32 / f32::from(face.units_per_em());
@@ -63,7 +63,7 @@ fn kerning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> f32 {
 /// Draws glyphs one behind the other, font units.
 struct Pen {
     builder: PathBuilder,
-    /// Where the next glyph begins.
+    /// Left end of the next glyph.
     x: f32,
 }
 

@@ -41,7 +41,7 @@ impl StructuredGrid {
     /// Makes a grid of node coordinates `x`, `y` (units of the axes) and values `z`, each `rows * columns` long.
     ///
     /// # Errors
-    /// [`GridError::Length`] where a length is wrong.
+    /// [`GridError::Length`] if a length is wrong.
     pub fn new(
         rows: usize,
         columns: usize,

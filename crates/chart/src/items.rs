@@ -51,7 +51,7 @@ pub struct Line {
     pub arrows: bool,
     /// Entry in the legend; items with equal text share one entry.
     pub label: Option<String>,
-    /// Text beside one end.
+    /// Text next to one end.
     pub end_label: Option<EndLabel>,
 }
 
@@ -64,7 +64,7 @@ pub enum LineEnd {
     Last,
 }
 
-/// A text beside one end of a line, on the line's continuation.
+/// A text next to one end of a line, on the line's continuation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EndLabel {
     /// The text.
@@ -103,7 +103,7 @@ impl Line {
         self
     }
 
-    /// Writes a text beside one end.
+    /// Writes a text next to one end.
     pub fn end_label(mut self, text: impl Into<String>, end: LineEnd) -> Self {
         self.end_label = Some(EndLabel { text: text.into(), end });
         self
@@ -189,7 +189,7 @@ impl Scatter {
         }
     }
 
-    /// Sets what is said at each point, in the order of the points.
+    /// Sets the note of each point, in the order of the points.
     pub fn notes(mut self, notes: Vec<Note>) -> Self {
         self.notes = notes;
         self
@@ -220,7 +220,7 @@ impl Scatter {
     }
 }
 
-/// Where a [`Rule`] runs.
+/// Direction and position of a [`Rule`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RuleAt {
     /// Along x at this y.
@@ -296,7 +296,7 @@ pub enum Space {
     Panel,
 }
 
-/// Which part of a text stands at its place.
+/// Which part of a text is at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TextAnchor {
     /// Its beginning.
@@ -318,7 +318,7 @@ pub struct Annotation {
     pub space: Space,
     /// Shift from the place, px, to the right and up.
     pub shift_px: (f64, f64),
-    /// Which part of the text stands there.
+    /// Which part of the text is there.
     pub anchor: TextAnchor,
     /// Colour.
     pub colour: Colour,
@@ -344,7 +344,7 @@ impl Annotation {
 }
 
 /// Short texts next to points, e.g. the numbers of steps. Each is placed where it covers neither a marker nor another text, and as
-/// few lines as possible; one that stands apart from its point has a leader line.
+/// few lines as possible; one that is away from its point has a leader line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointLabels {
     /// Text and point of each, the most important first; those that find no place are left out.

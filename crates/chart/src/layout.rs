@@ -1,4 +1,4 @@
-//! Where everything stands on the paper.
+//! Positions of all parts on the paper.
 
 use crate::clip::Rect;
 use crate::frame::{Frame, scales};

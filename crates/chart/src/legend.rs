@@ -1,4 +1,4 @@
-//! Entries of a legend, and where they stand.
+//! Entries of a legend, and their positions.
 
 use crate::drawing::{Drawing, Stroke, TextStyle};
 use crate::items::{Dash, Item, TextAnchor};

@@ -1,7 +1,7 @@
 //! Contour lines: marching squares that knows about missing values.
 //!
 //! Source: W. E. Lorensen, H. E. Cline, "Marching cubes", SIGGRAPH 1987, in two dimensions; the two readings of a
-//! saddle are told apart by the mean of the four corners. A crossing is found on each cell edge by linear
+//! saddle are distinguished by the mean of the four corners. A crossing is found on each cell edge by linear
 //! interpolation, so on a plane field every point of a contour lies on one straight line whatever the grid's shape.
 
 use crate::StructuredGrid;
@@ -84,7 +84,7 @@ fn cell_segments(
     }
 }
 
-/// Where z reaches `level` between two nodes, by linear interpolation: (x, y).
+/// The point at which z reaches `level` between two nodes, by linear interpolation: (x, y).
 pub(crate) fn crossing(from: &Node, to: &Node, level: f64) -> (f64, f64) {
     let share = (level - from[2]) / (to[2] - from[2]);
     let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.5 };

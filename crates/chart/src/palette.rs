@@ -1,4 +1,4 @@
-//! Colours that people with any colour vision can tell apart, and that survive a black-and-white printer where ordered.
+//! Colours that people with any colour vision can distinguish, and that survive a black-and-white printer where ordered.
 
 /// An sRGB colour, 8 bits per channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,7 @@ impl Colour {
 pub const INK: Colour = Colour(34, 34, 34);
 /// White.
 pub const WHITE: Colour = Colour(255, 255, 255);
-/// Grey for what stands back.
+/// Grey for the background.
 pub const GREY: Colour = Colour(119, 119, 119);
 /// Light grey for grid lines.
 pub const LIGHT_GREY: Colour = Colour(225, 225, 225);

@@ -29,7 +29,7 @@ pub enum PngError {
     /// The encoder failed.
     #[error("failed to encode the picture: {source}")]
     Encode {
-        /// What it said.
+        /// Its error.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }
@@ -96,7 +96,7 @@ impl Canvas {
         }
     }
 
-    /// Draws nothing where there is no path: of too few points, or of none that is a number.
+    /// Draws nothing without a path: from too few points, or from points that are not numbers.
     fn fill(&mut self, path: Option<Path>, colour: Colour, opacity: f64) {
         if let Some(path) = path {
             self.pixels.fill_path(&path, &paint(colour, opacity), FillRule::Winding, self.to_pixels, None);

@@ -1,4 +1,4 @@
-//! Where short texts stand around their points.
+//! Positions of short texts around their points.
 
 use crate::Item;
 use crate::clip::{Rect, touches};
@@ -59,7 +59,7 @@ impl Surroundings {
         Surroundings { inside: frame.rect, boxes, lines, leaders: Vec::new() }
     }
 
-    /// The cheapest place around a point, which is taken from then on; `None` where there is none.
+    /// The cheapest place around a point, which is taken from then on; `None` if there is none.
     pub(crate) fn place(&mut self, point: Px, text: &str, size_px: f64) -> Option<PlacedLabel> {
         let half = (0.5 * BOLD_RATIO * width_px(text, size_px) + ROOM_PX, 0.5 * size_px + ROOM_PX);
         let mut best: Option<(f64, PlacedLabel, Rect)> = None;
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_with_room_stands_at_its_point_and_one_without_has_no_place() {
+    fn a_text_with_room_is_at_its_point_and_one_without_has_no_place() {
         let (mut surroundings, points) = crowd(1);
         let label = surroundings.place(points[0], "7", 10.0).unwrap();
         assert_eq!(label.leader, None);

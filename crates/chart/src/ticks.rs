@@ -2,7 +2,7 @@
 
 /// Largest magnitude an axis shows; beyond it the span of an axis could overflow.
 const LARGEST: f64 = 1e300;
-/// Smallest span of an axis relative to its largest value: below it, tick labels could not tell ticks apart.
+/// Smallest span of an axis relative to its largest value: below it, tick labels could not distinguish ticks.
 const SMALLEST_RELATIVE_SPAN: f64 = 1e-9;
 
 /// Makes any pair of numbers a usable axis range: ordered, finite, with a span that is not lost in rounding.
@@ -50,7 +50,7 @@ fn nice_step(raw: f64) -> f64 {
     factor * power
 }
 
-/// Labels that tell all `values` apart: fixed point where that is short, scientific elsewhere.
+/// Labels that distinguish all `values`: fixed point where that is short, scientific elsewhere.
 pub(crate) fn labels(values: &[f64]) -> Vec<String> {
     let largest = values.iter().fold(0.0f64, |a, v| a.max(v.abs()));
     let step = values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(f64::INFINITY, f64::min);
@@ -86,7 +86,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn ticks_are_few_rising_inside_and_told_apart(low in proptest::num::f64::ANY, high in proptest::num::f64::ANY, target in 0usize..30) {
+        fn ticks_are_few_rising_inside_and_distinct(low in proptest::num::f64::ANY, high in proptest::num::f64::ANY, target in 0usize..30) {
             let ticks = nice_ticks(low, high, target);
             let (low, high) = usable_range(low, high);
             prop_assert!(low < high);

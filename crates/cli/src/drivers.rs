@@ -6,13 +6,13 @@ use mapper_host::{Driver, KNOWN, Places};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Where drivers are looked for: those that listen at a socket, then beside this program, then on `PATH`.
+/// The places of drivers: those that listen at a socket, then next to this program, then on `PATH`.
 pub fn places() -> Places {
     let sockets = own_state().map(|state| state.join("drivers"));
     Places::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref(), sockets)
 }
 
-/// `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`: a directory that nobody else may write to, since whoever
+/// `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`: a directory that no other user may write to, since whoever
 /// listens at a socket in it drives the rig.
 fn own_state() -> Option<PathBuf> {
     let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);

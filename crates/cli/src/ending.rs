@@ -1,15 +1,15 @@
-//! How the program ends where it could not do what it was asked.
+//! How the program ends if it could not do what it was asked.
 
 use crate::failure::Failure;
 use crate::{output, output_options};
 use serde_json::json;
 use std::process::ExitCode;
 
-/// Says it, with `--json` as an object where none was printed yet.
+/// Prints the failure, with `--json` as an object if none was printed yet.
 pub fn failed(failure: &Failure) -> ExitCode {
     let Some(code) = failure.say() else { return ExitCode::SUCCESS };
     if output_options::json() && !output::has_told() {
-        // A reader that has gone away is told nothing.
+        // A reader that has gone away receives nothing.
         let _ = output::print_json(&failure.json());
     }
     code

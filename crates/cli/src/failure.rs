@@ -24,16 +24,16 @@ pub struct Failure {
     manner: Manner,
 }
 
-/// How a failure is told.
+/// How a failure is reported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Manner {
     /// In a sentence behind "mapper: ".
     Sentence,
     /// The message has its own layout (a rendered list of mistakes).
     Rendered,
-    /// It has been told already; the exit code is left.
+    /// It has been reported already; only the exit code remains.
     Told,
-    /// The reader of standard output went away: a normal end, there is nobody to tell.
+    /// The reader of standard output went away: a normal end without a message.
     ClosedPipe,
 }
 
@@ -114,12 +114,12 @@ impl Failure {
         Failure { manner: Manner::ClosedPipe, ..Failure::new(Code::Failure, "") }
     }
 
-    /// What went wrong stands in the JSON on standard output.
+    /// A failure whose message is in the JSON on standard output.
     pub fn told(code: Code) -> Self {
         Failure { manner: Manner::Told, ..Failure::new(code, "") }
     }
 
-    /// Prints the message to standard error and gives the exit code; `None` where nobody is left to tell: a normal end.
+    /// Prints the message to standard error and gives the exit code; `None` if the reader went away: a normal end.
     pub fn say(&self) -> Option<ExitCode> {
         match self.manner {
             Manner::ClosedPipe => return None,
@@ -130,7 +130,7 @@ impl Failure {
         Some(ExitCode::from(self.code as u8))
     }
 
-    /// Code, message, and what to do: what stands behind the message's last semicolon, or with the first mistake.
+    /// Code, message, and what to do: the text behind the message's last semicolon, or with the first mistake.
     pub fn json(&self) -> Value {
         let first = self.findings.as_ref().and_then(|findings| findings.get(0));
         let (message, help) = match first {

@@ -33,8 +33,8 @@ pub fn in_fleet<T>(
         let fleet = Fleet::open(directory, &mapper_studies::program(registry))?;
         let (kind, stop, progress) =
             (fleet.kind(kinds)?, interrupt::stop_flag()?, output_options::progress());
-        let told = |done, of| progress.pieces(done, of);
-        let result = then(&fleet, kind, &Engine { jobs, stop: &stop, told: &told }, machine);
+        let report = |done, of| progress.pieces(done, of);
+        let result = then(&fleet, kind, &Engine { jobs, stop: &stop, told: &report }, machine);
         progress.clear();
         Ok(result?)
     })

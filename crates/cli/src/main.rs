@@ -1,6 +1,6 @@
 //! `mapper`: from one campaign file to a compressor map.
 //!
-//! One file per command in `commands`: its options, its call, its words. What is done stands in `mapper-session`;
+//! One file per command in `commands`: its options, its call, its words. The work is done in `mapper-session`;
 //! `registry` alone names plug-ins.
 
 mod commands;

@@ -18,7 +18,7 @@ pub struct OutputOptions {
     progress: Option<String>,
 }
 
-/// What was said.
+/// The chosen options.
 #[derive(Debug, Clone, Copy, Default)]
 struct ChosenOptions {
     colour: ColourChoice,
@@ -30,13 +30,13 @@ struct ChosenOptions {
 /// All commands with their options, as `main` has them.
 static COMMANDS: OnceLock<fn() -> clap::Command> = OnceLock::new();
 
-static SAID: OnceLock<ChosenOptions> = OnceLock::new();
+static CHOSEN: OnceLock<ChosenOptions> = OnceLock::new();
 
-fn said() -> ChosenOptions {
-    SAID.get().copied().unwrap_or_default()
+fn chosen() -> ChosenOptions {
+    CHOSEN.get().copied().unwrap_or_default()
 }
 
-/// Keeps what was said, for all that is printed later.
+/// Keeps the chosen options, for all that is printed later.
 pub fn keep(arguments: &OutputOptions, matches: &ArgMatches) {
     let colour = match arguments.color {
         ColorChoice::Auto => ColourChoice::Auto,
@@ -49,7 +49,7 @@ pub fn keep(arguments: &OutputOptions, matches: &ArgMatches) {
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
     let replaces = command.is_some_and(|of| of.try_contains_id("force").is_ok());
     // It is kept once: `main` alone calls this.
-    let _ = SAID.set(ChosenOptions { colour, progress, json, replaces });
+    let _ = CHOSEN.set(ChosenOptions { colour, progress, json, replaces });
 }
 
 /// Whether arguments that could not be read ask for JSON and for no colours.
@@ -77,12 +77,12 @@ pub fn commands() -> clap::Command {
 
 /// Whether results are one JSON object.
 pub fn json() -> bool {
-    said().json
+    chosen().json
 }
 
 /// Whether the command can replace files that are there.
 pub fn replaces() -> bool {
-    said().replaces
+    chosen().replaces
 }
 
 /// Colours of standard output.
@@ -96,15 +96,15 @@ pub fn warns_in_colour() -> bool {
 }
 
 fn coloured(terminal: bool) -> bool {
-    is_coloured(said().colour, terminal, std::env::var_os("NO_COLOR").as_deref())
+    is_coloured(chosen().colour, terminal, std::env::var_os("NO_COLOR").as_deref())
 }
 
-/// Who is told how far it is.
+/// The display of progress.
 pub fn progress() -> Progress {
     let usual = match (std::io::stderr().is_terminal(), json()) {
         (true, _) => ProgressManner::Bar,
         (false, true) => ProgressManner::Quiet,
         (false, false) => ProgressManner::Lines,
     };
-    Progress::new(said().progress.unwrap_or(usual))
+    Progress::new(chosen().progress.unwrap_or(usual))
 }

@@ -10,7 +10,7 @@ pub struct ShownArguments {
     /// Show everything: wide tables, what all points share, repeats, sensors, the zero
     #[arg(long)]
     pub full: bool,
-    /// Show the simulator's truth beside the points
+    /// Show the simulator's truth next to the points
     #[arg(long)]
     pub truth: bool,
 }

@@ -1,4 +1,4 @@
-//! What the contract costs beside the work: items made, parts written through, all merged.
+//! What the contract costs in addition to the work: items made, parts written through, all merged.
 //!
 //! `cargo run --release -p mapper-fleet --example overhead -- DIR 10000 8192`: items, and bytes of each result.
 

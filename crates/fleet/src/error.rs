@@ -29,7 +29,7 @@ pub enum FleetError {
         /// The cause.
         source: serde_json::Error,
     },
-    /// There is no study in the directory.
+    /// The directory has no study.
     #[error("there is no study in {}; make one with `mapper fleet make STUDY.yaml --out DIR`", .directory.display())]
     NoStudy {
         /// The directory.

@@ -75,12 +75,12 @@ impl Fleet {
         self.directory.join(BEGUN).join(hash.to_string())
     }
 
-    /// State of an item's part; `None` if there is no part.
+    /// State of an item's part; `None` without a part.
     pub(crate) fn head(&self, item: &Listed) -> Option<Result<Part, PartRefusal>> {
         Part::read_head(&self.part(&item.hash), self.expected(item))
     }
 
-    /// An item's part with its body; `None` if there is no part.
+    /// An item's part with its body; `None` without a part.
     pub(crate) fn whole(&self, item: &Listed) -> Option<Result<(Part, String), PartRefusal>> {
         Part::read(&self.part(&item.hash), self.expected(item))
     }

@@ -73,7 +73,7 @@ impl Output {
     }
 }
 
-/// Name and result of each item in the order of the study; `Err`: why there is no result.
+/// Name and result of each item in the order of the study; `Err`: why an item has none.
 pub type Results<'a> = dyn Iterator<Item = (String, Result<String, String>)> + 'a;
 
 /// A kind of study.

@@ -45,11 +45,11 @@ impl Fleet {
         let description = kind.merge(&self.study.settings, &mut parts, &output);
         drop(parts);
         // Content that was changed, which the first lines do not show.
-        for lacking in spoilt.into_inner() {
-            self.put_aside(&lacking);
-            if !status.refused.contains(&lacking) {
+        for changed in spoilt.into_inner() {
+            self.put_aside(&changed);
+            if !status.refused.contains(&changed) {
                 status.done -= 1;
-                status.refused.push(lacking);
+                status.refused.push(changed);
             }
         }
         let whole = partial || status.lacking() == 0;
@@ -74,11 +74,11 @@ impl Fleet {
 
 impl Fleet {
     /// Moves a part with changed content out of the way: its first line is intact, so it would count as done.
-    fn put_aside(&self, lacking: &Lacking) {
-        let part = self.part(&lacking.hash);
-        let is_changed = lacking.why.as_deref() == Some(PartRefusal::Checksum.to_string().as_str());
+    fn put_aside(&self, changed: &Lacking) {
+        let part = self.part(&changed.hash);
+        let is_changed = changed.why.as_deref() == Some(PartRefusal::Checksum.to_string().as_str());
         if is_changed {
-            let _ = std::fs::rename(&part, self.parts().join(format!(".{}.changed", lacking.hash)));
+            let _ = std::fs::rename(&part, self.parts().join(format!(".{}.changed", changed.hash)));
         }
     }
 }

@@ -18,7 +18,7 @@ const LARGEST_BODY_BYTES: u64 = 64 << 20;
 pub enum Outcome {
     /// The body is its result.
     Done,
-    /// The body is the reason why there is no result.
+    /// The body is the reason for the missing result.
     Failed,
 }
 
@@ -112,7 +112,7 @@ impl Part {
         Ok(part)
     }
 
-    /// The header line of a part file, and whether the file has the stated length; `None` if there is no file.
+    /// The header line of a part file, and whether the file has the stated length; `None` without a file.
     pub(crate) fn read_head(path: &Path, expected: Expected<'_>) -> Option<Result<Part, PartRefusal>> {
         match std::fs::symlink_metadata(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
@@ -124,7 +124,7 @@ impl Part {
         Some(open(path, expected).map(|(part, ..)| part))
     }
 
-    /// A part with its body; `None` if there is no file.
+    /// A part with its body; `None` without a file.
     pub(crate) fn read(path: &Path, expected: Expected<'_>) -> Option<Result<(Part, String), PartRefusal>> {
         match Self::read_head(path, expected)? {
             Ok(_) => Some(read_body(path, expected)),

@@ -49,9 +49,9 @@ pub(crate) fn quoted(text: &str) -> String {
 
 /// Runs the submission; returns the IDs that it prints as `word ID`, by word.
 pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<String, String>, FleetError> {
-    let failed = |said: String| FleetError::Queue {
+    let failed = |message: String| FleetError::Queue {
         script: PathBuf::from(script),
-        said,
+        said: message,
         template: template.name.clone(),
     };
     let output = Command::new("sh")
@@ -60,17 +60,17 @@ pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<S
         .output()
         .map_err(|error| failed(format!("failed to start sh: {error}")))?;
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        return Err(failed(said.trim().to_owned()));
+        let message = String::from_utf8_lossy(&output.stderr);
+        return Err(failed(message.trim().to_owned()));
     }
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    let words = said.lines().filter_map(|line| line.trim().split_once(' '));
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let words = printed.lines().filter_map(|line| line.trim().split_once(' '));
     let ids: BTreeMap<String, String> =
         words.map(|(word, id)| (word.to_owned(), id.trim().to_owned())).collect();
     if ids.contains_key("work") {
         Ok(ids)
     } else {
-        Err(failed(format!("it printed no `work ID` but {said:?}")))
+        Err(failed(format!("it printed no `work ID` but {printed:?}")))
     }
 }
 
@@ -88,10 +88,10 @@ pub fn running(template: &Template, job: &str) -> Option<BTreeMap<String, usize>
         .ok()?;
     for _ in 0..LOOKS {
         if child.try_wait().ok()?.is_some() {
-            let mut said = String::new();
-            child.stdout.take()?.take(LARGEST_BYTES * 16).read_to_string(&mut said).ok()?;
+            let mut printed = String::new();
+            child.stdout.take()?.take(LARGEST_BYTES * 16).read_to_string(&mut printed).ok()?;
             let mut states = BTreeMap::new();
-            for state in said.lines().map(str::trim).filter(|line| !line.is_empty()) {
+            for state in printed.lines().map(str::trim).filter(|line| !line.is_empty()) {
                 *states.entry(state.to_lowercase()).or_insert(0) += 1;
             }
             return Some(states);

@@ -13,7 +13,7 @@ pub struct Lacking {
     pub name: String,
     /// Its hash.
     pub hash: Hash,
-    /// Why there is no result; `None` if unknown.
+    /// Why the result is missing; `None` if unknown.
     pub why: Option<String>,
 }
 
@@ -75,12 +75,12 @@ impl Fleet {
     pub fn status(&self) -> Status {
         let mut status = Status { items: self.study.items.len(), ..Status::default() };
         for item in &self.study.items {
-            let lacking = |why| Lacking { name: item.name.clone(), hash: item.hash, why };
+            let unfinished = |why| Lacking { name: item.name.clone(), hash: item.hash, why };
             match self.head(item) {
                 Some(Ok(part)) if part.outcome == Outcome::Done => status.count(&part),
-                Some(Ok(_)) => status.failed.push(lacking(Some(self.why(item)))),
-                Some(Err(refusal)) => status.refused.push(lacking(Some(refusal.to_string()))),
-                None => status.missing.push(lacking(self.who_began(item))),
+                Some(Ok(_)) => status.failed.push(unfinished(Some(self.why(item)))),
+                Some(Err(refusal)) => status.refused.push(unfinished(Some(refusal.to_string()))),
+                None => status.missing.push(unfinished(self.who_began(item))),
             }
         }
         status.strangers = self.strangers();

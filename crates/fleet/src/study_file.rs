@@ -12,7 +12,7 @@ static DOCUMENT: Document = Document { name: "study", example: "campaigns/fleet/
 /// Largest file of a study, bytes: some ten thousand names of campaigns.
 const LARGEST_BYTES: usize = 4 << 20;
 
-/// Why there is no study.
+/// Errors of reading a study file.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyFileError {
     /// The file cannot be read.

@@ -92,7 +92,7 @@ impl Fleet {
         let refused = |why: String| Err(FleetError::DoesNotFit { why });
         if let Some(hours) = limits.hours.filter(|hours| cost.left_hours > *hours) {
             return refused(format!(
-                "what is left takes {:.2} processor hours, the limit is {hours}; raise the limit or make the study smaller",
+                "the remaining items take {:.2} processor hours, the limit is {hours}; raise the limit or make the study smaller",
                 cost.left_hours
             ));
         }
@@ -183,9 +183,9 @@ impl Fleet {
 
     /// Number of items without a result in the largest shard, for this number of shards.
     fn largest_shard(&self, status: &Status, tasks: u64) -> usize {
-        let lacking = status.failed.iter().chain(&status.refused).chain(&status.missing);
+        let unfinished = status.failed.iter().chain(&status.refused).chain(&status.missing);
         let mut counts = std::collections::BTreeMap::new();
-        for item in lacking {
+        for item in unfinished {
             *counts.entry(Shard::holding(&item.hash, tasks).number()).or_insert(0) += 1;
         }
         counts.into_values().max().unwrap_or(0)

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 const PROGRAM: &str = "mapper 1.2.3";
 
-/// Squares of numbers. 13 fails once and 17 panics once where `faults` says so.
+/// Squares of numbers. 13 fails once and 17 panics once if `faults` says so.
 #[derive(Default)]
 struct Squares {
     faults: AtomicBool,
@@ -164,7 +164,7 @@ fn what_fails_is_named_with_its_reason_and_done_again_when_asked() {
         merged.status.failed.iter().map(|item| (item.name.as_str(), item.why.as_deref().unwrap())).collect();
     assert_eq!(why["number 13"], "thirteen brings bad luck");
     assert!(why["number 17"].contains("panicked") && why["number 17"].contains("seventeen"), "{why:?}");
-    // Told again, not done again.
+    // Reported again, not done again.
     let worked = work(&fleet, &kind, Which::All, false).unwrap();
     assert_eq!((worked.done, worked.there, worked.failed.len()), (0, 28, 2));
     fleet.merge(&kind, true, &machine("merger")).unwrap().result.expect("what there is");
@@ -180,8 +180,8 @@ fn a_stop_keeps_what_is_done() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = made(folder.path(), 40, PROGRAM).unwrap().fleet;
     let (kind, stop) = (Squares::default(), AtomicBool::new(false));
-    let told = |done: usize, _: usize| stop.store(done >= 10, Ordering::Relaxed);
-    let stopped = Engine { jobs: Some(1), stop: &stop, told: &told };
+    let report = |done: usize, _: usize| stop.store(done >= 10, Ordering::Relaxed);
+    let stopped = Engine { jobs: Some(1), stop: &stop, told: &report };
     let error = fleet.work(&kind, Which::All, false, &stopped, &machine("worker")).unwrap_err();
     assert!(matches!(error, FleetError::Interrupted), "{error}");
     assert_eq!((fleet.status().done, fleet.status().begun()), (10, 0));
@@ -241,8 +241,8 @@ fn hostile_parts_are_named_and_left_out() {
         (9, "changed"),
         (11, "bytes of"),
     ] {
-        let said = why.get(format!("number {number}").as_str()).copied().unwrap_or("nothing");
-        assert!(said.contains(word), "{number}: {said}");
+        let reason = why.get(format!("number {number}").as_str()).copied().unwrap_or("nothing");
+        assert!(reason.contains(word), "{number}: {reason}");
     }
     assert_eq!(merged.status.strangers, ["notes.txt"]);
     assert!(merge(&fleet).result.is_none());
@@ -297,7 +297,7 @@ fn two_that_merge_at_once_write_the_same() {
 fn mistakes_of_a_study_have_their_places() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("study.yaml");
-    let said = |text: &str| {
+    let read = |text: &str| {
         std::fs::write(&path, text).unwrap();
         let study = open_study(&path).map_err(FleetError::from)?;
         kind_of(&study, &[&Squares::default()])?;
@@ -310,8 +310,8 @@ fn mistakes_of_a_study_have_their_places() {
         ("fleet: a\nstudy: squares\nnumbres: 3\n", "numbers"),
         ("fleet: a\nstudy: [squares\n", "study.yaml"),
     ] {
-        let error = said(text).unwrap_err().to_string();
+        let error = read(text).unwrap_err().to_string();
         assert!(error.contains(word), "{error}");
     }
-    assert!(said("fleet: a\nstudy: squares\nnumbers: 3\n").is_ok());
+    assert!(read("fleet: a\nstudy: squares\nnumbers: 3\n").is_ok());
 }

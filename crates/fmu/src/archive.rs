@@ -9,7 +9,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 /// The archive of an FMU's files.
 ///
 /// # Errors
-/// [`FmuError::Archive`] or [`FmuError::File`] where the archive cannot hold them.
+/// [`FmuError::Archive`] or [`FmuError::File`] if the archive cannot hold them.
 pub fn archive(files: &[FmuFile]) -> Result<Vec<u8>, FmuError> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     // No time of the clock: equal files, equal bytes.

@@ -8,7 +8,7 @@ use crate::variable::{Causality, Switch, UNITS, Variable};
 use quick_xml::escape::escape;
 use std::fmt::Write;
 
-/// The description, with a GUID that stands in the sources too.
+/// The description, with a GUID that is in the sources too.
 pub fn description(
     machine: &FmuMachine<'_>,
     variables: &[Variable],

@@ -9,7 +9,7 @@ const LOWEST_EFFICIENCY: f64 = 0.05;
 /// The speed lines of a fit, its extrapolated ones included, without the far end of choke where nothing is compressed.
 ///
 /// # Errors
-/// [`MapError`] where what is left is no map that a model can run on.
+/// [`MapError`] if the remaining lines are not a map that a model can run on.
 pub fn table_of_fit(fitted: &FittedMap, reference: ReferenceState) -> Result<TabulatedMap, MapError> {
     let compresses =
         |node: &&FittedNode| node.pressure_ratio > 1.0 && (LOWEST_EFFICIENCY..=1.0).contains(&node.eta);

@@ -9,7 +9,7 @@ use mapper_physics::tabulated_map::{Line, Node, TabulatedMap};
 use mapper_physics::{air, housing, nusselt, rodas5p};
 use std::fmt::Write;
 
-/// Tolerance where the importer names none, relative to each state.
+/// Tolerance if the importer names none, relative to each state.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 
 /// The header. The GUID is written by [`with_guid`], since it depends on the rest.
@@ -87,7 +87,7 @@ fn value_references(text: &mut String, variables: &[Variable], switches: &[Switc
     Ok(())
 }
 
-/// A column of a table: its name in C, and where it stands.
+/// A column of a table: its name in C, and the function that gives its value in a row.
 type Column<T> = (&'static str, fn(&T) -> f64);
 
 fn table(text: &mut String, map: &TabulatedMap) -> Result<(), FmuError> {

@@ -2,7 +2,7 @@
 //!
 //! The equations are C files that ship with the program (`c/`); what differs from machine to machine (parameters, start values, the
 //! map, the coefficients of the integrator) is written into one header, and the same list of variables makes that header and
-//! `modelDescription.xml`. The standard's own three headers lie beside them, so that any C99 compiler builds the folder `sources`.
+//! `modelDescription.xml`. The standard's own three headers are next to them, so that any C99 compiler builds the folder `sources`.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,4 +1,4 @@
-//! What is exported: a machine with its map, and where it begins.
+//! The exported machine with its map and its initial state.
 
 use mapper_physics::closed_form_map::ClosedFormMap;
 use mapper_physics::params::{BoundaryConditions, Params};
@@ -19,7 +19,7 @@ pub enum FmuMap {
 pub struct FmuMachine<'a> {
     /// Its name, as people wrote it.
     pub name: &'a str,
-    /// One sentence on where its numbers come from.
+    /// One sentence on the origin of its numbers.
     pub origin: &'a str,
     /// Parameters.
     pub params: &'a Params,
@@ -27,7 +27,7 @@ pub struct FmuMachine<'a> {
     pub map: &'a FmuMap,
     /// Start values of the inputs.
     pub boundary: &'a BoundaryConditions,
-    /// Where it begins unless the importer says otherwise.
+    /// Its initial state unless the importer sets another.
     pub start: &'a State,
 }
 
@@ -46,7 +46,7 @@ impl FmuMachine<'_> {
 /// Why no FMU can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FmuError {
-    /// A number that C cannot be told.
+    /// A number that cannot be written in C.
     #[error("{name} = {value}: an FMU needs a finite number there")]
     NotFinite {
         /// Which number.

@@ -20,7 +20,7 @@ pub struct Variable {
     pub causality: Causality,
     /// Unit, a name of [`UNITS`].
     pub unit: &'static str,
-    /// Value before anybody sets one; `None` for outputs.
+    /// Value until one is set; `None` for outputs.
     pub start: Option<f64>,
     /// What it is.
     pub description: &'static str,
@@ -31,7 +31,7 @@ pub struct Variable {
 pub struct Switch {
     /// Name.
     pub name: &'static str,
-    /// Value before anybody sets one.
+    /// Value until one is set.
     pub start: bool,
     /// What it does.
     pub description: &'static str,
@@ -42,7 +42,7 @@ pub struct Switch {
 pub struct Unit {
     /// Its name.
     pub name: &'static str,
-    /// Base units and exponents, and the factor where it is not 1, as attributes of XML.
+    /// Base units and exponents, and the factor if it is not 1, as attributes of XML.
     pub base: &'static str,
 }
 

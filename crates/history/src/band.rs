@@ -16,7 +16,7 @@ pub enum Floor {
     Relative(f64),
 }
 
-/// Where a figure has been.
+/// The range that a figure has been in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
     /// Median of the nights.

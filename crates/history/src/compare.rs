@@ -11,9 +11,9 @@ pub struct Moved {
     pub run: RunKey,
     /// The figure.
     pub figure: Metric,
-    /// Tonight's value; `None` where tonight has none and the nights before had.
+    /// Tonight's value; `None` if tonight has none and the nights before had.
     pub value: Option<f64>,
-    /// Where it has been.
+    /// The range that it has been in.
     pub band: Band,
 }
 
@@ -24,7 +24,7 @@ pub struct Shift {
     pub place: String,
     /// Tonight's value.
     pub value: f64,
-    /// Where it has been.
+    /// The range that it has been in.
     pub band: Band,
 }
 
@@ -43,7 +43,7 @@ pub struct MovedPoints {
     pub mean_shift: f64,
     /// Mean of the bands' medians, unit of the quantity.
     pub mean_level: f64,
-    /// The largest shift; `None` where points only lost their value.
+    /// The largest shift; `None` if points only lost their value.
     pub largest: Option<Shift>,
 }
 

@@ -13,7 +13,7 @@ pub enum HistoryError {
         /// Why.
         source: std::io::Error,
     },
-    /// There is no such file, and only reading was asked for.
+    /// The file does not exist, and only reading was requested.
     #[error("there is no history at {}; `mapper nightly` makes one, `--db FILE` names another", .path.display())]
     Missing {
         /// The file.

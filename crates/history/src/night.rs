@@ -23,7 +23,7 @@ impl std::fmt::Display for RunKey {
     }
 }
 
-/// One identified point beside its truth.
+/// One identified point with its truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PointRow {
     /// Speed aimed at, rpm.
@@ -56,11 +56,11 @@ pub struct RunRow {
     /// Which run.
     #[serde(flatten)]
     pub key: RunKey,
-    /// SHA-256 of the campaign as it was understood; empty where the run failed before.
+    /// SHA-256 of the campaign as it was understood; empty if the run failed before.
     pub campaign_sha256: String,
-    /// SHA-256 of the nominal model; empty where the run failed before.
+    /// SHA-256 of the nominal model; empty if the run failed before.
     pub model_sha256: String,
-    /// Why the run failed; `None` where it did not.
+    /// Why the run failed; `None` if it did not.
     pub failure: Option<String>,
     /// The figures it has.
     pub figures: BTreeMap<Metric, f64>,

@@ -8,7 +8,7 @@ const OUTLYING_SIGMAS: f64 = 3.5;
 /// Machines from which on the middle half says what is usual.
 pub const MACHINES_FOR_OUTLIERS: usize = 8;
 
-/// How far each machine lies off the average one at one place; `None` where it was not measured.
+/// How far each machine lies off the average one at one place; `None` if it was not measured.
 pub(crate) struct Deviations {
     /// Speed aimed at, rpm.
     pub(crate) speed_rpm: f64,
@@ -85,7 +85,7 @@ impl Signs {
     }
 }
 
-/// Machines beyond [`OUTLYING_SIGMAS`] in any sign, farthest first; `None` where too few were measured.
+/// Machines beyond [`OUTLYING_SIGMAS`] in any sign, farthest first; `None` if too few were measured.
 pub(crate) fn outliers(machines: &[String], places: &[Deviations]) -> Option<Vec<Outlier>> {
     let lowest = places.iter().map(|place| place.speed_rpm).fold(f64::INFINITY, f64::min);
     let signs: Vec<Option<Signs>> =
@@ -140,7 +140,7 @@ fn signs(machine: usize, places: &[Deviations], lowest_rpm: f64) -> Option<Signs
     let middle_y = mean(eta.iter().map(|(_, y, _)| *y))?;
     let spread: f64 = eta.iter().map(|(x, ..)| (x - middle_x).powi(2)).sum();
     let across: f64 = eta.iter().map(|(x, y, _)| (x - middle_x) * (y - middle_y)).sum();
-    // One speed alone tells nothing of a course with speed.
+    // One speed alone does not show a dependence on speed.
     let at_lowest = if spread > 1e-6 { across / spread } else { 0.0 };
     Some(Signs {
         eta: mean(eta.iter().map(|(.., eta)| *eta))?,

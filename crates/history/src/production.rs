@@ -27,9 +27,9 @@ pub struct Production {
     pub nights_ms: Vec<i64>,
     /// The points of the map, by speed and opening; outliers are not in them.
     pub places: Vec<Place>,
-    /// What the stand did to all machines alike, means over the points; `None` where there is one night.
+    /// What the stand did to all machines alike, means over the points; `None` if there is one night.
     pub stand: Option<Stand>,
-    /// Machines that are not like the others, farthest first; `None` where too few are there to say.
+    /// Machines that are not like the others, farthest first; `None` if too few are there to say.
     pub outliers: Option<Vec<Outlier>>,
 }
 
@@ -46,14 +46,14 @@ pub struct Place {
     pub h_w_m2k: Option<Spread>,
 }
 
-/// Where a quantity lies and how far it scatters.
+/// Mean and scatter of a quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spread {
     /// Of the average machine.
     pub mean: f64,
-    /// Standard deviation between machines; `None` where each was measured once, so that it is within `rest_sigma`.
+    /// Standard deviation between machines; `None` if each was measured once, so that it is within `rest_sigma`.
     pub machine_sigma: Option<f64>,
-    /// Standard deviation between nights, a drift in time apart; `None` where there is one night.
+    /// Standard deviation between nights, a drift in time apart; `None` if there is one night.
     pub night_sigma: Option<f64>,
     /// Standard deviation of one measurement of one machine in one night.
     pub rest_sigma: f64,
@@ -62,11 +62,11 @@ pub struct Spread {
 /// What all machines share from night to night.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stand {
-    /// Drift of the efficiency, fraction a day; `None` where the nights are fewer than 3.
+    /// Drift of the efficiency, fraction a day; `None` if the nights are fewer than 3.
     pub eta_drift: Option<Drift>,
     /// Drift of h, ratio a day.
     pub h_drift: Option<Drift>,
-    /// Standard deviation of the efficiency between nights beside that, fraction.
+    /// Standard deviation of the efficiency between nights in addition to the drift, fraction.
     pub eta_night_sigma: f64,
     /// The same of h, ratio.
     pub h_night_sigma: f64,
@@ -142,8 +142,8 @@ fn production(
         observed.days.push((start - first_ms) as f64 / MS_A_DAY);
     }
     let all: Vec<Observed<'_>> = by_place.into_values().collect();
-    let nobody = BTreeSet::new();
-    let measured = measure(&all, machines.len(), &nobody);
+    let none_left_out = BTreeSet::new();
+    let measured = measure(&all, machines.len(), &none_left_out);
     let outliers = outliers(&machines, &measured.deviations);
     let out: BTreeSet<usize> = outliers
         .iter()
@@ -255,7 +255,7 @@ fn fitted(
     let fixed = DMatrix::from_fn(y.len(), 1 + usize::from(with_drift), |row, column| {
         if column == 0 { 1.0 } else { days[row] - middle_day }
     });
-    // One machine a measurement: what a machine has of its own is then not told apart from the rest.
+    // With one measurement per machine, a machine's own deviation is indistinguishable from the rest.
     let with_machines = different(&machines) < y.len() && different(&machines) > 1;
     let with_nights = different(&nights) > 1 && different(&nights) < y.len();
     let mut groups: Vec<&[usize]> = Vec::new();
@@ -276,7 +276,7 @@ fn fitted(
     Some(Fitted { fit, machines: of_machines, nights: of_nights, with_drift, middle_day })
 }
 
-/// How far each machine lies off the average one, what the stand did in its nights apart; `None` where it was not measured.
+/// How far each machine lies off the average one, what the stand did in its nights apart; `None` if it was not measured.
 fn deviations(
     observed: &Observed<'_>,
     quantity: PointQuantity,

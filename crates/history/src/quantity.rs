@@ -33,7 +33,7 @@ impl PointQuantity {
         PointQuantity::HError,
     ];
 
-    /// Value at a point; `None` where the point has none.
+    /// Value at a point; `None` if the point has none.
     pub fn of(self, point: &PointRow) -> Option<f64> {
         match self {
             PointQuantity::EtaTrue => point.eta_true,

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Nights that make a band where nothing else is said: two weeks.
+/// Nights that make a band unless stated otherwise: two weeks.
 pub const DEFAULT_NIGHTS: usize = 14;
 
 /// Marks the file as one of ours: "mapr".
@@ -75,10 +75,10 @@ pub struct History {
 }
 
 impl History {
-    /// Opens the history, making it where there is none.
+    /// Opens the history, creating it if it does not exist.
     ///
     /// # Errors
-    /// [`HistoryError`] where the file cannot be made, is not a history, or was written by a newer program.
+    /// [`HistoryError`] if the file cannot be made, is not a history, or was written by a newer program.
     pub fn open(path: &Path) -> Result<History, HistoryError> {
         if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
             std::fs::create_dir_all(parent)
@@ -92,7 +92,7 @@ impl History {
     /// Opens a history that is there, to read it.
     ///
     /// # Errors
-    /// [`HistoryError::Missing`] where there is none, otherwise as [`History::open`].
+    /// [`HistoryError::Missing`] if there is none, otherwise as [`History::open`].
     pub fn open_existing(path: &Path) -> Result<History, HistoryError> {
         if !path.exists() {
             return Err(HistoryError::Missing { path: path.to_owned() });

@@ -76,10 +76,10 @@ fn equal_nights_are_quiet_and_a_model_that_moves_truth_too_is_caught_the_next_ni
     assert!(!caught.is_quiet());
     assert!(caught.moved.iter().any(|moved| moved.figure == Metric::EtaMean));
     assert!(caught.moved.iter().all(|moved| moved.figure != Metric::EtaMedianError), "{:?}", caught.moved);
-    let said = caught.conclusions.join("\n");
-    assert!(said.contains("maps_a: the true efficiency moved by +0.20 points"), "{said}");
-    assert!(said.contains("the simulated machine or its model changed"), "{said}");
-    // It is told every night until it is accepted or taken back, not only once.
+    let conclusions = caught.conclusions.join("\n");
+    assert!(conclusions.contains("maps_a: the true efficiency moved by +0.20 points"), "{conclusions}");
+    assert!(conclusions.contains("the simulated machine or its model changed"), "{conclusions}");
+    // It is reported every night until it is accepted or taken back, not only once.
     for number in 3..20 {
         assert!(!append(&path, &night(number, 0.002, 0.0)).is_quiet(), "night {number}");
     }
@@ -87,12 +87,15 @@ fn equal_nights_are_quiet_and_a_model_that_moves_truth_too_is_caught_the_next_ni
 }
 
 #[test]
-fn an_identification_that_moves_is_told_from_a_model_that_moves() {
+fn an_identification_that_moves_is_distinguished_from_a_model_that_moves() {
     let (_scratch, path) = scratch();
     append(&path, &night(0, 0.0, 0.0));
-    let said = append(&path, &night(1, 0.0, -0.002)).conclusions.join("\n");
-    assert!(said.contains("the identified efficiency moved by -0.20 points"), "{said}");
-    assert!(said.contains("dynamic and steady") && said.contains("the true one stayed"), "{said}");
+    let conclusions = append(&path, &night(1, 0.0, -0.002)).conclusions.join("\n");
+    assert!(conclusions.contains("the identified efficiency moved by -0.20 points"), "{conclusions}");
+    assert!(
+        conclusions.contains("dynamic and steady") && conclusions.contains("the true one stayed"),
+        "{conclusions}"
+    );
 }
 
 #[test]
@@ -100,17 +103,17 @@ fn an_accepted_night_begins_a_new_band() {
     let (_scratch, path) = scratch();
     append(&path, &night(0, 0.0, 0.0));
     let accepted = Night { accepted: true, ..night(1, 0.002, 0.0) };
-    assert!(!append(&path, &accepted).is_quiet(), "what moved is still said");
+    assert!(!append(&path, &accepted).is_quiet(), "what moved is still reported");
     assert!(append(&path, &night(2, 0.002, 0.0)).is_quiet());
     assert!(!append(&path, &night(3, 0.0, 0.0)).is_quiet());
 }
 
 #[test]
-fn failures_lost_runs_lost_points_and_other_nightlies_are_told_apart() {
+fn failures_lost_runs_lost_points_and_other_nightlies_are_distinguished() {
     let (_scratch, path) = scratch();
     append(&path, &night(0, 0.0, 0.0));
     let other = Night { name: "others".into(), ..night(1, 0.1, 0.0) };
-    assert_eq!(append(&path, &other).nights, 0, "nights of another name are no comparison");
+    assert_eq!(append(&path, &other).nights, 0, "nights of another name are not compared");
 
     let mut failed = night(1, 0.0, 0.0);
     failed.runs[0].failure = Some("stopped at 12 s: surge".into());
@@ -129,7 +132,7 @@ fn failures_lost_runs_lost_points_and_other_nightlies_are_told_apart() {
         "{lost:?}"
     );
     assert_eq!(lost.len(), 2, "efficiency and its error: {lost:?}");
-    assert!(append(&path, &night(4, 0.0, 0.0)).is_quiet(), "odd nights are no part of the band");
+    assert!(append(&path, &night(4, 0.0, 0.0)).is_quiet(), "odd nights are not part of the band");
 }
 
 #[test]
@@ -151,7 +154,7 @@ fn what_was_written_is_read_and_filtered() {
     assert_eq!(count(Filter { method: Some("steady".into()), ..Filter::default() }), 6);
     assert_eq!(count(Filter { machine: Some("turbo_a".into()), ..Filter::default() }), 12);
     assert_eq!(count(Filter { machine: Some("maps_a".into()), ..Filter::default() }), 12);
-    assert_eq!(count(Filter { machine: Some("nobody".into()), ..Filter::default() }), 0);
+    assert_eq!(count(Filter { machine: Some("unknown".into()), ..Filter::default() }), 0);
     assert_eq!(count(Filter { since_ms: Some(all[4].night.started_ms), ..Filter::default() }), 8);
 }
 

@@ -11,7 +11,7 @@ pub enum LogError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
     /// No format knows the file.

@@ -34,7 +34,7 @@ impl LogFile {
         &self.path
     }
 
-    /// The bytes, where they are in memory.
+    /// The bytes, if they are in memory.
     pub fn bytes(&self) -> Option<&[u8]> {
         self.bytes.as_deref()
     }
@@ -42,7 +42,7 @@ impl LogFile {
     /// The bytes from the start.
     ///
     /// # Errors
-    /// [`LogError::Read`] where the file cannot be opened.
+    /// [`LogError::Read`] if the file cannot be opened.
     pub fn open(&self) -> Result<Box<dyn ReadSeek>, LogError> {
         match &self.bytes {
             Some(bytes) => Ok(Box::new(Cursor::new(bytes.clone()))),
@@ -53,7 +53,7 @@ impl LogFile {
     /// At most the first `count` bytes.
     ///
     /// # Errors
-    /// [`LogError::Read`] where the file cannot be read.
+    /// [`LogError::Read`] if the file cannot be read.
     pub fn head(&self, count: usize) -> Result<Vec<u8>, LogError> {
         let mut head = Vec::new();
         let limit = u64::try_from(count).unwrap_or(u64::MAX);

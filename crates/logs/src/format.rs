@@ -9,7 +9,7 @@ pub struct Row<'a> {
     pub group: usize,
     /// Time, s, on the clock that all groups share; any finite number.
     pub t_s: f64,
-    /// Values of those wanted columns that belong to the group, in the order in which they were wanted; NaN where the
+    /// Values of those wanted columns that belong to the group, in the order in which they were wanted; NaN if the
     /// log has none.
     pub values: &'a [f64],
 }
@@ -25,7 +25,7 @@ pub trait Log {
     /// Gives the rows of the wanted columns (indices of [`Layout::columns`]), each group in the order of the file.
     ///
     /// # Errors
-    /// [`LogError`] where the file cannot be read on; what came before was given.
+    /// [`LogError`] if the file cannot be read on; what came before was given.
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError>;
 }
 
@@ -59,7 +59,7 @@ impl LogFormats {
     /// Opens a log.
     ///
     /// # Errors
-    /// [`LogError`] where the file cannot be read, is of no known format, or holds nothing that can be used.
+    /// [`LogError`] if the file cannot be read, is of no known format, or holds nothing that can be used.
     pub fn open(
         self,
         file: &LogFile,

@@ -11,14 +11,14 @@ pub struct Layout {
     pub columns: Vec<Column>,
     /// What was found by looking, one sentence each, with the key that overrides it.
     pub findings: Vec<String>,
-    /// Time 0 of all groups in nanoseconds since 1970-01-01, where the log gives dates; in the zone of the log.
+    /// Time 0 of all groups in nanoseconds since 1970-01-01, if the log gives dates; in the zone of the log.
     pub start_time_ns: Option<u64>,
 }
 
 /// Columns that share a clock.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Group {
-    /// Name: a sheet, a group of the format, the clock's column; empty where the log has one group without a name.
+    /// Name: a sheet, a group of the format, the clock's column; empty if the log has one group without a name.
     pub name: String,
     /// The clock in words.
     pub clock: String,
@@ -31,16 +31,16 @@ pub struct Column {
     pub name: String,
     /// The cell of the header as written, unit included.
     pub header: String,
-    /// Unit as written; `None` where the log gives none.
+    /// Unit as written; `None` if the log gives none.
     pub unit: Option<String>,
-    /// Long name or comment; empty where there is none.
+    /// Long name or comment; empty if there is none.
     pub description: String,
     /// Index of its group.
     pub group: usize,
 }
 
 impl Layout {
-    /// Columns of that name, or with that header as a whole, in a group of that name (any where `topic` is empty).
+    /// Columns of that name, or with that header as a whole, in a group of that name (any if `topic` is empty).
     pub fn find(&self, topic: &str, field: &str) -> Vec<usize> {
         let in_group = |column: &Column| {
             topic.is_empty() || self.groups.get(column.group).is_some_and(|group| group.name == topic)

@@ -1,4 +1,4 @@
-//! What a user may say about a log, where looking at it gave the wrong answer.
+//! The user's options for a log, if automatic detection gave the wrong answer.
 
 use mapper_yaml::units::{Kind, parse};
 
@@ -37,7 +37,7 @@ pub struct LogOptions {
     pub encoding: Option<Encoding>,
     /// Row of the names, from 1; rows without any cell do not count, nor does a byte order mark.
     pub names_row: Option<usize>,
-    /// Row of the units, from 1; 0 where there is none.
+    /// Row of the units, from 1; 0 if there is none.
     pub units_row: Option<usize>,
     /// First row of data, from 1.
     pub data_row: Option<usize>,
@@ -77,7 +77,7 @@ pub enum OptionError {
         key: String,
     },
     /// Not a value of the key.
-    #[error("`{value}` is no value of `{key}`; write e.g. `{example}`")]
+    #[error("`{value}` is not a value of `{key}`; write e.g. `{example}`")]
     Value {
         /// The key.
         key: &'static str,

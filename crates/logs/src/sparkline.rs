@@ -4,7 +4,7 @@
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// A trace of at most `width` characters: each shows the mean of its share of the values between the least and the
-/// largest; a blank where there are none.
+/// largest; a blank if there are none.
 pub fn sparkline(values: &[f64], width: usize) -> String {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
     let low = finite().fold(f64::INFINITY, f64::min);

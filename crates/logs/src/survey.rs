@@ -27,7 +27,7 @@ pub struct Survey {
 pub struct GroupSurvey {
     /// Rows.
     pub rows: u64,
-    /// First time, s; NaN where there are no rows.
+    /// First time, s; NaN without rows.
     pub first_s: f64,
     /// Last time, s.
     pub last_s: f64,
@@ -62,9 +62,9 @@ pub struct ColumnSurvey {
     pub count: u64,
     /// Cells without one.
     pub missing: u64,
-    /// Least value; infinite where there is none.
+    /// Least value; infinite if there is none.
     pub min: f64,
-    /// Largest value; minus infinity where there is none.
+    /// Largest value; minus infinity if there is none.
     pub max: f64,
     /// The course of it.
     pub trace: Trace,
@@ -83,7 +83,7 @@ impl Default for ColumnSurvey {
 }
 
 impl ColumnSurvey {
-    /// A value that this share of the course stays below; NaN where there are no values.
+    /// A value that this share of the course stays below; NaN without values.
     pub fn quantile(&self, share: f64) -> f64 {
         let mut values: Vec<f64> = self.trace.means().into_iter().filter(|value| value.is_finite()).collect();
         values.sort_by(f64::total_cmp);
@@ -149,7 +149,7 @@ impl GroupSurvey {
 /// Looks at every column.
 ///
 /// # Errors
-/// [`LogError`] where the log cannot be read to its end.
+/// [`LogError`] if the log cannot be read to its end.
 pub fn survey(log: &mut dyn Log) -> Result<Survey, LogError> {
     let layout = log.layout().clone();
     let mut survey = Survey {

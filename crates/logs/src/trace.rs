@@ -40,7 +40,7 @@ impl Trace {
         self.rows += 1;
     }
 
-    /// The means, in order; NaN where there was no value.
+    /// The means, in order; NaN if there was no value.
     pub fn means(&self) -> Vec<f64> {
         self.bins.iter().map(|(sum, count)| sum / f64::from(*count)).collect()
     }

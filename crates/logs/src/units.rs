@@ -54,9 +54,9 @@ fn find(kind: Kind, spelling: &str) -> Option<&'static Unit> {
         (Kind::Fraction, "1" | "-") => Some(&BARE_RATIO),
         (Kind::Temperature, "C" | "celsius") => kind.unit("degC"),
         (Kind::Temperature, "F") => kind.unit("degF"),
-        // Of a whole channel there is no doubt: channels hold absolute pressures.
+        // A whole channel is unambiguous: channels hold absolute pressures.
         (Kind::Pressure, "psi") => kind.unit("psia"),
-        // Of an interval neither: only its scale counts, and that of degF is degR.
+        // An interval is unambiguous too: only its scale counts, and that of degF is degR.
         (Kind::TemperatureDifference, "degC" | "°C") => kind.unit("K"),
         (Kind::TemperatureDifference, "degF" | "°F") => Kind::Temperature.unit("degR"),
         _ => None,

@@ -19,7 +19,7 @@ const lineColour = name => {
 const redrawn = [];
 const redraw = () => redrawn.forEach(draw => draw());
 
-// A drawing with a name for those who do not see it; its parts are no elements of their own to them.
+// A drawing with a name for those who do not see it; its parts are not separate elements for them.
 function put(element, plot, name) {
   plot.querySelectorAll("[aria-label]").forEach(part => {
     part.dataset.mark = part.getAttribute("aria-label");

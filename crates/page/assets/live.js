@@ -49,7 +49,7 @@ function showNow() {
   now.readings.forEach((r, i) => {
     const row = body.rows[i] ?? body.insertRow();
     const bound = b => b == null ? "-" : short(b);
-    // The last twentieth before a limit is worth a look.
+    // The last twentieth before a limit is marked.
     const near = (r.high != null && r.value > 0.95 * r.high) || (r.low != null && r.value < 1.05 * r.low);
     const beyond = (r.high != null && r.value > r.high) || (r.low != null && r.value < r.low);
     const state = r.high == null && r.low == null ? "no limit" : beyond ? "beyond" : near ? "near" : "within";
@@ -89,9 +89,9 @@ function addPoint(p) {
   row.addEventListener("click", () => choose(p.step));
 }
 
-function addEvent(told) {
+function addEvent(event) {
   const item = document.createElement("li");
-  item.textContent = `${told.t_s.toFixed(0)} s: ${told.message}`;
+  item.textContent = `${event.t_s.toFixed(0)} s: ${event.message}`;
   byId("events").prepend(item);
   while (byId("events").children.length > EVENTS) byId("events").lastChild.remove();
 }

@@ -12,7 +12,7 @@ function words(p) {
   if (p.eta_common != null) lines.push(`  common ${shown(p.eta_common, 2)}, own ${shown(p.eta_own, 2)}`);
   if (p.h != null) lines.push(`h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`);
   if (p.dynamic) lines.push(`two-parameter ${shown(p.dynamic[0], 2)} %`);
-  // Three readings a line: the words stand beside the pointer.
+  // Three readings a line: the text is next to the pointer.
   for (let i = 0; i < p.raw.length; i += 3) lines.push(`${i ? "  " : "read "}${p.raw.slice(i, i + 3).join(", ")}`);
   lines.push(p.verdict);
   return lines.join("\n");
@@ -79,7 +79,7 @@ const pointMarks = (data, y) => [
   Plot.tip(data, Plot.pointer({ x: "flow", y, title: words, fill: style("--ground"), stroke: style("--line"), fontSize: 12, lineWidth: innerWidth < 700 ? 24 : 42 })),
 ];
 
-// Each mark knows its step; a click takes the point under the pointer, as the words beside it do.
+// Each mark knows its step; a click takes the point under the pointer, as the text next to it does.
 function clickable(plot, data) {
   d3.select(plot).selectAll("g.points path, g.points circle").each(function () {
     const p = data[d3.select(this).datum()];
@@ -134,7 +134,7 @@ function drawEta() {
       const name = d3.least(lineNames, n => Math.abs(n - line.speed));
       marks.push(Plot.areaY(nodes, { x: "flow", y1: n => n.eta - n.half, y2: n => n.eta + n.half, fill: lineColour(name), fillOpacity: 0.15, clip: true }));
       marks.push(Plot.line(nodes, { x: "flow", y: "eta", stroke: lineColour(name), clip: true }));
-      // Its speed stands where the line ends towards choke, or where it leaves what is drawn.
+      // Its speed is written where the line ends towards choke, or where it leaves what is drawn.
       const end = d3.greatest(nodes, n => n.flow);
       if (end) marks.push(Plot.text([end], { x: "flow", y: "eta", text: () => short(line.speed), dy: 14, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
     }

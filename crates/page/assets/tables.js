@@ -1,4 +1,4 @@
-// Every table is copied with a button, and sorted by a click on a head where it has heads; then everything is drawn.
+// Every table is copied with a button, and sorted by a click on a head if it has heads; then everything is drawn.
 async function copied(text) {
   try {
     await navigator.clipboard.writeText(text);

@@ -34,9 +34,9 @@ pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
     };
     for verdict in [Verdict::Unusable, Verdict::Doubtful] {
         // Findings about the most steps come first. Three sentences are enough here; the rest is listed with the points.
-        let mut said = doubts(of(verdict));
-        said.sort_by_key(|doubt| std::cmp::Reverse(doubt.count()));
-        things.extend(said.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message)));
+        let mut warnings = doubts(of(verdict));
+        warnings.sort_by_key(|doubt| std::cmp::Reverse(doubt.count()));
+        things.extend(warnings.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message)));
     }
     things
 }

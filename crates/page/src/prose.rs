@@ -36,7 +36,7 @@ mod tests {
     use super::{prose, sentence};
 
     #[test]
-    fn code_stands_between_backticks_and_markup_stays_text() {
+    fn code_is_between_backticks_and_markup_stays_text() {
         assert_eq!(prose("`joint` finds <it>").into_string(), "<code>joint</code> finds &lt;it&gt;");
         assert_eq!(prose("one ` alone").into_string(), "one ` alone");
     }

@@ -19,7 +19,7 @@ pub struct ChannelMap {
     pub elements: BTreeMap<Element, ChannelSource>,
     /// Channels with a constant known value that the recording does not contain; SI, in the channel's unit.
     pub constants: BTreeMap<Channel, f64>,
-    /// Machine data for the identification if there is no campaign.
+    /// Machine data for the identification without a campaign.
     pub machine: Option<MachineConstants>,
     /// Reference state of corrected quantities.
     pub reference: Option<ReferenceState>,

@@ -20,7 +20,7 @@ const SIZE_LIMIT: usize = 1 << 20;
 pub(crate) static DOCUMENT: Document =
     Document { name: "channel map", example: "examples/channels/gap_rig.yaml" };
 
-/// Why there is no channel map.
+/// Errors of reading a channel map.
 #[derive(Debug, thiserror::Error)]
 pub enum ChannelMapError {
     /// The file cannot be read.
@@ -197,7 +197,7 @@ impl<'a> Reader<'a> {
         );
         if gauge && kind != Kind::Pressure {
             let message =
-                format!("{channel} is no pressure, and only pressures are read over the ambient pressure");
+                format!("{channel} is not a pressure, and only pressures are read over the ambient pressure");
             self.note(FindingKind::Conflict, &of("gauge"), message, "remove `gauge`");
         }
         (topic, written, gauge)

@@ -32,7 +32,7 @@ enum State {
 #[derive(Debug)]
 struct Pace {
     last_s: f64,
-    /// A bit for each interval, set where it was short.
+    /// A bit for each interval, set if it was short.
     short: u64,
 }
 

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_wrong_time_is_passed_over_wherever_it_stands() {
+    fn a_single_wrong_time_is_skipped_at_any_place() {
         let good: Vec<f64> = (0..100).map(|row| f64::from(row) / 10.0).collect();
         for wrong in [1e9, -1e9, f64::NAN, 1e300] {
             for at in [0, 50, 100] {

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_the_nearest_ones_and_everything_else_is_told_apart() {
+    fn numbers_are_the_nearest_ones_and_everything_else_is_distinguished() {
         use FieldValue::{Absent, Number, Other};
         let values = fields(
             r#"{"b":-0.1,"x":{"a":[9]},"a":1.7976931348623157e308,"c":"1","d":7}"#,

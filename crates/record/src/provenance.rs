@@ -35,7 +35,7 @@ impl ProvenanceWriter {
     /// The unusual provenance in a sample of a batch.
     pub(crate) fn message(&self, batch: &SampleBatch, index: usize) -> Option<serde_json::Value> {
         let t_s = *batch.t_s.get(index)?;
-        let said = |from: &mapper_core::Provenance| {
+        let origin_of = |from: &mapper_core::Provenance| {
             // A missing reading has no source.
             let read = batch.column(from.channel).and_then(|values| values.get(index));
             let quality = from.quality.get(index).copied().filter(|quality| *quality != Quality::Good);
@@ -48,7 +48,7 @@ impl ProvenanceWriter {
             let says = quality.is_some() || source_t_s.is_some();
             says.then_some((from.channel, Origin { source_t_s, quality }))
         };
-        let message: BTreeMap<Channel, Origin> = batch.provenance.iter().filter_map(said).collect();
+        let message: BTreeMap<Channel, Origin> = batch.provenance.iter().filter_map(origin_of).collect();
         if message.is_empty() { None } else { serde_json::to_value(message).ok() }
     }
 
@@ -67,8 +67,8 @@ impl ProvenanceWriter {
 /// A parsed message; unknown channels are skipped.
 pub(crate) fn read_origins(data: &[u8]) -> Option<OriginMessage> {
     let message: BTreeMap<String, serde_json::Value> = serde_json::from_slice(data).ok()?;
-    let known = message.into_iter().filter_map(|(symbol, said)| {
-        let origin: Origin = serde_json::from_value(said).ok()?;
+    let known = message.into_iter().filter_map(|(symbol, value)| {
+        let origin: Origin = serde_json::from_value(value).ok()?;
         let source_t_s = origin.source_t_s.filter(|t_s| t_s.is_finite());
         let quality = origin.quality.unwrap_or(Quality::Good);
         Some((symbol.parse().ok()?, ReadingOrigin { t_s: 0.0, source_t_s, quality }))

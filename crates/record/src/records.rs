@@ -64,7 +64,7 @@ pub(crate) struct ChannelDefinition {
     pub(crate) topic: String,
     pub(crate) encoding: String,
     pub(crate) metadata: BTreeMap<String, String>,
-    /// Content of the schema; empty where there is none.
+    /// Content of the schema; empty if there is none.
     pub(crate) schema: Vec<u8>,
 }
 

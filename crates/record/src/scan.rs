@@ -215,7 +215,10 @@ impl Scanned {
         let whole = match opcode {
             op::MESSAGE => {
                 parse_message(body).map(|(id, log_time_ns, data)| match self.definitions.contains_key(&id) {
-                    true => sink.read(id, data).into_iter().for_each(|told| sink.take(id, log_time_ns, told)),
+                    true => sink
+                        .read(id, data)
+                        .into_iter()
+                        .for_each(|message| sink.take(id, log_time_ns, message)),
                     false => *self.undefined.entry(id).or_default() += 1,
                 })
             }

@@ -85,14 +85,14 @@ pub(crate) fn without_rest(steps: Vec<StepMarker>, series: &BTreeMap<Channel, Se
     let Some(speed) = series.get(&Channel::ShaftSpeed) else { return steps };
     let rests = |step: &StepMarker| median(speed, step.start_s, step.end_s) < AT_REST_RPM;
     if steps.iter().all(rests) {
-        // A dead sensor, or a file without a run: there is no evidence.
+        // A dead sensor, or a file without a run: neither shows when the machine is at rest.
         return steps;
     }
     let turning = steps.into_iter().filter(|step| !rests(step));
     turning.enumerate().map(|(index, step)| StepMarker { index, ..step }).collect()
 }
 
-/// NaN if there are no readings.
+/// NaN without readings.
 fn median(series: &Series, start_s: f64, end_s: f64) -> f64 {
     let values = series.slice(start_s, end_s).1.iter().filter(|value| value.is_finite());
     mapper_numerics::statistics::median(values).unwrap_or(f64::NAN)
@@ -229,7 +229,7 @@ impl Signal {
             .collect();
         let top = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
         let floor = 0.1 * top;
-        // Only where the signal moves, and without steps of 0: for a reading that is constant between its jumps,
+        // Only while the signal moves, and without steps of 0: for a reading that is constant between its jumps,
         // only the jumps would remain.
         let running = values.windows(2).filter(|pair| pair[0].abs() > floor && pair[1].abs() > floor);
         let mut steps: Vec<f64> = running.map(|pair| (pair[1] - pair[0]).abs()).collect();

@@ -128,7 +128,7 @@ pub enum ReadWarning {
     },
     /// Rows or samples with impossible times.
     #[error(
-        "{count} rows or samples were left out: their times, the first of them {first_s} s, are none or more than a day from those beside them, or step back"
+        "{count} rows or samples were left out: their times, the first of them {first_s} s, are none or more than a day from those next to them, or step back"
     )]
     StrayTimes {
         /// How many.

@@ -64,7 +64,7 @@ impl RecordingWriter {
     /// Creates the file and writes header, metadata and attachments.
     ///
     /// # Errors
-    /// [`RecordError::Exists`] where the file is there already, [`RecordError::Create`] and [`RecordError::Write`]
+    /// [`RecordError::Exists`] if the file is there already, [`RecordError::Create`] and [`RecordError::Write`]
     /// as the system says.
     pub fn create(path: &Path, header: &RecordingHeader) -> Result<RecordingWriter, RecordError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
@@ -397,7 +397,7 @@ mod tests {
 
     /// Linux has a device that is always full.
     #[test]
-    fn a_full_disk_is_said_with_the_file_and_what_to_do() {
+    fn a_full_disk_is_reported_with_the_file_and_a_remedy() {
         let full = File::options().write(true).open("/dev/full").unwrap();
         let error =
             RecordingWriter::on(full, Path::new("run.mcap"), &RecordingHeader::default()).unwrap_err();

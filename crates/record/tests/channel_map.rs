@@ -155,7 +155,7 @@ noise_color: {share: 1, time_constant: 2 s}
 #[test]
 fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
     for (text, kind, place, words) in [
-        ("channels:\n  T2: {topic: /a}\n", Kind::MissingKey, (2, 3), "lacks the key `field`"),
+        ("channels:\n  T2: {topic: /a}\n", Kind::MissingKey, (2, 3), "has no key `field`"),
         (
             "channels:\n  T2: {topic: /a, field: x}\n  T2: {topic: /a, field: x}\n",
             Kind::DuplicateKey,
@@ -196,7 +196,7 @@ fn missing_and_repeated_keys_and_wrong_types_are_refused_at_their_place() {
 }
 
 #[test]
-fn a_file_that_is_not_there_and_one_that_is_not_text_are_told_apart() {
+fn a_missing_file_and_a_file_that_is_not_text_are_distinguished() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.yaml");
     assert!(matches!(ChannelMap::load(&path), Err(ChannelMapError::Read { .. })));

@@ -141,7 +141,7 @@ fn damaged_records_are_counted_and_a_few_are_listed() {
 }
 
 #[test]
-fn what_is_no_mcap_file_is_said_to_be_none() {
+fn a_file_that_is_not_mcap_is_refused() {
     let error = read(b"time,T2\n0,300\n").unwrap_err();
     assert!(error.to_string().contains("not an MCAP file"), "{error}");
     let missing = read_recording(Path::new("/no/such.mcap"), &ChannelMap::native(), &ReadOptions::default());
@@ -207,7 +207,7 @@ fn times_out_of_order_are_sorted_and_repeats_left_out() {
 }
 
 #[test]
-fn a_single_wrong_time_is_left_out_and_told() {
+fn a_single_wrong_time_is_left_out_and_reported() {
     let second = 1_000_000_000;
     let mut rows: Vec<(u64, &str)> =
         (0..100).map(|row| (1_795_356_185 * second + row * second, "{\"tt2\": 1}")).collect();
@@ -217,8 +217,8 @@ fn a_single_wrong_time_is_left_out_and_told() {
     let report = read_foreign(&foreign("/daq", &rows, &[]), &map(", unit: degC")).unwrap();
     let t_s = &report.recording.series[&Channel::T2].t_s;
     assert_eq!((t_s.len(), t_s[0], t_s[99]), (100, 0.0, 99.0));
-    let told = |warning: &ReadWarning| matches!(warning, ReadWarning::StrayTimes { count: 2, .. });
-    assert!(report.warnings.iter().any(told), "{:?}", report.warnings);
+    let stray = |warning: &ReadWarning| matches!(warning, ReadWarning::StrayTimes { count: 2, .. });
+    assert!(report.warnings.iter().any(stray), "{:?}", report.warnings);
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn a_unit_comes_from_the_map_or_the_recording_and_never_from_a_guess() {
     let contradicting = read_foreign(&foreign("/daq", &rows, &[("tt2", "K")]), &map(", unit: degC")).unwrap();
     assert_eq!(contradicting.recording.series[&Channel::T2].values, [274.15]);
     assert!(contradicting.warnings.iter().any(|w| matches!(w, ReadWarning::UnitContradiction { .. })));
-    // Two spellings of one unit are no contradiction.
+    // Two spellings of one unit are not a contradiction.
     let agreeing = read_foreign(&foreign("/daq", &rows, &[("tt2", "C")]), &map(", unit: degC")).unwrap();
     assert!(!agreeing.warnings.iter().any(|w| matches!(w, ReadWarning::UnitContradiction { .. })));
 }

@@ -56,10 +56,10 @@ fn a_fast_log_is_averaged_and_says_so() {
 }
 
 #[test]
-fn units_that_contradict_the_log_are_told_and_gauge_units_need_the_word() {
-    let told =
+fn units_that_contradict_the_log_are_reported_and_gauge_units_need_the_word() {
+    let contradicting =
         read(&log(10), "channels:\n  N: {field: n, unit: rpm}\n  T2: {field: T2, unit: degF}\n").unwrap();
-    let channels: Vec<Channel> = told
+    let channels: Vec<Channel> = contradicting
         .warnings
         .iter()
         .filter_map(|warning| match warning {
@@ -114,7 +114,7 @@ fn a_measured_valve_position_keeps_the_steps_and_says_so() {
     }
     let measured = |warning: &&ReadWarning| matches!(warning, ReadWarning::MeasuredValve { .. });
     assert_eq!(read.warnings.iter().filter(measured).count(), 1, "{:?}", read.warnings);
-    // Identification waits for commands to come to rest: the position stands still within each step.
+    // Identification waits for commands to come to rest: the position is constant within each step.
     let valve = &read.recording.series[&Channel::ValveCommand].values;
     assert_eq!(valve.windows(2).filter(|pair| pair[0] != pair[1]).count(), 2);
 }
@@ -184,7 +184,7 @@ fn two_runs_in_one_file_are_refused_where_the_second_begins() {
 }
 
 #[test]
-fn a_single_wrong_time_is_left_out_and_told() {
+fn a_single_wrong_time_is_left_out_and_reported() {
     let text = format!("{}1e9;60000;-2.5;990;45\n", log(10));
     let read = read(&text, "channels:\n  N: {field: n}\n").unwrap();
     assert!(

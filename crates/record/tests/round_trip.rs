@@ -47,11 +47,11 @@ fn a_run_reads_back_whole() {
     assert_eq!((truth.t_s, truth.columns), (batch.t_s, batch.truth));
 }
 
-/// Quality and source time are kept where they are not as usual, a bad reading is none, and a run without any has no such topic.
+/// Quality and source time are kept if they are not as usual, a bad reading is none, and a run without any has no such topic.
 #[test]
-fn where_readings_come_from_is_kept_beside_them() {
+fn the_provenance_of_readings_is_kept_with_them() {
     let folder = tempfile::tempdir().unwrap();
-    let (plain, told) = (folder.path().join("plain.mcap"), folder.path().join("told.mcap"));
+    let (plain, marked) = (folder.path().join("plain.mcap"), folder.path().join("marked.mcap"));
     let whole = batch(35);
     write(&plain, &whole, &[]);
     let usual =
@@ -60,7 +60,7 @@ fn where_readings_come_from_is_kept_beside_them() {
     let mut quality = vec![Quality::Good; 35];
     (source_t_s[3], quality[5], quality[7]) = (source_t_s[3] - 0.04, Quality::Bad, Quality::Uncertain);
     let unusual = Provenance { channel: Channel::T2, source_t_s, quality };
-    write(&told, &SampleBatch { provenance: vec![usual.clone(), unusual], ..whole.clone() }, &[]);
+    write(&marked, &SampleBatch { provenance: vec![usual.clone(), unusual], ..whole.clone() }, &[]);
     let same = folder.path().join("same.mcap");
     write(&same, &SampleBatch { provenance: vec![usual], ..whole.clone() }, &[]);
     assert_eq!(
@@ -68,10 +68,10 @@ fn where_readings_come_from_is_kept_beside_them() {
         std::fs::read(&plain).unwrap(),
         "what is as usual is not written"
     );
-    let (plain, told) = (read(&plain), read(&told));
+    let (plain, marked) = (read(&plain), read(&marked));
     assert!(plain.recording.origins.is_empty());
-    assert_eq!(told.warnings, [ReadWarning::BadReadings { channel: Channel::T2, count: 1 }]);
-    let origins = &told.recording.origins;
+    assert_eq!(marked.warnings, [ReadWarning::BadReadings { channel: Channel::T2, count: 1 }]);
+    let origins = &marked.recording.origins;
     assert_eq!(origins.keys().collect::<Vec<_>>(), [&Channel::T2]);
     let of = |index: usize, source_t_s, quality| ReadingOrigin { t_s: whole.t_s[index], source_t_s, quality };
     let expected = [
@@ -80,7 +80,7 @@ fn where_readings_come_from_is_kept_beside_them() {
         of(7, None, Quality::Uncertain),
     ];
     assert_eq!(origins[&Channel::T2], expected);
-    let (before, after) = (&plain.recording.series[&Channel::T2], &told.recording.series[&Channel::T2]);
+    let (before, after) = (&plain.recording.series[&Channel::T2], &marked.recording.series[&Channel::T2]);
     assert!(after.values[5].is_nan());
     let others = |values: &[f64]| [&values[..5], &values[6..]].concat();
     assert_eq!(others(&before.values), others(&after.values));

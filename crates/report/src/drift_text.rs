@@ -47,7 +47,7 @@ pub fn drift_text(report: &DriftReport) -> String {
     text
 }
 
-/// The most probable alternatives, no drift included, with their probabilities; `None` if no alternative is worth mentioning.
+/// The most probable alternatives, no drift included, with their probabilities; `None` if no alternative is probable enough.
 fn likely(alternatives: &[Alternative]) -> Option<String> {
     let named = |other: &Alternative| {
         let cause = other.cause.map_or_else(|| "no drift".to_owned(), Cause::name);

@@ -66,11 +66,11 @@ pub fn merged_text(merged: &Merged) -> String {
     let status = &merged.status;
     let mut text = lacking_text(status, |_| true);
     match &merged.result {
-        Some((path, said)) => {
+        Some((path, description)) => {
             let of = if status.lacking() > 0 { " (incomplete)" } else { "" };
             let _ = writeln!(
                 text,
-                "merged {} of {} items{of} in {}\n{said}",
+                "merged {} of {} items{of} in {}\n{description}",
                 status.done,
                 status.items,
                 path.display()

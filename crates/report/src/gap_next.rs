@@ -24,7 +24,7 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     }
     let Some(first) = diagnosis.experiments.first() else { return text };
     text += &format!(
-        "  of {:.2} bit that are open: answered a minute, in all, chance that the true cause then has 95 %\n",
+        "  of {:.2} bit that are open: answered a minute, in total, chance that the true cause then has 95 %\n",
         first.entropy_bit
     );
     for experiment in &diagnosis.experiments {
@@ -73,7 +73,7 @@ fn named(experiment: &Suggestion) -> String {
             format!("a sensor for {}, and a {}", experiment.sensor.as_deref().unwrap_or("-"), jump())
         }
         Kind::Soak => {
-            "a soak before the next run, which tells the offsets of the temperature sensors".to_owned()
+            "a soak before the next run, which determines the offsets of the temperature sensors".to_owned()
         }
     }
 }

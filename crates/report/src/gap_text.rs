@@ -51,7 +51,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     for candidate in diagnosis.candidates.iter().take(CAUSES) {
         text += &format!("  {:>5.1} %  {}\n", 100.0 * candidate.probability, cause(candidate));
         for set in &candidate.equivalent {
-            text += &format!("           cannot be told apart from {}\n", set.join(" + "));
+            text += &format!("           is indistinguishable from {}\n", set.join(" + "));
         }
     }
     text += &format!("  {:>5.1} %  nothing beyond tolerance\n", 100.0 * diagnosis.probability_none);
@@ -102,10 +102,10 @@ fn laws(diagnosis: &Diagnosis) -> String {
             removed(law)
         );
         if law.probability < NOT_THE_TRUTH {
-            text += "  what it leaves is more than noise: its form is not the true one\n";
+            text += "  its residual is more than noise: its form is not the true one\n";
         }
         for other in &law.equivalent {
-            text += &format!("  cannot be told apart from: {other}\n");
+            text += &format!("  indistinguishable from: {other}\n");
         }
         if let Some(file) = &law.rhai {
             text += &format!("  written to {file}: give it with --effect\n");
@@ -157,14 +157,14 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
 
 /// Effects in both recordings, which are not judged, if a reference recording was given.
 fn not_judged(since: &Since) -> String {
-    let lacking = since.lacking.iter().map(|(channel, lacking)| {
-        let (scale, unit) = in_people_s_unit(&lacking.unit);
-        format!("{channel} {}", with_unit(four_figures(scale * lacking.size), unit))
+    let residuals = since.lacking.iter().map(|(channel, residual)| {
+        let (scale, unit) = in_people_s_unit(&residual.unit);
+        format!("{channel} {}", with_unit(four_figures(scale * residual.size), unit))
     });
     format!(
-        "what changed since {} alone is told; what the model lacked there already is not judged: {}\n",
+        "only the change since {} is reported; the residual already present there is not judged: {}\n",
         since.recording,
-        lacking.collect::<Vec<_>>().join(", ")
+        residuals.collect::<Vec<_>>().join(", ")
     )
 }
 
@@ -205,8 +205,8 @@ pub fn cause(candidate: &Candidate) -> String {
 fn parameter(name: &str, estimate: &Estimate) -> String {
     let written = with_unit(four_figures(estimate.value), &estimate.unit);
     let (low, high) = (four_figures(estimate.low), four_figures(estimate.high));
-    let beside = if written == estimate.size { String::new() } else { format!(", {}", estimate.size) };
-    format!("{name} = {written} ({low} .. {high}){beside}")
+    let size = if written == estimate.size { String::new() } else { format!(", {}", estimate.size) };
+    format!("{name} = {written} ({low} .. {high}){size}")
 }
 
 /// The smallest detectable size of each effect.

@@ -19,7 +19,7 @@ pub fn heat_correction_text(correction: &HeatCorrection) -> String {
         text += "           slow lines take no more work than fast ones: nothing is taken off\n";
     }
     if correction.scatter_ratio.is_some_and(|ratio| ratio > ONE_CURVE_RATIO) {
-        text += "           the lines do not become one curve: part of this is no heat, and slow lines come out too good\n";
+        text += "           the lines do not become one curve: part of this is not heat, and slow lines come out too good\n";
     }
     text += "\n krpm  points  apparent, %  corrected, %\n";
     for line in &correction.lines {

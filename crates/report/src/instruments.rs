@@ -21,7 +21,7 @@ pub const INSTRUMENT_HEADS: [&str; 9] = [
 /// Meaning of the columns.
 pub const INSTRUMENT_WORDS: &str = "Half widths of 95 % intervals, as declared: noise of one sample, offset left after calibration, gain; \
                                     temperatures in K. As used: the offset that the isothermal zero leaves, where there was one. \
-                                    `-`: nobody has declared it.";
+                                    `-`: it is not declared.";
 
 /// A row for each sensor of the campaign. `used`: the uncertainties of the identification.
 pub fn instrument_rows(

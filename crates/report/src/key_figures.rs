@@ -6,7 +6,7 @@ use mapper_core::{CompressorMap, IdentifiedPoint, Plan, Verdict};
 use mapper_numerics::statistics::median;
 use mapper_record::score::ScoredPoint;
 
-/// Measured range, uncertainty and planned duration; `None` if there is no map.
+/// Measured range, uncertainty and planned duration; `None` without a map.
 pub fn key_figures(
     map: Option<&CompressorMap>,
     points: &[ScoredPoint],

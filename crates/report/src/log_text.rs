@@ -130,7 +130,7 @@ fn proposal_text(layout: &Layout, proposal: &Proposal) -> String {
         Some(Ambient::Assumed) => {
             let _ = writeln!(
                 text,
-                "  gauge pressures: {}; the log does not hold the ambient pressure: 101.3 kPa stands in its place until you \
+                "  gauge pressures: {}; the log does not hold the ambient pressure: 101.3 kPa is used in its place until you \
                  write what the barometer read",
                 gauge.join(", ")
             );

@@ -39,15 +39,15 @@ fn one(production: &Production) -> String {
     if production.places.iter().all(|place| place.eta.as_ref().is_none_or(|eta| eta.machine_sigma.is_none()))
     {
         text.push_str(
-            "each machine was measured once: how far machines differ is within the rest; a second night or seed tells them apart\n",
+            "each machine was measured once: how far machines differ is within the rest; a second night or seed separates them\n",
         );
     }
     if let Some(stand) = &production.stand {
         text.push_str(&of_stand(stand, production));
     }
     text.push_str(&match &production.outliers {
-        None => format!("fewer than {MACHINES_FOR_OUTLIERS} machines: which one stands out is not told\n"),
-        Some(outliers) if outliers.is_empty() => "no machine stands out\n".to_owned(),
+        None => format!("fewer than {MACHINES_FOR_OUTLIERS} machines: outliers are not determined\n"),
+        Some(outliers) if outliers.is_empty() => "no machine is an outlier\n".to_owned(),
         Some(outliers) => {
             let lines: String = outliers.iter().map(of_outlier).collect();
             format!(
@@ -86,13 +86,13 @@ fn of_stand(stand: &Stand, production: &Production) -> String {
     };
     let drift = |drift: &Option<Drift>, unit: &str| {
         let Some(Drift { a_day, low, high }) = drift else {
-            return format!("no drift in time is told from so few nights ({unit})");
+            return format!("too few nights to determine a drift in time ({unit})");
         };
         let clear = if low * high > 0.0 { "drifts by" } else { "does not drift clearly:" };
         format!("{clear} {:+.3} ({:+.3} .. {:+.3}) {unit} a day", 100.0 * a_day, 100.0 * low, 100.0 * high)
     };
     format!(
-        "the stand, shared by all machines, {span}:\n  efficiency {}; nights scatter by {:.3} points beside it\n  h {}; nights scatter by {:.3} % beside it\n",
+        "the stand, shared by all machines, {span}:\n  efficiency {}; nights scatter by {:.3} points in addition\n  h {}; nights scatter by {:.3} % in addition\n",
         drift(&stand.eta_drift, "points"),
         100.0 * stand.eta_night_sigma,
         drift(&stand.h_drift, "%"),

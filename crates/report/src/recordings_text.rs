@@ -17,14 +17,14 @@ pub fn recordings_text(headlines: &[(String, String)], over: &[Over]) -> String 
     for cause in over {
         let fate = match cause.fate {
             Fate::Persists => "persists",
-            Fate::Changes => "is in all, and changes",
+            Fate::Changes => "is in every recording, and changes",
             Fate::Came => "came",
             Fate::Went => "went",
             Fate::ComesAndGoes => "comes and goes",
         };
         text += &format!("  {} ({}) {fate}: {}\n", cause.name, cause.effect, cause.size);
         for (number, (value, present)) in cause.each.iter().zip(&cause.present).enumerate() {
-            let absent = if *present { "" } else { ", not told from nothing" };
+            let absent = if *present { "" } else { ", indistinguishable from zero" };
             text += &format!("    {:8} {}{absent}\n", number + 1, interval(value, &cause.unit));
         }
         text += &format!("    together {}\n", interval(&cause.together, &cause.unit));

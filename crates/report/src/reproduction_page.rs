@@ -7,7 +7,7 @@ use mapper_reproduce::{FigureResult, picture_path};
 pub fn reproduction_page(results: &[FigureResult]) -> String {
     let figures = results.iter().map(|result| {
         let statements = result.statements.iter();
-        let rows = statements.map(|said| [said.paper.clone(), said.here.clone(), said.verdict.to_string()]);
+        let rows = statements.map(|one| [one.paper.clone(), one.here.clone(), one.verdict.to_string()]);
         format!(
             "\n## Figure {}: {}\n\n{}\n\n{}\n![Figure {}]({})\n\n{}",
             result.number,
@@ -33,10 +33,10 @@ mapper reproduce --out docs
 R. D. Burke and others, dynamic identification of thermodynamic parameters for turbocharger compressor models: the
 figures made in simulation (5 to 10), and figure 12, redone on the virtual laboratory's nominal model. Its map and air
 tables are not printed in the paper and are closed forms here, so numbers agree in kind, not in digits. Each statement
-of the paper stands beside what came out: *holds*, *partly* or *differs*. An efficiency error is identified minus model
+of the paper is next to the result here: *holds*, *partly* or *differs*. An efficiency error is identified minus model
 value, in points (1 point = 0.01); ranges run over the valve openings.
 
-Errata of the paper followed here: eq. 2 lacks T1' on its right side; the nRMSE of the heat-transfer coefficient is 3.2 %
+Errata of the paper followed here: in eq. 2, T1' is missing on the right side; the nRMSE of the heat-transfer coefficient is 3.2 %
 (section 5.1, conclusion 2), not the abstract's 1 %; table 1's \"110000 to 50000\" means target 50 krpm from 110 krpm.
 ";
 

@@ -13,7 +13,7 @@ pub fn sensors_text(channels: &[FusedChannel]) -> String {
     format!("\nseveral sensors, fused by their declared uncertainty (one standard deviation):\n{lines}")
 }
 
-/// A line for each channel for which a campaign declares several sensors; empty where it declares none.
+/// A line for each channel for which a campaign declares several sensors; empty if it declares none.
 pub fn declared_sensors_text(campaign: &Campaign) -> String {
     let several = campaign.sensors.iter().filter_map(|(channel, sensor)| {
         let fused = FusedChannel {

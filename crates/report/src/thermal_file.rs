@@ -74,7 +74,7 @@ impl ThermalExport<'_> {
                     let origin = match shared.origin {
                         Origin::Fitted => "identified",
                         Origin::Assumed => "declared",
-                        Origin::NotIdentifiable => "declared; the recording does not tell",
+                        Origin::NotIdentifiable => "declared; not identifiable from the recording",
                     };
                     (value, format!("{origin}, 95 % {low:.6} to {high:.6}"))
                 }

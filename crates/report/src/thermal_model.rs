@@ -16,7 +16,10 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
                 writeln!(text, "  {name:<34} {:.decimals$} +/- {half:.decimals$} {unit}", scale * number)
             }
             (None, _) => {
-                writeln!(text, "  {name:<34} the recording cannot tell (+/- {half:.decimals$} {unit})")
+                writeln!(
+                    text,
+                    "  {name:<34} not identifiable from the recording (+/- {half:.decimals$} {unit})"
+                )
             }
         };
     };
@@ -61,7 +64,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
     for pair in &thermal.entangled {
         let _ = writeln!(
             text,
-            "  {} and {} can hardly be told apart (correlation {:+.2})",
+            "  {} and {} are hardly distinguishable (correlation {:+.2})",
             pair.first, pair.second, pair.correlation
         );
     }
@@ -84,12 +87,12 @@ pub(crate) fn inlet_text(inlet: &FoundInlet) -> String {
             format!("h before the wheel: {here}, says the recording (probability {:.2})", inlet.probability)
         }
         (Origin::NotIdentifiable, None) => format!(
-            "h before the wheel: {here}; the recording does not tell it from {} (probability {:.2}): the intervals contain both",
+            "h before the wheel: {here}; the recording does not distinguish it from {} (probability {:.2}): the intervals contain both",
             named(inlet.convection.other()),
             inlet.probability
         ),
         (Origin::NotIdentifiable, Some(alpha)) => format!(
-            "h before the wheel: {here}; the recording does not tell it from {}, with which alpha_A would be {alpha:.3} (probability {:.2}): the intervals contain both",
+            "h before the wheel: {here}; the recording does not distinguish it from {}, with which alpha_A would be {alpha:.3} (probability {:.2}): the intervals contain both",
             named(inlet.convection.other()),
             inlet.probability
         ),
@@ -102,7 +105,7 @@ mod tests {
     use mapper_core::{Entangled, ProfilePoint};
 
     #[test]
-    fn of_h_before_the_wheel_the_law_and_what_speaks_for_it_are_said() {
+    fn the_correlation_of_h_before_the_wheel_and_its_evidence_are_reported() {
         let open = FoundInlet {
             convection: InletConvection::Shared,
             diameter_m: 0.04,
@@ -123,7 +126,7 @@ mod tests {
 
     /// Parameters that the recording cannot determine are reported in text and in files.
     #[test]
-    fn what_can_not_be_told_apart_is_said() {
+    fn parameters_that_are_not_identifiable_are_reported() {
         let unknown =
             SharedValue { value: None, origin: Origin::NotIdentifiable, ..SharedValue::assumed(0.0) };
         let thermal = ThermalModel {
@@ -145,10 +148,10 @@ mod tests {
             doubts: Vec::new(),
         };
         let text = thermal_text(&thermal);
-        assert!(!text.contains("before the wheel"), "nothing is said of what makes no difference: {text}");
-        assert!(text.contains("the recording cannot tell"), "{text}");
+        assert!(!text.contains("before the wheel"), "what makes no difference is not reported: {text}");
+        assert!(text.contains("not identifiable from the recording"), "{text}");
         assert!(text.contains("flat: 0.0 to 0.2"), "{text}");
-        assert!(text.contains("alpha_A and direction factor can hardly be told apart"), "{text}");
+        assert!(text.contains("alpha_A and direction factor are hardly distinguishable"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
         assert_eq!(json["alpha_area_profile"][3]["value"], 0.3);
         assert_eq!(json["entangled"][0]["correlation"], 0.97);

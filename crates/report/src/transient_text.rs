@@ -74,7 +74,7 @@ fn verdict(held_out: &Judged) -> &'static str {
     if held_out.rms_k > held_out.expected_high_k {
         "more is left than the fitted part allows: something acts there that this side has not, or that its readings do not show"
     } else {
-        "what is left is what the fitted part lets expect"
+        "the residual is within what the fitted part predicts"
     }
 }
 

@@ -26,7 +26,7 @@ pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
     readings.add(Scatter::new(dots, palette::INK).size_px(2.0).label("read"));
     rule(&mut readings);
     let mut left =
-        Panel::new(Axis::new("time, s"), Axis::new("read less predicted, K")).title("(b) what is left");
+        Panel::new(Axis::new("time, s"), Axis::new("read less predicted, K")).title("(b) residual");
     let off = |predicted: &[f64]| {
         over(&mut course.read_k.iter().zip(predicted).map(|(read, predicted)| read - predicted))
     };

@@ -70,7 +70,7 @@ fn headline(found: &Diagnosis) -> String {
             open.first().map_or_else(String::new, |cause| percent(cause.probability))
         ),
         Word::NotToldApart => format!(
-            "{} explain it alike and are not told apart.",
+            "{} explain it equally well and are indistinguishable.",
             begun(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
         ),
         Word::NotBorneOut => format!(
@@ -78,11 +78,11 @@ fn headline(found: &Diagnosis) -> String {
             open.first().map_or_else(String::new, |cause| cause.names.join(" and "))
         ),
         Word::WithinTolerance => format!(
-            "Nothing is seen beyond what nobody knows of such a machine anyway (no cause: {}).",
+            "Nothing is seen beyond the usual uncertainty of such a machine (no cause: {}).",
             percent(found.probability_none)
         ),
         Word::Outside => format!(
-            "Nothing of the catalogue explains it: something outside it acts here ({}). The nearest leaves what stands below.",
+            "Nothing of the catalogue explains it: something outside it acts here ({}). The residual of the nearest cause is below.",
             percent(found.probability_outside)
         ),
     }
@@ -129,7 +129,7 @@ fn causes(text: &mut String, found: &Diagnosis) {
     let _ = writeln!(text, "{rows}\n");
     if found.causes[..found.open.min(found.causes.len())].iter().any(|cause| !cause.at_the_end.is_empty()) {
         text.push_str(
-            "What stands at the end of its range is more than such an effect can be: rather something that the catalogue has not.\n\n",
+            "A size at the end of its range is more than such an effect can be: rather something that the catalogue has not.\n\n",
         );
     }
 }
@@ -190,7 +190,7 @@ fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
 
 fn behind(beyond: &Beyond) -> String {
     format!(
-        "{:.1} to {:.1} s, {} readings that nobody fitted: {:.2} K rms without a cause, {:.2} K with; expected {:.2} K ({:.2} .. {:.2});\n          \
+        "{:.1} to {:.1} s, {} readings that were not fitted: {:.2} K rms without a cause, {:.2} K with; expected {:.2} K ({:.2} .. {:.2});\n          \
          intervals hold {:.0} % of the readings",
         beyond.from_s,
         beyond.until_s,
@@ -206,9 +206,9 @@ fn behind(beyond: &Beyond) -> String {
 
 fn verdict(beyond: &Beyond, word: Word) -> &'static str {
     match (beyond.after_k > beyond.expected_high_k, word) {
-        (false, _) => "what is left is what the fitted part lets expect",
+        (false, _) => "the residual is within what the fitted part predicts",
         (true, Word::Named | Word::NotToldApart) => {
-            "more is left than this cause lets expect: something acts there beside it, or it is another one"
+            "more is left than this cause lets expect: something else acts there too, or it is another one"
         }
         (true, _) => {
             "more is left than the fitted part lets expect: something acts there that showed nowhere before"

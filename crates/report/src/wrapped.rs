@@ -1,6 +1,6 @@
 //! Wraps sentences for a terminal.
 
-/// Wraps text to `columns` characters where words allow it; continuation lines are indented. Ends with a line end.
+/// Wraps text to `columns` characters if words allow it; continuation lines are indented. Ends with a line end.
 pub fn wrapped(text: &str, columns: usize, indent: usize) -> String {
     let mut lines = String::new();
     for line in text.lines() {

@@ -23,7 +23,7 @@ pub fn zero_words(zero: &ZeroOutcome) -> Option<String> {
     }
 }
 
-/// A row for each sensor with an offset; none if there is no zero.
+/// A row for each sensor with an offset; none without a zero.
 pub fn zero_rows(zero: &ZeroOutcome, display: &Display) -> Vec<[String; 4]> {
     let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
     let row = |(channel, offset): (&Channel, &f64)| {

@@ -1,4 +1,4 @@
-//! The page of what a script may call, beside the one in docs.
+//! The page of the functions that a script may call, compared with the one in docs.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[test]

@@ -37,7 +37,7 @@ pub(crate) fn apparent_eta(steady: &SteadyState) -> f64 {
     apparent_efficiency(outputs.pressure_ratio, t1_k, outputs.t2_k, Air::PAPER)
 }
 
-/// The settled point at a turbine inlet temperature; `None` where no P3 holds the speed.
+/// The settled point at a turbine inlet temperature; `None` if no P3 holds the speed.
 fn settled(model: &Model, speed_rpm: f64, opening: f64, t3_k: f64) -> Option<SteadyState> {
     let boundary = BoundaryConditions { valve_opening_ratio: opening, t3_k, ..BoundaryConditions::default() };
     hold_speed(model, speed_rpm, &boundary).ok()

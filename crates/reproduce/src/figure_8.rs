@@ -66,7 +66,7 @@ fn own_inlet() -> Result<OwnInlet, ReproduceError> {
 fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &OwnInlet) -> [Statement; 3] {
     let span = |outcomes: &[Outcome]| extremes(outcomes.iter().map(Outcome::h_error_percent));
     let off = |outcomes: &[Outcome]| rms(outcomes.iter().map(Outcome::h_error_percent)).unwrap_or(f64::NAN);
-    let said =
+    let errors_text =
         |outcomes: &[Outcome]| format!("{} % (rms {} %)", range(span(outcomes), 1), fixed(off(outcomes), 1));
     let grows = |right: &[Outcome], wrong: &[Outcome]| off(wrong) / off(right);
     let (shared_grows, own_grows) = (grows(right, wrong), grows(&own.right, &own.wrong));
@@ -81,11 +81,11 @@ fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &
             "Figure 8 (b): a wrong alpha_A has little effect on the heat-transfer coefficient; the errors are slightly larger.",
             format!(
                 "One h shared: alpha_A = 0.2 right {}, taken for 0 {}: {} times. Its own h before the wheel: right {}, taken for 0 {}: {} times. Nearer to the paper is {}.",
-                said(right),
-                said(wrong),
+                errors_text(right),
+                errors_text(wrong),
                 fixed(shared_grows, 1),
-                said(&own.right),
-                said(&own.wrong),
+                errors_text(&own.right),
+                errors_text(&own.wrong),
                 fixed(own_grows, 1),
                 nearer((own_grows - 1.0).abs() < (shared_grows - 1.0).abs())
             ),
@@ -112,7 +112,7 @@ fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &
             },
         ),
         Statement::new(
-            "One coefficient before and behind the wheel is not correct: with the right alpha_A an average is identified that is not the model's, as 8 (b) beside 6 (b) shows.",
+            "One coefficient before and behind the wheel is not correct: with the right alpha_A an average is identified that is not the model's, as the comparison of 8 (b) with 6 (b) shows.",
             format!(
                 "Without area before the wheel (figure 6) rms {} %. With alpha_A = 0.2 right {} % on the machine that shares one h; {} % on that with its own, and {} % there once identified with the same law. The remark is that of {}.",
                 fixed(off(nothing_before), 1),

@@ -19,7 +19,7 @@ pub(crate) fn signed(value: f64, decimals: usize) -> String {
     if zero || text.starts_with('-') { text } else { format!("+{text}") }
 }
 
-/// As [`signed`]; `-` where there is no value.
+/// As [`signed`]; `-` for a missing value.
 pub(crate) fn maybe(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| signed(value, decimals))
 }

@@ -1,4 +1,4 @@
-//! The paper's simulated figures redone on the virtual laboratory's model, each beside what the paper states.
+//! The paper's simulated figures redone on the virtual laboratory's model, each compared with the paper's statements.
 //!
 //! [`reproduce`] gives data and pictures. Nothing depends on time or machine:
 //! the same program gives the same bytes.
@@ -26,10 +26,10 @@ pub use result::{FigureResult, Statement, Table, Verdict, picture_path};
 /// Numbers of the figures that [`reproduce`] redoes, in its order.
 pub const FIGURES: [&str; 7] = ["5", "6", "7", "8", "9", "10", "12"];
 
-/// Redoes all figures; `progress` is told the figure's number before each is made.
+/// Redoes all figures; `progress` receives the figure's number before each is made.
 ///
 /// # Errors
-/// [`ReproduceError`] where the model cannot be run or a recording cannot be identified.
+/// [`ReproduceError`] if the model cannot be run or a recording cannot be identified.
 pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, ReproduceError> {
     let model = mapper_physics::model::Model::nominal();
     let mut results = Vec::with_capacity(FIGURES.len());

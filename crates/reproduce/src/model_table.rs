@@ -1,5 +1,5 @@
 //! The figures that an independent implementation found with this model (`docs/physics.md`, its last table): 4 jumps at
-//! openings 0.5, 0.7 and 1.0, noise-free, 10 to 110 s, errors against the mean in the window unless said otherwise.
+//! openings 0.5, 0.7 and 1.0, noise-free, 10 to 110 s, errors against the mean in the window unless stated otherwise.
 //! Tolerances are half the last printed digit.
 
 #![cfg(test)]
@@ -46,7 +46,7 @@ fn the_operating_point_drifts_as_elsewhere() {
     ] {
         let relative = |run: &Run| 100.0 * spread(run, value) / value(&in_window(run, &WINDOW)[0]);
         let (low, high) = extremes(runs.iter().map(|run| Some(relative(run)))).unwrap();
-        // Over what the drift is counted (start, mean, end) is worth some percent of it.
+        // The reference of the drift (start, mean, end) changes it by some percent.
         assert!((low - low_percent).abs() < 0.1 && (high - high_percent).abs() < 0.1, "{low} to {high} %");
     }
 }

@@ -1,4 +1,4 @@
-//! A run identified, beside what the model used.
+//! An identified run, with the model's true values.
 
 use crate::ReproduceError;
 use crate::lab::{Jump, Run, Truth};
@@ -32,7 +32,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Identified less mean model efficiency, points; `None` where the method failed.
+    /// Identified less mean model efficiency, points; `None` if the method failed.
     pub(crate) fn eta_error_points(&self) -> Option<f64> {
         self.point.eta.map(|eta| 100.0 * (eta - self.eta_mean))
     }

@@ -9,7 +9,7 @@ pub struct FigureResult {
     pub title: String,
     /// How it was redone here, in a few sentences.
     pub method: String,
-    /// What the paper states beside what came out.
+    /// The paper's statements, with the results here.
     pub statements: Vec<Statement>,
     /// The numbers behind the picture.
     pub table: Table,
@@ -80,7 +80,7 @@ impl Table {
     }
 }
 
-/// Where a page of the figures expects this one's picture, relative to the page.
+/// Path of this figure's picture, relative to the page of the figures.
 pub fn picture_path(result: &FigureResult) -> String {
     format!("reproduction/figure_{}.svg", result.number)
 }

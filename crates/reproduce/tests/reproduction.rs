@@ -5,9 +5,9 @@ use mapper_reproduce::{FIGURES, reproduce};
 
 #[test]
 fn every_figure_has_statements_a_table_and_a_picture_and_the_same_bytes_twice() {
-    let mut told = Vec::new();
-    let results = reproduce(|number| told.push(number.to_owned())).unwrap();
-    assert_eq!(told, FIGURES);
+    let mut numbers = Vec::new();
+    let results = reproduce(|number| numbers.push(number.to_owned())).unwrap();
+    assert_eq!(numbers, FIGURES);
     for result in &results {
         assert!(!result.statements.is_empty() && !result.table.rows.is_empty(), "figure {}", result.number);
         assert!(result.table.rows.iter().all(|row| row.len() == result.table.head.len()));

@@ -176,7 +176,7 @@ fn no_step_leaves_the_limits() {
         (r#"jump(point("110 krpm", 0.2))"#, "beyond the surge line"),
         (r#"jump(point("110 krpm", 1.0), "25 h")"#, "14400 s"),
         (r#"jump(point("110 krpm", 1.0), "-5 s")"#, "more than 0 s"),
-        (r#"jump(point("110", 1.0))"#, "lacks its unit"),
+        (r#"jump(point("110", 1.0))"#, "has no unit"),
         ("repeat(1)", "no result of step 1"),
     ] {
         let error = error_of(&format!("// first line\n  {step};\n"));

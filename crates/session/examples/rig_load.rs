@@ -270,7 +270,7 @@ fn row(what: &str, measured: &str) {
 
 fn load(folder: &Path) {
     let fast = "readers: {fast: {backend: {fast: {}}, channels: [P1]}}\n";
-    for (name, readers) in [("100 Hz, 24 sensors", ""), ("the same beside 1 kHz of P1", fast)] {
+    for (name, readers) in [("100 Hz, 24 sensors", ""), ("the same with 1 kHz of P1", fast)] {
         let cost = run(&campaign(75, readers), folder, false, usize::MAX, None);
         let read = read_recording(&cost.recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
         let count = |channel| read.recording.series.get(&channel).map_or(0, |s| s.t_s.len());
@@ -343,7 +343,7 @@ fn resume(folder: &Path) {
         let mut log = LOG.lock().unwrap();
         (log.real_time, log.trips_s, log.rate_hz) = (false, f64::INFINITY, 10.0);
     }
-    for (name, more) in [("by its plan", ""), ("told again", "drift: {on_drift: continue}\n")] {
+    for (name, more) in [("by its plan", ""), ("replayed", "drift: {on_drift: continue}\n")] {
         let text = campaign(900, more);
         let text = match more {
             "" => text,

@@ -198,7 +198,7 @@ pub enum SessionError {
         /// Rigs that wait for acknowledgement.
         in_doubt: Vec<String>,
     },
-    /// The rig could not be armed, so there is no run.
+    /// The rig could not be armed, so the run did not start.
     #[error(transparent)]
     NotArmed(RunError),
     /// The preflight check refused the run.

@@ -31,7 +31,7 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
 }
 
 /// Writes a file under another name in the same directory; it is removed if it does not get its own. So no half of a file ever
-/// stands under its name, even if the disk is full.
+/// has its name, even if the disk is full.
 fn aside(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();

@@ -122,7 +122,7 @@ impl Session<'_> {
     }
 }
 
-/// Declared parameters, replaced by the identified values where they exist.
+/// Declared parameters, replaced by the identified values if they exist.
 fn with_found(declared: &Params, found: &ThermalModel) -> Params {
     let mut params = *declared;
     let compressor = &mut params.compressor;

@@ -40,7 +40,7 @@ pub fn keep_night_report(history: &Path, night: &Night, comparison: &Comparison)
     write_file(&path, text.as_bytes(), Existing::Replaced)
 }
 
-/// Link from a picture to the report of a night, relative if possible and absolute otherwise. `None` if there is no report.
+/// Link from a picture to the report of a night, relative if possible and absolute otherwise. `None` without a report.
 pub fn night_report_link(picture: &Path, history: &Path, started_ms: i64) -> Option<String> {
     let report = std::fs::canonicalize(night_report_path(history, started_ms)).ok()?;
     let folder = picture.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_leads_to_the_report_beside_it_or_anywhere_on_the_disk() {
+    fn a_picture_links_to_the_report_next_to_it_or_anywhere_on_the_disk() {
         let scratch = tempfile::tempdir().unwrap();
         let runs = scratch.path().join("my runs");
         let history = runs.join("history.db");

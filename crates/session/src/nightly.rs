@@ -71,10 +71,10 @@ impl PreparedNight {
         if here.eq(rows.iter().map(|row| &row.key)) {
             return Ok(rows);
         }
-        let lacks = self.runs.iter().find(|run| !rows.iter().any(|row| row.key == run.key));
-        let lacks = lacks
+        let missing = self.runs.iter().find(|run| !rows.iter().any(|row| row.key == run.key));
+        let missing = missing
             .map_or_else(|| "it has other runs besides".to_owned(), |run| format!("it has no {}", run.key));
-        Err(SessionError::OtherNight { lacks })
+        Err(SessionError::OtherNight { lacks: missing })
     }
 
     /// Number of runs.

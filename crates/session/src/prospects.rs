@@ -46,7 +46,7 @@ impl Session<'_> {
     /// Simulates the steps of the campaign, or rehearses its script, and looks for parts that will give no result.
     ///
     /// # Errors
-    /// [`SessionError`] if there is no plan, or the script fails.
+    /// [`SessionError`] if the plan is missing, or the script fails.
     pub fn prospects(&self, campaign: &Campaign, model: &Model) -> Result<Prospects, SessionError> {
         let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
         let plan = match &campaign.sequence {
@@ -123,7 +123,7 @@ fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
         &["zero", "soak"],
         format!(
             "after {:.0} min at rest, housings that were {WARM_K} K warmer than the cell would still be {:.1} K warmer, and Tc drift by \
-             {:+.2} K/min; the zero refuses a drift of more than {:.2} K/min, and takes what is left for an offset",
+             {:+.2} K/min; the zero refuses a drift of more than {:.2} K/min, and takes the remaining difference for an offset",
             soak.duration_s / 60.0,
             tc_k(soak.duration_s) - ambient_k,
             drift_k_min(soak.duration_s),
@@ -177,7 +177,7 @@ fn uninformative_steps(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     unpredicted.then(|| {
         Concern::warning(
             &["timing"],
-            "these steps tell too little of alpha_A, probe and heating/cooling ratio: the points will be doubtful (`rests_on_declaration`)"
+            "these steps contain too little information on alpha_A, probe and heating/cooling ratio: the points will be doubtful (`rests_on_declaration`)"
                 .to_owned(),
             "lengthen the dwell, add points, or hold what is known (`identification.joint`)".to_owned(),
         )

@@ -124,7 +124,7 @@ pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option
     Ok(Some(checked.map_err(|findings| CampaignError::Mistakes(Box::new(findings)))?))
 }
 
-/// Reads a file named by the campaign of a recording. A missing sequence script is no error, because it is not needed here.
+/// Reads a file named by the campaign of a recording. A missing sequence script is not an error, because it is not needed here.
 fn read_beside(path: &Path) -> std::io::Result<String> {
     let text = mapper_campaign::read_text(path);
     if path.extension().is_some_and(|extension| extension == "rhai") {

@@ -23,7 +23,7 @@ pub type MakeDriver = fn(&str, &serde_json::Value) -> Result<Box<dyn Backend>, B
 pub struct Registry {
     /// Rigs, real and simulated.
     pub backends: Vec<BackendPlugin>,
-    /// Factory for backends that are not plug-ins; `None` if there are no drivers.
+    /// Factory for backends that are not plug-ins; `None` without drivers.
     pub driver: Option<MakeDriver>,
     /// The effect library.
     pub effects: Vec<Arc<dyn Effect>>,

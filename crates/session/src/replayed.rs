@@ -70,7 +70,7 @@ impl<'a> ResumedSteps<'a> {
             ..last
         });
         let note = format!(
-            "resumed: {} steps hold, and were told to the source of the steps again; {}nobody knows how far the housings have cooled, so they \
+            "resumed: {} steps hold, and were replayed to the source of the steps; {}it is unknown how far the housings have cooled, so they \
              are warmed up again{}",
             replayed_steps,
             if broken_off.soaked() { "the soak is not repeated; " } else { "" },
@@ -154,9 +154,9 @@ impl Replay<'_, '_> {
             };
             // Before the first step, the source has already handed out its step, as in the original run.
             self.handed_out(&shifted)?;
-            pieces.tell(self.inner, shifted.start_s);
+            pieces.replay_until(self.inner, shifted.start_s);
             self.inner.begins(&shifted);
-            pieces.tell(self.inner, shifted.end_s);
+            pieces.replay_until(self.inner, shifted.end_s);
             self.inner.after_step(&shifted).map_err(|error| self.refused(error.to_string()))?;
             self.replayed_steps += 1;
         }
@@ -258,7 +258,7 @@ impl Pieces {
     }
 
     /// Replays all data up to a time, in batches of one second.
-    fn tell(&mut self, source: &mut dyn StepSource, until_s: f64) {
+    fn replay_until(&mut self, source: &mut dyn StepSource, until_s: f64) {
         while self.until_s < until_s {
             let piece_s = (self.until_s + PIECE_S).min(until_s);
             // A recording rounds times to whole nanoseconds.

@@ -57,7 +57,7 @@ pub struct Results {
     pub surge: Option<SoughtSurge>,
     /// Other remarks.
     pub remarks: Vec<String>,
-    /// The map itself; `None` where there is none.
+    /// The map itself; `None` if there is none.
     #[serde(skip)]
     pub compressor_map: Option<CompressorMap>,
 }
@@ -228,7 +228,7 @@ impl Session<'_> {
             let identified = self.identify(other, channels, None)?;
             match compressor_map(&machine, &identified, &mut Vec::new()) {
                 Some(map) => other_maps.push((name, map.at_reference(reference))),
-                None => remarks.push(format!("{name} has no map to hold this one against")),
+                None => remarks.push(format!("{name} has no map to compare this one with")),
             }
         }
         let others: Vec<OtherRun<'_>> =

@@ -126,7 +126,7 @@ impl BrokenOff {
             (true, false) => "the soak is repeated: the recording does not have it whole",
         };
         format!(
-            "resumed: {} of {} steps hold; {soak}; nobody knows how far the housings have cooled, so they are warmed up again and the step before the first \
+            "resumed: {} of {} steps hold; {soak}; it is unknown how far the housings have cooled, so they are warmed up again and the step before the first \
              missing one is made once more",
             plan.steps.iter().filter(|step| saved.contains(&step.index)).count(),
             plan.steps.len()

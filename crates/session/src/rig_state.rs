@@ -123,7 +123,7 @@ impl RigStates {
         Ok((file.map_err(SessionError::file("open", &path))?, path))
     }
 
-    /// Locks a rig. An abandoned run is no obstacle if it is the run in `resumes`.
+    /// Locks a rig. An abandoned run is not an obstacle if it is the run in `resumes`.
     ///
     /// # Errors
     /// [`SessionError::RigInUse`], [`SessionError::RigAbandoned`] and [`SessionError::RigLatched`] with the known facts; [`SessionError::File`]
@@ -327,7 +327,7 @@ fn read_entry<T: for<'de> Deserialize<'de>>(file: &mut File) -> Entry<T> {
     }
 }
 
-/// Opens a file for reading and writing that is a plain file under one name: a link that somebody put there could make a run
+/// Opens a file for reading and writing that is a plain file under one name: a link placed there could make a run
 /// overwrite what it points to.
 fn open_plain(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();

@@ -107,7 +107,7 @@ impl<'s> Session<'s> {
     /// Makes the plan or checks the stored one, rehearses a script and creates the backend. Errors here never reach the rig.
     ///
     /// # Errors
-    /// [`SessionError`] if there is no plan, the stored one is stale, the script fails or the backend's settings are wrong.
+    /// [`SessionError`] if the plan is missing, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
         let (campaign, mut request) = (request.campaign, request);
         if let Some(broken_off) = &mut request.resume {

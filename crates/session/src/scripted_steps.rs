@@ -100,7 +100,7 @@ impl StepSource for ScriptedSteps {
         Ok(())
     }
 
-    /// Reports to the script that there is no result.
+    /// Reports to the script that a result is missing.
     fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(step) = self.now.take() else { return Ok(()) };
         self.finished = Some(StepResult {

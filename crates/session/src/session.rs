@@ -16,7 +16,7 @@ pub struct Session<'a> {
     pub stop: &'a AtomicBool,
     /// Set by the caller to stop a run at the end of its step.
     pub stop_after_step: &'a AtomicBool,
-    /// Other operator requests during a run; `None` if there is no operator.
+    /// Other operator requests during a run; `None` without an operator.
     pub operator: Option<&'a Operator>,
     /// Whether each step is identified separately as soon as it ends, for observers.
     pub estimates: bool,

@@ -21,7 +21,7 @@ enum ObserverMessage {
 
 /// The observer accepts no more messages.
 #[derive(Debug, thiserror::Error)]
-#[error("nothing is recorded any more, after an error that was told before")]
+#[error("nothing is recorded any more, after an error that was reported before")]
 struct Gone;
 
 /// Forwards messages in order to an observer on another thread until that observer fails. The next call returns its error; all later calls fail.
@@ -55,7 +55,7 @@ impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
 }
 
 impl<O> ThreadedObserver<'_, O> {
-    fn tell(&mut self, message: ObserverMessage) -> Result<(), ObserverError> {
+    fn send(&mut self, message: ObserverMessage) -> Result<(), ObserverError> {
         match self.to_thread.send(message) {
             Ok(()) => Ok(()),
             Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(Gone))),
@@ -76,27 +76,27 @@ fn observe(observer: &mut impl RunObserver, message: ObserverMessage) -> Result<
 
 impl<O> RunObserver for ThreadedObserver<'_, O> {
     fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(ObserverMessage::StepStart(*marker))
+        self.send(ObserverMessage::StepStart(*marker))
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        self.tell(ObserverMessage::Batch(batch.clone()))
+        self.send(ObserverMessage::Batch(batch.clone()))
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        self.tell(ObserverMessage::Event(event.clone()))
+        self.send(ObserverMessage::Event(event.clone()))
     }
 
     fn on_step_abandoned(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(ObserverMessage::StepAbandoned(*marker))
+        self.send(ObserverMessage::StepAbandoned(*marker))
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(ObserverMessage::StepEnd(*marker))
+        self.send(ObserverMessage::StepEnd(*marker))
     }
 
     fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.tell(ObserverMessage::StepHeld(*marker))
+        self.send(ObserverMessage::StepHeld(*marker))
     }
 }
 
@@ -135,16 +135,16 @@ mod tests {
 
     /// Counts messages and fails at a given count.
     struct Counts {
-        told: Vec<f64>,
+        times: Vec<f64>,
         fails_at: usize,
     }
 
     impl RunObserver for Counts {
         fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-            if self.told.len() == self.fails_at {
+            if self.times.len() == self.fails_at {
                 return Err(ObserverError::of(io::Error::from(io::ErrorKind::StorageFull)));
             }
-            self.told.push(event.t_s);
+            self.times.push(event.t_s);
             Ok(())
         }
     }
@@ -157,26 +157,28 @@ mod tests {
     fn all_is_seen_in_order_before_the_end() {
         let times: Vec<f64> = (0..1000).map(f64::from).collect();
         let (observer, error) = scope(|scope| {
-            let mut aside = ThreadedObserver::begin(scope, Counts { told: Vec::new(), fails_at: usize::MAX });
+            let mut aside =
+                ThreadedObserver::begin(scope, Counts { times: Vec::new(), fails_at: usize::MAX });
             times.iter().for_each(|t_s| aside.on_event(&event(*t_s)).unwrap());
             aside.end()
         });
-        assert_eq!(observer.told, times);
+        assert_eq!(observer.times, times);
         error.unwrap();
     }
 
     /// For a failure at any call, the error is returned once, and no later message counts as observed.
     #[test]
-    fn an_error_is_told_and_nothing_after_it_passes() {
+    fn an_error_is_reported_and_nothing_after_it_passes() {
         for fails_at in [0, 1, 50, 99] {
             let (observer, errors) = scope(|scope| {
-                let mut aside = ThreadedObserver::begin(scope, Counts { told: Vec::new(), fails_at });
-                let told: Vec<_> = (0..100).map(|t_s| aside.on_event(&event(f64::from(t_s)))).collect();
+                let mut aside = ThreadedObserver::begin(scope, Counts { times: Vec::new(), fails_at });
+                let results: Vec<_> = (0..100).map(|t_s| aside.on_event(&event(f64::from(t_s)))).collect();
                 let (observer, untold) = aside.end();
-                let errors = told.into_iter().chain([untold]).skip_while(Result::is_ok).collect::<Vec<_>>();
+                let errors =
+                    results.into_iter().chain([untold]).skip_while(Result::is_ok).collect::<Vec<_>>();
                 (observer, errors)
             });
-            assert_eq!(observer.told.len(), fails_at);
+            assert_eq!(observer.times.len(), fails_at);
             let full = io::Error::from(io::ErrorKind::StorageFull).to_string();
             let [first, later @ ..] = errors.as_slice() else { panic!("no error") };
             assert_eq!(first.as_ref().unwrap_err().to_string(), full, "{fails_at}");
@@ -199,7 +201,7 @@ mod tests {
             scope(|scope| {
                 let mut aside = ThreadedObserver::begin(scope, Panics);
                 let refused = (0..1000).any(|t_s| aside.on_event(&event(f64::from(t_s))).is_err());
-                assert!(refused, "a thousand events for nobody");
+                assert!(refused, "a thousand events after the observer failed");
                 aside.end().1
             })
         });

@@ -43,7 +43,7 @@ pub fn twin_campaign(
 /// The backend block.
 fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, TwinError> {
     let mut text = format!(
-        "# The machine as found in {}; its covariance stands there.\nbackend:\n  virtual_lab:\n    start: settled\n",
+        "# The machine as found in {}; its covariance is there.\nbackend:\n  virtual_lab:\n    start: settled\n",
         twin.source.display()
     );
     // As in the diagnosis: P3 follows with its declared lag, the valve without lag.

@@ -142,7 +142,7 @@ impl Variant {
             machines.push(Variant { serial_number, settings });
         }
         if machines.is_empty() {
-            return Err(wrong("no machine stands below the header".to_owned()));
+            return Err(wrong("the table has no machines below its header".to_owned()));
         }
         Ok(machines)
     }
@@ -236,11 +236,11 @@ mod tests {
             ("serial_number,x\nA,1\n,2\n", "line 3: the machine has no `serial_number`\n3 | ,2\n  | ^"),
             ("serial_number,x\nA,1,2\n", "line 2: 3 cells below a header of 2\n2 | A,1,2\n  |     ^"),
             ("serial_number,x,y\nA,1\n", "line 2: 2 cells below a header of 3\n2 | A,1\n  |    ^"),
-            ("serial_number,x\n", "no machine stands below the header"),
+            ("serial_number,x\n", "the table has no machines below its header"),
             ("", "no column is called `serial_number`"),
         ] {
-            let told = read(text).unwrap_err();
-            assert!(told.contains(expected), "{text:?}: {told}");
+            let error = read(text).unwrap_err();
+            assert!(error.contains(expected), "{text:?}: {error}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! Plans from files that anybody may have written or damaged.
+//! Plans from untrusted or damaged files.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -1,4 +1,4 @@
-//! Plans for the joint method, held against what its fits of simulated recordings then give.
+//! Plans for the joint method, compared with the results of its fits of simulated recordings.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -31,7 +31,7 @@ fn planned(campaign: &Campaign) -> Plan {
     plan(campaign, &nominal_model(campaign).unwrap()).unwrap()
 }
 
-/// alpha_A, probe and heating/cooling ratio as declared: twelve points do not tell them.
+/// alpha_A, probe and heating/cooling ratio as declared: twelve points do not determine them.
 const AS_DECLARED: (&str, &str) =
     ("  method: joint ", "  joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint ");
 
@@ -103,7 +103,7 @@ fn steps_last_as_long_as_the_required_error_takes() {
     assert!(error_of(&chosen) <= required && dwell_s <= 70.0, "{dwell_s} s");
     assert!(chosen.steps.iter().all(|step| step.dwell_s == dwell_s), "all steps last equally long");
     assert!(error_of(&with(Dwell::Fixed(dwell_s - 1.0))) > required, "{dwell_s} s");
-    // What no dwell reaches is said.
+    // An error that no dwell reaches is reported.
     let impossible = with(Dwell::RequiredSigmaEta(0.01 * required));
     assert_eq!(impossible.steps[0].dwell_s, 300.0);
     assert!(impossible.remarks.len() > chosen.remarks.len(), "{:?}", impossible.remarks);

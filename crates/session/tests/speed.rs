@@ -81,7 +81,7 @@ fn on_the_nominal_machine_the_loop_is_quiet() {
 
 /// The worse turbine needs more than 288 kPa at 155 krpm. It says so, and the next step is right from the start.
 #[test]
-fn a_limit_of_p3_is_told_and_nothing_winds_up() {
+fn a_limit_of_p3_is_reported_and_nothing_winds_up() {
     let limits = [("{min: 110 kPa, max: 500 kPa}", "{min: 110 kPa, max: 288 kPa}")];
     let driven = run(WORSE, 1, &limits);
     let (reached, missed): (Vec<_>, Vec<_>) = driven.steps.iter().partition(|step| !step.not_reached);

@@ -38,10 +38,10 @@ struct BlindStudy {
     /// Number of cases.
     #[schemars(range(min = 1), example = 100)]
     cases: usize,
-    /// Kinds of cases (none, single, pair, outside, triple); the usual four where it is left out.
+    /// Kinds of cases (none, single, pair, outside, triple); the usual four if it is left out.
     #[schemars(with = "Option<Vec<String>>", extend("examples" = [["single", "pair"]]))]
     kinds: Option<Vec<CaseKind>>,
-    /// Simulator that makes the recordings: virtual_lab (where it is left out) or other_lab, whose equations are not the model's.
+    /// Simulator that makes the recordings: virtual_lab (if it is left out) or other_lab, whose equations are not the model's.
     #[serde(default)]
     #[schemars(with = "Option<String>", example = &"other_lab")]
     laboratory: Laboratory,
@@ -81,7 +81,7 @@ impl Kind for Blind<'_> {
         let (campaign, nominal) = CampaignSource::read(&study.beside(&file.campaign), self.0)?;
         let sigma_range = file.sigmas.unwrap_or(SIGMA_RANGE);
         if !(0.0 < sigma_range[0] && sigma_range[0] <= sigma_range[1] && sigma_range[1].is_finite()) {
-            let message = format!("{} to {} is no range of lengths", sigma_range[0], sigma_range[1]);
+            let message = format!("{} to {} is not a range of lengths", sigma_range[0], sigma_range[1]);
             return Err(study
                 .mistake("sigmas", message, "write the minimum and the maximum, e.g. [12, 400]")
                 .into());
@@ -113,7 +113,7 @@ impl Kind for Blind<'_> {
         let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;
         let file = at.scratch.join("case.mcap");
         let truth = record(&campaign, &case, laboratory, &file)?;
-        // As anybody would diagnose it: from the file alone, which has no truth.
+        // As a user would diagnose it: from the file alone, which has no truth.
         let recorded = Recorded::read(self.0, &file, &ChannelMap::native(), Some(&campaign))?;
         let session = Session { stop: at.stop, ..Session::new(self.0) };
         let gap = session.diagnose_gap(

@@ -65,7 +65,7 @@ impl Kind for Calibration<'_> {
         let (campaign, nominal) = CampaignSource::read(&path, self.0)?;
         let plan = Plan { seed: file.seed, nulls: file.nulls, others: file.cases };
         let drawn = cases(&nominal, &self.0.effects, &plan).map_err(FleetError::kind)?;
-        // Cases of both draws are counted from 0: told apart by their place.
+        // Cases of both draws are counted from 0: distinguished by their place.
         let item = |(place, case): (usize, &Case)| Draft {
             name: format!("{place:05} {}", case.kind.name()),
             payload: json!(CalibrationItem { campaign: campaign.clone(), case: StoredCase::from(case) }),
@@ -106,14 +106,14 @@ impl Kind for Calibration<'_> {
 pub struct Fitted {
     /// Files by name: calibration, reliability and its picture.
     pub files: Vec<(&'static str, String)>,
-    /// What is said of them.
+    /// Their description.
     pub said: String,
 }
 
 /// Fits the calibration to diagnoses, and says whether its probabilities hold.
 ///
 /// # Errors
-/// [`FleetError::Kind`] where the calibration that ships was spoilt.
+/// [`FleetError::Kind`] if the calibration that ships was spoilt.
 pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, FleetError> {
     let calibration = fitted(observed, made_by).map_err(FleetError::kind)?;
     let reliabilities = reliabilities(observed).map_err(FleetError::kind)?;
@@ -122,10 +122,10 @@ pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, Flee
         ("reliability.json", json_text(&reliabilities).map_err(FleetError::kind)?),
         ("reliability.svg", reliability_svg(&reliabilities)),
     ];
-    let said = format!(
+    let description = format!(
         "calibration.json from {} diagnoses in observed.json; reliability.svg\n{}",
         observed.len(),
         reliability_text(&reliabilities).trim_end()
     );
-    Ok(Fitted { files, said })
+    Ok(Fitted { files, said: description })
 }

@@ -1,5 +1,5 @@
 //! `study: maps`: campaigns by seeds, each identified by methods and kept with all its points: coverage of intervals, tables
-//! over seeds, scatter beside what the planner foretells.
+//! over seeds, scatter compared with the prediction of the planner.
 
 use crate::error::StudyError;
 use crate::source::CampaignSource;
@@ -29,10 +29,10 @@ struct MapsStudy {
     /// The campaigns, from this file.
     #[schemars(length(min = 1), extend("examples" = [["../turbo_a.yaml"]]))]
     campaigns: Vec<PathBuf>,
-    /// Seeds, whole numbers from 0; each campaign's own where they are left out.
+    /// Seeds, whole numbers from 0; each campaign's own if they are left out.
     #[schemars(extend("uniqueItems" = true, "examples" = [[1, 2, 3]]))]
     seeds: Option<Vec<u64>>,
-    /// Methods by which each recording is identified; each campaign's own where they are left out.
+    /// Methods by which each recording is identified; each campaign's own if they are left out.
     #[schemars(with = "Option<Vec<String>>", extend("uniqueItems" = true, "examples" = [["joint", "dynamic"]]))]
     methods: Option<Vec<Method>>,
 }

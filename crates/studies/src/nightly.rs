@@ -109,7 +109,7 @@ impl Kind for Nightly<'_> {
 /// The rows of a merged study, for a night.
 ///
 /// # Errors
-/// [`FleetError`] where there is no result, or it is none of a night.
+/// [`FleetError`] if the result is missing or is not of a night.
 pub fn rows_of(directory: &Path, registry: &Registry) -> Result<Vec<RunRow>, FleetError> {
     let fleet = Fleet::open(directory, &program(registry))?;
     let path = fleet.result().join(RUNS);

@@ -28,7 +28,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_fit_beside_a_bar_of_80_columns() {
+    fn words_fit_next_to_a_bar_of_80_columns() {
         assert_eq!(
             run_words(12, 57, 1320.0, 7440.0, 1.4),
             "step 12 of 57, 22 min of 2 h 04 min of rig time, 1.4 s left"

@@ -346,7 +346,7 @@ mod tests {
     use super::{PIECES_LINES, is_printed, pieces_line};
 
     #[test]
-    fn a_pipe_is_told_what_is_left_and_never_a_thousand_lines() {
+    fn a_pipe_gets_the_remaining_time_and_never_a_thousand_lines() {
         assert_eq!(pieces_line(0, 14, 0.0), "0 of 14 done");
         // A third done in 20 s: the other two thirds take 40 s.
         assert_eq!(pieces_line(5, 15, 20.0), "5 of 15 done in 20 s, 40 s left");

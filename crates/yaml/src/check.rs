@@ -123,7 +123,7 @@ impl Check<'_> {
         let example = property.and_then(example_of).map_or(format!("{key}: ..."), |e| format!("{key}: {e}"));
         let complaint = Complaint {
             kind: FindingKind::MissingKey,
-            message: format!("{within} lacks the key `{key}`"),
+            message: format!("{within} has no key `{key}`"),
             remedy: with_description(format!("write e.g. `{example}`"), property.and_then(Value::as_object)),
         };
         self.note(steps, complaint);

@@ -1,4 +1,4 @@
-//! What is said about each violated rule.
+//! Messages of the violated rules.
 
 use crate::finding::FindingKind;
 use crate::quantity_check::{Complaint, name_of};

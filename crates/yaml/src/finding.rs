@@ -15,7 +15,7 @@ pub enum FindingKind {
     TooLarge,
     /// A key that does not exist.
     UnknownKey,
-    /// A key that stands twice in one mapping.
+    /// A key that occurs twice in one mapping.
     DuplicateKey,
     /// A key that is needed and not there.
     MissingKey,
@@ -27,7 +27,7 @@ pub enum FindingKind {
     Unit,
     /// A value outside its range.
     Range,
-    /// A point, speed or opening that stands twice.
+    /// A point, speed or opening that occurs twice.
     Duplicate,
     /// Two statements that contradict each other.
     Conflict,

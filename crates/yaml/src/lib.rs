@@ -4,7 +4,7 @@
 //! The text becomes a tree that keeps positions ([`read`]); the tree is checked against a JSON schema
 //! ([`Schema::check`]), units and ranges included; the caller checks what no schema can say on the same tree; only a
 //! tree without [`Notes`] is deserialised ([`Node::deserialise`]). All mistakes of a text come in one go, as
-//! [`Findings`]. What the files are about is no business of this crate.
+//! [`Findings`]. This crate does not depend on the subject of the files.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

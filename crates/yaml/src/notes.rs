@@ -27,7 +27,7 @@ impl Notes {
         }
     }
 
-    /// Whether there were more than are worth keeping; then further checks are not worth their time either.
+    /// Whether there were more than are kept; then further checks are skipped too.
     pub fn is_full(&self) -> bool {
         self.overflow > 0
     }

@@ -19,7 +19,7 @@ pub(crate) fn check(schema: &Map<String, Value>, value: &Value) -> Option<Compla
     let example = example.unwrap_or_else(|| kind.example());
     let text = match value {
         Value::String(text) => text.clone(),
-        // A bare number is a quantity that lacks its unit.
+        // A bare number is a quantity without its unit.
         Value::Number(number) => number.to_string(),
         Value::Null => {
             return Some(Complaint {

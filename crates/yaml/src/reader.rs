@@ -35,7 +35,7 @@ struct Pending {
     duplicate: bool,
 }
 
-/// Reads the text. `None` where no tree can be had; then at least one finding says why.
+/// Reads the text. `None` if no tree can be had; then at least one finding says why.
 pub fn read(source: &Source, notes: &mut Notes) -> Option<Node> {
     Reader { source, notes, frames: Vec::new(), root: None, values: 0 }.read()
 }

@@ -14,7 +14,7 @@ const LINE_LIMIT: usize = 400;
 const WIDTH: usize = 100;
 
 impl Findings {
-    /// All findings, each with its place in the file; `colours` only where a terminal reads it.
+    /// All findings, each with its place in the file; `colours` only for a terminal.
     pub fn render(&self, colours: bool) -> String {
         // ASCII characters in both: the carets are carets, and logs stay legible.
         let renderer = if colours { Renderer::styled() } else { Renderer::plain() }
@@ -43,7 +43,7 @@ impl Findings {
             out.push_str("\n\n");
         }
         let count = self.count();
-        // Warnings never stand beside mistakes: they are looked for in files without any.
+        // Warnings never occur together with mistakes: they are looked for in files without any.
         let warnings = self.list.first().is_some_and(|finding| finding.kind.is_warning());
         let noun = match (warnings, count) {
             (false, 1) => "mistake",

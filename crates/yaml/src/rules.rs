@@ -8,7 +8,7 @@ use crate::tree::Step;
 use serde_json::{Map, Value};
 use std::collections::HashSet;
 
-/// A value, or what lacks one, that a schema does not allow.
+/// A value, or a place without one, that a schema does not allow.
 #[derive(Debug)]
 pub(crate) struct Violation<'a> {
     /// The value's place.
@@ -60,7 +60,7 @@ impl<'a> Walk<'a> {
     fn check(&mut self, schema: &'a Value, value: &'a Value) {
         let schema = match schema {
             Value::Object(schema) => schema,
-            // `true` allows everything, and `false` stands nowhere but at `additionalProperties`.
+            // `true` allows everything, and `false` occurs only at `additionalProperties`.
             _ => return,
         };
         for (keyword, argument) in schema {
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn right_and_wrong_documents_are_told_apart_as_a_complete_validator_does() {
+    fn right_and_wrong_documents_are_judged_as_by_a_complete_validator() {
         assert!(unknown_keywords(&schema()).is_empty());
         let (schema, oracle) = (schema(), oracle());
         for (key, right, wrong) in [

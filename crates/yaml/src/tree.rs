@@ -1,10 +1,10 @@
-//! A tree in which every key and value knows where it stands in the text.
+//! A tree in which every key and value knows its place in the text.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ops::Range;
 
-/// A value and where it stands.
+/// A value and its place.
 #[derive(Debug, Clone)]
 pub struct Node {
     /// Byte range in the text.
@@ -20,7 +20,7 @@ pub enum Content {
     Scalar(Value),
     /// A list.
     Sequence(Vec<Node>),
-    /// Keys with their values, in the order of the text; no key stands twice.
+    /// Keys with their values, in the order of the text; no key occurs twice.
     Mapping(Vec<Entry>),
 }
 
@@ -108,7 +108,7 @@ impl Node {
         }
     }
 
-    /// Where to point for a complaint about the thing at a path as a whole: at a scalar itself; at the key of a
+    /// The place for a complaint about the thing at a path as a whole: at a scalar itself; at the key of a
     /// mapping or sequence; at the deepest parent there is, if the path leads nowhere.
     pub fn place(&self, steps: &[Step]) -> Range<usize> {
         let mut node = self;
@@ -125,7 +125,7 @@ impl Node {
         place
     }
 
-    /// Where the key at the end of a path stands, for complaints about the key itself.
+    /// The place of the key at the end of a path, for complaints about the key itself.
     pub fn key_place(&self, parent: &[Step], key: &str) -> Range<usize> {
         let entry = self.get(parent).and_then(|node| node.entries().iter().find(|entry| entry.key == key));
         entry.map_or_else(|| self.place(parent), |entry| entry.key_span.clone())
@@ -159,7 +159,7 @@ impl Node {
     }
 
     /// The tree as a value of a type. A tree that was found right against the schema of the type fails here only
-    /// where the schema is laxer than the type.
+    /// if the schema is laxer than the type.
     ///
     /// # Errors
     /// [`ReadError`] with the place of the first value that does not fit.

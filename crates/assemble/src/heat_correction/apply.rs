@@ -10,7 +10,7 @@ use mapper_core::{
 use serde::Serialize;
 
 /// Standard error of a heat that the map shows, over the heat: on the virtual lab it is up to twice what slow lines really take up,
-/// where their work grows for other reasons too.
+/// if their work grows for other reasons too.
 const HEAT_ERROR_RATIO: f64 = 0.5;
 /// Standard error of every efficiency from the premise that one heat holds for the whole map: on the virtual lab at 500 degC fast
 /// lines lose 1.4 points by heat to the housing, which the method does not see.
@@ -40,7 +40,7 @@ pub struct CorrectedLine {
 pub struct HeatCorrection {
     /// Heat to the gas that was taken off, at the map's reference state, W.
     pub heat_w: f64,
-    /// What the map shows, W: negative where slow lines take less work than fast ones; `None` where the heat was given.
+    /// What the map shows, W: negative if slow lines take less work than fast ones; `None` if the heat was given.
     pub heat_shown_w: Option<f64>,
     /// Standard error of that from the scatter of lines alone, W.
     pub heat_standard_error_w: Option<f64>,
@@ -130,7 +130,7 @@ pub fn correct_for_heat(
     Ok((map, correction))
 }
 
-/// Efficiency when a specific heat counts as work no more; `None` where it would be none.
+/// Efficiency when a specific heat counts as work no more; `None` if it would be none.
 fn without_heat(apparent: f64, isentropic_work_j_kg: f64, heat_j_kg: f64) -> Option<f64> {
     let work_j_kg = isentropic_work_j_kg / apparent - heat_j_kg;
     let eta = isentropic_work_j_kg / work_j_kg;
@@ -148,7 +148,7 @@ fn put(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: 
         ..uncertainty
     });
     let (low, high) = confidence_interval_95(eta, own.hypot(added));
-    // Entry k of every point is error k of the map: what is shared from here on stands behind all others.
+    // Entry k of every point is error k of the map: the errors shared from here on follow all others.
     identified.common.eta_changes.resize(shared, 0.0);
     identified.common.eta_changes.extend([heat_change, PREMISE_ERROR]);
     (identified.eta_low, identified.eta_high) = (Some(low), Some(high));

@@ -24,14 +24,14 @@ pub enum HeatCorrectionError {
     },
     /// Lines of nearly one speed.
     #[error(
-        "the fastest line turns at {ratio:.2} times the speed of the slowest; below 1.5 the heat cannot be told from the wheel's work; or give it by `--heat`"
+        "the fastest line turns at {ratio:.2} times the speed of the slowest; below 1.5 the heat cannot be distinguished from the wheel's work; or give it by `--heat`"
     )]
     OneSpeed {
         /// Fastest over slowest.
         ratio: f64,
     },
     /// Points that determine nothing.
-    #[error("flows and speeds of the map do not tell heat from work; give the heat by `--heat`")]
+    #[error("flows and speeds of the map do not separate heat from work; give the heat by `--heat`")]
     Singular,
     /// A heat that is none.
     #[error("a heat of {heat_w} W cannot be taken off; it must be finite and not negative")]

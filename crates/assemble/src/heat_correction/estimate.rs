@@ -18,7 +18,7 @@ const RANK: f64 = 1e-5;
 /// The heat of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Heat to the gas at the reference state, W; negative where slow lines take less work than fast ones.
+    /// Heat to the gas at the reference state, W; negative if slow lines take less work than fast ones.
     pub heat_w: f64,
     /// Its standard error: leaving each line out in turn, W.
     pub standard_error_w: f64,
@@ -39,7 +39,7 @@ pub fn estimate(points: &[WorkPoint]) -> Result<Estimate, HeatCorrectionError> {
         return Err(HeatCorrectionError::OneSpeed { ratio });
     }
     let (heat_w, scatter_ratio) = fitted(points).ok_or(HeatCorrectionError::Singular)?;
-    // Errors of a line (its speed, its day) are shared by its points, so lines are what is left out.
+    // Errors of a line (its speed, its day) are shared by its points, so whole lines are left out.
     let without = |line: &usize| {
         let others: Vec<WorkPoint> = points.iter().filter(|point| point.line != *line).copied().collect();
         fitted(&others).map(|(heat_w, _)| heat_w)

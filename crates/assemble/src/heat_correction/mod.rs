@@ -6,8 +6,8 @@
 //! and its flow with speed. One heat for the whole map is what makes the lines one curve again; nothing else need be known.
 //!
 //! Here the curve is `a + b phi2 + k/phi1` (Euler with slip and backsweep; disc friction and recirculation) and the heat is in watts at
-//! the map's reference state. All of it is found together by robust least squares of relative residuals. What the method cannot
-//! tell (docs/maps.md): work that grows at low speed for other reasons is taken for heat, and heat that fast lines lose to their
+//! the map's reference state. All of it is found together by robust least squares of relative residuals. Limits of the
+//! method (docs/maps.md): work that grows at low speed for other reasons is taken for heat, and heat that fast lines lose to their
 //! housing is not seen. Both are in the standard errors, by round numbers: half the heat, and one point of efficiency.
 
 mod apply;

@@ -1,9 +1,9 @@
 //! How much wider than its roughness says a fit's errors are beyond the measured speeds.
 //!
-//! Between lines the roughness of each parameter tells what a line may do that nobody measured. Beyond them it tells too
-//! little: whatever bends towards one end (choke flow at low speed, work at high Mach numbers) is smooth in the middle, where the
+//! Between lines the roughness of each parameter limits the shape of a line that was not measured. Beyond them it is not
+//! enough: whatever bends towards one end (choke flow at low speed, work at high Mach numbers) is smooth in the middle, where the
 //! roughness is found. So the outermost line is left out, and the variance of what is drawn on is widened until it explains how
-//! far that line lies from where the others put it. It is never narrowed: one line is no ground for more confidence.
+//! far that line lies from where the others put it. It is never narrowed: one line does not justify more confidence.
 
 use super::ends::{Beyond, BothEnds, End};
 use super::miss::Off;

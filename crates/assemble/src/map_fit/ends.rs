@@ -1,6 +1,6 @@
 //! The two ends of the measured speeds, and how much wider than its roughness says a fit's errors are beyond each.
 
-/// Factors on the variance of what is drawn on beyond one end; 1 where the roughness says enough.
+/// Factors on the variance of what is drawn on beyond one end; 1 if the roughness says enough.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Beyond {
     /// Of the shape of lines.

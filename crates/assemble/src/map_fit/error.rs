@@ -3,7 +3,7 @@
 /// Why a map could not be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MapFitError {
-    /// Speeds cannot be told apart or there is one.
+    /// Speeds are indistinguishable or there is only one.
     #[error("the map has {lines} speed line(s) with points; a fit over speed needs at least 2")]
     TooFewLines {
         /// Lines with usable points.

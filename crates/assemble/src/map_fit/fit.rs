@@ -16,10 +16,10 @@ const STIFFNESSES: [f64; 3] = [1.0, 30.0, 1000.0];
 impl MapFit {
     /// Fits all lines of a map, every point at its own corrected speed.
     ///
-    /// Where lines cross, the fit is made again with stiffer parameters over speed.
+    /// If lines cross, the fit is made again with stiffer parameters over speed.
     ///
     /// # Errors
-    /// [`MapFitError`] where there is too little, too much or nothing sensible to fit.
+    /// [`MapFitError`] if there is too little, too much or nothing sensible to fit.
     pub fn new(map: &CompressorMap) -> Result<Self, MapFitError> {
         Ok(MapFit::of(Observations::of(map)?, None)?.widened(&[End::Slow, End::Fast]))
     }

@@ -10,7 +10,7 @@ use mapper_numerics::statistics::{NORMAL_975, median};
 /// Leaves each line out in turn, fits the others again, and measures the line's points against what that fit says at its
 /// speed. Lines without which too little is left are passed over.
 ///
-/// Each search starts where the fit of all lines stands, parameters and variances: it ends close to where one from the beginning
+/// Each search starts from the fit of all lines, parameters and variances: it ends close to where one from the beginning
 /// does (docs/maps.md says how close), in a third of the rounds.
 pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
     let count = fit.data.lines_rpm.len();

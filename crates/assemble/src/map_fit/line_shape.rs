@@ -46,7 +46,7 @@ pub(crate) const LOWEST_ANGLE: f64 = -3.0;
 /// Bounds of the angle where points are looked for, rad: 0 is choke, pi/2 zero slope; below 0 the line falls vertically.
 pub(crate) const ANGLE_RANGE: (f64, f64) = (-0.6, 0.8 * std::f64::consts::PI);
 
-/// Where flow coefficients lie: makes the work coefficient's terms of order 1.
+/// Location and scale of the flow coefficients: makes the work coefficient's terms of order 1.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FlowFrame {
     /// Middle of all measured flows over the speed ratio, kg/s.

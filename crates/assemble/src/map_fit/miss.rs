@@ -14,7 +14,7 @@ pub(super) struct Off {
 pub(super) struct Miss {
     /// In units of the line's scales.
     pub distance: Off,
-    /// Of efficiency, fraction; `None` where the point has none.
+    /// Of efficiency, fraction; `None` if the point has none.
     pub eta: Option<Off>,
 }
 

@@ -25,7 +25,7 @@ const REACH: f64 = 0.12;
 /// Half step of the difference quotients by angle, rad.
 const STEP: f64 = 1e-5;
 
-/// The nearest place; starts at `guess_rad` where one is given, else tries the whole line.
+/// The nearest place; starts at `guess_rad` if one is given, else tries the whole line.
 pub(crate) fn nearest(
     shape: &LineShape,
     speed_ratio: f64,
@@ -48,7 +48,7 @@ pub(crate) fn nearest(
         Some(guess) => (guess, guess - REACH, guess + REACH),
         None => best_of_net(&squared),
     };
-    // Gauss-Newton in one variable from there, halved where it does not come nearer.
+    // Gauss-Newton in one variable from there, halved if it does not come nearer.
     let mut foot = describe(shape, speed_ratio, start, offset, scales);
     let mut least = squared(start);
     for _ in 0..8 {
@@ -80,7 +80,7 @@ pub(crate) fn nearest(
 fn best_of_net(squared: &impl Fn(f64) -> f64) -> (f64, f64, f64) {
     let (mut low, mut high) = ANGLE_RANGE;
     let mut best = low;
-    // The first is fine enough to tell the flat from the steep part.
+    // The first is fine enough to distinguish the flat from the steep part.
     for mesh in [48, 10] {
         let step = (high - low) / f64::from(mesh);
         let mut least = f64::INFINITY;

@@ -21,7 +21,7 @@ pub(crate) struct Observation {
     pub flow_kg_s: f64,
     pub pressure_ratio: f64,
     pub eta: Option<f64>,
-    /// Standard error of the efficiency that no other point shares, fraction; 0 where none is known.
+    /// Standard error of the efficiency that no other point shares, fraction; 0 if none is known.
     pub eta_error: f64,
     /// Whether it is a surge mark: it says where the line ends, nothing of efficiency.
     pub is_mark: bool,

@@ -1,4 +1,4 @@
-//! What weighs the parts of a fit against each other.
+//! Relative weights of the parts of a fit.
 
 use super::line_shape::Parameters;
 

@@ -22,7 +22,7 @@ pub(crate) struct Solution {
     pub(super) beyond: BothEnds,
     /// Standard deviations of the line offsets, logarithms.
     pub line_scatter: [f64; 3],
-    /// Scales of distance and efficiency that the residuals were weighed by.
+    /// Scales of distance and efficiency that the residuals were weighted by.
     pub(super) scales: [f64; 2],
     /// Root mean squares of distance and efficiency.
     pub rms: [f64; 2],

@@ -35,12 +35,12 @@ const DAMPING: DampingRule = DampingRule {
     tries: 6,
 };
 
-/// Where a search starts.
+/// Start of a search.
 #[derive(Clone, Copy)]
 enum Start<'a> {
     /// From the points alone, with this scale of the residuals.
     Scale(f64),
-    /// Where another fit ended.
+    /// The result of another fit.
     Near(&'a Solution),
 }
 
@@ -56,7 +56,7 @@ enum Phase {
 
 /// Fits. `stiffness` (1 or more) is the factor on the smallest penalty that the estimation may choose.
 ///
-/// Where the points end far from their lines, the estimation may have settled on scatter where there is shape, or on
+/// If the points end far from their lines, the estimation may have settled on scatter where there is shape, or on
 /// outliers where there are none: then it is made again from other scales, and the most probable is kept.
 ///
 /// `near`: a fit of nearly the same points, from which the search may start.

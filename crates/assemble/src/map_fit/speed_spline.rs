@@ -145,7 +145,7 @@ impl SpeedSpline {
         }
         let mut knots = self.knots.clone();
         knots.insert(place, at);
-        // The precision of one value given all others stands on the diagonal.
+        // The precision of one value given all others is on the diagonal.
         let precision = SpeedSpline::with_knots(self.coordinate, knots).penalty[(place, place)];
         if precision > 0.0 { 1.0 / precision } else { 0.0 }
     }

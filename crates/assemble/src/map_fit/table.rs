@@ -74,7 +74,7 @@ pub(super) fn table(fit: &MapFit, options: &MapFitOptions) -> Result<FittedMap, 
     })
 }
 
-/// Where lines end, as angles over speed.
+/// Ends of the lines, as angles over speed.
 struct Ends {
     /// Smooth surge-side end.
     spline: SpeedSpline,
@@ -83,7 +83,7 @@ struct Ends {
     measured: Vec<MeasuredEnds>,
 }
 
-/// Where a measured line ends.
+/// Ends of a measured line.
 struct MeasuredEnds {
     speed_ratio: f64,
     /// Smallest and largest angle with a measured point.

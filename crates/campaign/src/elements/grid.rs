@@ -150,7 +150,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
             check.note(
                 FindingKind::MissingKey,
                 &here,
-                "`grid` has `speeds` and lacks `openings`".into(),
+                "`grid` has `speeds` but not `openings`".into(),
                 FORMS,
             );
         }
@@ -158,7 +158,7 @@ pub(crate) fn check(check: &mut Check<'_>) {
             check.note(
                 FindingKind::MissingKey,
                 &here,
-                "`grid` has `openings` and lacks `speeds`".into(),
+                "`grid` has `openings` but not `speeds`".into(),
                 FORMS,
             );
         }

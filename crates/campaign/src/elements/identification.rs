@@ -90,7 +90,7 @@ mod tests {
         };
         assert_eq!(read("{}"), plain);
         let joint = JointSettings { probe: Choice::Fixed, ..plain.joint };
-        let said = Identification {
+        let written = Identification {
             method: Method::Dynamic,
             alpha_area_ratio: 0.0,
             alpha_area_sigma_ratio: 0.0,
@@ -99,7 +99,7 @@ mod tests {
         };
         assert_eq!(
             read("{method: dynamic, alpha_area: 0, alpha_area_sigma: 0, joint: {probe: fixed}}"),
-            said
+            written
         );
     }
 }

@@ -123,7 +123,7 @@ mod tests {
             surge_margin: crate::testing::any("3 %").ok(),
             widest_opening: crate::testing::any("2.0").ok(),
         };
-        let said = line.request(all, ReferenceState::SAE, &limits(None));
-        assert_eq!((said.surge_margin_ratio, said.widest_opening_ratio), (0.03, 2.0));
+        let written = line.request(all, ReferenceState::SAE, &limits(None));
+        assert_eq!((written.surge_margin_ratio, written.widest_opening_ratio), (0.03, 2.0));
     }
 }

@@ -41,8 +41,8 @@ mod tests {
         let read = |text| crate::testing::any::<SafeStateFile>(text).unwrap().trajectory();
         let expected = SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 };
         assert_eq!(read("{pressure_slew: 50 kPa/s}"), expected);
-        let said = read("{pressure_slew: 50 kPa/s, opening: 2, within: 8 s}");
-        assert_eq!((said.valve_opening_ratio, said.within_s), (2.0, 8.0));
+        let written = read("{pressure_slew: 50 kPa/s, opening: 2, within: 8 s}");
+        assert_eq!((written.valve_opening_ratio, written.within_s), (2.0, 8.0));
         assert!(crate::testing::any::<SafeStateFile>("{opening: 2}").is_err());
     }
 }

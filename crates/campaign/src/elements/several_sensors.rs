@@ -107,7 +107,7 @@ pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
     let (misplaced, remedy) = if is_list {
         ("count", "a list names each sensor by itself: leave `count` out, or write one mapping with it")
     } else {
-        ("name", "a name tells the sensors of a list apart: write a list, or leave it out")
+        ("name", "a name is only needed to distinguish the sensors of a list: write a list, or leave it out")
     };
     for place in &places {
         let path = at(place, misplaced);
@@ -118,12 +118,13 @@ pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
     }
     // One place in the flow and one calibration bath have one value each.
     for key in ["common_offset", "tap", "pipe_diameter"] {
-        let said = |check: &Check<'_>, place: &[Step]| {
+        let text_of = |check: &Check<'_>, place: &[Step]| {
             check.get(&at(place, key)).and_then(Node::text).map(str::to_owned)
         };
-        let first = places.iter().find_map(|place| said(check, place));
-        let other =
-            places.iter().find(|place| said(check, place).is_some_and(|text| Some(&text) != first.as_ref()));
+        let first = places.iter().find_map(|place| text_of(check, place));
+        let other = places
+            .iter()
+            .find(|place| text_of(check, place).is_some_and(|text| Some(&text) != first.as_ref()));
         if let (Some(first), Some(other)) = (first, other) {
             let message =
                 format!("`{key}` is {first} for another sensor of {symbol}, and holds for all of them");

@@ -49,7 +49,7 @@ mod tests {
     fn what_is_left_out_has_its_default() {
         let read = |text| crate::testing::any::<SurgeSearchFile>(text).unwrap().seek();
         assert_eq!(read("{}"), SurgeSeek::default());
-        let said = SurgeSeek { closest_margin_ratio: 0.05, dwell_s: 60.0, ..SurgeSeek::default() };
-        assert_eq!(read("{closest: 5 %, dwell: 1 min}"), said);
+        let written = SurgeSeek { closest_margin_ratio: 0.05, dwell_s: 60.0, ..SurgeSeek::default() };
+        assert_eq!(read("{closest: 5 %, dwell: 1 min}"), written);
     }
 }

@@ -50,7 +50,7 @@ mod tests {
             pressure_sigma_pa: 5.0,
         };
         assert_eq!(read("{soak: 30 min}"), plain);
-        let said = Soak { temperature_sigma_k: 0.15, pressure_sigma_pa: 15.0, ..plain };
-        assert_eq!(read("{soak: 0.5 h, evenness: 0.15 K, pressure_evenness: 15 Pa}"), said);
+        let written = Soak { temperature_sigma_k: 0.15, pressure_sigma_pa: 15.0, ..plain };
+        assert_eq!(read("{soak: 0.5 h, evenness: 0.15 K, pressure_evenness: 15 Pa}"), written);
     }
 }

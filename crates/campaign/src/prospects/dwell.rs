@@ -38,7 +38,7 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
             grave: false,
             at: steps!["identification", "window", "end"].to_vec(),
             message: format!(
-                "the window is {} s long, shorter than the {shortest_s} s from which efficiency and heat transfer can be told apart",
+                "the window is {} s long, shorter than the {shortest_s} s from which efficiency and heat transfer are distinguishable",
                 end_s - start_s
             ),
             remedy: "end it later, or begin it earlier".to_owned(),

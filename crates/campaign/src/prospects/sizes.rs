@@ -28,7 +28,7 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
             grave: !(POSSIBLE_WHEELS_M.0..=POSSIBLE_WHEELS_M.1).contains(&wheel_m),
             at: steps!["machine", "geometry", "compressor", "wheel_diameter"].to_vec(),
             message: format!(
-                "a compressor wheel of {} mm is no turbocharger's: they have {:.0} to {:.0} mm",
+                "a compressor wheel of {} mm is not a turbocharger's: they have {:.0} to {:.0} mm",
                 mm(wheel_m),
                 1e3 * USUAL_WHEELS_M.0,
                 1e3 * USUAL_WHEELS_M.1

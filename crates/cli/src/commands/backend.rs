@@ -11,7 +11,7 @@ use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// List the backends, or hold one against the rules that every backend keeps
+/// List the backends, or check one against the rules for every backend
 #[derive(Debug, Args)]
 pub struct Backend {
     /// What to do.
@@ -27,7 +27,7 @@ pub struct Backend {
 enum BackendCommand {
     /// List the backends that campaigns may name
     List,
-    /// Hold the backend of a campaign against every rule of the seam. It is armed, told setpoints and made safe: never on a rig with a machine
+    /// Check the backend of a campaign against every rule of the interface. It is armed, given setpoints and made safe: never on a rig with a machine
     Check {
         /// Name of the backend
         name: String,
@@ -107,7 +107,7 @@ impl Backend {
                 mapper_campaign::campaign::BackendChoice { name: name.to_owned(), settings: json!({}) };
         }
         let model = nominal_model(&campaign)?;
-        // Mistakes in the settings are told as those of a campaign.
+        // Mistakes in the settings are reported as those of a campaign.
         let rig = registry
             .make_backend(&campaign, &model)
             .map_err(|error| Failure::in_campaign(error, path))?

@@ -24,7 +24,7 @@ pub struct Drift {
     /// Channel map: where recordings made by another program hold the rig's channels (YAML)
     #[arg(long, value_name = "FILE")]
     pub channels: Option<PathBuf>,
-    /// Campaign of the machine, where the recordings carry none
+    /// Campaign of the machine, if the recordings carry none
     #[arg(long, value_name = "FILE")]
     pub campaign: Option<PathBuf>,
     /// Write the points corrected for drift to this new CSV file
@@ -73,7 +73,7 @@ impl Drift {
         output::print(&text)
     }
 
-    /// Recordings, and the campaign where one is given.
+    /// Recordings, and the campaign if one is given.
     fn sources(&self) -> Result<(&[PathBuf], Option<Campaign>), Failure> {
         let named = !self.recording.is_empty();
         if named && self.paths.len() > 1 {

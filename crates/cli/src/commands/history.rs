@@ -71,7 +71,7 @@ fn day(text: &str) -> Result<jiff::Timestamp, String> {
     Ok(midnight.timestamp())
 }
 
-/// Figures that are shown where none is asked for.
+/// Figures that are shown by default.
 const SHOWN: [Metric; 6] = [
     Metric::GoodPoints,
     Metric::EtaMean,

@@ -1,4 +1,4 @@
-//! `mapper report`: the page of a run, beside other runs.
+//! `mapper report`: the page of a run, with other runs for comparison.
 
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Make the page of a run: map, points, transients, plan and provenance in one HTML file
 #[derive(Debug, Args)]
 pub struct Report {
-    /// Run directory, MCAP file or log of another program; further ones are drawn beside it
+    /// Run directory, MCAP file or log of another program; further ones are drawn for comparison
     #[arg(required = true, value_name = "RUN")]
     pub runs: Vec<PathBuf>,
     /// Write the page here

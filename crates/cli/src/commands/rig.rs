@@ -28,7 +28,7 @@ enum RigCommand {
         /// Name of the rig, as its backend says it
         rig: Option<String>,
     },
-    /// Say that somebody has looked at the rig: the next run may begin
+    /// Confirm that the rig has been inspected: the next run may begin
     Acknowledge {
         /// Name of the rig, as its backend says it
         rig: String,
@@ -74,7 +74,7 @@ fn text(status: &RigStatus, cleared: bool) -> String {
         (Some(owner), false) => lines.push(format!(
             "left by {owner}, which ended with the rig in its hands (a driver makes it safe by itself then); look at the rig"
         )),
-        (None, _) => lines.push("nobody has it".to_owned()),
+        (None, _) => lines.push("not in use".to_owned()),
     }
     if let Some(latch) = &status.latch {
         lines.push(format!("latched since the run {}: {}", latch.run.display(), latch.reason));

@@ -136,7 +136,7 @@ impl Run {
         progress.clear();
         onlookers
             .end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
-        self.tell(&campaign, outcome)
+        self.report_outcome(&campaign, outcome)
     }
 
     fn onlookers(&self) -> Result<Observers<'_>, LiveError> {
@@ -149,7 +149,7 @@ impl Run {
         })
     }
 
-    fn tell(&self, campaign: &Campaign, outcome: RunOutcome) -> Result<(), Failure> {
+    fn report_outcome(&self, campaign: &Campaign, outcome: RunOutcome) -> Result<(), Failure> {
         let RunOutcome { directory, recording, end, results } = outcome;
         let unusable = results.as_ref().is_ok_and(|results| {
             results.points.iter().all(|scored| scored.point.verdict == Verdict::Unusable)

@@ -45,7 +45,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 impl Transient {
-    /// Fits, predicts, and says what is left and why.
+    /// Fits, predicts, and reports the residual and its cause.
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;

@@ -65,7 +65,7 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
     proposal
 }
 
-/// The channels that a column may be by what is said about it.
+/// The channels that a column may be by its description.
 fn names_of(index: usize, layout: &Layout, units: &[Option<HeaderUnit>]) -> Vec<(Channel, Weight)> {
     let Some(column) = layout.columns.get(index) else { return Vec::new() };
     let unit = units.get(index).copied().flatten();
@@ -77,7 +77,7 @@ fn names_of(index: usize, layout: &Layout, units: &[Option<HeaderUnit>]) -> Vec<
     channels_of(without_number(column), group, &column.description, kind)
 }
 
-/// A name without the number by which readers tell equal names apart: `Pressure (2)` is no pressure at station 2.
+/// A name without the number by which readers distinguish equal names: `Pressure (2)` is not a pressure at station 2.
 fn without_number(column: &Column) -> &str {
     let numbered = column
         .name

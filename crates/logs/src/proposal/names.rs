@@ -233,7 +233,7 @@ fn kind_of_name(name: &str) -> Option<Kind> {
     kinds.next().is_none().then_some(kind)
 }
 
-/// The channels that a column may be, by its name, its group and what else is said about it, with their weights.
+/// The channels that a column may be, by its name, its group and its further description, with their weights.
 pub(crate) fn channels_of(
     name: &str,
     group: &str,

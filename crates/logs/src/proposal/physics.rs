@@ -155,7 +155,7 @@ impl Course {
     }
 }
 
-/// Correlation of pairs; `None` where one of the two does not move.
+/// Correlation of pairs; `None` if one of the two does not move.
 fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let count = pairs.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;

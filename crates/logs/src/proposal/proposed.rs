@@ -24,7 +24,7 @@ pub struct ProposedChannel {
     pub column: usize,
     /// Further columns with the same quantity: several sensors at one place.
     pub others: Vec<usize>,
-    /// Unit as a channel map writes it; `None` where it could not be found out.
+    /// Unit as a channel map writes it; `None` if it could not be found out.
     pub unit: Option<&'static str>,
     /// Whether the pressure is read over the ambient pressure.
     pub gauge: bool,
@@ -44,7 +44,7 @@ pub enum Ambient {
         /// Its unit.
         unit: &'static str,
     },
-    /// No column: the standard atmosphere stands in, to be replaced by the barometer's reading.
+    /// No column: the standard atmosphere is used, to be replaced by the barometer's reading.
     Assumed,
 }
 
@@ -53,7 +53,7 @@ pub enum Ambient {
 pub struct Proposal {
     /// Channels in the order of the channel table.
     pub channels: Vec<ProposedChannel>,
-    /// Where gauge pressures start from; `None` where there are none.
+    /// The zero of gauge pressures; `None` if the log has none.
     pub ambient: Option<Ambient>,
     /// What the channels say of each other.
     pub remarks: Vec<String>,

@@ -1,4 +1,4 @@
-//! Units of a log that gives none: columns of one kind share a unit, and physics settles what is left.
+//! Units of a log that gives none: columns of one kind share a unit, and physics settles the rest.
 
 use super::proposed::{Certainty, Proposal, ProposedChannel};
 use crate::plausible::fitting_units;

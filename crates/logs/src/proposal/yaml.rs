@@ -75,13 +75,13 @@ fn source(layout: &Layout, proposed: &ProposedChannel) -> String {
     text
 }
 
-/// Topic, where there are several groups, and field.
+/// Topic, if there are several groups, and field.
 fn place(layout: &Layout, column: usize) -> String {
     let name = layout.columns.get(column).map_or("", |column| column.name.as_str());
     format!("{}field: {}", topic(layout, column), scalar(name))
 }
 
-/// The topic of a column, where there are several groups.
+/// The topic of a column, if there are several groups.
 fn topic(layout: &Layout, column: usize) -> String {
     let group = layout.columns.get(column).and_then(|column| layout.groups.get(column.group));
     match group {
@@ -90,7 +90,7 @@ fn topic(layout: &Layout, column: usize) -> String {
     }
 }
 
-/// A text that needs no quotes where it is a plain word, and one with them else.
+/// A text that needs no quotes if it is a plain word, and one with them otherwise.
 fn scalar(text: &str) -> String {
     const WORDS: [&str; 9] = ["y", "n", "yes", "no", "on", "off", "true", "false", "null"];
     let mut letters = text.chars();

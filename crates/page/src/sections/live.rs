@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 /// Buttons: request, label, confirmation question.
 const BUTTONS: [(&str, &str, &str); 4] = [
-    ("hold", "Hold", "Stay at this step until somebody lets it go on?"),
+    ("hold", "Hold", "Stay at this step until the operator lets it go on?"),
     ("go-on", "Go on", "Let the held step end as planned?"),
     (
         "stop",

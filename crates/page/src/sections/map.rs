@@ -35,7 +35,7 @@ pub(crate) fn map(page: &RunPage<'_>) -> Markup {
                 figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Numbers: at lines corrected speed, " (units.speed) "; on contours efficiency, %." span.screen { " Ctrl and the wheel zoom, dragging moves; a click on a point shows its transient." } } }
                 figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals; numbers at lines: corrected speed, " (units.speed) "." } }
             }
-            noscript { p { "The drawings need the page's own script; the same map stands beside this file as map.svg." } }
+            noscript { p { "The drawings need the page's own script; the same map is next to this file as map.svg." } }
         }
     }
 }

@@ -14,7 +14,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
     let report = page.report;
     let display = Display::new(units);
     let zero = zero_rows(report.zero, &display);
-    let said = doubts(report.points.iter().map(|scored| &scored.point));
+    let warnings = doubts(report.points.iter().map(|scored| &scored.point));
     html! {
         section #notes aria-labelledby="notes-head" {
             h2 #notes-head { "Notes" }
@@ -44,8 +44,8 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
                 ul { @for fused in report.sensors { li { (fused) } } }
             }
             h3 { "Doubts and remarks" }
-            @if said.is_empty() { p { "None." } }
-            @else { ul { @for doubt in &said { li { (doubt.steps()) " (" (doubt.code) "): " (sentence(&doubt.message)) } } } }
+            @if warnings.is_empty() { p { "None." } }
+            @else { ul { @for doubt in &warnings { li { (doubt.steps()) " (" (doubt.code) "): " (sentence(&doubt.message)) } } } }
             h3 { "Events" }
             @if report.events.is_empty() { p { "None." } }
             @else { ul { @for event in report.events { li { (format!("{:.1} s", event.t_s)) ": " (prose(&event.message)) } } } }
@@ -58,7 +58,7 @@ fn surge_part(surge: &SurgeReport<'_>, display: &Display) -> Markup {
     let rows: Vec<Row> = surge_rows(surge.marks, display).into_iter().map(cells).collect();
     html! {
         (data_table("Surge-side ends that were sought", &surge_heads(surge.marks, display), &rows))
-        @for said in surge_remarks(surge.remarks, surge.surges) { p { (said) } }
+        @for remark in surge_remarks(surge.remarks, surge.surges) { p { (remark) } }
     }
 }
 

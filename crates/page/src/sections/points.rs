@@ -16,7 +16,7 @@ pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
             h2 #points-head { "Points by speed line" }
             p {
                 "+/- is half a 95 % interval. T2, P2 and T3 are means over the last " (END_S) " s of the step, when the gas is settled and \
-                 the housing is not; how sure readings are stands with the instruments. The intervals of flow and pressure ratio are those \
+                 the housing is not; the uncertainty of readings is given with the instruments. The intervals of flow and pressure ratio are those \
                  of their sensors."
             }
             @if let Some(shared) = shared_errors_text(all(), display.units()) { p { (shared) } }

@@ -14,7 +14,7 @@ pub struct Step {
     pub marker: StepMarker,
     /// Time after the jump s, speed rpm, commanded P3 Pa.
     pub rows: Vec<(f64, f64, f64)>,
-    /// Whether the run told that its speed was not reached.
+    /// Whether the run reported that its speed was not reached.
     pub not_reached: bool,
 }
 
@@ -36,7 +36,7 @@ impl Step {
         self.off_ratio(end_s - 10.0, end_s)
     }
 
-    /// How far the step overshoots its target: the highest mean of a second over it, ratio. `None` where the jump comes from
+    /// How far the step overshoots its target: the highest mean of a second over it, ratio. `None` if the jump comes from
     /// above or from the same speed.
     pub fn overshoot_ratio(&self) -> Option<f64> {
         let from_below = self.marker.from.is_some_and(|from| from.speed_rpm < self.target_rpm());

@@ -27,7 +27,7 @@ pub struct HeaderUnit {
     pub reference: Reference,
 }
 
-/// Spellings that logs use beside those of the table of units, in small letters without blanks.
+/// Spellings that logs use in addition to those of the table of units, in small letters without blanks.
 const SPELLINGS: &[(Kind, &str, &[&str])] = &[
     (
         Kind::Temperature,
@@ -172,7 +172,7 @@ fn unit(kind: Kind, symbol: &str) -> Option<&'static Unit> {
     kind.unit(symbol).or((symbol == BARE_RATIO.symbol()).then_some(&BARE_RATIO))
 }
 
-/// A name and its unit, where a header holds both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
+/// A name and its unit, if a header holds both: `T2 [degC]`, `T2 (degC)`, `p2 / kPa`, `p2 in kPa`, `T2_degC`.
 pub fn split_unit(header: &str) -> (String, Option<String>) {
     let header = header.trim();
     let whole = || (header.to_owned(), None);
@@ -202,8 +202,8 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
             // A single letter behind a blank or a line is a place more often than a unit: `T_C`, `p_a`.
             let doubtful = [" ", "_"].contains(&between) && unit.chars().count() < 2;
             let longer = best.is_none_or(|(_, known)| known.len() < unit.len());
-            let told = !name.is_empty() && !doubtful && unit != "-" && !unit.ends_with("--");
-            if told && longer && header_unit(unit).is_some() {
+            let stated = !name.is_empty() && !doubtful && unit != "-" && !unit.ends_with("--");
+            if stated && longer && header_unit(unit).is_some() {
                 best = Some((name, unit));
             }
         }

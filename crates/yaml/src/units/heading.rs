@@ -2,7 +2,7 @@
 
 use super::{BARE_RATIO, Kind, Reference, Unit, header_unit, split_unit};
 
-/// What stands in brackets behind a name without being a unit: kinds of ratios and of efficiencies.
+/// The text in brackets behind a name without being a unit: kinds of ratios and of efficiencies.
 const NO_UNITS: &[&str] = &["", "-", "1", "ts", "tt", "t-s", "t-t", "corr", "corrected"];
 
 /// A column that is looked for.
@@ -16,23 +16,23 @@ pub struct WantedColumn<'a> {
     pub kind: Kind,
 }
 
-/// Where a column is, and its unit.
+/// Place of a column, and its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoundColumn {
     /// Position, from 0.
     pub index: usize,
-    /// Unit that the heading names; `None` where it names none.
+    /// Unit that the heading names; `None` if it names none.
     pub unit: Option<&'static Unit>,
 }
 
 impl FoundColumn {
-    /// A value of the column in the unit used inside; as it stands where the heading names no unit.
+    /// A value of the column in the unit used inside; unchanged if the heading names no unit.
     pub fn inside(&self, value: f64) -> f64 {
         self.unit.map_or(value, |unit| unit.to_inside(value))
     }
 }
 
-/// Why a table's columns cannot be told.
+/// Why a table's columns cannot be identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum HeadingError {
     /// No heading has one of the names.
@@ -45,7 +45,7 @@ pub enum HeadingError {
         /// Headings that are there, shortened.
         found: String,
     },
-    /// A unit that nobody knows.
+    /// An unknown unit.
     #[error("the heading `{heading}` has the unit `{unit}`, which is none of a {kind}; write one of {known}")]
     Unit {
         /// The heading.
@@ -63,7 +63,7 @@ pub enum HeadingError {
 /// `speed_krpm`.
 ///
 /// # Errors
-/// [`HeadingError`] where one is missing, or has a unit that is not known.
+/// [`HeadingError`] if one is missing, or has a unit that is not known.
 pub fn find_columns<const N: usize>(
     headings: &[&str],
     wanted: [WantedColumn<'_>; N],
@@ -73,7 +73,7 @@ pub fn find_columns<const N: usize>(
         let read: Vec<(String, Option<String>)> =
             headings.iter().map(|heading| split(heading, column.kind)).collect();
         let named = column.names.iter().find_map(|name| read.iter().position(|(plain, _)| plain == name));
-        // Some write the unit alone. A share has none by which it could be told from another.
+        // Some write the unit alone. A share has none by which it could be distinguished from another.
         let by_unit = || {
             let is_unit = |heading: &&str| known(column.kind, heading.trim()).is_some();
             headings.iter().position(is_unit).filter(|_| column.kind != Kind::Fraction)
@@ -106,7 +106,7 @@ fn split(heading: &str, kind: Kind) -> (String, Option<String>) {
     if known(kind, heading).is_some() {
         return (plain(heading), Some(heading.to_owned()));
     }
-    // In brackets even what is no unit is the unit: it can be refused by name.
+    // In brackets even a text that is not a unit counts as the unit: it can be refused by name.
     if let Some((name, rest)) = heading.split_once(['[', '(']) {
         let unit = rest.trim_end_matches([']', ')', ' ']).trim();
         let is_unit = !NO_UNITS.contains(&unit.to_ascii_lowercase().as_str());
@@ -156,7 +156,7 @@ mod tests {
         ] {
             match find_columns(&headings, [SPEED, FLOW]) {
                 Ok([speed, flow]) => {
-                    // The factors are exact; what is left is rounding.
+                    // The factors are exact; the difference is rounding.
                     assert!((speed.inside(1.0) / rpm - 1.0).abs() < 1e-15, "{headings:?}");
                     assert!((flow.inside(1.0) / kg_s - 1.0).abs() < 1e-15, "{headings:?}");
                 }

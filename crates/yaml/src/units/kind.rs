@@ -223,7 +223,7 @@ impl Kind {
         Kind::RatioRate,
     ];
 
-    /// Stable key, as it stands in the schema's `x-quantity`.
+    /// Stable key, as in the schema's `x-quantity`.
     pub fn key(self) -> &'static str {
         self.row().0
     }

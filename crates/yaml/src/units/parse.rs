@@ -24,7 +24,7 @@ pub enum UnitError {
         text: String,
     },
     /// A number without its unit.
-    #[error("`{text}` lacks its unit")]
+    #[error("`{text}` has no unit")]
     NoUnit {
         /// What was written.
         text: String,
@@ -92,7 +92,7 @@ pub fn parse(kind: Kind, text: &str) -> Result<f64, UnitError> {
     parse_with(kind, text, |spelling| kind.unit(spelling))
 }
 
-/// As [`parse`], with the units that `unit_of` knows. It is asked for the empty spelling where a bare number stands.
+/// As [`parse`], with the units that `unit_of` knows. It is asked for the empty spelling if the text is a bare number.
 ///
 /// # Errors
 /// As [`parse`].
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn what_is_no_quantity_is_refused_with_its_remedy() {
         let table = [
-            (Kind::Duration, "10", "`10` lacks its unit", "write e.g. `10 s` (units: s, ms, min, h)"),
+            (Kind::Duration, "10", "`10` has no unit", "write e.g. `10 s` (units: s, ms, min, h)"),
             (Kind::Duration, "ten s", "does not start with a number", "e.g. `10 s`"),
             (Kind::Duration, "", "does not start with a number", "e.g. `10 s`"),
             (Kind::Duration, ".", "does not start with a number", "e.g. `10 s`"),

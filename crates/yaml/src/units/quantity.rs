@@ -1,4 +1,4 @@
-//! A value of a known kind, as it stands in the YAML.
+//! A value of a known kind, as written in the YAML.
 
 use super::{Kind, parse};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};

@@ -10,7 +10,7 @@ pub struct TableText {
 }
 
 impl TableText {
-    /// By the first line with content: `;` or tab where it has three of them, as a table of four columns has; otherwise a comma.
+    /// By the first line with content: `;` or tab if it has three of them, as a table of four columns has; otherwise a comma.
     pub fn of(line: &str) -> TableText {
         let separator = [';', '\t'].into_iter().find(|c| line.matches(*c).count() >= 3).unwrap_or(',');
         TableText { separator }
@@ -21,7 +21,7 @@ impl TableText {
         line.split(self.separator).map(str::trim).collect()
     }
 
-    /// A number; with a decimal comma too, where commas do not separate columns.
+    /// A number; with a decimal comma too, if commas do not separate columns.
     pub fn number(&self, text: &str) -> Option<f64> {
         let text = text.trim();
         text.parse().ok().or_else(|| {
@@ -32,7 +32,7 @@ impl TableText {
     }
 }
 
-/// Headings with the units that stand in a row of their own below them: `flow` and `g/s` become `flow [g/s]`. `None` where the row below is
+/// Headings with the units from a row of their own below them: `flow` and `g/s` become `flow [g/s]`. `None` if the row below is
 /// no row of units. A heading that names its unit itself keeps it.
 pub fn with_units_row(headings: &[&str], below: &[&str]) -> Option<Vec<String>> {
     let bare = |text: &str| text.trim().trim_matches(['[', ']', '(', ')']).trim().to_owned();

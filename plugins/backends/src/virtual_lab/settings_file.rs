@@ -449,7 +449,7 @@ mod tests {
         for (settings, expected) in [
             (json!({"sampel_rate": "10 Hz"}), "`sampel_rate`"),
             (json!({"actuators": {"valve": {"lag": "1 K"}}}), "actuators.valve.lag"),
-            (json!({"sample_rate": "10"}), "lacks its unit"),
+            (json!({"sample_rate": "10"}), "has no unit"),
             (json!({"sample_rate": "0 Hz"}), "sample_rate"),
             (json!({"surge_precursor": {"onset": "80 %"}}), "surge_precursor.onset"),
             (json!({"surge_precursor": {"growth": "1 K"}}), "surge_precursor.growth"),

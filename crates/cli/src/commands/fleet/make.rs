@@ -9,7 +9,7 @@ use mapper_studies::program;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Make the items of a study; where they are there, items come and go and results stay
+/// Make the items of a study; if they exist, items come and go and results stay
 #[derive(Debug, Args)]
 pub struct Make {
     /// Study (YAML): its kind and what the kind needs

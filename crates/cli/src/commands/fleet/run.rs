@@ -10,7 +10,7 @@ use mapper_report::merged_text;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Do what is left of a study on this machine and merge it; stopped, the same command goes on from there
+/// Do the remaining items of a study on this machine and merge it; stopped, the same command goes on from there
 #[derive(Debug, Args)]
 pub struct Run {
     /// Directory of the study

@@ -36,7 +36,7 @@ impl Status {
                 return output::print(&fleet.study.items.iter().map(line).collect::<String>());
             }
             let status = fleet.status();
-            // Asked only where something may be under way, and never waited for.
+            // Asked only if something may be under way, and never waited for.
             let submission = fleet.submission().ok().filter(|_| status.lacking() > 0);
             let states = submission.and_then(|sent| {
                 running(&Template { name: sent.template, text: sent.template_text }, &sent.work)

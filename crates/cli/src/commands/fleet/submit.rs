@@ -9,7 +9,7 @@ use mapper_fleet::{Limits, SubmitOptions, Template};
 use mapper_report::submission_text;
 use std::path::PathBuf;
 
-/// Submit what is left as an array job with the merge behind it; nothing is submitted that exceeds a limit
+/// Submit the remaining items as an array job with the merge behind it; nothing is submitted that exceeds a limit
 #[derive(Debug, Args)]
 pub struct Submit {
     /// Directory of the study
@@ -50,7 +50,7 @@ pub struct Submit {
 }
 
 impl Submit {
-    /// Tries a few items where none is done, then submits.
+    /// Tries a few items if none is done, then submits.
     pub fn run(&self) -> Result<(), Failure> {
         let program = std::env::current_exe()
             .map_err(|error| Failure::new(Code::Failure, format!("failed to find this program: {error}")))?;

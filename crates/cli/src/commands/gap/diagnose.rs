@@ -26,7 +26,7 @@ pub struct Diagnose {
     /// The same, by name
     #[arg(long = "recording", value_name = "FILE")]
     pub named: Vec<PathBuf>,
-    /// Recording of the same rig and steps, made while nothing was wrong: say what changed since, not what the model lacks
+    /// Recording of the same rig and steps, made while nothing was wrong: report what changed since, not what is missing in the model
     #[arg(long, value_name = "FILE")]
     pub healthy: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -100,7 +100,7 @@ impl Diagnose {
         output::print(&recordings_text(&heads, &over))
     }
 
-    /// Writes the laws that can be written into `directory`; beside the page where only that was asked for.
+    /// Writes the laws that can be written into `directory`; next to the page if only that was asked for.
     fn write_laws(&self, laws: &mut [Law]) -> Result<(), Failure> {
         let (directory, page) = (self.laws.as_deref(), self.html.as_deref());
         if let Some(directory) = directory.filter(|_| laws.iter().any(|law| law.script.is_some())) {

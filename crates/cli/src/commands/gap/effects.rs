@@ -17,7 +17,7 @@ pub struct Effects {
     /// Also check and list a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
     pub effects: Vec<PathBuf>,
-    /// Print which missing force could stand in for which effect on this campaign (YAML): what can be told apart
+    /// Print which residual source term could replace which effect on this campaign (YAML): which are distinguishable
     #[arg(long, value_name = "CAMPAIGN")]
     pub signatures: Option<PathBuf>,
     /// Print one JSON object on standard output

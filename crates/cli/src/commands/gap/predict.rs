@@ -20,10 +20,10 @@ pub struct Predict {
     /// The forecast: a new file with --diagnosis, an existing one with --recording
     #[arg(long, value_name = "FILE")]
     pub forecast: PathBuf,
-    /// Run directory, MCAP file, or log of another program that the forecast is held against
+    /// Run directory, MCAP file, or log of another program that the forecast is compared with
     #[arg(long, value_name = "FILE", conflicts_with = "diagnosis")]
     pub recording: Option<PathBuf>,
-    /// SHA-256 that was printed when the forecast was made; refused where the file has another
+    /// SHA-256 that was printed when the forecast was made; refused if the file has another
     #[arg(long, value_name = "HASH", requires = "recording")]
     pub seal: Option<String>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -38,7 +38,7 @@ pub struct Predict {
 }
 
 impl Predict {
-    /// Makes a forecast, or holds one against a recording.
+    /// Makes a forecast, or compares one with a recording.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
@@ -60,7 +60,7 @@ impl Predict {
                 self.forecast.display()
             ));
         }
-        // clap asks for a recording where there is no diagnosis.
+        // clap requires a recording if no diagnosis is given.
         let Some(recording) = &self.recording else { return Ok(()) };
         let (forecast, seal) = SealedForecast::read(&self.forecast, self.seal.as_deref())?;
         let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub struct Inspect {
     /// Log of a test stand
     pub log: PathBuf,
-    /// How to read it where looking at it gave the wrong answer, e.g. `separator=;`, `time=TS`; may be repeated
+    /// How to read it if automatic detection gave the wrong answer, e.g. `separator=;`, `time=TS`; may be repeated
     #[arg(long = "with", value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub with: Vec<(String, String)>,
     /// Write the proposed channel map to this new file

@@ -1,4 +1,4 @@
-//! `mapper map compare`: where two maps differ.
+//! `mapper map compare`: differences between two maps.
 
 use crate::exit_code::Code;
 use crate::failure::Failure;

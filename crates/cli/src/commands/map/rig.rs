@@ -1,4 +1,4 @@
-//! `mapper map rig`: what a run gave beside the compressor's map.
+//! `mapper map rig`: results of a run in addition to the compressor's map.
 
 use crate::failure::Failure;
 use crate::given::{channel_map, given_campaign};

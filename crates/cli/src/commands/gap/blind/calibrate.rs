@@ -49,8 +49,8 @@ impl Calibrate {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let plan = Plan { seed: self.seed, nulls: self.nulls, others: self.cases };
         let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
-        let told = |done, of| progress.pieces(done, of);
-        let engine = Engine { jobs: self.jobs, stop: &stop, told: &told };
+        let report = |done, of| progress.pieces(done, of);
+        let engine = Engine { jobs: self.jobs, stop: &stop, told: &report };
         let made_by = plan.command(&self.campaign);
         let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &engine);
         progress.clear();

@@ -29,14 +29,14 @@ pub struct Run {
 }
 
 impl Run {
-    /// Diagnoses each recording in a process of its own, as anybody would: `mapper gap diagnose ... --json`.
+    /// Diagnoses each recording in a process of its own, as a user would: `mapper gap diagnose ... --json`.
     pub fn run(&self) -> Result<(), Failure> {
         let failure = |message: String| Failure::new(Code::Failure, message);
         let manifest = Manifest::read(&self.directory.join(MANIFEST_NAME))?;
         let program = std::env::current_exe().map_err(|error| failure(error.to_string()))?;
         let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
-        let told = |done, of| progress.pieces(done, of);
-        let engine = Engine { jobs: self.jobs, stop: &stop, told: &told };
+        let report = |done, of| progress.pieces(done, of);
+        let engine = Engine { jobs: self.jobs, stop: &stop, told: &report };
         let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();
         let threads = (cores() / engine.at_a_time(names.len())).max(1);
         let diagnosed =
@@ -55,7 +55,7 @@ impl Run {
         }
         Err(failure(format!("{} recordings were not diagnosed:\n{}", failed.len(), failed.join("\n"))))
     }
-    /// Diagnoses one case where that is not done yet; `Err` within: what the diagnosis said.
+    /// Diagnoses one case if that is not done yet; `Err` within: the message of the diagnosis.
     fn diagnose(
         &self,
         program: &Path,
@@ -91,7 +91,7 @@ impl Run {
             write_new(&diagnosis, &finished.stdout)?;
             return Ok(Ok(()));
         }
-        let said = String::from_utf8_lossy(&finished.stderr);
-        Ok(Err(format!("{name}: {}", said.lines().last().unwrap_or_default())))
+        let message = String::from_utf8_lossy(&finished.stderr);
+        Ok(Err(format!("{name}: {}", message.lines().last().unwrap_or_default())))
     }
 }

@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 pub struct Score {
     /// Directory of the cases
     pub directory: PathBuf,
-    /// Print the table in Markdown, beside that of the cases in another directory
+    /// Print the table in Markdown, next to that of the cases in another directory
     #[arg(long, value_name = "DIR", conflicts_with = "json")]
     pub beside: Option<PathBuf>,
-    /// Also write each answer as NAME.truth.json beside its recording
+    /// Also write each answer as NAME.truth.json next to its recording
     #[arg(long)]
     pub open: bool,
     /// Print one JSON object on standard output

@@ -19,7 +19,8 @@ const WAITING_EVENTS: usize = 1024;
 pub struct Shared {
     /// Stop at the next sample.
     pub stop: Arc<AtomicBool>,
-    /// Whether work that must not be left alone is going on: planning a run, and the rig until it is safe.
+    /// Whether a rig is held, which must not be left alone. The worker sets it first and then looks at `stop`; the caller sets `stop` first and
+    /// then looks here. So no rig is armed behind the back of a caller that has left.
     pub holds_rig: Arc<AtomicBool>,
 }
 

@@ -1,6 +1,7 @@
 //! Recordings and how they are read.
 
 use crate::attended::compute;
+use crate::campaign::Campaign;
 use crate::error::Fault;
 use crate::registry::registry;
 use mapper_campaign::Campaign as Checked;
@@ -28,8 +29,8 @@ pub struct Source {
 }
 
 impl Source {
-    fn new(path: PathBuf, map: ChannelMap) -> Result<Self, SessionError> {
-        let recorded = Recorded::read_run(&registry(), &path, &map, None)?;
+    fn new(path: PathBuf, map: ChannelMap, given: Option<&Checked>) -> Result<Self, SessionError> {
+        let recorded = Recorded::read_run(&registry(), &path, &map, given)?;
         Ok(Source { path, map, recorded })
     }
 
@@ -68,16 +69,18 @@ fn map_of(file: Option<&Path>, text: Option<&str>) -> Result<ChannelMap, Session
 impl Recording {
     /// Reads a recording. `channels_text`: a channel map as text, which `channels` then names in messages.
     #[staticmethod]
-    #[pyo3(signature = (path, channels=None, channels_text=None))]
+    #[pyo3(signature = (path, channels=None, channels_text=None, campaign=None))]
     fn read(
         py: Python<'_>,
         path: PathBuf,
         channels: Option<PathBuf>,
         channels_text: Option<String>,
+        campaign: Option<&Campaign>,
     ) -> PyResult<Recording> {
+        let campaign = campaign.map(|campaign| campaign.inner.clone());
         compute(py, None, move |_| {
             let map = map_of(channels.as_deref(), channels_text.as_deref())?;
-            let source = Source::new(path, map)?;
+            let source = Source::new(path, map, campaign.as_ref().map(|inner| &inner.campaign))?;
             let read = &source.recorded;
             let first = read.first().ok_or(SessionError::NoRecording)?;
             let warnings: Vec<String> =

@@ -72,7 +72,6 @@ pub fn run_campaign(
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<Outcome> {
     let (inner, shared) = (campaign.inner.clone(), Shared::default());
-    shared.holds_rig.store(true, Ordering::SeqCst);
     let of_worker = shared.clone();
     let attended = attend(py, shared, on_event.as_ref(), move |events| {
         let on_event = |event: &SessionEvent| events.show(event);
@@ -103,7 +102,9 @@ fn run(
     if !rig.simulated_time {
         return Err(Fault::RealTime { backend: rig.backend });
     }
+    shared.holds_rig.store(true, Ordering::SeqCst);
     if shared.stop.load(Ordering::SeqCst) {
+        shared.holds_rig.store(false, Ordering::SeqCst);
         return Err(Fault::NotBegun);
     }
     let outcome = prepared.run(&session)?;

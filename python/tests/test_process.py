@@ -57,6 +57,31 @@ def test_ctrl_c_leaves_the_rig_safe_and_the_recording_readable(
     assert command("identify", directories[0])["recording"] == str(directories[0] / "recording.mcap")
 
 
+DIAGNOSIS = """
+import sys
+import mapper
+
+campaign = mapper.Campaign.load(sys.argv[1])
+recording = mapper.Recording.read(sys.argv[2])
+try:
+    print("running", flush=True)
+    mapper.diagnose(recording, campaign)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    sys.exit(7)
+"""
+
+
+def test_ctrl_c_ends_a_diagnosis(run: mapper.Run, campaign_file: Path) -> None:
+    arguments = [sys.executable, "-c", DIAGNOSIS, str(campaign_file), str(run.directory)]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().strip() == "running"
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.read().strip() == "interrupted"
+        assert process.wait(timeout=60) == 7
+
+
 def test_an_error_of_the_observer_stops_the_run(campaign: mapper.Campaign, tmp_path: Path) -> None:
     def fail(event: dict[str, Any]) -> None:
         raise RuntimeError(event["event"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,22 @@ def test_a_log_without_a_machine_is_an_identification_error(run: mapper.Run) -> 
     recording = mapper.Recording.from_frame(run.recording.frame, mapping)
     with pytest.raises(mapper.IdentificationError):
         mapper.identify(recording)
+
+
+def test_a_campaign_replaces_one_that_cannot_be_read(command: Callable[..., Any], tmp_path: Path) -> None:
+    file = tmp_path / "t.yaml"
+    text = mapper.Campaign.template(name="t", directory=tmp_path).text
+    file.write_text(text.replace("points: 6", "points: 2"))
+    campaign = mapper.Campaign.load(file)
+    run = campaign.run(tmp_path / "runs")
+    # Alone, without the map that its campaign names.
+    alone = tmp_path / "alone" / "recording.mcap"
+    alone.parent.mkdir()
+    shutil.copy(run.directory / "recording.mcap", alone)
+    with pytest.raises(mapper.CampaignError):
+        mapper.Recording.read(alone)
+    recording = mapper.Recording.read(alone, campaign=campaign)
+    assert mapper.identify(recording).json == command("identify", alone, "--campaign", file)
 
 
 def test_the_map_is_that_of_the_command(run: mapper.Run, command: Callable[..., Any], tmp_path: Path) -> None:

@@ -45,7 +45,9 @@ class Outcome:
 
 class Recording:
     @staticmethod
-    def read(path: Path, channels: Path | None = None, channels_text: str | None = None) -> Recording: ...
+    def read(
+        path: Path, channels: Path | None = None, channels_text: str | None = None, campaign: Campaign | None = None
+    ) -> Recording: ...
     @property
     def summary(self) -> str: ...
     @property

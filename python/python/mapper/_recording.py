@@ -7,13 +7,16 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
 from mapper import _mapper, _tables
+
+if TYPE_CHECKING:
+    from mapper._campaign import Campaign
 
 
 class Recording:
@@ -30,7 +33,13 @@ class Recording:
         self._units: dict[str, str] = dict(inner.channels)
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str], channels: str | os.PathLike[str] | None = None) -> Recording:
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        channels: str | os.PathLike[str] | None = None,
+        *,
+        campaign: Campaign | None = None,
+    ) -> Recording:
         """Read a run directory, an MCAP file or a log of another program.
 
         Parameters
@@ -39,13 +48,18 @@ class Recording:
             Run directory, MCAP file, CSV, Excel or MDF 4 log.
         channels
             Channel map (YAML): which column of a log is which channel. Recordings of this program need none.
+        campaign
+            Campaign with machine, sensors and window, instead of the one in the recording.
 
         Raises
         ------
         RecordingError
             The recording cannot be read, or the channel map has mistakes, shown with line and caret.
+        CampaignError
+            The campaign in the recording has mistakes, for example because another version made it: give `campaign`.
         """
-        return cls(_mapper.Recording.read(Path(path), None if channels is None else Path(channels)))
+        own = None if campaign is None else campaign._inner
+        return cls(_mapper.Recording.read(Path(path), None if channels is None else Path(channels), None, own))
 
     @classmethod
     def from_frame(

@@ -8,7 +8,7 @@ pub trait Chain {
     /// Number of points.
     fn len(&self) -> usize;
 
-    /// Whether there is no point.
+    /// Whether it has no points.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -22,7 +22,7 @@ pub trait Chain {
     /// What a long stay at a point leaves.
     fn settled(&self, at: usize) -> Self::State;
 
-    /// Whether two states are so close that what follows no longer tells them apart.
+    /// Whether two states are so close that what follows no longer distinguishes them.
     fn alike(&self, a: Self::State, b: Self::State) -> bool;
 
     /// Whether the jump is allowed.

@@ -287,7 +287,7 @@ fn propose(
         held_out_steps: held_out.len(),
         channels,
         worse,
-        beside: names_beside(study, best),
+        beside: accompanying_effects(study, best),
         stability: found.stability,
         equivalent: equivalent.collect(),
         rhai: None,
@@ -296,7 +296,7 @@ fn propose(
 }
 
 /// Library effects fitted together with a law.
-fn names_beside(study: &Study, law: &Candidate) -> Vec<String> {
+fn accompanying_effects(study: &Study, law: &Candidate) -> Vec<String> {
     let others = law.fit.hypothesis.effects.iter().filter_map(|(index, _)| study.effects.get(*index));
     others.map(|effect| effect.info().id.to_string()).collect()
 }

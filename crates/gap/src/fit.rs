@@ -157,7 +157,7 @@ impl Model for Fitted<'_> {
         let Fitted { study, linearised, coordinates, rows, .. } = self;
         // Near surge the cost has small steps: a slope taken over more of the way sees past them.
         let distance = if reach == Reach::Fine { FINE } else { COARSE };
-        let columns = changes_beside(study, linearised, hypothesis, prediction, coordinates, distance);
+        let columns = changes_near(study, linearised, hypothesis, prediction, coordinates, distance);
         let matrix = normal_matrix(rows, linearised, &self.nuisance_products, &columns);
         let ask = |column: &Vec<f64>| dot_over(rows, column, residual);
         let pulled = linearised.columns.iter().zip(&hypothesis.nuisances).map(|(c, sigmas)| ask(c) - sigmas);
@@ -194,11 +194,11 @@ pub fn effect_changes(
     here: &Prediction,
     coordinates: &[Coordinate],
 ) -> Vec<Vec<f64>> {
-    changes_beside(study, linearised, hypothesis, here, coordinates, FINE)
+    changes_near(study, linearised, hypothesis, here, coordinates, FINE)
 }
 
 /// As [`effect_changes`], from runs at `distance` from the hypothesis, in the coordinate's unit.
-fn changes_beside(
+fn changes_near(
     study: &Study,
     linearised: &Linearised,
     hypothesis: &Hypothesis,

@@ -72,11 +72,11 @@ fn next_night(effects: &[(&str, &[f64])], seed: u64) -> Recording {
 
 /// With a few candidates only; `mapper gap blind` tests the search over all of them.
 fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
-    ask_beside(recording, None)
+    ask_with(recording, None)
 }
 
 /// The same with one more candidate.
-fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diagnosed, GapError> {
+fn ask_with(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diagnosed, GapError> {
     let candidates = ["tip_diameter", "stem_conduction", "bearing_friction", "flowmeter_gain"];
     let effects: Vec<Arc<dyn Effect>> =
         candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
@@ -317,7 +317,7 @@ fn a_suspected_effect_in_rhai_is_named_and_measured() {
     let recording = record_of(&rig, 11);
     let blind = ask(&recording).unwrap().diagnosis;
     assert_ne!(blind.verdict, Verdict::Explained, "{:?}", blind.candidates[0]);
-    let extended = ask_beside(&recording, Some(scripted)).unwrap().diagnosis;
+    let extended = ask_with(&recording, Some(scripted)).unwrap().diagnosis;
     assert_eq!(extended.verdict, Verdict::Explained);
     assert_eq!(extended.candidates[0].effects, ["coolant_passage"]);
     let estimate = &extended.candidates[0].parameters["coolant_passage"];

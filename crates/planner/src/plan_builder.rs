@@ -292,9 +292,9 @@ impl<'a> PlanBuilder<'a> {
             draft.resting.filter(|resting| resting.eta > resting.max_eta)
         {
             remarks.push(format!(
-                "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps determine the efficiencies only to \
-                 {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the dwell, add points, or hold what \
-                 is known (`identification.joint`)",
+                "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps determine the efficiencies \
+                 only to {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the \
+                 dwell, add points, or hold what is known (`identification.joint`)",
                 100.0 * eta,
                 100.0 * max_eta
             ));

@@ -89,7 +89,7 @@ pub(crate) fn smallest<S: Side>(
         let info = question.effects[*effect].info();
         let (parameter, others) = info.parameters.split_last()?;
         let coordinate = Coordinate::new(parameter);
-        let length_beside = |others: &[f64], value: f64| -> Option<(f64, usize)> {
+        let length_with = |others: &[f64], value: f64| -> Option<(f64, usize)> {
             let there = Hypothesis { effects: vec![(*effect, [others, &[value]].concat())], ..base.clone() };
             let there = question.predict(&there)?;
             let change: Vec<Vec<f64>> = there
@@ -121,8 +121,8 @@ pub(crate) fn smallest<S: Side>(
         let neutral: Vec<f64> = others.iter().map(|p| p.neutral).collect();
         let usual: Vec<f64> =
             others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
-        let alone = length_beside(&neutral, value_at(typical))?.0 > 1e-6;
-        let length = |value: f64| length_beside(if alone { &neutral } else { &usual }, value);
+        let alone = length_with(&neutral, value_at(typical))?.0 > 1e-6;
+        let length = |value: f64| length_with(if alone { &neutral } else { &usual }, value);
         let (mut here, mut taker) = (typical, 0);
         // The smallest sufficient size tried.
         let mut seen: Option<f64> = None;

@@ -171,18 +171,18 @@ impl IdentifiedPoint {
     /// Standard error of `eta` that no other point shares, fraction; `None` without an interval.
     pub fn eta_own_standard_error(&self) -> Option<f64> {
         let all = standard_error_of(self.eta_low?, self.eta_high?);
-        Some(beside(all, self.common.eta_standard_error()))
+        Some(remaining_standard_error(all, self.common.eta_standard_error()))
     }
 
     /// Standard error of `h` that no other point shares, W/(m2 K); `None` without an interval.
     pub fn h_own_standard_error_w_m2k(&self) -> Option<f64> {
         let all = standard_error_of(self.h_low_w_m2k?, self.h_high_w_m2k?);
-        Some(beside(all, self.common.h_standard_error_w_m2k()))
+        Some(remaining_standard_error(all, self.common.h_standard_error_w_m2k()))
     }
 }
 
 /// The standard error that remains after an independent part is removed.
-fn beside(all: f64, part: f64) -> f64 {
+fn remaining_standard_error(all: f64, part: f64) -> f64 {
     (all * all - part * part).max(0.0).sqrt()
 }
 

@@ -56,7 +56,7 @@ pub enum UnknownElement {
     /// It is not a channel and a number.
     #[error("`{0}` is not a channel and the number of one of its sensors, such as `T2/3`")]
     Form(String),
-    /// There is no such channel.
+    /// Unknown channel.
     #[error(transparent)]
     Channel(#[from] UnknownChannel),
 }

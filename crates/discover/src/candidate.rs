@@ -140,18 +140,18 @@ pub fn sort(candidates: &mut [Candidate]) {
 /// Selects the choices to fit: the best ones, and the best of every machine part with a sufficient linear gain.
 pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
     let Some(best) = choices.first() else { return Vec::new() };
-    let mut worth: Vec<Choice> = Vec::new();
+    let mut selected: Vec<Choice> = Vec::new();
     let part = |choice: &Choice| library[choice.terms[0]].submodel();
     // With a strong term present, the linearisation is less accurate.
     let least = PROMISE * best.gain;
     for choice in choices.iter().filter(|choice| choice.gain > least) {
-        let of_part = worth.iter().filter(|other| part(other) == part(choice)).count();
+        let of_part = selected.iter().filter(|other| part(other) == part(choice)).count();
         let parts = if part(choice) == part(best) { OF_THE_BEST_PART } else { OF_OTHER_PARTS };
-        if of_part < parts && worth.len() < MAX {
-            worth.push(choice.clone());
+        if of_part < parts && selected.len() < MAX {
+            selected.push(choice.clone());
         }
     }
-    worth
+    selected
 }
 
 /// Minimum linear gain of another machine part, as a share of the best gain.

@@ -111,13 +111,13 @@ impl<'a> Base<'a> {
 fn runs(terms: &[Term]) -> Vec<Vec<usize>> {
     let mut runs: Vec<Vec<usize>> = Vec::new();
     for (place, term) in terms.iter().enumerate() {
-        let beside = |run: &&mut Vec<usize>| {
+        let can_join = |run: &&mut Vec<usize>| {
             term.sensor().is_some()
                 && run
                     .iter()
                     .all(|other| terms[*other].sensor().is_some() && terms[*other].sensor() != term.sensor())
         };
-        match runs.iter_mut().find(beside) {
+        match runs.iter_mut().find(can_join) {
             Some(run) => run.push(place),
             None => runs.push(vec![place]),
         }

@@ -70,12 +70,12 @@ pub fn discover(
     let mut found = found(&mut bench, &nothing, &training, &everywhere, &|fit| {
         adequacy(study, linearised, fit, 0.0).may_be_noise()
     });
-    progress(0.4, "a law beside a cause");
+    progress(0.4, "a law together with a cause");
     let left = found.as_ref().is_none_or(|found| !found.adequate);
     if left
         && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
         && let Some(best) = diagnosed.fits.first()
-        && let Some(both) = beside(&mut bench, diagnosed, best, &training, &everywhere)
+        && let Some(both) = together_with_cause(&mut bench, diagnosed, best, &training, &everywhere)
     {
         let score = |found: &FittedLaws| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
         let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARE_BESIDE);
@@ -132,7 +132,7 @@ struct FittedLaws {
 const RARE_BESIDE: f64 = 3.0;
 
 /// Search in addition to the best library cause.
-fn beside(
+fn together_with_cause(
     bench: &mut Bench,
     diagnosed: &Diagnosed,
     best: &Fit,
@@ -210,8 +210,8 @@ fn fitted(
     keep_determined(&bench.library, &mut trained);
     trained.truncate(FINALISTS);
     // Tolerances act differently in the presence of a strong term.
-    let beside = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
-    let linearised = beside.as_ref().unwrap_or(base.linearised);
+    let at_trained = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
+    let linearised = at_trained.as_ref().unwrap_or(base.linearised);
     let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
     let trained = bench.refit(&trained, linearised, training, effort);
     let mut fitted = bench.refit(&trained, linearised, everywhere, effort);
@@ -287,7 +287,7 @@ fn propose(
         held_out_steps: held_out.len(),
         channels,
         worse,
-        beside: names_beside(study, best),
+        beside: accompanying_effects(study, best),
         stability: found.stability,
         equivalent: equivalent.collect(),
         rhai: None,
@@ -296,7 +296,7 @@ fn propose(
 }
 
 /// Library effects fitted together with a law.
-fn names_beside(study: &Study, law: &Candidate) -> Vec<String> {
+fn accompanying_effects(study: &Study, law: &Candidate) -> Vec<String> {
     let others = law.fit.hypothesis.effects.iter().filter_map(|(index, _)| study.effects.get(*index));
     others.map(|effect| effect.info().id.to_string()).collect()
 }

@@ -66,16 +66,16 @@ pub fn begun(
                     .iter()
                     .map(|term| Some(terms.iter().position(|other| other == term)? * steps + begin))
                     .collect();
-                let Some(weighed) = weigh(&projected, &places?, PRIOR_STEPS) else { continue };
-                let coefficients: Vec<f64> = weighed.coefficients.iter().copied().collect();
+                let Some(evidence) = weigh(&projected, &places?, PRIOR_STEPS) else { continue };
+                let coefficients: Vec<f64> = evidence.coefficients.iter().copied().collect();
                 let wrong = choice
                     .terms
                     .iter()
                     .zip(&coefficients)
                     .any(|(term, c)| library[*term].positive && *c < 0.0);
-                if !wrong && weighed.gain.is_finite() {
+                if !wrong && evidence.gain.is_finite() {
                     found.push(Choice {
-                        gain: weighed.gain - rarity,
+                        gain: evidence.gain - rarity,
                         rarity,
                         begin,
                         coefficients,

@@ -23,7 +23,7 @@ pub enum Role {
 /// A term of the library.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Where it acts, with the formula that its coefficient multiplies; the first is its location. Heat between two parts acts on both.
+    /// Balances it acts on, with the formulas that its coefficient multiplies; the first is its location. Heat between two parts acts on both.
     pub acts_on: Vec<(Balance, Expression)>,
     /// Unit of the coefficient.
     pub unit: &'static str,

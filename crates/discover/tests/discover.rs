@@ -152,10 +152,10 @@ fn every_term_can_be_written_and_its_script_does_the_same() {
     let short = Visits { speeds_rpm: &[90e3, 130e3, 60e3], dwell_s: 20.0 };
     let study = study(&short, Vec::new());
     let nothing = study.predict(&study.nothing()).unwrap();
-    let told = LawDescription { sentence: "a term".to_owned(), terms: Vec::new(), sink_k: None };
+    let description = LawDescription { sentence: "a term".to_owned(), terms: Vec::new(), sink_k: None };
     let terms = library();
     let complaints = parallel::map(&terms, |term| {
-        let text = script_of(&[term], &told).unwrap();
+        let text = script_of(&[term], &description).unwrap();
         let script = match ScriptEffect::new(&text, Path::new("term.rhai")) {
             Ok(script) => script,
             Err(error) => return Some(format!("{error}\n{text}")),

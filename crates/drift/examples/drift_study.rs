@@ -5,8 +5,8 @@
 //! an onset in the first 40 %, one of three as a step in the middle half. Points are identified by METHOD (`dynamic`,
 //! `joint` or `steady`). Prints a confusion table as Markdown.
 //!
-//! Each campaign has a twin: same seed, same noise, without the drift. What the points of the drifting one differ by is the
-//! error that the drift makes; what its corrected points still differ by is what the correction leaves of it.
+//! Each campaign has a twin: same seed, same noise, without the drift. The difference between the points of the two is the error due
+//! to the drift; the difference that remains with the corrected points is the error that the correction does not remove.
 
 // It prints its table.
 #![allow(clippy::print_stdout)]
@@ -34,7 +34,7 @@ const CAUSES: [Cause; 8] = [
 struct Row {
     cause: Option<Cause>,
     found: Option<Cause>,
-    /// Drifts that were found beside it.
+    /// Drifts found in addition to it.
     also: usize,
     probability: f64,
     onset_right: bool,
@@ -44,7 +44,7 @@ struct Row {
     /// Errors against the truth of `eta`, of `eta_identified`, and of the drift alone in `eta_identified`: over the same
     /// without correction.
     shrink: [Option<f64>; 3],
-    said: String,
+    summary: String,
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -204,7 +204,7 @@ fn one(
             _ => None,
         }),
         shrink: [shrink(&fitted, &start), shrink(&identified, &start), shrink(&identified, &undrifted)],
-        said: format!("seed {seed}: {planted:?} -> {}", report.reason),
+        summary: format!("seed {seed}: {planted:?} -> {}", report.reason),
     }
 }
 
@@ -244,13 +244,13 @@ fn print(rows: Vec<Row>) {
     for row in rows.iter().filter(|row| {
         row.found != row.cause || row.also > 0 || (row.found.is_some() && row.probability < 0.5)
     }) {
-        eprintln!("{}", row.said);
+        eprintln!("{}", row.summary);
     }
 }
 
-/// Of the causes that were named: how probable they were said to be, and how often they were right.
+/// Stated probability of the causes that were named, and how often they were right.
 fn calibration(rows: &[Row]) {
-    println!("\n| said to be probable | named | mean probability | right |\n|---|---:|---:|---:|");
+    println!("\n| stated probability | named | mean probability | right |\n|---|---:|---:|---:|");
     for (low, high) in [(0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)] {
         let named: Vec<&Row> =
             rows.iter().filter(|row| row.found.is_some() && (low..high).contains(&row.probability)).collect();

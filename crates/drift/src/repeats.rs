@@ -54,7 +54,7 @@ pub(crate) fn refusal(
     let whole_s: f64 = steps.iter().map(|step| step.end_s - step.start_s).sum();
     if let Some(step) = longest.or(steps.first().filter(|_| whole_s > LONGEST_S)) {
         return Some(format!(
-            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in all; steps of a campaign last up to {:.0} h, and all of \
+            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in total; steps of a campaign last up to {:.0} h, and all of \
              them up to {:.0} h. A wrong time in the log would do that.",
             step_number(step.index),
             step.run + 1,
@@ -147,11 +147,11 @@ mod tests {
 
     #[test]
     fn a_log_without_a_valve_and_one_with_a_wrong_time_are_refused_by_name() {
-        let said = |steps: &[CampaignStep]| refusal(&[], steps, &[]).unwrap();
-        assert!(said(&[step(60.0, f64::NAN)]).contains("`valve_command`"));
+        let message = |steps: &[CampaignStep]| refusal(&[], steps, &[]).unwrap();
+        assert!(message(&[step(60.0, f64::NAN)]).contains("`valve_command`"));
         // The last step reaches to a time of 1e9 s; or many steps together last for years.
-        assert!(said(&[step(60.0, 0.7), step(1e9, 0.7)]).contains("lasts 277777.8 h"));
-        assert!(said(&vec![step(8e4, 0.7); 100]).contains("2222.2 h in all"));
-        assert!(said(&[step(60.0, 0.7)]).contains("no repeats"));
+        assert!(message(&[step(60.0, 0.7), step(1e9, 0.7)]).contains("lasts 277777.8 h"));
+        assert!(message(&vec![step(8e4, 0.7); 100]).contains("2222.2 h in total"));
+        assert!(message(&[step(60.0, 0.7)]).contains("no repeats"));
     }
 }

@@ -178,7 +178,7 @@ pub struct DriftReport {
     pub drifts: Vec<FoundDrift>,
     /// No drift, and each cause as the only one, most probable first; sums to 1. Empty without a verdict.
     pub alone: Vec<Alternative>,
-    /// Sentences: why there is no verdict, what was found, what was corrected.
+    /// Sentences: the reason for a missing verdict, the causes found, the corrections made.
     pub reason: String,
     /// Smallest detectable drift, per cause.
     pub detection_limits: Vec<DetectionLimit>,

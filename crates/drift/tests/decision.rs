@@ -61,7 +61,7 @@ fn a_sensor_that_drifts_is_named_and_its_points_are_put_right() {
         report.reason
     );
 
-    // Against the truth, constant bias removed: at most a third of what is left without.
+    // Against the truth, constant bias removed: at most a third of the error without correction.
     let (mut corrected, mut uncorrected) = (Vec::new(), Vec::new());
     for (eta, point) in campaign.eta_true.iter().zip(&report.corrected_points) {
         if let Some(before) = point.eta_uncorrected {
@@ -76,7 +76,7 @@ fn a_sensor_that_drifts_is_named_and_its_points_are_put_right() {
     assert!(rms(&corrected) * 3.0 <= rms(&uncorrected), "{} of {}", rms(&corrected), rms(&uncorrected));
 }
 
-/// Each as large as in the test before: both are named, sized and dated beside each other, and both are taken off.
+/// Each as large as in the test before: both are named, sized and dated together, and both are removed.
 #[test]
 fn two_drifts_at_once_are_both_named() {
     let ramp = Course { kind: CourseKind::Ramp, onset_s: 600.0 };
@@ -98,8 +98,8 @@ fn two_drifts_at_once_are_both_named() {
     assert!(report.corrected_points.iter().all(|point| point.corrections.len() == 2));
 }
 
-/// Ten times the limit, between two onsets of the grid, and a machine that changes at once by thirty times its limit: what one drift dated or
-/// sized roughly would leave is no drift of others.
+/// Ten times the limit, between two onsets of the grid, and a machine that changes at once by thirty times its limit: the residual of
+/// one drift dated or sized roughly is not taken for another drift.
 #[test]
 fn a_large_step_is_one_drift() {
     let at = |onset_s: f64| Course { kind: CourseKind::Step, onset_s };

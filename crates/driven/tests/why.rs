@@ -171,8 +171,8 @@ fn what_cannot_be_asked_is_said() {
             ("tc_offset", "not recorded"),
             ("oil_scale", "surroundings"),
         ] {
-            let said = &not_asked(effect).unwrap().reason;
-            assert!(said.contains(reason), "{effect}: {said}");
+            let stated = &not_asked(effect).unwrap().reason;
+            assert!(stated.contains(reason), "{effect}: {stated}");
         }
         // Every library effect is in one of the two lists.
         let mut all: Vec<String> = found.asked.iter().map(|one| one.effect.clone()).collect();

@@ -84,11 +84,11 @@ pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64
     let energies = smooth_energies(study, linearised, &fit.residual);
     let expected: f64 = study.groups.iter().map(|group| DIRECTIONS.min(group.rows.len()) as f64).sum();
     let smooth_excess = energies.iter().sum::<f64>() - expected;
-    let all = Selection::all(study);
+    let everywhere = Selection::all(study);
     let mut scatter_sigma: f64 = 0.0;
     for column in &fit.effect_columns {
         let (mut sum, mut count) = (0.0, 0.0);
-        for rows in all.rows(study) {
+        for rows in everywhere.rows(study) {
             let own = dot(&column[rows.clone()], &column[rows.clone()]);
             if own > 1.0 {
                 sum += dot(&column[rows.clone()], &fit.residual[rows]).powi(2) / own;

@@ -47,18 +47,18 @@ pub struct Question<'a> {
     /// Whether the campaign declares its tolerances; where it does not, the usual ones hold, and its actuators follow as the
     /// recording says.
     pub tolerances_declared: bool,
-    /// What may be done on this machine to tell causes apart; where there is no jump among it, those of the recording.
+    /// Experiments allowed on this machine to distinguish causes; if they contain no jump, those of the recording.
     pub experiments: Vec<Experiment>,
     /// Numbers behind the probabilities.
     pub calibration: Calibration,
-    /// Told the share done, and what comes.
+    /// Receives the share done and the name of the next stage.
     pub progress: &'a (dyn Fn(f64, &str) + Sync),
 }
 
 /// A diagnosis with what it was made from, for pictures and calibration.
 #[derive(Debug)]
 pub struct Diagnosed {
-    /// What is said.
+    /// The diagnosis.
     pub diagnosis: Diagnosis,
     /// The recording made ready.
     pub study: Study,
@@ -127,7 +127,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     }
     if study.scatter_s > 0.0 {
         warnings.push(format!(
-            "the times of the samples are off by {:.0} ms, as P3 tells where it jumps: readings that move count for as much less",
+            "the times of the samples are off by {:.0} ms, as P3 shows where it jumps: readings that move count for as much less",
             1e3 * study.scatter_s
         ));
     }
@@ -147,7 +147,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let found = search(at(&linearised), progress)?;
     progress(0.65, "closest causes");
     let null = found.null;
-    let beside = found.refound.as_ref().map_or(&linearised, |(linearised, _)| linearised);
+    let at_best = found.refound.as_ref().map_or(&linearised, |(linearised, _)| linearised);
     let hopeless = |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > HOPELESS);
     let mut finalists: Vec<&Fit> = found
         .fits
@@ -165,29 +165,29 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         }
     }
     let effort = Effort { iterations: 5, enough: 0.1, ..Effort::default() };
-    let mut fits = refit(&at(beside), &finalists, effort);
-    // Close races are run where the best stands, not where nothing is off.
+    let mut fits = refit(&at(at_best), &finalists, effort);
+    // Close candidates are compared with the linearisation at the best fit, not at the nominal point.
     let refound = match (fits.first(), &found.refound) {
         (Some(best), Some((_, there))) if members(&best.hypothesis) != *there => {
             linearised.at(&study, &best.hypothesis).ok()
         }
         _ => None,
     };
-    let beside = refound.as_ref().unwrap_or(beside);
+    let at_best = refound.as_ref().unwrap_or(at_best);
     if refound.is_some() {
         let (closest, others) = fits.split_at(fits.len().min(4));
-        let again = refit(&at(beside), &closest.iter().collect::<Vec<_>>(), effort);
-        fits = ranked(&at(beside), again.iter().chain(closest).chain(others));
+        let again = refit(&at(at_best), &closest.iter().collect::<Vec<_>>(), effort);
+        fits = ranked(&at(at_best), again.iter().chain(closest).chain(others));
     }
     progress(0.75, "what one more would do");
-    let mut one_more = most_gain(&study, beside, &everywhere, fits.first().unwrap_or(&null));
+    let mut one_more = most_gain(&study, at_best, &everywhere, fits.first().unwrap_or(&null));
     let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
     if calibration.outside(left.features()) > 0.5 && study.steps.len() >= MIN_STEPS {
         progress(0.8, "causes that begin");
         study.add_onsets();
         let at = Search {
             study: &study,
-            linearised: beside,
+            linearised: at_best,
             selection: &everywhere,
             calibration: &calibration,
             onsets: true,
@@ -195,14 +195,14 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         search_onsets(at, &null, &mut fits);
         fits.truncate(FINALISTS);
         let best = fits.first().unwrap_or(&null);
-        one_more = most_gain(&study, beside, &everywhere, best);
+        one_more = most_gain(&study, at_best, &everywhere, best);
         left = adequacy(&study, &linearised, best, one_more);
     }
-    progress(0.88, "what is left");
+    progress(0.88, "residual");
     let best = fits.first().unwrap_or(&null);
     let left_by_null = adequacy(&study, &linearised, &null, 0.0);
-    let weighed = weigh(&study, &calibration, &null, &fits, &left);
-    let named = weighed.named;
+    let posterior = weigh(&study, &calibration, &null, &fits, &left);
+    let named = posterior.named;
     let weight = |fit: &Fit| weight(&calibration, &study, fit);
     let causes: Vec<&Fit> = fits
         .iter()
@@ -212,15 +212,15 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         .collect();
     let compared = Compared {
         study: &study,
-        linearised: [&linearised, beside],
+        linearised: [&linearised, at_best],
         null: &null,
         causes: &causes,
         weight: &weight,
     };
     let gap = how_far(compared, &folds);
     let verdict = if !named {
-        if weighed.outside > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
-    } else if weighed.outside <= 0.5 {
+        if posterior.outside > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
+    } else if posterior.outside <= 0.5 {
         Verdict::Explained
     } else {
         let n = null.residual.len() as f64;
@@ -242,13 +242,13 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     };
     progress(0.95, "what next");
     let Suggested { next, experiments } = match verdict {
-        Verdict::WithinTolerance => suspicions(&weighed, &fits, &null)
+        Verdict::WithinTolerance => suspicions(&posterior, &fits, &null)
             .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
             .unwrap_or_default(),
         Verdict::Unexplained | Verdict::PartlyExplained => {
             Suggested { next: Some(look_beside(&r#where)), experiments: Vec::new() }
         }
-        Verdict::Explained => rivals(&weighed, &fits)
+        Verdict::Explained => rivals(&posterior, &fits)
             .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
             .unwrap_or_default(),
     };
@@ -262,9 +262,9 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         verdict,
         since,
         r#where,
-        candidates: weighed.candidates,
-        probability_none: weighed.none,
-        probability_outside: weighed.outside,
+        candidates: posterior.candidates,
+        probability_none: posterior.none,
+        probability_outside: posterior.outside,
         laws: Vec::new(),
         forces: Vec::new(),
         gap,

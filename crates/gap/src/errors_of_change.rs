@@ -16,11 +16,11 @@ const SAYS_NOTHING: f64 = 1e3;
 /// Values within this time after a jump are fully correlated, s.
 const AT_ONCE_S: f64 = 0.3;
 
-/// Relative model error of each output's variation over a recording; 0 if noise accounts for it. `lacking` is measured minus predicted.
+/// Relative model error of each output's variation over a recording; 0 if noise accounts for it. `model_error` is measured minus predicted.
 pub(crate) fn errors_of_change(
     study: &Study,
     linearised: &Linearised,
-    lacking: &[f64],
+    model_error: &[f64],
 ) -> [f64; OUTPUTS.len()] {
     let mut of_output = [const { Vec::new() }; OUTPUTS.len()];
     for (place, group) in study.groups.iter().enumerate() {
@@ -36,7 +36,7 @@ pub(crate) fn errors_of_change(
             rows.iter().map(|(row, _)| (of[*row] - mean).powi(2)).sum::<f64>() / count
         };
         let noise = rows.iter().map(|(_, variance)| variance).sum::<f64>() / count;
-        let (missed, moved) = (variance(lacking) - noise, variance(&study.measured));
+        let (missed, moved) = (variance(model_error) - noise, variance(&study.measured));
         if moved > 0.0 { (missed.max(0.0) / moved).sqrt().min(1.0) } else { 0.0 }
     })
 }

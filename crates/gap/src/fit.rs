@@ -54,7 +54,7 @@ impl Default for Effort {
     }
 }
 
-/// Fits nuisances and effects from where `start` stands.
+/// Fits nuisances and effects, starting at `start`.
 ///
 /// # Errors
 /// [`PredictError`] where the model cannot follow at the start itself.
@@ -156,8 +156,8 @@ impl Model for Fitted<'_> {
         let Point { hypothesis, prediction, residual } = point;
         let Fitted { study, linearised, coordinates, rows, .. } = self;
         // Near surge the cost has small steps: a slope taken over more of the way sees past them.
-        let beside = if reach == Reach::Fine { FINE } else { COARSE };
-        let columns = changes_beside(study, linearised, hypothesis, prediction, coordinates, beside);
+        let distance = if reach == Reach::Fine { FINE } else { COARSE };
+        let columns = changes_near(study, linearised, hypothesis, prediction, coordinates, distance);
         let matrix = normal_matrix(rows, linearised, &self.nuisance_products, &columns);
         let ask = |column: &Vec<f64>| dot_over(rows, column, residual);
         let pulled = linearised.columns.iter().zip(&hypothesis.nuisances).map(|(c, sigmas)| ask(c) - sigmas);
@@ -182,11 +182,11 @@ fn cost_of(rows: &[std::ops::Range<usize>], residual: &[f64], hypothesis: &Hypot
     if cost.is_finite() { cost } else { f64::INFINITY }
 }
 
-/// Distance of the runs beside a hypothesis from which slopes are taken, in typical steps.
+/// Distance from a hypothesis to the runs from which slopes are taken, in typical steps.
 const FINE: f64 = 0.02;
 const COARSE: f64 = 0.2;
 
-/// Whitened change for a unit of each effect's coordinate, by runs of the model beside the hypothesis.
+/// Whitened change for a unit of each effect's coordinate, by runs of the model next to the hypothesis.
 pub fn effect_changes(
     study: &Study,
     linearised: &Linearised,
@@ -194,17 +194,17 @@ pub fn effect_changes(
     here: &Prediction,
     coordinates: &[Coordinate],
 ) -> Vec<Vec<f64>> {
-    changes_beside(study, linearised, hypothesis, here, coordinates, FINE)
+    changes_near(study, linearised, hypothesis, here, coordinates, FINE)
 }
 
-/// As [`effect_changes`], from runs `beside` the hypothesis in the coordinate's unit.
-fn changes_beside(
+/// As [`effect_changes`], from runs at `distance` from the hypothesis, in the coordinate's unit.
+fn changes_near(
     study: &Study,
     linearised: &Linearised,
     hypothesis: &Hypothesis,
     here: &Prediction,
     coordinates: &[Coordinate],
-    beside: f64,
+    distance: f64,
 ) -> Vec<Vec<f64>> {
     let values = parameters(hypothesis);
     coordinates
@@ -214,9 +214,9 @@ fn changes_beside(
         .map(|(place, (coordinate, value))| {
             let at = coordinate.of(*value);
             // To the side where there is room.
-            let tried = [at + beside, at - beside];
+            let tried = [at + distance, at - distance];
             let away = tried.into_iter().find(|x| (coordinate.of(coordinate.value(*x)) - x).abs() < 1e-9);
-            let away = away.unwrap_or(at - beside);
+            let away = away.unwrap_or(at - distance);
             let mut moved = hypothesis.clone();
             set_parameter(&mut moved, place, coordinate.value(away));
             let step = coordinate.of(coordinate.value(away)) - at;
@@ -232,7 +232,7 @@ fn changes_beside(
         .collect()
 }
 
-/// Six sigma of a declared tolerance is no longer a tolerance.
+/// Limit of a nuisance in declared sigmas: a larger deviation does not count as a tolerance.
 pub const MAX_SIGMAS: f64 = 6.0;
 /// Maximum number of typical steps an effect moves in one iteration: effects bend.
 const MAX_STEPS: f64 = 2.0;

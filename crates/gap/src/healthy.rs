@@ -73,15 +73,15 @@ impl Study {
         another_machine(&before, &linearised.base.values)?;
         let tolerances = tolerances(&before, &linearised)?;
         let predicted = before.predict(&tolerances)?;
-        let lacking: Vec<f64> =
+        let model_error: Vec<f64> =
             before.measured.iter().zip(&predicted.values).map(|(seen, predicted)| seen - predicted).collect();
-        let shares = errors_of_change(&before, &linearised, &lacking);
+        let shares = errors_of_change(&before, &linearised, &model_error);
         // Values missing in the reference recording cannot be compared.
         let partners = partners(&self, &before);
         let mut study = self.with_rows(&partners.iter().map(Option::is_some).collect::<Vec<_>>());
         let partners: Vec<usize> = partners.into_iter().flatten().collect();
         for (measured, row) in study.measured.iter_mut().zip(&partners) {
-            *measured -= lacking[*row];
+            *measured -= model_error[*row];
         }
         // Tolerances may have moved from their reference values by as much as declared, because sensors are remounted.
         for nuisance in &mut study.nuisances {
@@ -102,7 +102,7 @@ impl Study {
                 group.blocks.iter().map(|block| blocks[*block].since_jump_s).collect();
             let missed: Vec<f64> =
                 group.rows.clone().map(|row| shares[group.output] * changed[row]).collect();
-            let moved: Vec<f64> = rows.iter().map(|row| elsewhere[group.step] * lacking[*row]).collect();
+            let moved: Vec<f64> = rows.iter().map(|row| elsewhere[group.step] * model_error[*row]).collect();
             let mut noise = covariance_of_errors(&since_jump_s, [&missed, &moved]);
             let before_it =
                 before.groups.iter().position(|other| rows.iter().all(|row| other.rows.contains(row)));
@@ -115,7 +115,7 @@ impl Study {
             noise
         });
         study.noise_besides = noise.collect();
-        let since = Since { recording: name, lacking: by_channel(&before, &lacking, &shares) };
+        let since = Since { recording: name, lacking: by_channel(&before, &model_error, &shares) };
         Ok(Changed { study, since, warnings })
     }
 }
@@ -155,14 +155,14 @@ fn tolerances(study: &Study, linearised: &Linearised) -> Result<Hypothesis, Pred
 }
 
 /// Model error of each channel.
-fn by_channel(study: &Study, lacking: &[f64], shares: &[f64]) -> BTreeMap<String, Lacking> {
+fn by_channel(study: &Study, model_error: &[f64], shares: &[f64]) -> BTreeMap<String, Lacking> {
     let of_output = |(output, channel): (usize, &Channel)| {
         let groups = study.groups.iter().filter(|group| group.output == output);
         let rows: Vec<usize> = groups.flat_map(|group| group.rows.clone()).collect();
-        let squares: f64 = rows.iter().map(|row| lacking[*row].powi(2)).sum();
+        let squares: f64 = rows.iter().map(|row| model_error[*row].powi(2)).sum();
         let size = (squares / rows.len().max(1) as f64).sqrt();
-        let lacking = Lacking { size, unit: channel.unit().to_owned(), share: shares[output] };
-        (!rows.is_empty()).then(|| (channel.symbol().to_owned(), lacking))
+        let of_channel = Lacking { size, unit: channel.unit().to_owned(), share: shares[output] };
+        (!rows.is_empty()).then(|| (channel.symbol().to_owned(), of_channel))
     };
     OUTPUTS.iter().enumerate().filter_map(of_output).collect()
 }

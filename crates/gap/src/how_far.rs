@@ -95,7 +95,7 @@ fn strained(study: &Study, fit: &Fit) -> Option<Strained> {
 }
 
 fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
-    let Compared { study, linearised: [nominal, beside], null, causes, weight } = compared;
+    let Compared { study, linearised: [nominal, at_best], null, causes, weight } = compared;
     let whole = |fit: &Fit| Unseen { residual: fit.residual.clone(), values: fit.prediction.values.clone() };
     if folds.steps.len() < 2 {
         return (whole(null), whole(causes.first().unwrap_or(&null)));
@@ -110,7 +110,7 @@ fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
         }
         let (linearised, whole) = match which.checked_sub(1) {
             None => (nominal, null),
-            Some(cause) => (beside, causes[cause]),
+            Some(cause) => (at_best, causes[cause]),
         };
         // If a fold cannot be fitted, it keeps the fit to all steps.
         let fitted = fit(study, linearised, &whole.hypothesis, &selection, EFFORT);
@@ -169,8 +169,8 @@ fn by_channel(
         if count == 0 {
             continue;
         }
-        let rms = |told: &Unseen| {
-            let off: Vec<f64> = study.measured.iter().zip(&told.values).map(|(m, v)| m - v).collect();
+        let rms = |predicted: &Unseen| {
+            let off: Vec<f64> = study.measured.iter().zip(&predicted.values).map(|(m, v)| m - v).collect();
             (dot_over(&rows, &off, &off) / count as f64).sqrt()
         };
         let gap = ChannelGap {
@@ -203,8 +203,8 @@ fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
         .steps
         .iter()
         .zip(points)
-        .filter_map(|(step, (after, beside))| {
-            let [nominal, before] = beside.as_slice() else { return None };
+        .filter_map(|(step, (after, others))| {
+            let [nominal, before] = others.as_slice() else { return None };
             Some(PointGap {
                 speed_rpm: after.speed_rpm,
                 valve: step.marker.valve_opening_ratio,

@@ -184,13 +184,13 @@ fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<(Fit, Vec<b
         })
         .collect();
     let start = Hypothesis { nuisances, effects: start };
-    let beside = diagnosed.linearised.at(study, &start).ok()?;
-    let whole = fit(study, &beside, &start, &everywhere, Effort::default()).ok()?;
+    let linearised = diagnosed.linearised.at(study, &start).ok()?;
+    let whole = fit(study, &linearised, &start, &everywhere, Effort::default()).ok()?;
     let places: Vec<usize> = (0..effects.len()).collect();
     let there = parallel::map(&places, |place| {
         let mut without = whole.hypothesis.clone();
         without.effects.remove(*place);
-        let without = fit(study, &beside, &without, &everywhere, Effort::default());
+        let without = fit(study, &linearised, &without, &everywhere, Effort::default());
         without.is_ok_and(|without| without.cost - whole.cost > THERE * THERE)
     });
     Some((whole, there))

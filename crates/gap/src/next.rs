@@ -176,7 +176,7 @@ pub fn look_beside(places: &[Place]) -> Next {
     let (sensor, lies) = match part {
         Some(part) => (sensor_for(part), format!("most of it lies in {}", part.name())),
         None => {
-            ("a second thermocouple in the compressor housing, near the gas", "no part stands out".to_owned())
+            ("a second thermocouple in the compressor housing, near the gas", "no part dominates".to_owned())
         }
     };
     Next::Sensor {

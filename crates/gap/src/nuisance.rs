@@ -138,8 +138,8 @@ pub fn apply(
     use NuisanceKind as K;
     match kind {
         K::CommonOffset(dimension) => {
-            let all = declared.common_offsets.iter().flat_map(|common| &common.channels);
-            for channel in all.filter(|channel| channel.info().dimension == dimension) {
+            let sharing = declared.common_offsets.iter().flat_map(|common| &common.channels);
+            for channel in sharing.filter(|channel| channel.info().dimension == dimension) {
                 rig.instruments.path_mut(*channel).offset += value;
             }
         }

@@ -14,20 +14,20 @@ use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
 pub struct Search<'a> {
     /// The recording.
     pub study: &'a Study,
-    /// Linearised where the fits begin: where nothing is off, or beside the best so far.
+    /// Linearised at the start of the fits: at the nominal point, or at the best so far.
     pub linearised: &'a Linearised,
     /// Steps that count.
     pub selection: &'a Selection,
     /// Numbers behind the probabilities.
     pub calibration: &'a Calibration,
-    /// Whether causes that begin with a step are looked for, beside what is known, or those that act throughout.
+    /// Whether to search for causes that begin with a step, in addition to what is known, or for those that act throughout.
     pub onsets: bool,
 }
 
 /// Judgement: bounds the time. The slack is the evidence that a cause has to have over nothing.
 const LIMITS: Limits = Limits { members: 4, starts: 2, fits: 6, slack: 3.0 };
-/// Where a single takes at least this off the cost, nuisances are linearised again beside it: tolerances of what an
-/// effect changes act otherwise beside it than where nothing is off.
+/// If a single takes at least this off the cost, nuisances are linearised again at its fit: tolerances of what an
+/// effect changes act otherwise there than at the nominal point.
 const STRONG: f64 = 30.0;
 /// A further effect that leaves more than this share of the excess cost is one of many that chip at a cause of another kind:
 /// nothing is built upon it.
@@ -82,11 +82,11 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     again(&search, &mut known, 7, EFFORT);
     let refound =
         known.ranked(&search).first().filter(|best| null.cost - best.cost > STRONG).and_then(|best| {
-            let beside = linearised.at(study, &best.hypothesis).ok()?;
-            Some((beside, members(&best.hypothesis)))
+            let at_best = linearised.at(study, &best.hypothesis).ok()?;
+            Some((at_best, members(&best.hypothesis)))
         });
     let search = match &refound {
-        Some((beside, _)) => Search { linearised: beside, ..search },
+        Some((at_best, _)) => Search { linearised: at_best, ..search },
         None => search,
     };
     if refound.is_some() {

@@ -33,8 +33,8 @@ pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calib
         // With several parameters, the others are a typical step from neutral.
         let at = |value: f64| {
             let mut there = study.nothing();
-            let beside = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
-            there.effects = vec![(*index, beside.chain([value]).collect())];
+            let typical = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
+            there.effects = vec![(*index, typical.chain([value]).collect())];
             there
         };
         let length = |value: f64| -> Option<f64> {

@@ -447,11 +447,11 @@ impl Study {
         }
         let mut points = vec![(PointState::default(), Vec::new()); times_s.len()];
         self.drive(hypothesis, &times_s, |index, _, prepared, state, outputs| {
-            let beside = |(rig, _): &(Rig, Circumstances)| {
+            let other_point = |(rig, _): &(Rig, Circumstances)| {
                 let outputs = rig.model.prepare(prepared.boundary()).evaluate(state);
                 PointState::of(state, &outputs)
             };
-            points[index] = (PointState::of(state, outputs), rigs[index].iter().map(beside).collect());
+            points[index] = (PointState::of(state, outputs), rigs[index].iter().map(other_point).collect());
         })?;
         Ok(points)
     }

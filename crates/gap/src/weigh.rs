@@ -190,26 +190,27 @@ pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> 
 
 /// If no cause is named but one is more probable than none: the causes and the null hypothesis, most probable first.
 pub(crate) fn suspicions<'a>(
-    weighed: &CauseProbabilities,
+    posterior: &CauseProbabilities,
     fits: &'a [Fit],
     null: &'a Fit,
 ) -> Option<Rivals<'a>> {
-    if weighed.candidates.first()?.probability <= weighed.none {
+    if posterior.candidates.first()?.probability <= posterior.none {
         return None;
     }
-    let causes = weighed.candidates.iter().zip(&weighed.shown);
+    let causes = posterior.candidates.iter().zip(&posterior.shown);
     let mut open: Vec<(f64, &Fit)> =
         causes.map(|(cause, place)| (cause.probability, &fits[*place])).collect();
-    let nothing = open.partition_point(|(probability, _)| *probability > weighed.none);
-    open.insert(nothing, (weighed.none, null));
+    let nothing = open.partition_point(|(probability, _)| *probability > posterior.none);
+    open.insert(nothing, (posterior.none, null));
     let (probabilities, fits) = open.into_iter().unzip();
     Some(Rivals { fits, probabilities })
 }
 
 /// Open causes, best first; `None` if the first is settled.
-pub(crate) fn rivals<'a>(weighed: &CauseProbabilities, fits: &'a [Fit]) -> Option<Rivals<'a>> {
-    let probabilities: Vec<f64> = weighed.candidates.iter().map(|candidate| candidate.probability).collect();
+pub(crate) fn rivals<'a>(posterior: &CauseProbabilities, fits: &'a [Fit]) -> Option<Rivals<'a>> {
+    let probabilities: Vec<f64> =
+        posterior.candidates.iter().map(|candidate| candidate.probability).collect();
     let total: f64 = probabilities.iter().sum();
     (probabilities.len() > 1 && probabilities[0] < SETTLED * total)
-        .then(|| Rivals { fits: weighed.shown.iter().map(|place| &fits[*place]).collect(), probabilities })
+        .then(|| Rivals { fits: posterior.shown.iter().map(|place| &fits[*place]).collect(), probabilities })
 }

@@ -110,7 +110,7 @@ impl Linearised {
     /// Whitened residual of a prediction.
     pub fn residual(&self, study: &Study, prediction: &Prediction) -> Vec<f64> {
         let mut residual: Vec<f64> =
-            study.measured.iter().zip(&prediction.values).map(|(seen, told)| seen - told).collect();
+            study.measured.iter().zip(&prediction.values).map(|(seen, predicted)| seen - predicted).collect();
         self.whiten(study, &mut residual);
         residual
     }

@@ -94,7 +94,7 @@ fn complaint(clean: &Study, nominal: &Linearised, index: usize, effect: &dyn Eff
     let mut more = additions(&study, nominal, &everywhere, &own);
     more.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     if more[0].gain > CHANCE {
-        return Some(format!("{} reduces it by {:.1} beside it", name(more[0].effect), more[0].gain));
+        return Some(format!("{} reduces it by {:.1} in addition", name(more[0].effect), more[0].gain));
     }
     let mut rivals = additions(&study, nominal, &everywhere, &null);
     rivals.retain(|rival| rival.effect != index);

@@ -72,11 +72,11 @@ fn next_night(effects: &[(&str, &[f64])], seed: u64) -> Recording {
 
 /// With a few candidates only; `mapper gap blind` tests the search over all of them.
 fn ask(recording: &Recording) -> Result<Diagnosed, GapError> {
-    ask_beside(recording, None)
+    ask_with(recording, None)
 }
 
 /// The same with one more candidate.
-fn ask_beside(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diagnosed, GapError> {
+fn ask_with(recording: &Recording, more: Option<Arc<dyn Effect>>) -> Result<Diagnosed, GapError> {
     let candidates = ["tip_diameter", "stem_conduction", "bearing_friction", "flowmeter_gain"];
     let effects: Vec<Arc<dyn Effect>> =
         candidates.iter().map(|id| mapper_effects::find(id).unwrap()).chain(more).collect();
@@ -262,8 +262,8 @@ fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
     }
     let diagnosis = ask(&recording).unwrap().diagnosis;
     assert_eq!(diagnosis.candidates[0].effects, ["tip_diameter"]);
-    for said in ["T4", "m_t", "gap"] {
-        assert!(diagnosis.warnings.iter().any(|w| w.contains(said)), "{said}: {:?}", diagnosis.warnings);
+    for part in ["T4", "m_t", "gap"] {
+        assert!(diagnosis.warnings.iter().any(|w| w.contains(part)), "{part}: {:?}", diagnosis.warnings);
     }
 }
 
@@ -317,10 +317,10 @@ fn a_suspected_effect_in_rhai_is_named_and_measured() {
     let recording = record_of(&rig, 11);
     let blind = ask(&recording).unwrap().diagnosis;
     assert_ne!(blind.verdict, Verdict::Explained, "{:?}", blind.candidates[0]);
-    let told = ask_beside(&recording, Some(scripted)).unwrap().diagnosis;
-    assert_eq!(told.verdict, Verdict::Explained);
-    assert_eq!(told.candidates[0].effects, ["coolant_passage"]);
-    let estimate = &told.candidates[0].parameters["coolant_passage"];
+    let extended = ask_with(&recording, Some(scripted)).unwrap().diagnosis;
+    assert_eq!(extended.verdict, Verdict::Explained);
+    assert_eq!(extended.candidates[0].effects, ["coolant_passage"]);
+    let estimate = &extended.candidates[0].parameters["coolant_passage"];
     // Three times the half width of its own interval.
     let room = 1.5 * (estimate.high - estimate.low);
     assert!((estimate.value - 4.0).abs() < room && room < 1.0, "{estimate:?}");

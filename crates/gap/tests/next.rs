@@ -109,18 +109,21 @@ fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
 
 /// At rest T1, T2 and Tc read the same apart from their offsets.
 #[test]
-fn a_soak_tells_more_the_evener_it_is() {
+fn a_more_uniform_soak_gives_more_information() {
     let soak = |left_k: f64| {
         let soak = AtRest { duration_s: 1800.0, left_sigma_k: [left_k; AtRest::CHANNELS.len()] };
         Experiment { beside: Beside::Soak(soak), ..jump(70e3, 70e3, 300.0) }
     };
     let diagnosed = ask(("t2_offset", 2.0), &["t1_offset", "t2_offset"]);
     let pair = [fit_of(&diagnosed, "t2_offset"), fit_of(&diagnosed, "t1_offset")];
-    let told = |left_k: f64| apart(&diagnosed.study, &soak(left_k), &pair).unwrap();
+    let information = |left_k: f64| apart(&diagnosed.study, &soak(left_k), &pair).unwrap();
     // A more uniform soak gives more information; the common temperature stays unknown, and a cause does not differ from itself.
-    let [even, uneven, useless] = [0.02, 0.3, 100.0].map(|left_k| told(left_k)[0][1]);
-    assert!(told(0.02)[0][0].abs() < 1e-9 && even > uneven && uneven > useless, "{even} {uneven} {useless}");
-    assert!(useless < 0.01, "sensors that rest unevenly by 100 K tell nothing: {useless}");
+    let [even, uneven, useless] = [0.02, 0.3, 100.0].map(|left_k| information(left_k)[0][1]);
+    assert!(
+        information(0.02)[0][0].abs() < 1e-9 && even > uneven && uneven > useless,
+        "{even} {uneven} {useless}"
+    );
+    assert!(useless < 0.01, "sensors that rest unevenly by 100 K give no information: {useless}");
 }
 
 /// The list is ranked by information per minute, its first entry is `next`, and it contains only allowed experiments.
@@ -166,11 +169,11 @@ fn the_smoother_follows_a_step_of_t3_and_oil() {
         })
         .collect();
     // Of 100 K of T3 and 40 K of oil, at most this much is lost around the corner.
-    for (beside, most_k) in [
+    for (change, most_k) in [
         (Beside::T3 { from_k: t3_k, to_k: t3_k - 100.0 }, 4.0),
         (Beside::Oil { from_k: oil_k, to_k: oil_k + 40.0 }, 1.5),
     ] {
-        let (channel, series) = Experiment { beside, ..hold }.driven(&t_s, 300.0).unwrap();
+        let (channel, series) = Experiment { beside: change, ..hold }.driven(&t_s, 300.0).unwrap();
         for noise_k in [0.0, declared().noise_sigma(channel)] {
             let mut random = Pcg64::seed_from_u64(5);
             let mut noisy = series.clone();

@@ -13,7 +13,7 @@ use mapper_core::{EstimateUncertainty, Recording, Window};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 
-/// Ratio of isentropic temperature rise to inlet temperature below which there is no compression.
+/// Ratio of isentropic temperature rise to inlet temperature below which the machine does not compress.
 const SMALLEST_RISE_RATIO: f64 = 1e-3;
 /// A residual this many robust standard deviations, and [`OUTLIER_K`], from its neighbours is an outlier.
 const OUTLIER_SIGMAS: f64 = 8.0;
@@ -265,7 +265,7 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     let dt2_k = dt2_k.unwrap_or(0.0);
     if fit.eta > 1.0 {
         let message = format!(
-            "the fitted efficiency is {:.3}, above 1: something outside the method is at work",
+            "the fitted efficiency is {:.3}, above 1: something outside the method has an influence",
             fit.eta
         );
         findings.refuse(code::POOR_FIT, message);

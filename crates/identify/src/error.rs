@@ -18,7 +18,7 @@ pub enum IdentifyError {
         /// The missing channels.
         missing: Vec<Channel>,
     },
-    /// There are no steps to identify.
+    /// The recording has no steps to identify.
     #[error(
         "the recording has no steps: it has no step markers, and its command channels never change. Map P3_command and valve_command"
     )]

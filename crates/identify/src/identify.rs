@@ -24,7 +24,7 @@ use mapper_inference::hypotheses::{Likelihood, Priors};
 /// [`end_mean_s`](crate::Thresholds::end_mean_s) of its step.
 ///
 /// # Errors
-/// [`IdentifyError`] if a channel that the method needs is missing, there are no steps, or the configuration is out of range.
+/// [`IdentifyError`] if a channel that the method needs is missing, the recording has no steps, or the configuration is out of range.
 pub fn identify(
     recording: &Recording,
     config: &IdentifyConfig,
@@ -172,8 +172,8 @@ pub fn identify_beside(
         .zip(findings)
         .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
         .collect();
-    let tells = balances.map(|(likelihood, priors)| faults::standard_errors(&likelihood, &priors));
-    Ok(Identified { points, thermal, two_parameter, faults, tells: tells.unwrap_or_default() })
+    let standard_errors = balances.map(|(likelihood, priors)| faults::standard_errors(&likelihood, &priors));
+    Ok(Identified { points, thermal, two_parameter, faults, tells: standard_errors.unwrap_or_default() })
 }
 
 /// The steps that contribute to the shared parameters: steps with a failed check would bias the others. Samples of a temporarily frozen

@@ -17,7 +17,7 @@ pub fn missing(recording: &Recording, method: Method) -> Vec<Channel> {
     needs(method).into_iter().filter(|channel| recording.require(*channel).is_err()).collect()
 }
 
-/// The default method for a recording, and why it differs from `usual`. Without a housing temperature there is no heat-transfer model, so only
+/// The default method for a recording, and why it differs from `usual`. Without a housing temperature no heat-transfer model applies, so only
 /// the apparent efficiency remains.
 pub fn method_for(recording: &Recording, usual: Method) -> (Method, Option<String>) {
     let lost = missing(recording, usual);
@@ -26,7 +26,7 @@ pub fn method_for(recording: &Recording, usual: Method) -> (Method, Option<Strin
     }
     let why = format!(
         "the recording has no {}, which `{usual}` needs: the efficiencies are those of conventional mapping (`{}`), in which \
-         heat that the housing takes or gives counts as work; there is no heat-transfer coefficient",
+         heat that the housing takes or gives counts as work; no heat-transfer coefficient is identified",
         names(&lost),
         Method::Steady
     );

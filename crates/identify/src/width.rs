@@ -15,7 +15,7 @@ pub(crate) fn cause(
     let all = points(eta.combined_standard_error());
     if dt2_k.abs() < least_dt2_k {
         let message = format!(
-            "T2 moves by {dt2_k:+.2} K in the window, less than the {least_dt2_k} K that tell efficiency from heat transfer; eta is \
+            "T2 moves by {dt2_k:+.2} K in the window, less than the {least_dt2_k} K that separate efficiency from heat transfer; eta is \
              uncertain by {all} points (1 sigma): come to this point by a larger jump"
         );
         return (code::SMALL_GRADIENT, message);

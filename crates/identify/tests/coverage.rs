@@ -57,7 +57,7 @@ fn coverage(with_offsets: bool, config: &IdentifyConfig) -> [f64; 2] {
     }
     let n = SEEDS as f64;
     println!(
-        "coverage eta {:.3}, h {:.3}; eta off by {:.5} rms, said {:.5}",
+        "coverage eta {:.3}, h {:.3}; eta off by {:.5} rms, stated {:.5}",
         held[0] / n,
         held[1] / n,
         (errors / n).sqrt(),
@@ -95,8 +95,8 @@ fn serial_correlation_matters() {
         config.noise_colour.time_constant_s = 1e-3;
         config
     };
-    let said = |config: &IdentifyConfig| {
+    let stated = |config: &IdentifyConfig| {
         point(&transient, 1, false, config).eta_uncertainty.unwrap().noise_standard_error
     };
-    assert!(said(&config(false, false)) > 2.0 * said(&white));
+    assert!(stated(&config(false, false)) > 2.0 * stated(&white));
 }

@@ -125,8 +125,8 @@ fn faults_are_found_and_named_and_none_is_invented() {
     let per_machine = 4;
     let results = mapper_numerics::parallel::map(&seeds, |seed| {
         let drawn = drawn(*seed);
-        let sound = found(&drawn, &drawn.recording);
-        let tellable: Vec<(usize, Suspect, f64)> = sound
+        let fault_free = found(&drawn, &drawn.recording);
+        let tellable: Vec<(usize, Suspect, f64)> = fault_free
             .tells
             .iter()
             .enumerate()
@@ -142,12 +142,12 @@ fn faults_are_found_and_named_and_none_is_invented() {
                 (index, outcome(&drawn, &suspect, sign * SIGMAS * error))
             })
             .collect();
-        (sound.faults, outcomes)
+        (fault_free.faults, outcomes)
     });
     let false_alarms: Vec<String> =
         results.iter().flat_map(|(faults, _)| faults).map(ToString::to_string).collect();
     println!(
-        "false alarms: {} faults in {} sound recordings {false_alarms:?}",
+        "false alarms: {} faults in {} fault-free recordings {false_alarms:?}",
         false_alarms.len(),
         seeds.len()
     );

@@ -35,14 +35,14 @@ fn worst(points: &[IdentifiedPoint], campaign: &Campaign) -> (f64, f64) {
 /// If h before the wheel has its own law (Appendix A: 40 mm), the shared model would give alpha_A = 0.21. Without noise the recording decides,
 /// whatever was declared.
 #[test]
-fn without_noise_the_law_before_the_wheel_is_told() {
+fn without_noise_the_law_before_the_wheel_is_identified() {
     for inlet in [InletConvection::Shared, InletConvection::Own] {
         let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.3, inlet, ..Machine::default() });
         for declared in [InletConvection::Shared, InletConvection::Own] {
             let config = IdentifyConfig { inlet_convection: declared, ..joint() };
             let (points, thermal) = found(&campaign.recording, &config);
-            let told = thermal.inlet.unwrap();
-            assert_eq!((told.convection, told.origin), (inlet, Origin::Fitted), "{told:?}");
+            let chosen = thermal.inlet.unwrap();
+            assert_eq!((chosen.convection, chosen.origin), (inlet, Origin::Fitted), "{chosen:?}");
             let ((eta, h), alpha) = (worst(&points, &campaign), thermal.alpha_area_ratio.value.unwrap());
             // Error of the surface at eighteen points of the map, up to a third of a point.
             assert!(
@@ -65,10 +65,10 @@ fn with_noise_either_law_before_the_wheel_lies_in_the_intervals() {
             let mut rng = Pcg64::seed_from_u64(seed);
             let (recording, declared) = measured(&campaign.recording, 1.0, 1.0, &mut rng);
             let (points, thermal) = found(&recording, &IdentifyConfig { declared, ..joint() });
-            let told = thermal.inlet.unwrap();
-            assert_eq!(told.origin, Origin::NotIdentifiable, "seed {seed}: {told:?}");
+            let chosen = thermal.inlet.unwrap();
+            assert_eq!(chosen.origin, Origin::NotIdentifiable, "seed {seed}: {chosen:?}");
             let (low, high) = thermal.alpha_area_ratio.interval_95().unwrap();
-            let otherwise = told.alpha_area_otherwise_ratio.unwrap();
+            let otherwise = chosen.alpha_area_otherwise_ratio.unwrap();
             assert!((low..high).contains(&otherwise), "seed {seed}: {otherwise} in {low} to {high}");
             alphas += usize::from((low..high).contains(&0.2));
             for (point, truth) in points.iter().zip(&campaign.truth) {
@@ -105,9 +105,13 @@ fn with_a_held_share_the_intervals_reach_to_the_other_law_before_the_wheel() {
                 found(&recording, &config)
             };
             let ((points, thermal), (unasked, _)) = (of(held), of(unasked));
-            let told = thermal.inlet.unwrap();
-            assert_eq!((told.convection, told.origin), (declared_inlet, Origin::NotIdentifiable), "{told:?}");
-            assert!(told.probability > 0.05 && told.probability < 0.95, "{told:?}");
+            let chosen = thermal.inlet.unwrap();
+            assert_eq!(
+                (chosen.convection, chosen.origin),
+                (declared_inlet, Origin::NotIdentifiable),
+                "{chosen:?}"
+            );
+            assert!(chosen.probability > 0.05 && chosen.probability < 0.95, "{chosen:?}");
             let mut eta = Honesty::default();
             for ((point, unasked), truth) in points.iter().zip(&unasked).zip(&campaign.truth) {
                 assert!((point.eta.unwrap() - unasked.eta.unwrap()).abs() < 1e-4);
@@ -119,7 +123,7 @@ fn with_a_held_share_the_intervals_reach_to_the_other_law_before_the_wheel() {
     }
 }
 
-/// Without area before the wheel there is no comparison, and nothing changes.
+/// Without area before the wheel no comparison is made, and nothing changes.
 #[test]
 fn without_a_share_before_the_wheel_its_law_makes_no_difference() {
     let campaign = campaign(&eighteen(), 120.0, Machine::default());

@@ -368,9 +368,9 @@ fn a_missing_channel_is_named() {
     }
 }
 
-/// Two steps with ten times the noise of a good rig: any alpha_A fits, so the profile shows it and there is no number.
+/// Two steps with ten times the noise of a good rig: any alpha_A fits, so the profile shows it and no number is given.
 #[test]
-fn a_share_that_the_recording_can_not_tell_is_no_number() {
+fn a_share_that_the_recording_cannot_determine_gets_no_number() {
     let campaign = campaign(&eighteen()[..3], 120.0, Machine { alpha: 0.2, ..Machine::default() });
     let (recording, declared) = measured(&campaign.recording, 10.0, 0.0, &mut Pcg64::seed_from_u64(31));
     let (_, thermal) = found(&recording, &IdentifyConfig { declared, ..joint() });
@@ -379,7 +379,7 @@ fn a_share_that_the_recording_can_not_tell_is_no_number() {
     assert_eq!(thermal.alpha_area_ratio.value, None, "{:?}", thermal.alpha_area_ratio);
 }
 
-/// Noise, offsets and a gain as declared, 8 campaigns of 18 points: the intervals of eta and of h cover the truth, and are no wider than
+/// Noise, offsets and a gain as declared, 8 campaigns of 18 points: the intervals of eta and of h cover the truth, and are not wider than
 /// necessary. The common errors of a campaign are one draw, so 144 points count for some twenty. Of twenty at 95 % fewer than 16 cover it in
 /// 0.3 % of the cases; of twenty at 68 % fewer than 7 or more than 18 in 0.3 % and 0.5 %. Their root mean square is known to 16 %; three of
 /// that are allowed above a width of 1.4. The intervals include what a recording cannot exclude of alpha_A, the probe and the heating/cooling

@@ -39,7 +39,7 @@ fn grid() -> Vec<(f64, f64)> {
     points
 }
 
-fn config(method: Method, sound: &Sound) -> IdentifyConfig {
+fn config(method: Method, fault_free: &FaultFree) -> IdentifyConfig {
     // The machine is as declared; steps of 100 s could not show otherwise, and every point would be doubtful.
     let joint = JointSettings {
         alpha_area: Choice::Fixed,
@@ -54,22 +54,22 @@ fn config(method: Method, sound: &Sound) -> IdentifyConfig {
         method,
         joint,
         thresholds,
-        declared: sound.declared.clone(),
+        declared: fault_free.declared.clone(),
         ..IdentifyConfig::default()
     }
 }
 
 /// A fault-free recording with its clean source.
-struct Sound {
+struct FaultFree {
     clean: Campaign,
     recording: Recording,
     declared: BTreeMap<Channel, DeclaredUncertainty>,
 }
 
-fn sound(seed: u64, clean: &Campaign) -> Sound {
+fn fault_free(seed: u64, clean: &Campaign) -> FaultFree {
     let (recording, declared) = measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(seed));
     let clean = Campaign { recording: clean.recording.clone(), truth: clean.truth.clone() };
-    Sound { clean, recording, declared }
+    FaultFree { clean, recording, declared }
 }
 
 /// Distance of a value from the truth in half intervals; `None` without an interval.
@@ -102,9 +102,9 @@ struct Score {
     misplaced: usize,
 }
 
-fn score(recording: &Recording, sound: &Sound, method: Method) -> Score {
+fn score(recording: &Recording, fault_free: &FaultFree, method: Method) -> Score {
     let mut score = Score::default();
-    let config = config(method, sound);
+    let config = config(method, fault_free);
     // As in a campaign that declares tolerances.
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let nominal = NominalRig { model: &model, tolerances: &tolerances };
@@ -112,7 +112,7 @@ fn score(recording: &Recording, sound: &Sound, method: Method) -> Score {
         return score;
     };
     // The same steps on readings without noise and fault: true position, and the truth of `steady`.
-    let mut clean = sound.clean.recording.clone();
+    let mut clean = fault_free.clean.recording.clone();
     clean.steps.clone_from(&recording.steps);
     let apparent = identify_each(
         &clean,
@@ -125,7 +125,7 @@ fn score(recording: &Recording, sound: &Sound, method: Method) -> Score {
             continue;
         }
         score.good += 1;
-        let truth = sound.clean.truth[position];
+        let truth = fault_free.clean.truth[position];
         let place: &IdentifiedPoint = apparent[position].as_ref().unwrap();
         let eta = if method == Method::Steady { place.eta.unwrap() } else { truth.eta };
         let eta_off = off(point.eta, point.eta_low, point.eta_high, eta);
@@ -173,16 +173,16 @@ fn no_doctored_recording_gives_a_good_point_that_is_wrong() {
 
 /// The failures of one draw of noise and offsets.
 fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
-    let sound = sound(seed, clean);
-    let base = METHODS.map(|method| score(&sound.recording, &sound, method));
-    println!("draw {seed}\n  {:35} {}", "sound", base.map(|score| cell(&score)).join(" | "));
+    let fault_free = fault_free(seed, clean);
+    let base = METHODS.map(|method| score(&fault_free.recording, &fault_free, method));
+    println!("draw {seed}\n  {:35} {}", "fault-free", base.map(|score| cell(&score)).join(" | "));
     let rows = mapper_numerics::parallel::map(table::DOCTORED, |(name, doctor)| {
-        let mut recording = sound.recording.clone();
+        let mut recording = fault_free.recording.clone();
         doctor(&mut recording);
-        (*name, METHODS.map(|method| score(&recording, &sound, method)))
+        (*name, METHODS.map(|method| score(&recording, &fault_free, method)))
     });
     // Errors that occur without the fault do not count: `dynamic` keeps h constant, which gives an error of h in fault-free recordings too.
-    let beyond = |worst: f64, sound: f64| worst > WORST.max(1.1 * sound);
+    let beyond = |worst: f64, fault_free: f64| worst > WORST.max(1.1 * fault_free);
     let wrong = |scores: &[Score; 3]| {
         scores.iter().zip(&base).any(|(score, base)| {
             score.bare > 0 || beyond(score.worst_eta, base.worst_eta) || beyond(score.worst_h, base.worst_h)
@@ -193,18 +193,21 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
         println!("{mark} {name:35} {}", scores.map(|score| cell(&score)).join(" | "));
     }
     assert!(rows.len() >= 60);
-    let said = |what: &str, scores: &[Score; 3]| {
+    let describe = |what: &str, scores: &[Score; 3]| {
         format!("draw {seed}, {what}: {}", scores.map(|score| cell(&score)).join(" | "))
     };
-    let mut bad: Vec<String> =
-        rows.iter().filter(|(_, scores)| wrong(scores)).map(|(name, scores)| said(name, scores)).collect();
+    let mut bad: Vec<String> = rows
+        .iter()
+        .filter(|(_, scores)| wrong(scores))
+        .map(|(name, scores)| describe(name, scores))
+        .collect();
     // Refusing everything is not enough: the fault-free recording keeps its points, and so do harmless changes of it.
     if base.iter().any(|score| score.good < 10) {
-        bad.push(said("sound", &base));
+        bad.push(describe("fault-free", &base));
     }
     for (name, scores) in rows.iter().filter(|(name, _)| HARMLESS.contains(name)) {
         if scores.iter().zip(&base).any(|(score, base)| score.good + 2 < base.good) {
-            bad.push(said(&format!("{name}, harmless, refused"), scores));
+            bad.push(describe(&format!("{name}, harmless, refused"), scores));
         }
     }
     bad
@@ -226,14 +229,14 @@ const OBJECTIONS: [&str; 9] = [
 /// Draws of noise and offsets, on two machines: as declared, and with an undeclared tenth of its area before the wheel and an undeclared slow
 /// probe.
 #[test]
-fn nothing_is_said_of_sound_recordings() {
+fn fault_free_recordings_get_no_objections() {
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let nominal = NominalRig { model: &model, tolerances: &tolerances };
     let other = Machine { alpha: 0.1, probe_m: 2e-3, ..Machine::default() };
     for (machine, nominal) in [(Machine::default(), Some(nominal)), (other, None)] {
         let clean = campaign(&grid(), 100.0, machine);
         let seeds: Vec<u64> = (40..44).collect();
-        let said = mapper_numerics::parallel::map(&seeds, |seed| {
+        let objections = mapper_numerics::parallel::map(&seeds, |seed| {
             let (recording, declared) =
                 measured(&clean.recording, 1.0, 1.0, &mut Pcg64::seed_from_u64(*seed));
             METHODS.map(|method| {
@@ -246,8 +249,8 @@ fn nothing_is_said_of_sound_recordings() {
                     .collect::<Vec<Warning>>()
             })
         });
-        let said: Vec<&Warning> = said.iter().flatten().flatten().collect();
+        let objections: Vec<&Warning> = objections.iter().flatten().flatten().collect();
         // Three standard deviations of an offset occur in one draw of 370.
-        assert!(said.is_empty(), "{said:?}");
+        assert!(objections.is_empty(), "{objections:?}");
     }
 }

@@ -125,7 +125,7 @@ fn declared_offsets_move_the_result_as_declared() {
             let declared = DeclaredUncertainty { noise_sigma: 0.0, offset_sigma, gain_sigma_ratio };
             let mut alone = config(0.1);
             alone.declared.insert(channel, declared);
-            let said = &identify(&transient.recording(), &alone).unwrap()[1];
+            let stated = &identify(&transient.recording(), &alone).unwrap()[1];
             let shifted = |sign: f64| {
                 let mut recording = transient.recording();
                 for value in &mut recording.series.get_mut(&channel).unwrap().values {
@@ -135,19 +135,19 @@ fn declared_offsets_move_the_result_as_declared() {
                 [point.eta.unwrap(), point.h_w_m2k.unwrap()]
             };
             let (up, down) = (shifted(1.0), shifted(-1.0));
-            let said = [bias(said.eta_uncertainty, base[0]), bias(said.h_uncertainty, base[1])];
+            let stated = [bias(stated.eta_uncertainty, base[0]), bias(stated.h_uncertainty, base[1])];
             for (i, size) in [(0, 1.0), (1, 1e3)] {
                 let moved = 0.5 * (up[i] - down[i]).abs();
                 // Second-order effects of the offset remain: a few percent for 2 K of gain error. If the flow is constant its gain goes into h
                 // alone.
-                let tolerance = 0.05 * said[i] + 1e-9 * size;
+                let tolerance = 0.05 * stated[i] + 1e-9 * size;
                 assert!(
-                    (moved - said[i]).abs() < tolerance,
-                    "{channel}: moved {moved:.2e}, said {:.2e}",
-                    said[i]
+                    (moved - stated[i]).abs() < tolerance,
+                    "{channel}: moved {moved:.2e}, stated {:.2e}",
+                    stated[i]
                 );
             }
-            sum += said[0].powi(2);
+            sum += stated[0].powi(2);
         }
         let both = DeclaredUncertainty { noise_sigma: 0.0, offset_sigma: offset, gain_sigma_ratio: gain };
         all.declared.insert(channel, both);
@@ -245,12 +245,12 @@ fn a_speed_that_was_not_reached_is_a_remark() {
     let plain = identify(&recording, &IdentifyConfig::default()).unwrap()[1].clone();
     let t_s = recording.steps[1].end_s;
     recording.events.push(Event { t_s, kind: EventKind::SpeedNotReached, message: String::new() });
-    let told = identify(&recording, &IdentifyConfig::default()).unwrap()[1].clone();
-    assert_eq!((told.verdict, told.eta), (plain.verdict, plain.eta));
-    let remark = told.warnings.iter().find(|warning| warning.code == code::SPEED_NOT_REACHED).unwrap();
+    let warned = identify(&recording, &IdentifyConfig::default()).unwrap()[1].clone();
+    assert_eq!((warned.verdict, warned.eta), (plain.verdict, plain.eta));
+    let remark = warned.warnings.iter().find(|warning| warning.code == code::SPEED_NOT_REACHED).unwrap();
     assert!(
         remark.message.contains("123.00 krpm")
-            && remark.message.contains(&format!("{:.2} krpm", told.speed_rpm / 1e3))
+            && remark.message.contains(&format!("{:.2} krpm", warned.speed_rpm / 1e3))
     );
     assert!(plain.warnings.iter().all(|warning| warning.code != code::SPEED_NOT_REACHED));
 }

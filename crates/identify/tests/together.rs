@@ -45,11 +45,15 @@ fn a_common_error_is_what_the_offset_does() {
         let (Some(eta), Some(moved_eta)) = (base.eta, moved.eta) else { continue };
         let (h, moved_h) = (base.h_w_m2k.unwrap(), moved.h_w_m2k.unwrap());
         // T1 comes first, then T2. Linear to a few percent of itself: 0.25 K of a rise of 15 K and more.
-        let (said, said_h) = (base.common.eta_changes[1], base.common.h_changes_w_m2k[1]);
-        assert!((moved_eta - eta - said).abs() < 0.04 * said.abs() + 1e-5, "{} for {said}", moved_eta - eta);
+        let (expected, expected_h) = (base.common.eta_changes[1], base.common.h_changes_w_m2k[1]);
         assert!(
-            (moved_h - h - said_h).abs() < 0.04 * said_h.abs() + 1e-3 * h,
-            "{} for {said_h}",
+            (moved_eta - eta - expected).abs() < 0.04 * expected.abs() + 1e-5,
+            "{} for {expected}",
+            moved_eta - eta
+        );
+        assert!(
+            (moved_h - h - expected_h).abs() < 0.04 * expected_h.abs() + 1e-3 * h,
+            "{} for {expected_h}",
             moved_h - h
         );
         compared += 1;

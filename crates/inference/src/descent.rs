@@ -27,9 +27,9 @@ pub trait Model {
 /// Over how much of the way slopes are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
-    /// Where the cost is smooth.
+    /// For a smooth cost.
     Fine,
-    /// Where it has small steps, which the fine slope does not see past.
+    /// For a cost with small steps, which the fine slope does not see past.
     Coarse,
 }
 
@@ -42,7 +42,7 @@ pub struct Until {
     pub enough: f64,
 }
 
-/// Where a descent ends.
+/// End of a descent.
 #[derive(Debug, Clone)]
 pub struct End<Point> {
     /// The unknowns.

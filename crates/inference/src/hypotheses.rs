@@ -16,10 +16,10 @@ use std::collections::BTreeMap;
 
 /// Most members of an explanation: bounds the search. Judgement.
 const MAX_MEMBERS: usize = 4;
-/// Most changes of the explanation on the way to the best: each member is found, replaced and taken back once. Where every family is one
+/// Most changes of the explanation on the way to the best: each member is found, replaced and taken back once. If every family is one
 /// hypothesis the search ends by itself, since each change makes the set more probable.
 const MAX_CHANGES: usize = 4 * MAX_MEMBERS;
-/// Sets from which the search starts, beside the empty one: bounds its time. Judgement.
+/// Sets from which the search starts, in addition to the empty one: bounds its time. Judgement.
 const MAX_STARTS: usize = 6;
 /// Gain, ln of odds, that is none: rounding.
 const NO_GAIN: f64 = 1e-9;
@@ -165,13 +165,13 @@ impl Likelihood {
         Some((matrix.cholesky()?, pull))
     }
 
-    /// Standard error with which the balances tell the size of each hypothesis by itself; infinite where they do not.
+    /// Standard error with which the balances determine the size of each hypothesis by itself; infinite if they do not.
     pub fn standard_errors(&self, priors: &Priors) -> Option<Vec<f64>> {
         let information = self.given(&priors.always)?.precision.diagonal();
         Some(information.iter().map(|information| information.max(0.0).sqrt().recip()).collect())
     }
 
-    /// Size of a hypothesis, beside parameters that are as declared, whose expected residuals make its family as probable as nothing; infinite
+    /// Size of a hypothesis, with the other parameters as declared, whose expected residuals make its family as probable as nothing; infinite
     /// where no size does.
     pub fn smallest_seen(&self, priors: &Priors, index: usize) -> Option<f64> {
         let given = self.given(&priors.always)?;
@@ -254,7 +254,7 @@ impl Search<'_> {
         0.5 * pull.dot(&scaled) - ln_root_determinant + ln_prior
     }
 
-    /// Every family that has no member among `rest`, beside those.
+    /// Every family that has no member among `rest`, added to it.
     fn offers(&self, rest: &[usize]) -> BTreeMap<usize, Offer> {
         let mut offers: BTreeMap<usize, Offer> = BTreeMap::new();
         let mut set = rest.to_vec();
@@ -278,7 +278,7 @@ impl Search<'_> {
         offers
     }
 
-    /// Where changes of one member at a time lead from this set.
+    /// The set to which changes of one member at a time lead from this set.
     fn climb(&self, mut members: Vec<usize>) -> Vec<usize> {
         for _ in 0..MAX_CHANGES {
             let Some(better) = self.better(&members) else { break };
@@ -413,21 +413,21 @@ mod tests {
         for _ in 0..draws {
             let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
             let declared = DVector::from_fn(2, |_, _| 0.3 * normal());
-            let sound = DVector::from_fn(30, |_, _| normal()) + columns.columns(0, 2) * declared;
+            let fault_free = DVector::from_fn(30, |_, _| normal()) + columns.columns(0, 2) * declared;
             let explain = |residual: DVector<f64>| {
                 let covariance = DMatrix::identity(30, 30);
                 let mut likelihood = Likelihood::new(9);
                 likelihood.add(&Balance { residual, covariance, columns: columns.clone() }).unwrap();
                 likelihood.explain(&priors).unwrap()
             };
-            alarms += usize::from(!explain(sound.clone()).members.is_empty());
+            alarms += usize::from(!explain(fault_free.clone()).members.is_empty());
             let size = 8.0 / columns.column(4).norm();
-            let found = explain(sound + size * columns.column(4)).members;
+            let found = explain(fault_free + size * columns.column(4)).members;
             let right =
                 |member: &Member| member.index == 2 && (member.value - size).abs() < 4.0 * member.sigma;
             named += usize::from(found.len() == 1 && found.iter().all(right));
         }
-        assert!(alarms <= draws / 100, "{alarms} alarms in {draws} sound draws");
+        assert!(alarms <= draws / 100, "{alarms} alarms in {draws} fault-free draws");
         // Two of the columns are nearly one, so that a few draws name the other.
         assert!(named > draws * 9 / 10, "{named} of {draws} named");
     }

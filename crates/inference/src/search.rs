@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub trait Causes: Sync {
     /// A set of causes at its best.
     type Fit: Clone + Send + Sync;
-    /// Where a fit begins.
+    /// Start of a fit.
     type Start: Clone + Send + Sync;
 
     /// The causes of a fit, ascending.
@@ -23,27 +23,27 @@ pub trait Causes: Sync {
     /// ln of the probability of a fit, but for a constant that all have in common.
     fn ln_odds(&self, fit: &Self::Fit) -> f64;
 
-    /// What each further cause promises beside a fit, by a straight line.
+    /// Gain that each further cause promises in addition to a fit, linearised.
     fn offers(&self, base: &Self::Fit) -> Vec<Offer<Self::Start>>;
 
-    /// Where the fit of a set begins that has one cause less.
+    /// Start for the fit of a set that has one cause less.
     fn without(&self, fit: &Self::Fit, cause: usize) -> Self::Start;
 
     /// The fit from there; `None` where the model cannot follow, and where one of the causes does nothing.
     fn fit(&self, start: &Self::Start) -> Option<Self::Fit>;
 
-    /// Whether sets with one cause more than the second are worth a look, given the set that it grew from.
+    /// Whether sets with one cause more than the second should be examined, given the set that it grew from.
     fn goes_on(&self, from: &Self::Fit, to: &Self::Fit) -> bool;
 }
 
-/// A further cause beside a fit.
+/// A cause that may be added to a fit.
 #[derive(Debug, Clone)]
 pub struct Offer<Start> {
     /// The cause.
     pub cause: usize,
     /// By how much ln of the odds is promised to grow.
     pub ln_gain: f64,
-    /// Where the fit begins.
+    /// Start of the fit.
     pub start: Start,
 }
 
@@ -134,7 +134,7 @@ fn climb_past<C: Causes>(
     let mut offered: BTreeMap<Vec<usize>, (f64, C::Start)> = BTreeMap::new();
     loop {
         let members = causes.members(&best);
-        // Each set with one cause less, from where this one stands: no set is to look useful because its parts were off their best.
+        // Each set with one cause less, started at this fit: no set should look useful because its parts were off their best.
         let parts = if members.len() > 1 { members.as_slice() } else { &[] };
         let fewer: Vec<C::Start> = parts.iter().map(|cause| causes.without(&best, *cause)).collect();
         known.fit_all(causes, &fewer);
@@ -221,9 +221,9 @@ mod tests {
         fn fitted(&self, mut sizes: Vec<(usize, f64)>) -> Fit {
             for _ in 0..50 {
                 let left = self.left(&sizes);
-                let said = &self.reading - &left;
+                let predicted = &self.reading - &left;
                 let slopes = DMatrix::from_fn(left.len(), sizes.len(), |row, place| {
-                    self.columns[(row, sizes[place].0)] * said[row]
+                    self.columns[(row, sizes[place].0)] * predicted[row]
                 });
                 let matrix: DMatrix<f64> =
                     slopes.tr_mul(&slopes) + 1e-9 * DMatrix::identity(sizes.len(), sizes.len());

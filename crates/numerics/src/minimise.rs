@@ -8,7 +8,7 @@ const SECTION: f64 = 0.381_966_011_250_105_1;
 /// Relative distance below which values of a smooth function are all the same: square root of the rounding.
 const RESOLUTION: f64 = 1.5e-8;
 
-/// Where a function is smallest, and its value there.
+/// Minimum of a function: its place and the value there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Minimum {
     /// Place, in the unit of the interval.
@@ -58,7 +58,7 @@ pub fn minimise(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) -> f
                 (SECTION * part, part)
             }
         };
-        // Nor nearer to the best than two values can be told apart.
+        // Nor nearer to the best than two values can be distinguished.
         let next = f(best.at + if step.abs() >= near { step } else { near.copysign(step) });
         if next.value <= best.value {
             if next.at < best.at {

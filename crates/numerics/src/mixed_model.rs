@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 const ROUNDS: usize = 60;
 /// Change of a share at which the rounds end.
 const SETTLED: f64 = 1e-7;
-/// Largest ratio of a group's standard deviation to the rest's that is told apart from an infinite one.
+/// Largest ratio of a group's standard deviation to the rest's that is distinguished from an infinite one.
 const LARGEST_RATIO: f64 = 1e4;
 /// Part of the sum of squares below which nothing is left but rounding.
 const ROUNDING: f64 = 1e-14;
@@ -51,7 +51,7 @@ pub struct Effect {
     pub standard_error: f64,
 }
 
-/// Why there is no fit.
+/// Why a fit fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoFit {
     /// Not more observations than coefficients.
@@ -197,7 +197,7 @@ impl Sums {
         solved.log_determinant + free * solved.square.ln()
     }
 
-    /// Solves the equations. Effects are counted in standard deviations of their group, so that one without any is no
+    /// Solves the equations. Effects are counted in standard deviations of their group, so that one without any causes no
     /// division by zero.
     fn solve(&self, shares: &[f64]) -> Option<Solved> {
         let p = self.coefficients;
@@ -225,7 +225,7 @@ impl Sums {
         let right = scale.component_mul(&self.columns_y) - over.transpose() * &first_y;
         let sizes = left.diagonal();
         let factors = left.cholesky()?;
-        // What is left of a column beside the others is rounding.
+        // Of a column that depends on the others only rounding remains.
         let left_over = factors.l_dirty().diagonal();
         if left_over.iter().zip(&sizes).any(|(left, size)| left * left < COLLINEAR * size) {
             return None;

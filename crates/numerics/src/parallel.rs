@@ -96,7 +96,7 @@ where
 }
 
 /// `work` with at most so many threads for all its [`map`] and [`try_map`]: one of several long pieces of work that share the
-/// cores out among themselves. Where no threads can be had it runs on those of the whole program.
+/// cores out among themselves. If no threads are available, it runs on those of the whole program.
 pub fn confined<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
         Ok(pool) => pool.install(work),

@@ -1,4 +1,4 @@
-//! Where a scalar function crosses zero, and where a condition changes, on an interval.
+//! Zeros of a scalar function, and changes of a condition, on an interval.
 
 /// Finds where `f` changes sign between `low` and `high` by a mix of secant (Illinois) and bisection.
 ///
@@ -48,7 +48,7 @@ pub fn root_between(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) 
 /// The two ends of the interval, at most `tolerance` wide or of neighbouring floats, in which `is_low` changes from true to
 /// false; in the unit of `low` and `high`, which are finite and rise.
 ///
-/// Bisection: `low` is taken to be low and `high` not, without a look. Where the condition changes more than once, one of the
+/// Bisection: `low` is taken to be low and `high` not, without a look. If the condition changes more than once, one of the
 /// changes is found.
 pub fn bisect(low: f64, high: f64, tolerance: f64, mut is_low: impl FnMut(f64) -> bool) -> (f64, f64) {
     let (mut low, mut high) = (low, high);

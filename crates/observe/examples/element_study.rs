@@ -1,4 +1,4 @@
-//! How often one faulty sensor of four is found and rightly named, and how often a sound recording is called faulty:
+//! How often one faulty sensor of four is found and rightly named, and how often a fault-free recording is called faulty:
 //! `cargo run --release -p mapper-observe --example element_study -- SEEDS` (200 where it is left out).
 #![allow(clippy::print_stdout, missing_docs, reason = "what it prints is all it is for")]
 #[path = "../tests/common/mod.rs"]
@@ -14,7 +14,7 @@ fn main() {
         "{seeds} recordings each; four thermocouples and two taps at each of four ports, six steps of 60 s"
     );
     for (what, fault) in [
-        ("sound", Fault::None),
+        ("fault-free", Fault::None),
         ("off by 6 sigma", Fault::Off(6.0)),
         ("off by -6 sigma", Fault::Off(-6.0)),
         ("6 sigma beyond its own draw", Fault::OffBeyondItsDraw(6.0)),
@@ -23,8 +23,9 @@ fn main() {
         ("slow: a tip of 2 mm for 1 mm", Fault::Slow(2e-3)),
         ("slow: a tip of 4 mm for 1 mm", Fault::Slow(4e-3)),
     ] {
-        let said: Vec<Said> = (0..seeds).map(|seed| judged(&clean, fault, seed)).collect();
-        let share = |of: Said| 100.0 * said.iter().filter(|said| **said == of).count() as f64 / seeds as f64;
+        let results: Vec<Said> = (0..seeds).map(|seed| judged(&clean, fault, seed)).collect();
+        let share =
+            |of: Said| 100.0 * results.iter().filter(|result| **result == of).count() as f64 / seeds as f64;
         println!(
             "{what:<30} right {:5.1} %, wrong {:4.1} %, missed {:4.1} %",
             share(Said::Right),

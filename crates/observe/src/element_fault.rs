@@ -64,10 +64,7 @@ impl fmt::Display for FaultyElement {
                 write!(f, "{name} follows changes {:.1} s {later} than {others}", lag_s.abs())?;
             }
             Fault::Stuck { from_s, reading } => {
-                write!(
-                    f,
-                    "{name} stands still at {reading:.6} {unit} from {from_s:.0} s on, {others} do not"
-                )?;
+                write!(f, "{name} is frozen at {reading:.6} {unit} from {from_s:.0} s on, {others} are not")?;
             }
             Fault::Silent { missing_ratio } => {
                 write!(f, "{name} gives no reading for {:.0} % of the time", 100.0 * missing_ratio)?;

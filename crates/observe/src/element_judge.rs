@@ -277,7 +277,7 @@ impl Judge<'_> {
             let others = weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0);
             let sigma =
                 (variance(index) + others.map(|(other, w)| w * w * variance(other)).sum::<f64>()).sqrt();
-            // Without any declaration there is no decision.
+            // Without any declaration nothing is decided.
             let sigmas = if sigma > 0.0 { by.abs() / sigma } else { 0.0 };
             if sigmas > worst.1 {
                 worst = (by, sigmas);

@@ -80,8 +80,8 @@ mod tests {
             (Channel::T2, 85.0, "degC"),
             (Channel::T2, f64::NAN, "Check unit"),
         ] {
-            let said = check_running(channel, value).unwrap_err().to_string();
-            assert!(said.contains(named), "{said}");
+            let message = check_running(channel, value).unwrap_err().to_string();
+            assert!(message.contains(named), "{message}");
         }
     }
 }

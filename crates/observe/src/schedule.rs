@@ -14,7 +14,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Starts and ends of the segments from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples) long. There are no
+    /// Starts and ends of the segments from `start_s` to `end_s`, each at least `interval_s` (the distance of two samples) long. They leave no
     /// gaps; the list is empty if the step is shorter than the shortest segment.
     pub fn stretches(&self, start_s: f64, end_s: f64, interval_s: f64) -> Vec<(f64, f64)> {
         let whole_s = end_s - start_s;

@@ -32,30 +32,30 @@ const RUNS_PER_S: f64 = 50.0;
 
 /// The recording with each step starting at the last sample before its command changed, so that it includes its whole transient.
 pub fn as_told(recording: &Recording) -> Recording {
-    let mut told = recording.clone();
-    for index in 0..told.steps.len() {
+    let mut corrected = recording.clone();
+    for index in 0..corrected.steps.len() {
         let (before_s, start_s) =
             (recording.steps[index].start_s, command_s(recording, &recording.steps[index]));
-        told.steps[index].start_s = start_s;
+        corrected.steps[index].start_s = start_s;
         // Keep adjacent steps adjacent.
-        if let Some(last) = index.checked_sub(1).map(|last| &mut told.steps[last])
+        if let Some(last) = index.checked_sub(1).map(|last| &mut corrected.steps[last])
             && last.end_s >= before_s - 1e-9
         {
             last.end_s = start_s;
         }
     }
-    told
+    corrected
 }
 
 fn command_s(recording: &Recording, step: &StepMarker) -> f64 {
     let commands = [(Channel::P3Command, step.p3_pa), (Channel::ValveCommand, step.valve_opening_ratio)];
-    let late = |(channel, told): (Channel, f64)| {
+    let late = |(channel, commanded): (Channel, f64)| {
         let command = recording.series.get(&channel)?;
         let before = command.held(step.start_s)?;
         let (t_s, values) = command.slice(step.start_s, (step.start_s + LATE_MAX_S).min(step.end_s));
         let still = values.iter().take_while(|value| alike(**value, before)).count();
         let then = values.get(still)?;
-        (still > 0 && !alike(before, told) && alike(*then, told)).then(|| t_s[still - 1])
+        (still > 0 && !alike(before, commanded) && alike(*then, commanded)).then(|| t_s[still - 1])
     };
     let late_s = commands.into_iter().find_map(late).map(|late_s| late_s.max(step.start_s));
     late_s.or_else(|| seen_late_s(recording, step)).unwrap_or(step.start_s)
@@ -268,7 +268,7 @@ mod tests {
         let truth = LaggedCommand::new(levels, LAG, Response::lag(0.0));
         let t_s: Vec<f64> = (0..2400).map(|i| f64::from(i) / 10.0).collect();
         // A driver reports the command at once; the next sample shows it.
-        let told = t_s.iter().map(|t| truth.levels()[truth.level(t - 1e-9)].p3_pa).collect();
+        let commanded = t_s.iter().map(|t| truth.levels()[truth.level(t - 1e-9)].p3_pa).collect();
         let read = t_s
             .iter()
             .map(|t| {
@@ -278,25 +278,25 @@ mod tests {
             .collect();
         let series = [
             (Channel::P3, Series { t_s: t_s.clone(), values: read }),
-            (Channel::P3Command, Series { t_s, values: told }),
+            (Channel::P3Command, Series { t_s, values: commanded }),
         ];
         Recording { series: series.into(), steps, ..Recording::default() }
     }
 
     fn read(recording: &Recording) -> (Recording, Times) {
-        let told = as_told(recording);
-        let table = Table::new(&told).unwrap();
-        let times = Times::read(&table, &told, LAG, NOISE_PA);
-        (told, times)
+        let aligned = as_told(recording);
+        let table = Table::new(&aligned).unwrap();
+        let times = Times::read(&table, &aligned, LAG, NOISE_PA);
+        (aligned, times)
     }
 
     #[test]
     fn a_run_in_simulated_time_is_left_as_it_is() {
         let recording = recorded(&[0.0; 12], 0.0);
-        let (told, times) = read(&recording);
-        assert_eq!(told, recording);
+        let (aligned, times) = read(&recording);
+        assert_eq!(aligned, recording);
         assert_eq!(times.scatter_s, 0.0);
-        assert_eq!(times.timed(&told), recording);
+        assert_eq!(times.timed(&aligned), recording);
     }
 
     /// A logger's table: no step marks, the new command in the first row after the jump.
@@ -308,26 +308,26 @@ mod tests {
             seen.steps[index].start_s += 0.1;
             seen.steps[index - 1].end_s = recording.steps[index - 1].end_s;
         }
-        let (told, times) = read(&seen);
-        assert_eq!(times.timed(&told).steps, recording.steps);
+        let (aligned, times) = read(&seen);
+        assert_eq!(times.timed(&aligned).steps, recording.steps);
         // If P3 has not moved by that sample, the command came with it.
         let mut with_it = seen.clone();
         let p3 = with_it.series.get_mut(&Channel::P3).unwrap();
         p3.t_s.iter_mut().for_each(|t_s| *t_s = (*t_s * 10.0).round() / 10.0 + 0.1);
-        let (told, _) = read(&with_it);
+        let (aligned, _) = read(&with_it);
         let starts =
             |recording: &Recording| recording.steps.iter().map(|step| step.start_s).collect::<Vec<_>>();
-        assert_eq!(starts(&told), starts(&seen));
+        assert_eq!(starts(&aligned), starts(&seen));
     }
 
     #[test]
-    fn when_a_late_run_was_told_its_steps_is_read_off_command_and_p3() {
+    fn the_start_of_late_steps_is_read_from_command_and_p3() {
         let late_s = [0.0, 0.412, 0.02, 0.07, 0.0, 0.133, 0.25, 0.04, 0.01, 0.09, 0.055, 0.003];
         for scatter_s in [0.0, 0.012] {
             let recording = recorded(&late_s, scatter_s);
-            let (told, times) = read(&recording);
-            assert_eq!(told.steps[1].start_s, 20.4, "the last sample before the change");
-            assert_eq!(told.steps[0].end_s, 20.4);
+            let (aligned, times) = read(&recording);
+            assert_eq!(aligned.steps[1].start_s, 20.4, "the last sample before the change");
+            assert_eq!(aligned.steps[0].end_s, 20.4);
             // A dozen samples of each jump determine its time.
             let error_s = (2.0 * scatter_s).max(3e-3);
             for (index, late_s) in late_s.iter().enumerate().skip(1) {

@@ -11,7 +11,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 
-/// Share of 50 recordings of which the right thing is said.
+/// Share of 50 recordings with the right outcome.
 fn right_ratio(clean: &Clean, fault: Fault) -> f64 {
     let right = (1000..1050).filter(|seed| judged(clean, fault, *seed) == Said::Right).count();
     right as f64 / 50.0

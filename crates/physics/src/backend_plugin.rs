@@ -44,7 +44,7 @@ impl BackendPlugin {
 
 /// A campaign names an unknown backend.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no such backend; the backends are {known}")]
+#[error("unknown backend; the backends are {known}")]
 pub struct UnknownBackend {
     /// Names of the known backends.
     pub known: String,

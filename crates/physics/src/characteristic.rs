@@ -40,8 +40,8 @@ pub trait CompressorCharacteristic: Send + Sync + std::fmt::Debug {
         }
         let flow_corrected_kg_s = flow_scale_ratio * here.flow_corrected_kg_s;
         // One hundredth of the pressure rise to each side.
-        let beside = 0.01 * (pressure_ratio - 1.0).abs().max(0.01);
-        let [low, high] = [-beside, beside].map(|by| self.evaluate(speed_corrected_rpm, pressure_ratio + by));
+        let offset = 0.01 * (pressure_ratio - 1.0).abs().max(0.01);
+        let [low, high] = [-offset, offset].map(|by| self.evaluate(speed_corrected_rpm, pressure_ratio + by));
         let between_kg_s = high.flow_corrected_kg_s - low.flow_corrected_kg_s;
         let slope =
             if between_kg_s.abs() > 1e-9 { (high.efficiency - low.efficiency) / between_kg_s } else { 0.0 };

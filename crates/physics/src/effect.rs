@@ -216,7 +216,7 @@ pub trait Effect: std::fmt::Debug + Send + Sync {
     /// Adds it to a rig.
     ///
     /// # Errors
-    /// [`EffectError::Room`] if there is no room for its hidden temperatures;
+    /// [`EffectError::Room`] if the rig has no room for its hidden temperatures;
     /// [`EffectError::NoParameter`] if it uses a parameter that it does not declare.
     fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
 }

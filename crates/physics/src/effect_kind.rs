@@ -45,7 +45,7 @@ pub trait EffectKind: EffectNumbers + std::fmt::Debug + Send + Sync + 'static {
     /// Adds it to a rig. At neutral values nothing changes.
     ///
     /// # Errors
-    /// [`TooManyExtraStates`] if there is no room for its hidden temperatures.
+    /// [`TooManyExtraStates`] if the rig has no room for its hidden temperatures.
     fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates>;
 }
 

@@ -157,7 +157,7 @@ impl StepForecast {
         }
     }
 
-    /// The same step, ended at one of its rows; `None` if there is no row at `dwell_s`.
+    /// The same step, ended at one of its rows; `None` without a row at `dwell_s`.
     pub fn ended_at(&self, dwell_s: f64) -> Option<StepForecast> {
         let last = self.rows.partition_point(|row| row.t_s < dwell_s - 1e-9);
         let end = self.rows.get(last).filter(|row| row.t_s <= dwell_s + 1e-9)?;
@@ -197,7 +197,7 @@ impl StepForecast {
     }
 
     /// The expected results of the step, without the errors of an identification. Without a jump (the first step of a
-    /// campaign) there are no gradients.
+    /// campaign) the gradients are missing.
     pub fn predicted(&self, rule: &WindowRule, bands: &SettleBands, has_jump: bool) -> Predicted {
         // An empty step has no results.
         let (end, dwell_s) = (self.rows.last(), self.rows.last().map_or(0.0, |row| row.t_s));
@@ -254,7 +254,7 @@ mod tests {
             assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
         }
         assert!((ended.highest_t2_k / short.highest_t2_k - 1.0).abs() < 1e-5);
-        assert!(long.ended_at(37.2).is_none(), "there is no row");
+        assert!(long.ended_at(37.2).is_none(), "no such row");
     }
 
     #[test]

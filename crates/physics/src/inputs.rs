@@ -7,7 +7,7 @@ pub trait Inputs {
     /// Boundary conditions at `t_s`.
     fn at(&self, t_s: f64) -> BoundaryConditions;
 
-    /// Time passed to hooks at `t_s`, s; NaN if there is no time, as in a steady state.
+    /// Time passed to hooks at `t_s`, s; NaN without a time, as in a steady state.
     fn time_s(&self, t_s: f64) -> f64 {
         t_s
     }

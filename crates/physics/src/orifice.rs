@@ -6,7 +6,7 @@
 use crate::air::{GAS_CONSTANT_J_KGK, HEAT_CAPACITY_RATIO as G};
 
 /// Mass flow of an isentropic orifice from (`p_up_pa`, `t_up_k`) to `p_down_pa`, choked below the critical pressure
-/// ratio, kg/s; 0 if there is no forward pressure difference.
+/// ratio, kg/s; 0 without a forward pressure difference.
 ///
 /// `effective_area_m2` is area times discharge coefficient.
 #[inline]

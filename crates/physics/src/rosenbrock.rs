@@ -67,7 +67,7 @@ pub enum IntegrationError {
     },
     /// The bound on the number of steps was reached.
     #[error(
-        "the integration took more than {steps} steps and stands at {t_s:.6} s; loosen the tolerance or shorten the run"
+        "the integration took more than {steps} steps and is at {t_s:.6} s; loosen the tolerance or shorten the run"
     )]
     TooManySteps {
         /// Time, s.

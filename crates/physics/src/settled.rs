@@ -79,13 +79,13 @@ mod tests {
             assert_eq!(settled_count(backwards, allowed_ratio, noise), count, "{allowed_ratio} {noise}");
         }
         assert_eq!(settled_count([f64::NAN; 3], 0.01, 0.0), 0, "nothing known never settles");
-        assert_eq!(settled_count([100.0, f64::NAN, 100.0], 0.01, 0.0), 3, "a gap is no variation");
+        assert_eq!(settled_count([100.0, f64::NAN, 100.0], 0.01, 0.0), 3, "a gap is not a variation");
     }
 
     #[test]
     fn a_ramp_has_no_noise() {
         let ramp: Vec<f64> = (0..50).map(|i| 3.0 * f64::from(i)).collect();
         assert!(noise_spread(&ramp) < 1e-9, "second differences of a line vanish");
-        assert_eq!(noise_spread(&[1.0; 8]), 0.0, "too few to tell");
+        assert_eq!(noise_spread(&[1.0; 8]), 0.0, "too few to judge");
     }
 }

@@ -1,7 +1,7 @@
 //! A nearly best assignment with prices, for many rows: the auction algorithm with falling increments (Bertsekas, Annals
 //! of Operations Research 14:105, 1988).
 //!
-//! Jumps between far and near points are worth much the same to many: the exact method then looks through nearly the whole
+//! Jumps between far and near points have much the same value for many rows: the exact method then looks through nearly the whole
 //! table for each row. Prices that are off by an increment cost the bound that much per row, and save most of the time.
 
 /// Increments from the first to the last, each this part of the one before.

@@ -11,12 +11,12 @@ use crate::chain::Chain;
 use crate::housing::{Housing, Interval, StateBox};
 use crate::relaxation::{Repeated, Visited, bounded_sum_k};
 
-/// Rounds of narrowing: each multiplies what is left to gain by what the housing remembers of a dwell.
+/// Rounds of narrowing: each multiplies the remaining gain by what the housing remembers of a dwell.
 const ROUNDS: usize = 12;
 /// Above this many points the sum is bounded by prices that are off by the last of these increments, K.
 pub(crate) const EXACT_POINTS: usize = 500;
 const INCREMENTS_K: (f64, f64) = (5.0, 0.01);
-/// Above this many points there is no bound: its table grows with the square.
+/// Above this many points no bound is computed: its table grows with the square.
 pub(crate) const MAX_POINTS: usize = 4000;
 /// Above this many points the smallest gradient is bounded without a matching.
 const MATCHING_POINTS: usize = 400;

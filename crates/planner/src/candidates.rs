@@ -1,7 +1,7 @@
-//! Which successors of a point are worth a try.
+//! Promising successors of a point.
 //!
-//! A nearly best assignment of successors, as if the housing settled at each point, prices points: what a jump is worth beyond
-//! the prices of both ends says how well it fits into a good order, where its bare worth would always name the same few
+//! A nearly best assignment of successors, as if the housing settled at each point, prices points. The value of a jump beyond
+//! the prices of both ends shows how well it fits into a good order; its value alone would always name the same few
 //! extreme points.
 
 use crate::auction::prices;
@@ -13,9 +13,9 @@ use rand_pcg::Pcg64Mcg;
 
 /// Successors that are kept of each point.
 const KEPT: usize = 10;
-/// Above this many points there are no candidates: the table of weights grows with the square.
+/// Above this many points no candidates are kept: the table of weights grows with the square.
 pub(crate) const MAX_POINTS: usize = 4000;
-/// A jump that is not allowed is no worse than this many times the usual: the assignment needs finite weights.
+/// A jump that is not allowed is at worst this many times the usual: the assignment needs finite weights.
 const MIN_VALUE: f64 = -1e9;
 
 /// The best successors of each point of a chain.
@@ -60,7 +60,7 @@ impl Candidates {
         Candidates { successors }
     }
 
-    /// A successor of `from`; `None` where there are no candidates.
+    /// A successor of `from`; `None` without candidates.
     pub(crate) fn draw(&self, from: usize, random: &mut Pcg64Mcg) -> Option<usize> {
         let successors = &self.successors[from];
         (!successors.is_empty()).then(|| successors[random.random_range(0..successors.len())])

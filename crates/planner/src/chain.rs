@@ -8,21 +8,21 @@ pub trait Chain {
     /// Number of points.
     fn len(&self) -> usize;
 
-    /// Whether there is no point.
+    /// Whether it has no points.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// What the first step, to which no jump leads, leaves.
+    /// State after the first step, to which no jump leads.
     fn first(&self, to: usize) -> Self::State;
 
-    /// The step `from` -> `to` from `state`: gradient of the housing within the window, K (signed), and what it leaves.
+    /// The step `from` -> `to` from `state`: gradient of the housing within the window, K (signed), and the state after it.
     fn step(&self, from: usize, to: usize, state: Self::State) -> (f64, Self::State);
 
-    /// What a long stay at a point leaves.
+    /// State after a long stay at a point.
     fn settled(&self, at: usize) -> Self::State;
 
-    /// Whether two states are so close that what follows no longer tells them apart.
+    /// Whether two states are so close that what follows no longer distinguishes them.
     fn alike(&self, a: Self::State, b: Self::State) -> bool;
 
     /// Whether the jump is allowed.

@@ -142,7 +142,7 @@ impl<C: Chain> Walk<'_, C> {
         let first = self.path.first().copied().filter(|_| self.chain.returns());
         let reached = || remaining().chain(first);
         match self.figure {
-            // The tighter of two: what each point can be reached with from what is left, or from anywhere.
+            // The tighter of two bounds: how each point can be reached from the remaining points, or from any point.
             Figure::Sum => so_far + reached().map(|to| into(to).min(self.best_into[to])).sum::<f64>(),
             Figure::Worst => reached().map(into).fold(so_far, f64::min),
         }

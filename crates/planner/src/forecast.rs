@@ -88,7 +88,7 @@ pub(crate) struct Resting {
     pub(crate) undeclared_eta: f64,
 }
 
-/// Adds the errors of a method that identifies all steps together, if the steps tell enough for points to be good: a forecast of
+/// Adds the errors of a method that identifies all steps together, if the steps give enough information for points to be good: a forecast of
 /// fewer does not hold. `rows`: those of each step.
 pub(crate) fn errors_together<'a>(
     request: &PlanRequest<'_>,

@@ -67,9 +67,9 @@ pub enum Rejection {
 /// An edge: what a jump from the steady state of one point to another is expected to do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JumpForecast {
-    /// Where it starts.
+    /// Start of the jump.
     pub from: OperatingPoint,
-    /// Where it goes.
+    /// Destination of the jump.
     pub to: OperatingPoint,
     /// What it is expected to give.
     pub predicted: Predicted,

@@ -22,7 +22,7 @@ pub struct MethodResult {
 pub struct MethodResults {
     /// One result for each step, on a machine that is as declared.
     pub steps: Vec<Option<MethodResult>>,
-    /// What the declaration is worth: by how much the efficiencies would be off (rms, one sigma, fraction) if the parameters that the method
+    /// Value of the declaration: by how much the efficiencies would be off (rms, one sigma, fraction) if the parameters that the method
     /// may find had to be found from these steps.
     pub resting_eta: f64,
     /// Largest such error with which points are good, fraction.

@@ -30,7 +30,7 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     let targets = reachable(request, request.points)?;
     let made = with_repeats(request, &targets);
     let (true, Err(PlanError::NoAdmissibleOrder(_))) = (request.return_to_first, &made) else { return made };
-    // It may be the way back alone that is not allowed: nobody asked for it by name.
+    // It may be the way back alone that is not allowed: it was not requested by name.
     let mut plan = with_repeats(&PlanRequest { return_to_first: false, ..request.clone() }, &targets)?;
     plan.remarks.push("a limit forbids the way back to the first point at the end".to_owned());
     Ok(plan)
@@ -97,7 +97,7 @@ fn within_budget(
 /// The plan with the shortest dwell, in whole seconds, whose expected error (rms over the points) is at most `required`; with the
 /// longest dwell if none reaches it.
 fn reaching(builder: &PlanBuilder<'_>, required: f64) -> Result<Draft, PlanError> {
-    // Steps that tell too little for an expected error miss it.
+    // Steps that give too little information for an expected error miss it.
     let error_of = |draft: &Draft| match rms_error_eta(draft.steps()) {
         None if draft.is_predicted() => Ok(f64::INFINITY),
         error => error.ok_or(PlanError::NoPredictedError),

@@ -126,7 +126,7 @@ impl<'a> PlanBuilder<'a> {
         Err(PlanError::NoAdmissibleOrder(barred))
     }
 
-    /// The order that is worth most with its repeats, its visits, and whether they end with a return to the first point.
+    /// The order with the highest value including repeats, its visits, and whether they end with a return to the first point.
     fn best_of(&self, housing: &Housing, orders: Vec<Ordered>) -> Option<(Ordered, Vec<Visit>, bool)> {
         let objective = objective(self.request.order);
         let with_visits = orders.into_iter().map(|ordered| {
@@ -248,7 +248,7 @@ impl<'a> PlanBuilder<'a> {
         }))
     }
 
-    /// Why there is no bound.
+    /// Why the bound is missing.
     fn bound_remark(&self, bound: Option<&PlanBound>) -> Option<String> {
         let request = self.request;
         let text = match () {
@@ -272,7 +272,7 @@ impl<'a> PlanBuilder<'a> {
         }
         if let Some(Jump { from, to }) = request.appended {
             remarks.push(format!(
-                "the jump from {from} to {to} is made after all else, and is no point of the map"
+                "the jump from {from} to {to} is made after all else, and is not a point of the map"
             ));
         }
         if let [first, others @ ..] = steps.as_slice() {
@@ -292,9 +292,9 @@ impl<'a> PlanBuilder<'a> {
             draft.resting.filter(|resting| resting.eta > resting.max_eta)
         {
             remarks.push(format!(
-                "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps tell the efficiencies only to \
-                 {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the dwell, add points, or hold what \
-                 is known (`identification.joint`)",
+                "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps determine the efficiencies \
+                 only to {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the \
+                 dwell, add points, or hold what is known (`identification.joint`)",
                 100.0 * eta,
                 100.0 * max_eta
             ));

@@ -361,7 +361,7 @@ impl Relaxation<'_> {
     }
 
     /// The bound of orders that return to their first point. That one is left in the state after the warm-up and reached in another
-    /// one, so that its prices do not cancel: with each point as the first, the jumps from it and to it are weighed without them.
+    /// one, so that its prices do not cancel: with each point as the first, the jumps from it and to it are weighted without them.
     fn with_start(&self, prices: &[Price], bound_k: f64) -> f64 {
         let n = self.nodes.len();
         let table = self.table(prices);

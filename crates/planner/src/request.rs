@@ -57,7 +57,7 @@ pub struct UnreachablePoint {
     pub reason: String,
 }
 
-/// Why there is no plan.
+/// Why planning fails.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// Points that cannot be reached, all of them.
@@ -99,7 +99,7 @@ pub enum PlanError {
     /// The forecast could not be made.
     #[error("the forecast of the step to {to} failed: {source}")]
     Forecast {
-        /// Where the step goes.
+        /// Destination of the step.
         to: OperatingPoint,
         /// Why.
         source: SimulationError,

@@ -122,7 +122,7 @@ pub fn search_worst<C: Chain + Sync>(chain: &C, given: &[usize], effort: Effort,
     order
 }
 
-/// Each time the point whose step is worth most.
+/// At each position the point whose step has the highest value.
 pub(crate) fn greedy<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Vec<usize> {
     let mut remaining = given.to_vec();
     let mut order = Vec::with_capacity(given.len());
@@ -175,8 +175,8 @@ struct Annealing<'a, C: Chain> {
     order: Vec<usize>,
     /// Position of each point of the chain; of no meaning for points that are not in the order.
     place: Vec<usize>,
-    /// What is known of each position's step; no state at 0, and behind the last position what its step leaves and what
-    /// the way back to the first point is worth.
+    /// What is known of each position's step; no state at 0, and behind the last position what its step leaves and the
+    /// value of the way back to the first point.
     known: Vec<Known<C::State>>,
     /// The order that is proposed from the first piece's place on; what follows the pieces stays as it is.
     pieces: Vec<Piece>,
@@ -219,7 +219,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
         self.known[self.order.len()] = (state, self.way_back(ends, state));
     }
 
-    /// What the jump from the last point back to the first is worth, where there is one.
+    /// Value of the jump from the last point back to the first, if there is one.
     #[inline]
     fn way_back(&self, ends: Option<(usize, usize)>, state: Option<C::State>) -> f64 {
         match (ends, state) {

@@ -160,7 +160,7 @@ fn put(visits: &[Visit], at: usize, jump: RepeatedJump) -> Vec<Visit> {
     longer
 }
 
-/// What the points are worth; the repeats themselves do not count, but for what is not allowed.
+/// Value of the points; the repeats themselves do not count, but for what is not allowed.
 pub(crate) fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective) -> f64 {
     let Some(first) = visits.first() else { return 0.0 };
     let (mut state, mut sum) = (chain.first(first.index), 0.0);

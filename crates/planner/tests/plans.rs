@@ -46,8 +46,8 @@ fn known_figures_are_reached_on_the_simple_housing() {
     let given: Vec<usize> = (0..points.len()).collect();
     let sum_of = |order: &[usize]| gradients_k(&housing, order).iter().sum::<f64>();
     let worst_of = |order: &[usize]| gradients_k(&housing, order).into_iter().fold(f64::INFINITY, f64::min);
-    // The housing is the one of these figures: its two reference orders come out as they were told, to the digits
-    // that were told: along speed lines 129 K in total and 0.4 K at minimum, a zigzag 640 K and 14.6 K.
+    // The housing is the one of these figures: its two reference orders come out as they were given, to the digits
+    // that were given: along speed lines 129 K in total and 0.4 K at minimum, a zigzag 640 K and 14.6 K.
     assert!((sum_of(&given) - 129.0).abs() < 0.5 && (worst_of(&given) - 0.4).abs() < 0.06);
     let zigzag: Vec<usize> =
         (0..3).flat_map(|opening| [2, 5, 0, 4, 1, 3].map(|speed| 3 * speed + opening)).collect();
@@ -187,7 +187,7 @@ fn few_points_are_ordered_best_and_proven_so() {
             best_k = best_k.max(plan.figures.sum_gradient_k);
         });
         assert!(plan.bound.unwrap().sum_gradient_k >= best_k);
-        // The reduced housing may prefer another order of nearly equal worth.
+        // The reduced housing may prefer another order of nearly equal value.
         assert!(plan.figures.sum_gradient_k > 0.999 * best_k, "{} {best_k}", plan.figures.sum_gradient_k);
     }
 }

@@ -99,7 +99,7 @@ fn mark(
     surged_at_ratio: Option<f64>,
     errors: SurgeErrors,
 ) -> Result<SurgeMark, String> {
-    let too_few = || format!("{} openings are too few to tell where surge is", looks.len());
+    let too_few = || format!("{} openings are too few to locate surge", looks.len());
     let last = looks.last().ok_or_else(too_few)?;
     let (flow_kg_s, standard_error_kg_s, closest_kg_s) = match surged_at_ratio {
         Some(surged_at_ratio) => {

@@ -71,7 +71,7 @@ pub fn identification() -> IdentifyConfig {
     let sensors = SENSORS.iter().map(|&(channel, noise_sigma, offset_sigma)| {
         (channel, DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio: 0.0 })
     });
-    // The gain of both flow meters stands with the tolerances.
+    // The tolerances include the gain of both flow meters.
     let tolerances = ModelTolerances::default();
     IdentifyConfig {
         window: WindowRule::Fixed { start_s: 10.0, end_s: 110.0 },
@@ -298,7 +298,7 @@ fn rand_share(normal: &mut dyn FnMut() -> f64) -> f64 {
     0.5 + 0.5 * (normal() / (1.0 + normal().powi(2)).sqrt()).clamp(-1.0, 1.0)
 }
 
-/// What is said of one recording.
+/// Verdict on one recording.
 pub fn judge(recording: &Recording) -> DriftReport {
     judge_all(&[RecordedRun { recording, fingerprint: None }])
 }
@@ -308,7 +308,7 @@ pub fn judge_by(recording: &Recording, identification: &IdentifyConfig) -> Drift
     ask(&[RecordedRun { recording, fingerprint: None }], identification)
 }
 
-/// What is said of some.
+/// Verdict on several recordings.
 pub fn judge_all(runs: &[RecordedRun<'_>]) -> DriftReport {
     ask(runs, &identification())
 }

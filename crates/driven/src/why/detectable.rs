@@ -34,7 +34,7 @@ pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<N
             let values =
                 info.parameters.iter().map(|p| (p.neutral + share * p.typical_step).clamp(p.low, p.high));
             let there = Hypothesis { effects: vec![(place, values.collect())], ..question.nothing() };
-            question.predict(&there).is_some_and(|said| largest(question, &said, &base) > NOTHING_K)
+            question.predict(&there).is_some_and(|predicted| largest(question, &predicted, &base) > NOTHING_K)
         });
         if changed {
             asked.push(place);
@@ -46,11 +46,13 @@ pub(crate) fn audible<S: Side>(question: &Question<'_, S>) -> (Vec<usize>, Vec<N
 }
 
 /// Largest change of a measured channel, K.
-fn largest<S: Side>(question: &Question<'_, S>, said: &[Vec<f64>], base: &[Vec<f64>]) -> f64 {
+fn largest<S: Side>(question: &Question<'_, S>, predicted: &[Vec<f64>], base: &[Vec<f64>]) -> f64 {
     let mut largest: f64 = 0.0;
-    for ((_, read), (said, base)) in question.side.rows().judged.iter().zip(said.iter().zip(base)) {
-        for (_, (said, base)) in read.iter().zip(said.iter().zip(base)).filter(|(read, _)| read.is_finite()) {
-            largest = largest.max((said - base).abs());
+    for ((_, read), (predicted, base)) in question.side.rows().judged.iter().zip(predicted.iter().zip(base)) {
+        for (_, (predicted, base)) in
+            read.iter().zip(predicted.iter().zip(base)).filter(|(read, _)| read.is_finite())
+        {
+            largest = largest.max((predicted - base).abs());
         }
     }
     largest
@@ -74,10 +76,10 @@ pub(crate) fn smallest<S: Side>(
     // At the fitted unknowns, without any effect.
     let unknowns = S::unknowns().len();
     let base = Hypothesis { effects: Vec::new(), nuisances: found.hypothesis.nuisances.clone() };
-    let Some(said) = question.predict(&base) else { return (Vec::new(), Vec::new()) };
+    let Some(predicted) = question.predict(&base) else { return (Vec::new(), Vec::new()) };
     let whitenings = question.whitenings(counts, &found.left_k);
-    let slopes = question.slopes(&base, &said, &[], BESIDE);
-    let none: Vec<Vec<f64>> = said.iter().map(|column| vec![0.0; column.len()]).collect();
+    let slopes = question.slopes(&base, &predicted, &[], BESIDE);
+    let none: Vec<Vec<f64>> = predicted.iter().map(|column| vec![0.0; column.len()]).collect();
     let (normal, columns) = normal(&whitenings, &slopes, &none, &vec![(0.0, 1.0); unknowns]);
     let Some(cholesky) = normal.matrix.cholesky() else { return (Vec::new(), Vec::new()) };
     let count = asked.len().max(2) as f64;
@@ -87,11 +89,14 @@ pub(crate) fn smallest<S: Side>(
         let info = question.effects[*effect].info();
         let (parameter, others) = info.parameters.split_last()?;
         let coordinate = Coordinate::new(parameter);
-        let length_beside = |others: &[f64], value: f64| -> Option<(f64, usize)> {
+        let length_with = |others: &[f64], value: f64| -> Option<(f64, usize)> {
             let there = Hypothesis { effects: vec![(*effect, [others, &[value]].concat())], ..base.clone() };
             let there = question.predict(&there)?;
-            let change: Vec<Vec<f64>> =
-                there.iter().zip(&said).map(|(t, s)| t.iter().zip(s).map(|(t, s)| t - s).collect()).collect();
+            let change: Vec<Vec<f64>> = there
+                .iter()
+                .zip(&predicted)
+                .map(|(t, s)| t.iter().zip(s).map(|(t, s)| t - s).collect())
+                .collect();
             let change = whitened(&whitenings, &change);
             let dot = |column: &[Vec<f64>]| -> f64 {
                 column.iter().flatten().zip(change.iter().flatten()).map(|(a, b)| a * b).sum()
@@ -116,8 +121,8 @@ pub(crate) fn smallest<S: Side>(
         let neutral: Vec<f64> = others.iter().map(|p| p.neutral).collect();
         let usual: Vec<f64> =
             others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
-        let alone = length_beside(&neutral, value_at(typical))?.0 > 1e-6;
-        let length = |value: f64| length_beside(if alone { &neutral } else { &usual }, value);
+        let alone = length_with(&neutral, value_at(typical))?.0 > 1e-6;
+        let length = |value: f64| length_with(if alone { &neutral } else { &usual }, value);
         let (mut here, mut taker) = (typical, 0);
         // The smallest sufficient size tried.
         let mut seen: Option<f64> = None;

@@ -89,13 +89,13 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     question.white_k = white_k(&question, &all, ask).ok_or(DrivenError::NoAnswer)?;
     let (asked, mut not_asked) = audible(&question);
     let found = search(&question, &asked, &counts, calibration).ok_or(DrivenError::NoAnswer)?;
-    let weighed = weigh(calibration, asked.len(), &found);
-    let fit_of = |place: usize| &found.fits[weighed.causes[place].0];
-    let causes = weighed.causes.len().min(SHOWN);
+    let posterior = weigh(calibration, asked.len(), &found);
+    let fit_of = |place: usize| &found.fits[posterior.causes[place].0];
+    let causes = posterior.causes.len().min(SHOWN);
     // The named cause before the comparison with an unmodelled one; held-out phases judge it.
-    let likeliest = if weighed.named && causes > 0 { fit_of(0) } else { &found.null };
-    let open = weighed.open;
-    let choices: Vec<&Fit> = (0..if weighed.named { causes.min(CHOICES) } else { 0 }).map(fit_of).collect();
+    let likeliest = if posterior.named && causes > 0 { fit_of(0) } else { &found.null };
+    let open = posterior.open;
+    let choices: Vec<&Fit> = (0..if posterior.named { causes.min(CHOICES) } else { 0 }).map(fit_of).collect();
     let open_effects: Vec<usize> = (0..open)
         .flat_map(|place| fit_of(place).hypothesis.effects.iter().map(|(effect, _)| *effect))
         .collect();
@@ -106,7 +106,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
     // Noise steps of the drives can imitate an effect in the fitted part, but not in held-out phases.
     let borne_out = held_out.as_ref().is_none_or(|phases| phases.after_k < phases.before_k);
     let word = match open {
-        _ if weighed.outside > 0.5 => Word::Outside,
+        _ if posterior.outside > 0.5 => Word::Outside,
         0 => Word::WithinTolerance,
         _ if !borne_out => Word::NotBorneOut,
         1 => Word::Named,
@@ -123,10 +123,10 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
         judged: rows.judged.iter().filter(measured).map(|(channel, _)| channel.symbol()).collect(),
         fitted_until_s: ask.fit_until_s,
         word,
-        probability_none: weighed.none,
-        probability_outside: weighed.outside,
+        probability_none: posterior.none,
+        probability_outside: posterior.outside,
         causes: (0..causes)
-            .map(|place| cause(&question, calibration, fit_of(place), weighed.causes[place].1))
+            .map(|place| cause(&question, calibration, fit_of(place), posterior.causes[place].1))
             .collect(),
         open: open.min(causes),
         before_k: off_k(&question, &found.null.predicted, 0..fitted),

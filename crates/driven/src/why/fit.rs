@@ -1,7 +1,7 @@
 //! A hypothesis at its best under the rows that count, and how well it is supported (Laplace's approximation).
 //!
-//! Gauss-Newton on whitened residuals, as in `mapper-gap`; but what the model leaves beside the noise is found with
-//! everything else, for nobody declares it of a machine on an engine.
+//! Gauss-Newton on whitened residuals, as in `mapper-gap`; but the model error in addition to the noise is fitted with
+//! everything else, because it is not declared for a machine on an engine.
 
 use super::noise::Whitening;
 use super::side::{Side, Smooth};
@@ -14,7 +14,7 @@ use mapper_physics::effect::{Effect, Rig, add};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::sync::Arc;
 
-/// What every hypothesis is held against.
+/// The data that every hypothesis is compared with.
 pub(crate) struct Question<'a, S> {
     /// The side under its rows.
     pub(crate) side: &'a S,
@@ -31,11 +31,11 @@ pub(crate) struct Question<'a, S> {
 pub(crate) struct Fit {
     /// Unknowns in standard normal numbers, effects in their units.
     pub(crate) hypothesis: Hypothesis,
-    /// Logarithm of the evidence, what is left being what such a model leaves.
+    /// Logarithm of the evidence, with the prior of the model error for such a model.
     pub(crate) score: f64,
-    /// The same, what is left being as large as a cause beside it makes it.
+    /// The same, with a model error as large as an unmodelled cause would make it.
     pub(crate) score_outside: f64,
-    /// What is left beside the noise, one standard deviation for each judged channel, K.
+    /// Model error in addition to the noise, one standard deviation for each judged channel, K.
     pub(crate) left_k: Vec<f64>,
     /// What the sensors would have read in all rows, K.
     pub(crate) predicted: Vec<Vec<f64>>,
@@ -57,7 +57,7 @@ const MAX_MOVED: f64 = 2.0;
 /// Iterations, and what one has to promise in the cost.
 const ITERATIONS: usize = 15;
 const ENOUGH: f64 = 0.02;
-/// Distance of the runs beside a hypothesis from which slopes are taken, in the coordinates' units, and where such slopes lead nowhere.
+/// Step from a hypothesis to the runs from which slopes are taken, in the coordinates' units, and the step if such slopes lead nowhere.
 pub(crate) const BESIDE: f64 = 0.02;
 const BESIDE_COARSE: f64 = 0.2;
 
@@ -103,8 +103,8 @@ impl<S: Side> Question<'_, S> {
     /// Readings less predictions in rows that count, and 0 elsewhere.
     fn residual(&self, predicted: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let judged = &self.side.rows().judged;
-        let off = |((_, read), said): (&(_, Vec<f64>), &Vec<f64>)| {
-            read.iter().zip(said).map(|(r, s)| if r.is_nan() { 0.0 } else { r - s }).collect()
+        let off = |((_, read), expected): (&(_, Vec<f64>), &Vec<f64>)| {
+            read.iter().zip(expected).map(|(r, s)| if r.is_nan() { 0.0 } else { r - s }).collect()
         };
         judged.iter().zip(predicted).map(off).collect()
     }
@@ -125,7 +125,7 @@ impl<S: Side> Question<'_, S> {
         Whitening::new(&rows.t_s, &looked, self.white_k[channel], left_k, S::smooth()[channel].alike_s)
     }
 
-    /// Misfit of one channel, with what is known of what is left by a prior of this median and width.
+    /// Misfit of one channel, with a prior of this median and width on its model error.
     fn misfit(&self, counts: &[bool], channel: usize, residual: &[f64], z: f64, prior: (f64, f64)) -> f64 {
         let (median_k, width) = prior;
         let whitening = self.whitening(counts, channel, median_k * (width * z).exp());
@@ -134,7 +134,7 @@ impl<S: Side> Question<'_, S> {
         0.5 * white.iter().map(|w| w * w).sum::<f64>() + whitening.ln_spreads + 0.5 * z * z
     }
 
-    /// What is left of one channel at its likeliest, K; the misfit there, and the logarithm of the evidence's width.
+    /// Likeliest model error of one channel, K; the misfit there, and the logarithm of the evidence's width.
     fn left(&self, counts: &[bool], channel: usize, residual: &[f64], prior: (f64, f64)) -> (f64, f64, f64) {
         let (median_k, width) = prior;
         if width == 0.0 {
@@ -142,12 +142,12 @@ impl<S: Side> Question<'_, S> {
         }
         let at = |z: f64| self.misfit(counts, channel, residual, z, prior);
         let best = minimise(MIN_LEFT, 9.0, 1e-3, at);
-        let (beside, here) = (0.1, best.value);
-        let curvature = (at(best.at + beside) + at(best.at - beside) - 2.0 * here) / (beside * beside);
+        let (step, here) = (0.1, best.value);
+        let curvature = (at(best.at + step) + at(best.at - step) - 2.0 * here) / (step * step);
         (median_k * (width * best.at).exp(), here, -0.5 * curvature.max(0.1).ln())
     }
 
-    /// The best fit from where `start` stands to the rows that `counts` says; `None` where the model has no answer there.
+    /// The best fit to the rows selected by `counts`, starting at `start`; `None` if the model has no answer there.
     pub(crate) fn fit(&self, start: &Hypothesis, counts: &[bool]) -> Option<Fit> {
         let coordinates = self.coordinates(start);
         let at = coordinates.iter().zip(parameters(start)).map(|(coordinate, value)| coordinate.of(value));
@@ -177,15 +177,15 @@ impl<S: Side> Question<'_, S> {
         Some(Fit { score, score_outside, left_k, predicted, precision: normal.matrix, hypothesis })
     }
 
-    /// What else may be seen beside a fit, by straight lines.
-    pub(crate) fn beside(&self, fit: &Fit, counts: &[bool]) -> Option<BesideFit<'_, '_, S>> {
+    /// The linearisation of a fit, for the gain of further effects.
+    pub(crate) fn beside(&self, fit: &Fit, counts: &[bool]) -> Option<LinearisedFit<'_, '_, S>> {
         let whitenings = self.whitenings(counts, &fit.left_k);
         let coordinates = self.coordinates(&fit.hypothesis);
         let slopes = self.slopes(&fit.hypothesis, &fit.predicted, &coordinates, BESIDE);
         let columns = slopes.iter().map(|slope| whitened(&whitenings, slope)).collect();
         let residual = whitened(&whitenings, &self.residual(&fit.predicted));
         let precision = fit.precision.clone().cholesky()?;
-        Some(BesideFit {
+        Some(LinearisedFit {
             question: self,
             predicted: fit.predicted.clone(),
             whitenings,
@@ -211,13 +211,13 @@ impl<S: Side> Question<'_, S> {
         self.all_left(counts, residual, &inside).into_iter().map(|(k, ..)| k).collect()
     }
 
-    /// Changes for a unit of each unknown and each coordinate, by runs beside the hypothesis.
+    /// Changes for a unit of each unknown and each coordinate, by runs next to the hypothesis.
     pub(crate) fn slopes(
         &self,
         hypothesis: &Hypothesis,
         here: &[Vec<f64>],
         coordinates: &[Coordinate],
-        beside: f64,
+        step: f64,
     ) -> Vec<Vec<Vec<f64>>> {
         let of = |moved: &Hypothesis, by: f64| -> Vec<Vec<f64>> {
             let Some(there) = self.predict(moved) else {
@@ -232,14 +232,14 @@ impl<S: Side> Question<'_, S> {
         let mut slopes = Vec::with_capacity(hypothesis.nuisances.len() + coordinates.len());
         for place in 0..hypothesis.nuisances.len() {
             let mut moved = hypothesis.clone();
-            moved.nuisances[place] += beside;
-            slopes.push(of(&moved, beside));
+            moved.nuisances[place] += step;
+            slopes.push(of(&moved, step));
         }
         for (place, (coordinate, value)) in coordinates.iter().zip(parameters(hypothesis)).enumerate() {
             let at = coordinate.of(value);
             // To the side where there is room.
             let room = |x: &f64| (coordinate.of(coordinate.value(*x)) - x).abs() < 1e-9;
-            let away = [at + beside, at - beside].into_iter().find(room).unwrap_or(at - beside);
+            let away = [at + step, at - step].into_iter().find(room).unwrap_or(at - step);
             let mut moved = hypothesis.clone();
             set_parameter(&mut moved, place, coordinate.value(away));
             slopes.push(of(&moved, away - at));
@@ -263,7 +263,7 @@ fn dot(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 }
 
 /// A fit at its best, with the slopes of all that is free in it.
-pub(crate) struct BesideFit<'a, 'q, S> {
+pub(crate) struct LinearisedFit<'a, 'q, S> {
     question: &'a Question<'q, S>,
     predicted: Vec<Vec<f64>>,
     whitenings: Vec<Whitening>,
@@ -272,7 +272,7 @@ pub(crate) struct BesideFit<'a, 'q, S> {
     precision: Cholesky<f64, Dyn>,
 }
 
-impl<S: Side> BesideFit<'_, '_, S> {
+impl<S: Side> LinearisedFit<'_, '_, S> {
     /// What the change from the fit to a hypothesis would take off the cost in any strength, all else free. At its best a fit has no slope
     /// along what is free, so that the residual needs no projection.
     pub(crate) fn gain(&self, there: &Hypothesis) -> Option<f64> {
@@ -302,7 +302,7 @@ struct Fitted<'a, 'q, S> {
     counts: &'a [bool],
     coordinates: Vec<Coordinate>,
     known: Vec<(f64, f64)>,
-    /// By what is left at the last point that was accepted.
+    /// For the model error at the last point that was accepted.
     whitenings: Vec<Whitening>,
 }
 
@@ -347,8 +347,8 @@ impl<S: Side> Model for Fitted<'_, '_, S> {
     }
 
     fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
-        let beside = if reach == Reach::Fine { BESIDE } else { BESIDE_COARSE };
-        let slopes = self.question.slopes(&point.hypothesis, &point.predicted, &self.coordinates, beside);
+        let step = if reach == Reach::Fine { BESIDE } else { BESIDE_COARSE };
+        let slopes = self.question.slopes(&point.hypothesis, &point.predicted, &self.coordinates, step);
         normal(&self.whitenings, &slopes, &point.residual, &self.pulls(unknowns)).0
     }
 

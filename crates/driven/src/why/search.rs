@@ -76,8 +76,8 @@ pub(crate) fn search<S: Side>(
     let null = question.fit(&question.nothing(), counts)?;
     let mut known = Known::default();
     known.keep(&search, null.clone());
-    let beside = |effect: &usize| search.starts(&question.nothing(), *effect);
-    known.fit_all(&search, &asked.iter().flat_map(beside).collect::<Vec<_>>());
+    let starts_of = |effect: &usize| search.starts(&question.nothing(), *effect);
+    known.fit_all(&search, &asked.iter().flat_map(starts_of).collect::<Vec<_>>());
     let best = known.ranked(&search).first().map_or(f64::NEG_INFINITY, |best| best.score);
     if best - null.score > calibration.threshold {
         extend(&search, &mut known, LIMITS);
@@ -120,7 +120,7 @@ impl<S: Side> Causes for Search<'_, S> {
     }
 
     fn offers(&self, base: &Fit) -> Vec<Offer<Hypothesis>> {
-        let Some(beside) = self.question.beside(base, self.counts) else { return Vec::new() };
+        let Some(linearised) = self.question.beside(base, self.counts) else { return Vec::new() };
         let used = members(&base.hypothesis);
         let others: Vec<usize> = self.asked.iter().copied().filter(|effect| !used.contains(effect)).collect();
         let starts = others
@@ -128,7 +128,7 @@ impl<S: Side> Causes for Search<'_, S> {
             .flat_map(|cause| self.starts(&base.hypothesis, *cause).into_iter().map(|start| (*cause, start)));
         let starts: Vec<(usize, Hypothesis)> = starts.collect();
         let offered = parallel::map(&starts, |(cause, start)| {
-            Some(Offer { cause: *cause, ln_gain: 0.5 * beside.gain(start)?, start: start.clone() })
+            Some(Offer { cause: *cause, ln_gain: 0.5 * linearised.gain(start)?, start: start.clone() })
         });
         offered.into_iter().flatten().collect()
     }

@@ -88,7 +88,8 @@ pub(crate) fn judge_step(
     let Some(member) = problem.members.get(index) else { return };
     let eta = member.local[ETA];
     if !(0.05..=1.0).contains(&eta) {
-        let message = format!("the fitted efficiency is {eta:.3}: something outside the model is at work");
+        let message =
+            format!("the fitted efficiency is {eta:.3}: something outside the model has an influence");
         findings.refuse(code::POOR_FIT, message);
     }
     let limits = &config.thresholds;
@@ -152,7 +153,7 @@ pub(crate) fn doubts(
     let slow = mean(&slow).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
         doubts.push(format!(
-            "the residual over all steps is {:.2} times the declared noise: something outside the model is at work",
+            "the residual over all steps is {:.2} times the declared noise: something outside the model has an influence",
             overall.sqrt()
         ));
     }

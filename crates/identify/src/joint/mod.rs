@@ -62,7 +62,7 @@ pub(crate) struct Joint {
     pub(crate) fitted: Option<FittedEfficiencies>,
 }
 
-/// Identifies all steps. `end_states` and `findings`: one for each step; without an end state there is no estimate. `alone`: each step fitted
+/// Identifies all steps. `end_states` and `findings`: one for each step; a step without an end state gets no estimate. `alone`: each step fitted
 /// alone, with its findings. `condemned`: the readings are refused already, so other explanations are not searched.
 pub(crate) fn estimate(
     recording: &Recording,
@@ -288,7 +288,7 @@ fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
 /// A problem at its minimum.
 struct Fitted {
     covariance: Covariance,
-    /// `None` if there is no parameter with a prior to search for.
+    /// `None` without parameters with a prior to search for.
     refined: Option<(Refinements, Gain)>,
     /// Remaining uncertainty of h before the wheel.
     inlet_sigma: Option<f64>,

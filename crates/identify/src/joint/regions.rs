@@ -1,7 +1,7 @@
 //! Finds a region of the map whose steps disagree with the others on the shared parameters, so that it does not condemn the recording.
 //!
 //! It runs if the fit of all steps has warnings. A region is one end of the map (near choke, near surge, slowest, fastest). It is left out if
-//! the warnings disappear without it, and if the shared parameters change by more than their own uncertainty explains. If there is no error,
+//! the warnings disappear without it, and if the shared parameters change by more than their own uncertainty explains. Without an error,
 //! the remaining steps only carry less information: the variance of the difference is then the difference of the variances (Hausman,
 //! Econometrica 46, 1978, eq. 2.10).
 

@@ -18,7 +18,7 @@ const LATE_BLOCK_S: f64 = 1.0;
 /// Time from the first sample after which that applies, s: several settling times of probe and speed.
 const LATE_S: f64 = 20.0;
 
-/// Time from the first row after which lags of lines and sensors are no longer visible, s.
+/// Time from the first row after which lags of lines and sensors have become invisible, s.
 const SETTLED_S: f64 = 8.5;
 /// Minimum number of rows of a shortened step.
 const MIN_ROWS: usize = 20;

@@ -283,7 +283,7 @@ fn whitening(
 
 /// Estimates the noise of each step and the spreads of the points about surface and law from the fit; `None` if the equations are singular.
 pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<()> {
-    weigh(problem, steps, config);
+    set_weights(problem, steps, config);
     let covariance = problem.with_exact_readings().covariance()?;
     let of_steps = || problem.members.iter().zip(&covariance.own).filter(|(member, _)| member.shares);
     let off_surface: Vec<(f64, f64)> = of_steps()
@@ -348,7 +348,7 @@ pub(crate) fn coupled(slopes: &[f64; 6], by_eta: f64) -> Option<[f64; OFFSET_CHA
 }
 
 /// Sets the noise of each step and the sensitivity of its efficiency to offsets, at the current parameters.
-pub(crate) fn weigh(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
+pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
     let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
     let declared: Vec<f64> = channels
         .iter()

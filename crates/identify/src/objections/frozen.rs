@@ -83,8 +83,8 @@ fn of_channel(
     })?;
     let (from_s, to_s) = (series.t_s[longest.first], series.t_s[longest.last]);
     let message = format!(
-        "{channel} shows {} and nothing else from {from_s:.0} s to {to_s:.0} s: it is frozen or saturated; nothing of the steps in \
-         which it stands still can be used, so mend the channel and repeat them",
+        "{channel} shows {} and nothing else from {from_s:.0} s to {to_s:.0} s: it is frozen or saturated; the steps in which it \
+         does not change cannot be used, so repair the channel and repeat them",
         with_unit(format!("{:.6}", series.values[longest.first]), channel.unit())
     );
     // Cleaning removes the constant samples of a channel with declared noise; speed needs no other check.

@@ -33,7 +33,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 return None;
             }
             let message = format!(
-                "{channel} scatters by {} from sample to sample (one standard deviation), and {} is declared: mend the channel, or \
+                "{channel} scatters by {} from sample to sample (one standard deviation), and {} is declared: repair the channel, or \
                  declare the noise that it has",
                 with_unit(format!("{found:.3e}"), channel.unit()),
                 with_unit(format!("{declared:.3e}"), channel.unit()),

@@ -40,7 +40,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     by_index.sort_by_key(|position| steps[*position].index);
     for same in by_index.chunk_by(|a, b| steps[*a].index == steps[*b].index).filter(|same| same.len() > 1) {
         let message = format!(
-            "{} steps have the number {}, so what is told of one cannot be told from the others: give each its own",
+            "{} steps have the number {}, so the results of one cannot be distinguished from those of the others: give each its own",
             same.len(),
             step_number(steps[same[0]].index)
         );

@@ -36,7 +36,7 @@ impl BlockNoise {
         }
         let first_order = first_order::block_covariance(share, block_s, noise.time_constant_s);
         let own = first_order::variance_of_mean(share, block_s, noise.time_constant_s);
-        // Never quite without: a filter that trusts rows without end is no use.
+        // Never quite without: a filter that trusts rows without end is useless.
         BlockNoise { white: (white + own - first_order).max(0.02 * (white + own)), first_order }
     }
 }

@@ -140,7 +140,7 @@ mod tests {
         assert!((covariance - full.view((0, 0), (3, 3))).abs().max() < 1e-12);
     }
 
-    /// A group without a say leaves the shared step as if it were not there, and takes its own best place beside it.
+    /// A group without a say leaves the shared step as if it were not there, and takes its own best place for that step.
     #[test]
     fn a_group_without_a_say_only_follows() {
         let (mut arrow, ..) = example();

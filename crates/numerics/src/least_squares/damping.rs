@@ -3,13 +3,13 @@
 /// How the damping changes. All are ratios of the normal matrix's diagonal, or factors on them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DampingRule {
-    /// Where it starts.
+    /// Initial value.
     pub start: f64,
     /// Factor after a step that does not help, above 1.
     pub growth: f64,
     /// Factor after one that does, below 1.
     pub relief: f64,
-    /// Where it goes at least after a step that does not help, so that a long way down is not taken back in small steps.
+    /// Minimum value after a step that does not help, so that a long way down is not taken back in small steps.
     pub renewed: f64,
     /// Least that relief makes of it.
     pub least: f64,

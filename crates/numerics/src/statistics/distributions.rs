@@ -35,7 +35,7 @@ mod tests {
     use super::*;
     use statrs::distribution::ChiSquared;
 
-    /// scipy: `scipy.stats.norm.ppf(0.975)`, `scipy.stats.chi2.ppf(0.95, 1)`; statrs as a second witness.
+    /// scipy: `scipy.stats.norm.ppf(0.975)`, `scipy.stats.chi2.ppf(0.95, 1)`; statrs as a second reference.
     #[test]
     fn the_constants_are_those_of_scipy() {
         assert!((NORMAL_975 - 1.959963984540054).abs() < 1e-15);

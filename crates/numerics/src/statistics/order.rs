@@ -30,7 +30,7 @@ pub fn median_of_sorted(sorted: &[f64]) -> Option<f64> {
     Some(halfway(sorted[(sorted.len() - 1) / 2], *upper))
 }
 
-/// The value that stands nearest to `share` (0 to 1) of the way from the smallest to the largest: always one of the values.
+/// The value nearest to `share` (0 to 1) of the way from the smallest to the largest: always one of the values.
 /// `None` without values, NaN where a value is NaN.
 ///
 /// In the unit of the values. For searches whose way depends on the last digit: what people read is [`median`] and
@@ -52,8 +52,7 @@ fn halfway(lower: f64, upper: f64) -> f64 {
 /// The value below which `share` (0 to 1) of the values lie, by straight lines between the values in order, of which the
 /// smallest stands for 0 and the largest for 1. `None` without values or with another share, NaN where a value is NaN.
 ///
-/// In the unit of the values. Type 7 of Hyndman and Fan (1996), which is what numpy, R and spreadsheets do unless told
-/// otherwise.
+/// In the unit of the values. Type 7 of Hyndman and Fan (1996), which is what numpy, R and spreadsheets do by default.
 pub fn quantile<T: Borrow<f64>>(values: impl IntoIterator<Item = T>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().map(|value| *value.borrow()).collect();
     if values.is_empty() || !(0.0..=1.0).contains(&share) {

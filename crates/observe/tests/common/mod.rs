@@ -118,10 +118,10 @@ pub fn record(clean: &Clean, fault: Fault, seed: u64) -> (Recording, Option<Elem
         Fault::Slow(_) => Channel::T2,
         _ => [Channel::T1, Channel::T2, Channel::T3, Channel::T4][random.random_range(0..4)],
     };
-    // One that only stands still shows where something moves.
+    // A sensor that is only frozen is visible when something moves.
     let channel = if fault == Fault::StuckWithNoise { Channel::T2 } else { channel };
     let faulty = (fault != Fault::None).then(|| Element { channel, number: random.random_range(1..=4) });
-    // With its noise left, one that stands still after the last jump looks as sound as the others.
+    // With its noise left, one that freezes after the last jump looks as fault-free as the others.
     let last = if fault == Fault::StuckWithNoise { 0.8 } else { 0.9 };
     let stuck_from = random.random_range(clean.t_s.len() / 10..(last * clean.t_s.len() as f64) as usize);
     let mut recording = Recording::default();
@@ -185,7 +185,7 @@ fn normal(random: &mut impl Rng) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// What was said of one recording.
+/// Outcome of judging one recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Said {
     /// Nothing, or exactly the right sensor.

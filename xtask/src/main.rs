@@ -1,4 +1,4 @@
-//! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs` and `performance`.
+//! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `wheel` and `performance`.
 
 mod constants;
 mod docs;
@@ -9,6 +9,7 @@ mod machine;
 mod offered;
 mod performance;
 mod python_env;
+mod python_package;
 mod quick;
 mod step;
 mod tally;
@@ -27,6 +28,7 @@ usage: cargo xtask COMMAND
   fmt            format every file, those included that a macro declares and `cargo fmt` does not see
   docs           make the generated documents again
   docs --check   fail where a generated document is not what the program makes now
+  wheel          build the Python package's wheel and test it in an empty environment
   performance    measure, with peers for comparison if they can be built, and write docs/performance.md
 ";
 
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
         ["fmt"] => formatting::formatting(formatting::Mode::Write),
         ["docs"] => docs::docs(docs::Mode::Write),
         ["docs", "--check"] => docs::docs(docs::Mode::Check),
+        ["wheel"] => python_package::wheel(),
         ["performance"] => performance::performance(),
         ["--help" | "-h" | "help"] => {
             step::say(USAGE);

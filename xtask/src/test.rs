@@ -6,7 +6,7 @@ use crate::formatting::{Mode, formatting};
 use crate::offered::{Offered, with_program};
 use crate::step::{Steps, command, run, say};
 use crate::tally::Tally;
-use crate::{machine, python_env, test_programs, workspace};
+use crate::{machine, python_env, python_package, test_programs, workspace};
 use std::process::Command;
 
 /// Examples that a test or the documents run.
@@ -62,10 +62,11 @@ pub fn test() -> Result<(), Error> {
     steps.run("building", || {
         // The program in one go with all tests: alone it would have other features of some libraries, and they
         // would be built twice.
-        let all = ["build", "--workspace", "--all-features", "--bins", "--tests", "--quiet"];
+        let all = ["build", "--workspace", "--all-features", "--lib", "--bins", "--tests", "--quiet"];
         run(offered.to(cargo(&[&all[..], EXAMPLES].concat())))
     });
     steps.run("tests", || tests(&offered));
+    steps.run("Python package", || python_package::check(&offered));
     steps.run("generated documents", || docs::docs(docs::Mode::Check));
     let result = steps.finish();
     if !offered.mountable {

@@ -1,0 +1,100 @@
+//! The Python package: its tests on the library that was built with everything else, and the wheel.
+
+use crate::error::Error;
+use crate::offered::{Offered, with_program};
+use crate::step::{command, run, say};
+use crate::{python_env, workspace};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Types, style, tests and notebooks, with the package put together from its Python files and the debug build. The wheel differs in
+/// the optimisation alone; building it would double the time.
+pub fn check(offered: &Offered) -> Result<(), Error> {
+    let home = workspace::target_dir().join("python-package");
+    let package = home.join("mapper");
+    if package.exists() {
+        fs::remove_dir_all(&package).map_err(|source| Error::File { path: package.clone(), source })?;
+    }
+    copy_files(&workspace::root().join("python/python/mapper"), &package)?;
+    let library = workspace::target_dir().join("debug/lib_mapper.so");
+    copy(&library, &package.join("_mapper.abi3.so"))?;
+    let of = |arguments: &[&str]| {
+        let mut command = with_program(command(&offered.python, arguments));
+        command
+            .env("PYTHONPATH", &home)
+            .env("MPLBACKEND", "agg")
+            .current_dir(workspace::root().join("python"));
+        command
+    };
+    run(of(&["-m", "ruff", "check", "."]))?;
+    run(of(&["-m", "mypy"]))?;
+    run(of(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))?;
+    for notebook in files(&workspace::root().join("examples/notebooks"))? {
+        // Executed in a directory of its own, where its runs go.
+        let runs = home.join("notebooks");
+        fs::create_dir_all(&runs).map_err(|source| Error::File { path: runs.clone(), source })?;
+        let script = "import nbformat, nbclient, sys\n\
+                      book = nbformat.read(sys.argv[1], as_version=4)\n\
+                      nbclient.NotebookClient(book, timeout=600, kernel_name='python3').execute()";
+        let mut execute = of(&["-c", script, &notebook.to_string_lossy()]);
+        execute.current_dir(&runs);
+        run(execute)?;
+    }
+    Ok(())
+}
+
+/// Builds the wheel as users do, installs it into an empty environment and runs its tests there.
+pub fn wheel() -> Result<(), Error> {
+    let python = python_env::prepare()?;
+    let (wheels, empty) = (workspace::target_dir().join("wheels"), workspace::target_dir().join("wheel-env"));
+    for old in [&wheels, &empty] {
+        if old.exists() {
+            fs::remove_dir_all(old).map_err(|source| Error::File { path: old.clone(), source })?;
+        }
+    }
+    let folder = wheels.to_string_lossy();
+    let mut build = command(&python, &["-m", "maturin", "build", "--release", "--out", &folder]);
+    build.current_dir(workspace::root().join("python"));
+    run(build)?;
+    run(command("python3", &["-m", "venv", &empty.to_string_lossy()]))?;
+    let mut install: Command = command(empty.join("bin/python"), &["-m", "pip", "install", "--quiet"]);
+    for wheel in files(&wheels)? {
+        install.arg(format!("{}[test]", wheel.display()));
+    }
+    run(install)?;
+    let mut tests = command(empty.join("bin/python"), &["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]);
+    tests.current_dir(workspace::root().join("python"));
+    run(tests)?;
+    say(&format!("the wheel is in {folder}\n"));
+    Ok(())
+}
+
+fn copy_files(from: &Path, to: &Path) -> Result<(), Error> {
+    fs::create_dir_all(to).map_err(|source| Error::File { path: to.to_owned(), source })?;
+    for file in files(from)? {
+        let name = file.file_name().unwrap_or_default();
+        // A library from a development build of the package.
+        if file.extension().is_none_or(|extension| extension != "so") {
+            copy(&file, &to.join(name))?;
+        }
+    }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), Error> {
+    fs::copy(from, to).map(drop).map_err(|source| Error::File { path: from.to_owned(), source })
+}
+
+/// The plain files of a directory.
+fn files(directory: &Path) -> Result<Vec<PathBuf>, Error> {
+    let failed = |source| Error::File { path: directory.to_owned(), source };
+    let mut found: Vec<PathBuf> = fs::read_dir(directory)
+        .map_err(failed)?
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.is_file())
+        .collect();
+    found.sort();
+    Ok(found)
+}

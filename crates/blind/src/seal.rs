@@ -33,10 +33,10 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// What tells its score from that of other cases.
+    /// Heading that distinguishes its score from those of other cases.
     pub fn title(&self) -> String {
-        let beside = if self.healthy { ", beside a healthy recording" } else { "" };
-        format!("{}{beside}", self.laboratory.name())
+        let recording = if self.healthy { ", with a healthy recording" } else { "" };
+        format!("{}{recording}", self.laboratory.name())
     }
 
     /// Reads a manifest.

@@ -1,4 +1,4 @@
-//! Blind cases from end to end: made, sealed, diagnosed by nobody and by an oracle, scored.
+//! Blind cases from end to end: made, sealed, scored without diagnoses and with those of an oracle.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_blind::{ANSWERS_NAME, BlindError, Draw, Made, OutsideUse, Share, Truth, make, score};

@@ -74,7 +74,7 @@ impl Pending {
         self.last_s.is_some_and(|last_s| last_s >= t_s)
     }
 
-    /// Returns all samples up to `until_s` plus `rounding_s`, with a column for each of `channels`: NaN if there is no reading.
+    /// Returns all samples up to `until_s` plus `rounding_s`, with a column for each of `channels`: NaN without a reading.
     pub(crate) fn take(&mut self, until_s: f64, rounding_s: f64, channels: &[Channel]) -> SampleBatch {
         let mut whole = SampleBatch {
             first_sequence: self.next,

@@ -28,7 +28,7 @@ fn patience(fault: &str) -> Patience {
 
 /// The driver of examples/misbehaving.rs under the name of its fault.
 fn program(fault: &str) -> PathBuf {
-    // target/debug/deps/faults-..., with target/debug/examples beside deps.
+    // target/debug/deps/faults-..., with target/debug/examples next to deps.
     let own = std::env::current_exe().unwrap();
     let built = own.parent().unwrap().parent().unwrap().join("examples/mapper-backend-misbehaving");
     assert!(built.is_file(), "{} is built with the tests", built.display());
@@ -92,7 +92,7 @@ fn samples_that_cannot_be_are_the_loss_of_the_rig_which_can_still_be_made_safe()
         ("reordered", "sample 11 was expected and sample 16 came"),
         ("backward", "a sample at"),
         ("no_numbers", "sent what no driver sends"),
-        ("flood", "more samples than anybody has asked for"),
+        ("flood", "more samples than were requested"),
     ] {
         let mut driver = running(fault);
         driver.set(&SETPOINTS).unwrap();
@@ -118,7 +118,7 @@ fn answers_that_nobody_waits_for_are_thrown_away_and_a_refusal_is_told() {
     assert!(error.contains("the valve does not answer"), "{error}");
 }
 
-/// A file that has the name and cannot be started: said as that, with what to do, and not that there is none.
+/// A file that has the name and cannot be started is reported as such, with what to do, not as missing.
 #[test]
 fn a_file_that_cannot_be_started_is_told_with_what_is_wrong_with_it() {
     use std::os::unix::fs::PermissionsExt;
@@ -133,13 +133,13 @@ fn a_file_that_cannot_be_started_is_told_with_what_is_wrong_with_it() {
         let file = directory.join(format!("mapper-backend-{name}"));
         std::fs::write(&file, text).unwrap();
         std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
-        let said = Driver::find(&places, name, &Value::Null, "", "").err().unwrap().to_string();
-        assert!(said.contains(words) && said.contains(file.to_str().unwrap()), "{name}: {said}");
+        let message = Driver::find(&places, name, &Value::Null, "", "").err().unwrap().to_string();
+        assert!(message.contains(words) && message.contains(file.to_str().unwrap()), "{name}: {message}");
     }
     std::fs::remove_dir_all(&directory).unwrap();
 }
 
-/// Told where was looked and what to do, and a name from a campaign reaches no other directory.
+/// The message names the searched places and what to do, and a name from a campaign reaches no other directory.
 #[test]
 fn a_driver_that_is_not_there_is_told_with_where_was_looked() {
     let places = Places { programs: vec!["/nowhere/at/all".into()], sockets: None };

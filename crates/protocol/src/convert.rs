@@ -68,8 +68,8 @@ pub enum Unusable {
         /// What came.
         found: u64,
     },
-    /// More than anybody has asked for.
-    #[error("it sends more samples than anybody has asked for")]
+    /// More than were requested.
+    #[error("it sends more samples than were requested")]
     TooMany,
 }
 

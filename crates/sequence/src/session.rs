@@ -140,7 +140,7 @@ impl Session {
         let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
         index.and_then(|index| self.results.get(index)).cloned().ok_or_else(|| {
             let message =
-                format!("there is no result of step {number}: {} have been run", self.results.len());
+                format!("no result of step {number}: {} have been run", self.results.len());
             throw(message, "steps are counted from 1; jump() returns its own result")
         })
     }

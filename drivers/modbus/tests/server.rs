@@ -241,8 +241,8 @@ fn only_what_was_written_counts_as_acknowledged() {
     for misdeed in [OTHER_REGISTER, FEWER_REGISTERS, DEVICE_FAILURE] {
         stand.misbehave(misdeed);
         lost(rig.make_safe());
-        let said = lost(rig.set(&SETPOINTS));
-        assert_eq!(said.contains("exception 4"), misdeed == DEVICE_FAILURE, "{said}");
+        let message = lost(rig.set(&SETPOINTS));
+        assert_eq!(message.contains("exception 4"), misdeed == DEVICE_FAILURE, "{message}");
         stand.misbehave(HONEST);
         rig.set(&SETPOINTS).unwrap();
     }

@@ -62,7 +62,7 @@ fn recordings_hold_the_schedule_and_nothing_of_the_truth() {
     }
 }
 
-/// Somebody who knows all answers has the full score; who says nothing has none.
+/// An oracle that knows all answers has the full score; without answers the score is zero.
 #[test]
 fn an_oracle_scores_full_and_silence_scores_nothing() {
     let scratch = tempfile::tempdir().unwrap();

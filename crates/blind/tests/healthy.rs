@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Nothing changed: within tolerance. A cause came: it is named. Without the healthy recording it is outside the catalogue.
 #[test]
-fn a_healthy_recording_tells_a_cause_from_structure() {
+fn a_healthy_recording_separates_a_cause_from_structure() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/gap_rig.yaml");
     let mut campaign = mapper_campaign::load(&path).unwrap();
     campaign.points.truncate(6);

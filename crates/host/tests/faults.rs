@@ -52,7 +52,7 @@ fn running(fault: &str) -> Driver {
 }
 
 #[test]
-fn what_is_no_driver_is_refused_before_there_is_a_rig() {
+fn a_program_that_is_not_a_driver_is_refused_before_a_rig_exists() {
     for (fault, words) in [
         ("mute", "did not answer `hello` within 0.3 s"),
         ("garbage", "text that begins with `Welc` where frames belong"),
@@ -76,7 +76,7 @@ fn what_is_no_driver_is_refused_before_there_is_a_rig() {
 fn a_driver_that_ends_or_hangs_while_it_is_armed_is_lost_in_bounded_time() {
     let mut gone = running("exits_armed");
     assert!(matches!(gone.set(&SETPOINTS), Err(BackendError::Lost { .. })));
-    // Nobody can say that the rig is safe.
+    // The state of the rig is unknown.
     assert!(matches!(gone.make_safe(), Err(BackendError::Lost { .. })));
     let mut hangs = running("hangs");
     assert!(matches!(hangs.set(&SETPOINTS), Err(BackendError::Deadline { call: "set", .. })));
@@ -109,7 +109,7 @@ fn samples_that_cannot_be_are_the_loss_of_the_rig_which_can_still_be_made_safe()
 }
 
 #[test]
-fn answers_that_nobody_waits_for_are_thrown_away_and_a_refusal_is_told() {
+fn late_answers_are_discarded_and_a_refusal_is_reported() {
     let mut talks = running("answers_twice");
     talks.set(&SETPOINTS).unwrap();
     assert_eq!(talks.poll(2.0).unwrap().t_s.len(), 10);
@@ -120,7 +120,7 @@ fn answers_that_nobody_waits_for_are_thrown_away_and_a_refusal_is_told() {
 
 /// A file that has the name and cannot be started is reported as such, with what to do, not as missing.
 #[test]
-fn a_file_that_cannot_be_started_is_told_with_what_is_wrong_with_it() {
+fn a_file_that_cannot_be_started_is_reported_with_the_reason() {
     use std::os::unix::fs::PermissionsExt;
     let directory = std::env::temp_dir().join(format!("mapper-host-files-{}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
@@ -141,7 +141,7 @@ fn a_file_that_cannot_be_started_is_told_with_what_is_wrong_with_it() {
 
 /// The message names the searched places and what to do, and a name from a campaign reaches no other directory.
 #[test]
-fn a_driver_that_is_not_there_is_told_with_where_was_looked() {
+fn a_missing_driver_is_reported_with_the_searched_places() {
     let places = Places { programs: vec!["/nowhere/at/all".into()], sockets: None };
     for name in ["opcuaa", "../../bin/sh"] {
         let error = Driver::find(&places, name, &Value::Null, "virtual_lab, replay", "").err().unwrap();

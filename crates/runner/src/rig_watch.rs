@@ -64,7 +64,7 @@ mod tests {
     use mapper_core::{ChannelColumn, Event, OperatingPoint};
 
     #[test]
-    fn a_rig_that_says_so_and_a_shaft_that_stands_trip_once_and_latch() {
+    fn a_reported_trip_and_a_stopped_shaft_trip_once_and_latch() {
         let aim = Some(OperatingPoint { speed_rpm: 1e5, valve_opening_ratio: 0.7 });
         let state = Told { running: true, step_since_s: Some(0.0), aim, jumped_s: None };
         let speeds = |from_s: f64, rpm: f64| {

@@ -127,7 +127,7 @@ fn each_channel_has_the_times_of_its_own_source() {
 
 /// A late reading follows the samples already passed on, and keeps its source time. A lost instrument delays nothing.
 #[test]
-fn what_is_late_keeps_the_time_of_its_source_and_a_lost_reader_is_said() {
+fn late_readings_keep_the_time_of_their_source_and_a_lost_reader_is_reported() {
     let mut rig = rig(Instrument { late_s: 0.25, lost_s: 2.0, ..instrument(10.0) });
     let batches: Vec<SampleBatch> =
         (1..=30).map(|tenth| rig.poll(f64::from(tenth) * 0.1 + 0.01).unwrap()).collect();
@@ -153,7 +153,7 @@ fn what_is_late_keeps_the_time_of_its_source_and_a_lost_reader_is_said() {
 
 /// In real time a hanging instrument does not delay the polling of the rig.
 #[test]
-fn nobody_waits_for_a_reader_in_real_time() {
+fn a_run_in_real_time_does_not_wait_for_a_reader() {
     struct Hangs(std::sync::mpsc::Receiver<()>, Instrument);
     impl Backend for Hangs {
         fn describe(&self) -> RigDescription {

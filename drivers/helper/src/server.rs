@@ -167,8 +167,7 @@ impl Server {
             return Err(lease_ended());
         }
         if armed.told.is_none() {
-            let message =
-                "no setpoints to hold: none were set since arming or since it was made safe";
+            let message = "no setpoints to hold: none were set since arming or since it was made safe";
             return Err(refused(Code::OutOfOrder, message));
         }
         guarded(|| rig.hold())?;
@@ -445,7 +444,7 @@ mod tests {
 
     /// Setpoints from before the safe state or the end of the lease must not be held: they would restore the air.
     #[test]
-    fn what_is_held_is_what_was_told_last_and_nothing_from_before_it_was_made_safe() {
+    fn hold_repeats_the_last_setpoints_and_none_from_before_the_safe_state() {
         let (mut server, log) = flying(false, 100);
         assert!(ask(&mut server, 0.1, "hold", json!({})).is_none());
         assert_eq!(*log.lock().unwrap(), ["hold"]);
@@ -499,7 +498,7 @@ mod tests {
     /// A controller is away when the lease ends. The driver retries every 0.1 s until it is back, and does not poll it
     /// meanwhile, so that the heartbeat stops. It does not disarm the rig before the safe state is confirmed.
     #[test]
-    fn a_rig_in_doubt_is_told_again_and_its_heartbeat_stops() {
+    fn an_unconfirmed_safe_state_is_repeated_and_the_heartbeat_stops() {
         let (mut server, log) = refusing(false, 1, 30);
         let mut next_s = 2.0;
         for hundredth in 0..600 {

@@ -128,7 +128,7 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
 
 /// The socket of a killed driver is reported as such, and the next driver replaces it.
 #[test]
-fn a_socket_at_which_nobody_listens_is_said_and_can_be_taken_again() {
+fn a_socket_without_a_listener_is_reported_and_can_be_reused() {
     let scratch = Scratch::new();
     let socket = scratch.file("lab.socket");
     drop(Listening::at(&socket, &scratch));

@@ -192,7 +192,7 @@ impl Read {
 /// The host neither reads nor writes. The lease ends and the run-down is on time; messages beyond the queue are dropped, and their
 /// numbers are missing. Later requests are executed and answered even if the queue is full.
 #[test]
-fn a_pipe_that_nobody_reads_holds_up_no_rig() {
+fn an_unread_pipe_does_not_delay_the_rig() {
     let lab = Lab::new();
     let mut pipes = Pipes::to(&lab.settings);
     let set = pipes.send("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
@@ -247,7 +247,7 @@ fn a_driver_that_is_left_with_a_full_pipe_ends() {
 
 /// The same through the host: the missed samples count as loss of the rig, the message gives their extent, and the rig can be disarmed.
 #[test]
-fn a_host_that_reads_nothing_is_told_what_it_missed() {
+fn a_host_that_reads_nothing_gets_a_note_of_what_it_missed() {
     let lab = Lab::new();
     let patience = Patience { silence: Duration::from_millis(300), ..PATIENCE };
     let mut driver = Driver::of_program(Path::new(PROGRAM), "lab", &lab.settings, patience).unwrap();

@@ -244,7 +244,7 @@ fn a_server_whose_certificate_has_expired_is_not_talked_to() {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_wrong_password_and_a_refused_setpoint_are_said_with_their_codes() {
+fn a_wrong_password_and_a_refused_setpoint_are_reported_with_their_codes() {
     let stand = Stand::new();
     stand.trust();
     let refused = words(stand.driver("wrong").arm().unwrap_err());
@@ -284,7 +284,7 @@ fn a_server_that_restarts_is_read_again_soon() {
 /// The server hangs with its connection alive, for longer than the client waits before it reconnects.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_that_stands_still_is_read_again_soon() {
+fn a_stopped_server_is_read_again_soon() {
     let stand = Stand::new();
     stand.trust();
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
@@ -308,7 +308,7 @@ fn a_server_that_stands_still_is_read_again_soon() {
 /// A failure is reported in time, so that the runner knows that the rig is in doubt.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_that_is_gone_for_good_is_said_in_time() {
+fn a_server_that_is_gone_for_good_is_reported_in_time() {
     let mut stand = Stand::new();
     stand.trust();
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
@@ -438,7 +438,7 @@ fn a_write_that_is_not_simply_good_is_lost() {
 /// Changes of a node at run time: a Boolean and readings from the future are missing; uncertain ones are readings, marked as uncertain.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn readings_that_turn_bad_are_none_and_uncertain_ones_are_said() {
+fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
     for misdeed in ["boolean", "future", "uncertain"] {
         let stand = Stand::with(&["--misdeed", misdeed]);
         stand.trust();

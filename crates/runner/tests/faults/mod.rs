@@ -187,7 +187,7 @@ fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_in_doubt() {
 }
 
 #[test]
-fn becoming_safe_is_tried_again_and_then_said_loudly() {
+fn the_safe_state_is_retried_and_then_its_failure_is_reported() {
     let nan = (FAULT_S, Fault::Nan(Channel::T2));
     let twice = night(&[nan.clone(), (0.0, Fault::NotSafe(2))], &usual());
     assert!(matches!(twice.end, Ok(RunEnd::Tripped(_))));

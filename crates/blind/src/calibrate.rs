@@ -215,7 +215,7 @@ pub(crate) fn weights(calibration: &Calibration, observed: &[Observed]) -> Vec<f
 
 /// Share of the effect-free cases that stay below the threshold.
 const QUIET: f64 = 0.985;
-/// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases say.
+/// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases suggest.
 const MIN_THRESHOLD: f64 = 3.0;
 /// The calibration that fits the observed cases, based on the shipped one.
 ///
@@ -226,7 +226,7 @@ pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, Bli
 }
 
 /// The calibration that fits what was observed: all of it, weak signatures too. An outside cause that can hardly be seen is named as
-/// something of the catalogue, and how often that happens is what a probability has to say.
+/// something of the catalogue, and a probability must state how often that happens.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
     let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
@@ -306,7 +306,7 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
     }
 
-    /// 90 cases of nothing and 10 with a cause count as the priors say, and on average 1.
+    /// 90 cases without and 10 with a cause count according to the priors, and on average 1.
     #[test]
     fn cases_of_nothing_count_as_the_prior_says() {
         let before = Calibration { prior_none: 0.3, ..Calibration::shipped().unwrap() };

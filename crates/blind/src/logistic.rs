@@ -5,7 +5,7 @@ use mapper_numerics::minimise::minimise;
 
 /// Rounds of coordinate descent at most; it needs some fifty.
 const ROUNDS: usize = 300;
-/// Slopes that are expected, and the precision of that expectation: some ten cases say otherwise.
+/// Slopes that are expected, and the precision of that expectation: some ten cases outweigh it.
 const EXPECTED: f64 = 1.0;
 const PRIOR: f64 = 0.25;
 /// Minimum slopes: more misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from

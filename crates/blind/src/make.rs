@@ -22,7 +22,7 @@ const MAX_CASES: usize = 100_000;
 /// What was made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Made {
-    /// What the directory says of itself.
+    /// Manifest of the directory.
     pub manifest: Manifest,
     /// Answers in the order of the cases; for calibration, which may know them.
     pub answers: Vec<Truth>,

@@ -103,7 +103,7 @@ pub struct SigmaClass {
 pub struct Score {
     /// Case by case.
     pub cases: Vec<ScoredCase>,
-    /// The cases by how plainly the cause that shows least does.
+    /// The cases by the signature length of their weakest cause.
     pub classes: [SigmaClass; CLASSES_SIGMA.len()],
     /// Recordings without effect that were left alone.
     pub none: Share,

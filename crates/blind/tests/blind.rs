@@ -62,7 +62,7 @@ fn recordings_hold_the_schedule_and_nothing_of_the_truth() {
     }
 }
 
-/// An oracle that knows all answers has the full score; without answers the score is zero.
+/// An oracle that knows all answers has the full score; without diagnoses no case is right.
 #[test]
 fn an_oracle_scores_full_and_silence_scores_nothing() {
     let scratch = tempfile::tempdir().unwrap();

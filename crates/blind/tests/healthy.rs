@@ -1,4 +1,4 @@
-//! On a rig of other equations: everything is outside the catalogue, until a healthy recording says what the rig is like.
+//! On a rig of other equations: everything is outside the catalogue, until a healthy recording shows the rig's behaviour.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_blind::{CaseKind, Draw, Laboratory, OutsideUse, make, study_without_causes};

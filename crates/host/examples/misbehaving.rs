@@ -1,4 +1,4 @@
-//! A driver that misbehaves on demand, for tests: it measures T2 in simulated time, and its setting `fault` says what it does wrong.
+//! A driver that misbehaves on demand, for tests: it measures T2 in simulated time, and its setting `fault` selects the fault.
 
 use mapper_protocol::{Encoding, Message, VERSION, decode, encode, read_frame, write_frame};
 use serde_json::{Value, json};

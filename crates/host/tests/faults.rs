@@ -1,4 +1,4 @@
-//! Whatever a driver does, the host comes back in bounded time, with an error that says what it was. Real processes and pipes.
+//! Whatever a driver does, the host comes back in bounded time, with an error that names the cause. Real processes and pipes.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -3,7 +3,7 @@
 use crate::message::{Code, Failure};
 use mapper_core::BackendError;
 
-/// What a driver says of its failure.
+/// The failure as the driver reports it.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct ReportedError(String);

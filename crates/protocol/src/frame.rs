@@ -27,7 +27,7 @@ impl Encoding {
 /// Why a frame or its content cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
-    /// It says that it is longer than may be sent.
+    /// Its declared length exceeds the limit.
     #[error("a frame of {bytes} bytes; at most {limit} may be sent")]
     TooLarge {
         /// Its length, bytes.
@@ -65,7 +65,7 @@ pub enum FrameError {
 /// The next frame; `None` where the stream ends between two.
 ///
 /// # Errors
-/// [`FrameError`]; the stream is of no further use then. No more than `limit_bytes` are kept, whatever the frame says of itself.
+/// [`FrameError`]; the stream is of no further use then. No more than `limit_bytes` are kept, whatever length the frame declares.
 pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec<u8>>, FrameError> {
     let mut length = Vec::with_capacity(4);
     stream.take(4).read_to_end(&mut length)?;

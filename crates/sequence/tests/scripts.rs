@@ -394,7 +394,7 @@ fn t3_and_oil_hold_from_where_they_are_set() {
     assert!(message.contains("193.15 K"), "{message}");
 }
 
-/// Whoever drops a script does not wait until it has used up its operations, wherever it computes.
+/// Dropping a script does not wait until it has used up its operations, wherever it computes.
 #[test]
 fn a_script_that_computes_ends_when_it_is_dropped() {
     for text in [

@@ -140,7 +140,7 @@ class Server:
                 raise Refused("refused", "the session is another one")
             call = getattr(self, "on_" + str(method), None)
             if call is None:
-                raise Refused("unknown_method", f"there is no method `{method}`")
+                raise Refused("unknown_method", f"unknown method `{method}`")
             self.out.append({"id": identity, "result": call(message.get("params") or {}, now_s)})
         except Refused as refused:
             self.out.append({"id": identity, "error": refused.failure})
@@ -171,7 +171,7 @@ class Server:
         if not self.rig or self.armed:
             raise Refused("out_of_order", "the rig is armed" if self.armed else "the settings have not come")
         self.rig.arm()
-        self.armed = {"fresh": True, "at_s": now_s, "told": None, "ticks": 0, "sequence": 0, "polled_s": 0.0, "lease_s": now_s + LEASE_S,
+        self.armed = {"fresh": True, "at_s": now_s, "setpoints": None, "ticks": 0, "sequence": 0, "polled_s": 0.0, "lease_s": now_s + LEASE_S,
                       "descent": None, "ended": False}
         return {}
 
@@ -187,15 +187,15 @@ class Server:
         if self.about["accepts"]:
             check(params, self.about["accepts"])
         self.rig.set(params)
-        armed["told"] = params
+        armed["setpoints"] = params
         return {}
 
     def on_hold(self, _, __):
         armed = self.held()
         if armed["ended"]:
             raise Refused("lease_ended", "the lease had ended and the rig was made safe; disarm it and arm it again")
-        if not armed["told"]:
-            raise Refused("out_of_order", "there are no setpoints to hold: none were set since arming or since it was made safe")
+        if not armed["setpoints"]:
+            raise Refused("out_of_order", "no setpoints to hold: none were set since arming or since it was made safe")
         self.rig.hold()
         return {}
 
@@ -204,7 +204,7 @@ class Server:
         if not self.about["simulated_time"]:
             raise Refused("unknown_method", "this rig is in real time: its samples come by themselves")
         if not isinstance(until_s, (int, float)) or not abs(until_s) <= LATEST_S:
-            raise Refused("params", f"until_s is no number, or beyond {LATEST_S} s")
+            raise Refused("params", f"until_s is not a number, or beyond {LATEST_S} s")
         self.measure(until_s)
         armed["polled_s"] = max(armed["polled_s"], until_s)
         return {"next_sequence": armed["sequence"]}
@@ -212,12 +212,12 @@ class Server:
     def on_make_safe(self, _, __):
         armed = self.held()
         self.rig.make_safe()
-        armed["descent"], armed["told"], armed["in_doubt"] = None, None, False
+        armed["descent"], armed["setpoints"], armed["in_doubt"] = None, None, False
         return {}
 
     def on_disarm(self, _, __):
         armed = self.held()
-        if armed["told"] or armed["descent"]:
+        if armed["setpoints"] or armed["descent"]:
             self.on_make_safe(None, None)  # a rig is not disarmed before it confirms
         self.rig.disarm()
         self.armed = None
@@ -255,7 +255,7 @@ class Server:
         armed = self.armed
         if armed and not armed["ended"]:
             armed["ended"] = True
-            armed["descent"] = (armed["told"], self.run_s(now_s))
+            armed["descent"] = (armed["setpoints"], self.run_s(now_s))
 
     def tick(self, now_s):
         """Does what is due; returns the time to the next task, s, or None."""
@@ -297,12 +297,12 @@ class Server:
         if not self.about["simulated_time"] and now_s < armed.get("due_s", 0.0):
             return armed["due_s"] - now_s
         armed["due_s"] = now_s + STEP_S
-        told, begun_s = armed["descent"]
+        setpoints, begun_s = armed["descent"]
         safe, simulated = self.about["safe"], self.about["simulated_time"]
         after_s = self.run_s(now_s) - begun_s + STEP_S
         if not armed.get("cut"):
             try:
-                wanted = self.on_the_way(told, safe, after_s)
+                wanted = self.on_the_way(setpoints, safe, after_s)
                 if wanted:
                     self.rig.set(wanted)
                     if simulated:
@@ -313,10 +313,10 @@ class Server:
                 pass  # cut the air at once
             armed["cut"] = True
         if self.cut_air():
-            armed["descent"], armed["told"], armed["in_doubt"] = None, None, False
+            armed["descent"], armed["setpoints"], armed["in_doubt"] = None, None, False
         else:
             if not armed.get("in_doubt"):
-                self.say("the rig did not confirm its safe state, and is told again")
+                self.say("the rig did not confirm its safe state; the command is repeated")
             armed["in_doubt"] = True
             if simulated:
                 armed["polled_s"] += STEP_S
@@ -324,19 +324,19 @@ class Server:
                 armed["descent"] = None  # no host, and the rig does not answer
         return STEP_S
 
-    def on_the_way(self, told, safe, after_s):
+    def on_the_way(self, setpoints, safe, after_s):
         """Setpoints of the safe trajectory after_s from its start; None: cut the air."""
         slew_pa_s = safe.get("p3_slew_pa_s")
-        if not (told and told.get("mode") == "running" and slew_pa_s and after_s <= safe["within_s"]):
+        if not (setpoints and setpoints.get("mode") == "running" and slew_pa_s and after_s <= safe["within_s"]):
             return None
-        p3_pa = told["p3_pa"] - slew_pa_s * after_s
+        p3_pa = setpoints["p3_pa"] - slew_pa_s * after_s
         if p3_pa <= ATMOSPHERE_PA:
             return None
         wanted = {
-            **told,
+            **setpoints,
             "p3_pa": p3_pa,
             "t3_k": HEATER_OFF_K,
-            "valve_opening_ratio": max(told["valve_opening_ratio"], safe["valve_opening_ratio"]),
+            "valve_opening_ratio": max(setpoints["valve_opening_ratio"], safe["valve_opening_ratio"]),
         }
         # A command that the rig refuses would cut the air at full pressure.
         accepts = self.about.get("accepts") or {}
@@ -430,7 +430,7 @@ def listen_at(path):
     listener = socket.socket(socket.AF_UNIX)
     if os.path.lexists(path):
         if not stat.S_ISSOCK(os.lstat(path).st_mode):
-            raise OSError("there is a file that is no socket")
+            raise OSError("there is a file that is not a socket")
         with socket.socket(socket.AF_UNIX) as probe:
             if probe.connect_ex(path) == 0:
                 raise OSError("another driver listens there")
@@ -474,14 +474,14 @@ def serve_one(server, stdin, write, news):
             pass  # disconnected, or the start of the next frame is unknown
         news.put(None)
 
-    def tell():
+    def send_all():
         try:
             while (body := to_write.get()) is not None:
                 write(struct.pack(">I", len(body)) + body)
         except (OSError, ValueError):
             return
 
-    for work in (listen, tell):
+    for work in (listen, send_all):
         threading.Thread(target=work, daemon=True).start()
 
     def heed(message):

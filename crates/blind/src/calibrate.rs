@@ -55,7 +55,7 @@ pub struct Observed {
     pub kind: CaseKind,
     /// Ids of its causes.
     pub causes: BTreeSet<String>,
-    /// What the diagnosis said with the calibration before.
+    /// Verdict of the diagnosis with the previous calibration.
     pub verdict: Verdict,
     /// Length of the shortest of their signatures, sigmas.
     pub sigma: Option<f64>,
@@ -87,7 +87,7 @@ pub fn calibrate(
     made_by: String,
     engine: &Engine<'_>,
 ) -> Result<Option<(Calibration, Vec<Observed>)>, BlindError> {
-    // Drawing takes some seconds, in which nobody shall wonder.
+    // Drawing takes some seconds: show progress from the start.
     (engine.told)(0, plan.nulls + plan.others);
     let cases = cases(campaign, catalogue, plan)?;
     let diagnosis = Calibrated::new(campaign, catalogue)?;
@@ -200,8 +200,8 @@ fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
     errors
 }
 
-/// How much each case counts, 1 on average. Cases without a cause are drawn in numbers for the threshold's sake: all together they
-/// count as much as the prior of nothing says, so that what is fitted and judged is what a reader is told.
+/// How much each case counts, 1 on average. The threshold needs many cases without a cause; together they count only as much as the
+/// prior probability of no cause, so that the fitted and judged probabilities are those that the user reads.
 pub(crate) fn weights(calibration: &Calibration, observed: &[Observed]) -> Vec<f64> {
     let all = observed.len() as f64;
     let nothing = observed.iter().filter(|o| o.kind == CaseKind::None).count() as f64;
@@ -215,9 +215,9 @@ pub(crate) fn weights(calibration: &Calibration, observed: &[Observed]) -> Vec<f
 
 /// Share of the effect-free cases that stay below the threshold.
 const QUIET: f64 = 0.985;
-/// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases say.
+/// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases suggest.
 const MIN_THRESHOLD: f64 = 3.0;
-/// The calibration that fits what was observed, beside the one that ships.
+/// The calibration that fits the observed cases, based on the shipped one.
 ///
 /// # Errors
 /// [`BlindError::Signatures`] where the one that ships was spoilt.
@@ -226,14 +226,14 @@ pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, Bli
 }
 
 /// The calibration that fits what was observed: all of it, weak signatures too. An outside cause that can hardly be seen is named as
-/// something of the catalogue, and how often that happens is what a probability has to say.
+/// something of the catalogue, and a probability must state how often that happens.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
     let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
     let weights = weights(before, observed);
-    let weighed = || observed.iter().zip(weights.iter().copied());
-    let inside: Vec<(&Observed, f64)> = weighed().filter(|(o, _)| o.kind != CaseKind::Outside).collect();
-    let rows: Vec<Row> = weighed()
+    let weighted = || observed.iter().zip(weights.iter().copied());
+    let inside: Vec<(&Observed, f64)> = weighted().filter(|(o, _)| o.kind != CaseKind::Outside).collect();
+    let rows: Vec<Row> = weighted()
         .map(|(o, weight)| Row { features: o.features, outside: o.kind == CaseKind::Outside, weight })
         .collect();
     let errors = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs());
@@ -241,7 +241,7 @@ pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Cali
         made_by,
         threshold: quiet,
         temperature: temperature(&inside, before.temperature),
-        // Never narrower than the fit says: a few cases are no ground for more confidence.
+        // Never narrower than the fit states: a few cases do not justify more confidence.
         interval_factor: quantile(errors, 0.95).map_or(before.interval_factor, |z| (z / NORMAL_975).max(1.0)),
         outside: logistic(&rows).unwrap_or(before.outside),
         ..before.clone()
@@ -306,7 +306,7 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
     }
 
-    /// 90 cases of nothing and 10 with a cause count as the priors say, and on average 1.
+    /// 90 cases without and 10 with a cause count according to the priors, and on average 1.
     #[test]
     fn cases_of_nothing_count_as_the_prior_says() {
         let before = Calibration { prior_none: 0.3, ..Calibration::shipped().unwrap() };

@@ -20,7 +20,7 @@ pub struct Case {
     pub kind: CaseKind,
     /// Its causes.
     pub causes: Vec<Cause>,
-    /// Length of each cause's signature beside the others, in sigmas.
+    /// Length of each cause's signature in the presence of the others, in sigmas.
     pub sigmas: Vec<f64>,
     /// Seed of its noise, offsets, tolerances and weather.
     pub seed: u64,
@@ -45,7 +45,7 @@ pub struct Draw {
     pub healthy: bool,
 }
 
-/// From what can hardly be seen to what nobody overlooks.
+/// From barely visible to impossible to overlook.
 pub const SIGMA_RANGE: [f64; 2] = [6.0, 400.0];
 
 impl Draw {
@@ -66,7 +66,7 @@ impl Draw {
     /// lengths of the signatures even in their logarithm. Equal draws give equal cases.
     pub fn cases(&self, catalogue: &[Arc<dyn Effect>], ruler: &dyn Ruler) -> Vec<Case> {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        // What this machine has no place for (convection before the wheel without area there) is no cause.
+        // An effect that this machine cannot show (convection before the wheel without area there) is not a cause.
         let placed: Vec<Arc<dyn Effect>> =
             catalogue.iter().filter(|effect| shows(effect, ruler)).cloned().collect();
         let mut catalogue = Deck::new(&placed);
@@ -130,8 +130,8 @@ impl Deck {
 fn signs(effect: &Arc<dyn Effect>) -> Vec<f64> {
     let [parameter] = effect.info().parameters.as_slice() else { return vec![1.0] };
     let has = |sign: &f64| {
-        let beside = parameter.neutral + 0.01 * sign * parameter.typical_step;
-        (parameter.low..=parameter.high).contains(&beside)
+        let shifted = parameter.neutral + 0.01 * sign * parameter.typical_step;
+        (parameter.low..=parameter.high).contains(&shifted)
     };
     [1.0, -1.0].into_iter().filter(has).collect()
 }

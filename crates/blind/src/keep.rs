@@ -1,4 +1,4 @@
-//! Where a case goes: into a file without its truth, or into memory.
+//! Destination of a case: a file without its truth, or memory.
 
 use crate::truth::TruthPoint;
 use mapper_core::{Recording, SampleBatch, StepMarker};

@@ -103,7 +103,7 @@ impl<'a> Schedule<'a> {
     /// Runs a case into a recording without truth, and gives the truth.
     ///
     /// # Errors
-    /// Where the lab stops or the file cannot be written.
+    /// If the lab stops or the file cannot be written.
     pub(crate) fn run(
         &self,
         case: &Case,
@@ -118,7 +118,7 @@ impl<'a> Schedule<'a> {
     /// Runs the rig of a case without its causes on another night: the same offsets and tolerances, other noise and weather.
     ///
     /// # Errors
-    /// Where the lab stops or the file cannot be written.
+    /// If the lab stops or the file cannot be written.
     pub(crate) fn run_healthy(
         &self,
         case: &Case,
@@ -135,7 +135,7 @@ impl<'a> Schedule<'a> {
     /// Runs a case into memory.
     ///
     /// # Errors
-    /// Where the lab stops.
+    /// If the lab stops.
     pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
         let mut kept = ToMemory::default();
         self.drive(case, case.seed, &mut kept)?;

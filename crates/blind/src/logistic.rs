@@ -5,12 +5,12 @@ use mapper_numerics::minimise::minimise;
 
 /// Rounds of coordinate descent at most; it needs some fifty.
 const ROUNDS: usize = 300;
-/// Slopes that are expected, and the precision of that expectation: some ten cases say otherwise.
+/// Slopes that are expected, and the precision of that expectation: some ten cases outweigh it.
 const EXPECTED: f64 = 1.0;
 const PRIOR: f64 = 0.25;
-/// Least slopes: more misfit never speaks against an outside cause. That of the smooth misfit is at least half of what noise
-/// makes of it, whatever the cases say: where a search went astray a fit leaves thousands of sigmas beside the right cause, and
-/// a few such cases would teach that a gross misfit means nothing.
+/// Minimum slopes: more misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from
+/// noise, whatever the cases state: after a failed search, a fit with the right cause leaves a residual of thousands of
+/// sigmas, and a few such cases would teach that a gross misfit means nothing.
 const MIN: [f64; 3] = [0.5, 0.0, 0.0];
 
 /// A case.
@@ -22,7 +22,7 @@ pub(crate) struct Row {
     pub weight: f64,
 }
 
-/// Offset and slopes of the logistic that tells outside causes from the others. `None` where one of the classes is empty.
+/// Offset and slopes of the logistic that separates outside causes from the others. `None` where one of the classes is empty.
 pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
     if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
         return None;
@@ -72,7 +72,7 @@ mod tests {
         Row { features, outside, weight: 1.0 }
     }
 
-    /// Two classes told apart by the second feature alone, 2 and 20; the others say nothing.
+    /// Two classes that only the second feature separates, 2 and 20; the others carry no information.
     #[test]
     fn the_boundary_lies_between_the_classes() {
         let rows: Vec<Row> = (0..80)

@@ -22,7 +22,7 @@ const MAX_CASES: usize = 100_000;
 /// What was made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Made {
-    /// What the directory says of itself.
+    /// Manifest of the directory.
     pub manifest: Manifest,
     /// Answers in the order of the cases; for calibration, which may know them.
     pub answers: Vec<Truth>,
@@ -31,7 +31,7 @@ pub struct Made {
 /// Draws cases from `catalogue` and the outside causes, runs each on the virtual lab of `campaign`, and leaves in
 /// `directory`, which must not hold cases yet, NAME.mcap for each (and NAME.healthy.mcap where that is asked for), the answers, and a manifest with their hash.
 ///
-/// `done` is told the number of finished cases. Equal arguments give equal bytes.
+/// `done` receives the number of finished cases. Equal arguments give equal bytes.
 ///
 /// # Errors
 /// [`BlindError`] where the campaign has no nominal model, a point cannot be held, or a file cannot be written.
@@ -127,7 +127,7 @@ fn run_all(
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Truth>, BlindError> {
     let finished = AtomicUsize::new(0);
-    // No case is worth starting once one has failed.
+    // After a failure no further case is started.
     parallel::try_map(cases, |case| {
         let header = header(campaign);
         let truth = schedule.run(case, &directory.join(format!("{}.mcap", case.name)), &header);

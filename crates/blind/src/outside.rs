@@ -1,7 +1,7 @@
 //! Causes that are not candidates of the diagnosis: reserved ones for the check, other ones for calibration.
 //!
-//! They are effects like those of the catalogue and never part of it. Their ids begin with `X_`: that is how answers tell
-//! them.
+//! They are effects like those of the catalogue and never part of it. Their ids begin with `X_`, which identifies them in
+//! the answers.
 
 mod back_plate;
 mod clearance;

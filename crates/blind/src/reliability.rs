@@ -1,4 +1,4 @@
-//! Whether probabilities hold: what was said with probability p should be right in a share p of the cases.
+//! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases.
 
 use crate::calibrate::{Observed, fit, shipped, weights};
 use crate::error::BlindError;
@@ -34,7 +34,7 @@ pub struct Bin {
     pub right_low: f64,
     /// Its other end.
     pub right_high: f64,
-    /// So many cases that count equally tell as much (Kish 1965): squared sum of the weights over the sum of their squares.
+    /// Number of equally weighted cases with the same information (Kish 1965): squared sum of the weights over the sum of their squares.
     pub effective_cases: f64,
 }
 
@@ -155,20 +155,20 @@ fn bin(index: usize, members: &[&Answer], all: f64) -> Option<Bin> {
 /// # Errors
 /// [`BlindError::Signatures`] where the one that ships was spoilt.
 pub fn reliabilities(observed: &[Observed]) -> Result<[Reliability; 2], BlindError> {
-    Ok(beside(&shipped()?, observed))
+    Ok(both(&shipped()?, observed))
 }
 
-fn beside(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
+fn both(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
     let weights = weights(before, observed);
     let by = |calibration: &Calibration, (case, weight): (&Observed, f64)| {
         first_answer(case, calibration).map(|(probability, right)| Answer { probability, right, weight })
     };
-    let weighed: Vec<(&Observed, f64)> = observed.iter().zip(weights.iter().copied()).collect();
-    let shipped: Vec<Answer> = weighed.iter().filter_map(|case| by(before, *case)).collect();
+    let weighted: Vec<(&Observed, f64)> = observed.iter().zip(weights.iter().copied()).collect();
+    let shipped: Vec<Answer> = weighted.iter().filter_map(|case| by(before, *case)).collect();
     let mut held_out = Vec::new();
     for fold in 0..FOLDS {
         let of_fold = |(index, _): &(usize, &(&Observed, f64))| index % FOLDS == fold;
-        let (judged, fitted): (Vec<_>, Vec<_>) = weighed.iter().enumerate().partition(of_fold);
+        let (judged, fitted): (Vec<_>, Vec<_>) = weighted.iter().enumerate().partition(of_fold);
         let fitted: Vec<Observed> = fitted.into_iter().map(|(_, (case, _))| (*case).clone()).collect();
         let calibration = fit(before, &fitted, String::new());
         held_out.extend(judged.iter().filter_map(|(_, case)| by(&calibration, **case)));
@@ -181,8 +181,8 @@ fn beside(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
 
 /// What came of so many diagnoses, and where the calibration is.
 pub fn calibrated_text(diagnoses: usize, file: &Path, reliabilities: &[Reliability]) -> String {
-    let said = reliability_text(reliabilities);
-    format!("calibration from {diagnoses} diagnoses in {}\n{said}", file.display())
+    let reliability = reliability_text(reliabilities);
+    format!("calibration from {diagnoses} diagnoses in {}\n{reliability}", file.display())
 }
 
 /// A sentence for each.
@@ -233,7 +233,7 @@ mod tests {
     }
 
     fn judged(cases: &[Observed]) -> Reliability {
-        let [before, _] = beside(&plain(), cases);
+        let [before, _] = both(&plain(), cases);
         before
     }
 

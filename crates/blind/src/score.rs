@@ -65,7 +65,7 @@ pub struct ScoredCase {
     pub kind: CaseKind,
     /// Its causes.
     pub causes: BTreeSet<String>,
-    /// What the diagnosis said; `None` where there is none.
+    /// Verdict of the diagnosis; `None` without a diagnosis.
     pub verdict: Option<String>,
     /// The causes it named.
     pub named: BTreeSet<String>,
@@ -73,8 +73,8 @@ pub struct ScoredCase {
     pub probability: Option<f64>,
     /// Whether that is right.
     pub right: bool,
-    /// Length of the signature of the cause that shows least, beside the others, in sigmas; `None` without causes, and
-    /// where the answers do not say.
+    /// Length of the weakest cause's signature in the presence of the others, in sigmas; `None` without causes, and if the
+    /// answers do not contain it.
     pub sigma: Option<f64>,
 }
 
@@ -92,7 +92,7 @@ pub struct SigmaClass {
     pub pair: Share,
     /// Pairs of which at least one was named.
     pub one_of_pair: Share,
-    /// Outside causes that were said to be so.
+    /// Outside causes that were recognised as outside.
     pub outside: Share,
     /// Outside causes that were explained by the catalogue.
     pub falsely_explained: Share,
@@ -103,7 +103,7 @@ pub struct SigmaClass {
 pub struct Score {
     /// Case by case.
     pub cases: Vec<ScoredCase>,
-    /// The cases by how plainly the cause that shows least does.
+    /// The cases by the signature length of their weakest cause.
     pub classes: [SigmaClass; CLASSES_SIGMA.len()],
     /// Recordings without effect that were left alone.
     pub none: Share,
@@ -119,7 +119,7 @@ pub struct Score {
     pub triple: Share,
     /// Triples of which at least two were named.
     pub two_of_triple: Share,
-    /// Outside causes that were said to be so.
+    /// Outside causes that were recognised as outside.
     pub outside: Share,
     /// Outside causes that were explained by the catalogue.
     pub falsely_explained: Share,
@@ -133,7 +133,7 @@ pub struct Score {
     pub shrink_median: Option<f64>,
     /// Mean of the squared miss of the probability given to the truth; `None` without cases.
     pub squared_miss_mean: Option<f64>,
-    /// Mean number of explanations that could not be told apart; `None` without diagnoses.
+    /// Mean number of indistinguishable explanations; `None` without diagnoses.
     pub set_size_mean: Option<f64>,
 }
 
@@ -150,7 +150,7 @@ pub fn score(directory: &Path) -> Result<Score, BlindError> {
     }))
 }
 
-/// Writes NAME.truth.json of each answer beside its recording, for `score.py`.
+/// Writes NAME.truth.json of each answer next to its recording, for `score.py`.
 ///
 /// # Errors
 /// As [`score`], and where a file cannot be written.
@@ -239,11 +239,11 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
             }
             CaseKind::Outside => {
                 let falsely = verdict == Some("explained");
-                for (said, explained) in [
+                for (recognised, explained) in [
                     (&mut score.outside, &mut score.falsely_explained),
                     (&mut class.outside, &mut class.falsely_explained),
                 ] {
-                    said.count(right);
+                    recognised.count(right);
                     explained.count(falsely);
                 }
             }
@@ -297,7 +297,7 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
     score
 }
 
-/// A diagnosis held against the truth.
+/// A diagnosis compared with the truth.
 struct Judged {
     named: BTreeSet<String>,
     set_size: usize,

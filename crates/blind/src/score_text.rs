@@ -67,7 +67,7 @@ impl Score {
         self.cases.iter().map(line).collect()
     }
 
-    /// The table with the values of other cases, e.g. of the same causes on another laboratory, beside it, in Markdown.
+    /// The table with a further column for other cases, e.g. the same causes on another laboratory, in Markdown.
     pub fn beside(&self, heads: [&str; 2], other: &Score) -> String {
         let mut text = format!("| | {} | {} |\n|---|---|---|\n", heads[0], heads[1]);
         for ((label, here), (_, there)) in self.rows().into_iter().zip(other.rows()) {

@@ -11,10 +11,10 @@ use std::path::Path;
 
 /// File of the answers, within the directory of the cases.
 pub const ANSWERS_NAME: &str = "answers.json";
-/// File that says what the directory holds.
+/// File that describes the content of the directory.
 pub const MANIFEST_NAME: &str = "manifest.json";
 
-/// What a directory of cases says of itself; nothing of the answers but their hash.
+/// Description of a directory of cases; of the answers it contains only the hash.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -33,10 +33,10 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// What tells its score from that of other cases.
+    /// Heading that distinguishes its score from those of other cases.
     pub fn title(&self) -> String {
-        let beside = if self.healthy { ", beside a healthy recording" } else { "" };
-        format!("{}{beside}", self.laboratory.name())
+        let recording = if self.healthy { ", with a healthy recording" } else { "" };
+        format!("{}{recording}", self.laboratory.name())
     }
 
     /// Reads a manifest.

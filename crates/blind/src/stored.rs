@@ -18,7 +18,7 @@ pub struct StoredCase {
     pub kind: CaseKind,
     /// Id and values of each cause.
     pub causes: Vec<(String, Vec<f64>)>,
-    /// Length of each cause's signature beside the others, in sigmas.
+    /// Length of each cause's signature in the presence of the others, in sigmas.
     pub sigmas: Vec<f64>,
     /// Seed of its noise, offsets, tolerances and weather.
     pub seed: u64,

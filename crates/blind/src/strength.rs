@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// Measures how plainly causes show in a recording.
 pub trait Ruler {
-    /// Length of each cause's signature beside the others, in sigmas; 0 where the rig cannot run with them.
+    /// Length of each cause's signature in the presence of the others, in sigmas; 0 where the rig cannot run with them.
     fn lengths(&self, causes: &[Cause]) -> Vec<f64>;
 }
 
@@ -19,8 +19,8 @@ const LOOKS: usize = 6;
 /// Share of the housing that an inner wall takes.
 const INNER_SHARE: std::ops::Range<f64> = 0.15..0.6;
 
-/// Weakest and strongest draw in the effect's typical steps, whatever its signature: from what somebody might look for to
-/// what breaks a test.
+/// Weakest and strongest draw in the effect's typical steps, whatever its signature: from the weakest that a user
+/// might look for to one that breaks a test.
 const STEPS: std::ops::RangeInclusive<f64> = 0.02..=4.0;
 
 /// Values of an effect in the direction `sign` of its typical step whose signature alone is `sigma` long, or as long as its

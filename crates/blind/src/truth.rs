@@ -12,7 +12,7 @@ pub struct Truth {
     pub name: String,
     /// Cause by cause its strength: a number, an object by parameter, or for outside causes a sentence.
     pub effects: Map<String, Value>,
-    /// Cause by cause the length of its signature beside the others, in sigmas, on a recording of the same campaign.
+    /// Length of each cause's signature in the presence of the others, in sigmas, on a recording of the same campaign.
     #[serde(default)]
     pub sigmas: BTreeMap<String, f64>,
     /// The points in order.

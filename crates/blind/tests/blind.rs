@@ -1,4 +1,4 @@
-//! Blind cases from end to end: made, sealed, diagnosed by nobody and by an oracle, scored.
+//! Blind cases from end to end: made, sealed, scored without diagnoses and with those of an oracle.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_blind::{ANSWERS_NAME, BlindError, Draw, Made, OutsideUse, Share, Truth, make, score};
@@ -62,7 +62,7 @@ fn recordings_hold_the_schedule_and_nothing_of_the_truth() {
     }
 }
 
-/// Somebody who knows all answers has the full score; who says nothing has none.
+/// An oracle that knows all answers has the full score; without diagnoses no case is right.
 #[test]
 fn an_oracle_scores_full_and_silence_scores_nothing() {
     let scratch = tempfile::tempdir().unwrap();

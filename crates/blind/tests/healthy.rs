@@ -1,4 +1,4 @@
-//! On a rig of other equations: everything is outside the catalogue, until a healthy recording says what the rig is like.
+//! On a rig of other equations: everything is outside the catalogue, until a healthy recording shows the rig's behaviour.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_blind::{CaseKind, Draw, Laboratory, OutsideUse, make, study_without_causes};
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Nothing changed: within tolerance. A cause came: it is named. Without the healthy recording it is outside the catalogue.
 #[test]
-fn a_healthy_recording_tells_a_cause_from_structure() {
+fn a_healthy_recording_separates_a_cause_from_structure() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/gap_rig.yaml");
     let mut campaign = mapper_campaign::load(&path).unwrap();
     campaign.points.truncate(6);

@@ -19,7 +19,7 @@ pub const RULES: &[Rule] = &[
     ("how often it is polled changes nothing but the cut", polling_changes_nothing),
     ("equal seeds, equal calls: equal samples to the bit", repeats_itself),
     ("a setpoint that means nothing is refused by a typed error, and changes nothing", refuses_wild_setpoints),
-    ("told to hold, it keeps the setpoints that it was told", holds),
+    ("after a hold command it keeps the setpoints that it received", holds),
     ("it may be made safe at any time after arming, and twice", is_made_safe),
     ("a disarmed rig can be armed again, and starts at time 0", can_be_restarted),
     ("the end of what it has is the loss of the rig, after which it can be made safe", ends_with_its_loss),
@@ -284,7 +284,7 @@ fn holds(candidate: &Candidate<'_>) -> Checked {
     fine("poll", unheld.poll(1.0))?;
     ensure!(
         bits(&fine("poll", unheld.poll(2.0))?) == bits(&after),
-        "to be told to hold has changed what it does"
+        "a hold command has changed what it does"
     );
     Ok(())
 }

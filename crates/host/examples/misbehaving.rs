@@ -1,4 +1,4 @@
-//! A driver that misbehaves on demand, for tests: it measures T2 in simulated time, and its setting `fault` says what it does wrong.
+//! A driver that misbehaves on demand, for tests: it measures T2 in simulated time, and its setting `fault` selects the fault.
 
 use mapper_protocol::{Encoding, Message, VERSION, decode, encode, read_frame, write_frame};
 use serde_json::{Value, json};
@@ -146,7 +146,7 @@ impl Misbehaving {
             "no_numbers" => self.send(&Message::note("samples", json!({"t_s": "soon"}))),
             "flood" => {
                 let mut sequence = begun;
-                // More than anybody keeps.
+                // More than any host keeps.
                 for _ in 0..300 {
                     let many: Vec<f64> = (0..10_000).map(|i| (sequence + i) as f64 / 10.0).collect();
                     self.samples(sequence, &many);

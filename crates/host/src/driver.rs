@@ -190,7 +190,7 @@ impl Driver {
         // Secrets are removed from the driver's text.
         let wrong = |error| self.lost(error);
         let welcome: Welcome = serde_json::from_value(answer)
-            .map_err(|error| wrong(DriverError::NoDriver(format!("its hello lacks something: {error}"))))?;
+            .map_err(|error| wrong(DriverError::NoDriver(format!("its hello is incomplete: {error}"))))?;
         let theirs = welcome.hello;
         if theirs.magic != MAGIC {
             return Err(wrong(DriverError::NoDriver("its hello begins with another word".to_owned())));
@@ -221,7 +221,7 @@ impl Driver {
 
     fn lost(&self, error: DriverError) -> BackendError {
         let source = Box::new(DriverError::Said(self.secrets.hide(&error.to_string())));
-        // Before the description arrives there is no rig to lose.
+        // Before the description arrives no rig can be lost.
         match self.description {
             Some(_) => BackendError::Lost { t_s: self.now_s, source },
             None => BackendError::Settings { backend: self.name.clone(), path: String::new(), source },
@@ -282,7 +282,7 @@ impl Driver {
     /// Converts a refusal to a rig error.
     fn refused(&self, failure: Failure, call: &'static str) -> BackendError {
         match rig_error(failure, &self.name, call, self.now_s) {
-            // Before the description arrives there is no rig to lose.
+            // Before the description arrives no rig can be lost.
             BackendError::Lost { source, .. } if self.description.is_none() => {
                 BackendError::Settings { backend: self.name.clone(), path: String::new(), source }
             }

@@ -30,7 +30,7 @@ pub enum DriverError {
     },
     /// No driver listens on the socket.
     #[error(
-        "nobody listens at the socket {}: {source}. Start the driver that belongs to it (`mapper-backend-NAME --socket PATH`), or remove the file: a \
+        "no driver listens at the socket {}: {source}. Start the driver that belongs to it (`mapper-backend-NAME --socket PATH`), or remove the file: a \
          driver that is found as a program is started then",
         socket.display()
     )]

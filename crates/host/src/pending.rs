@@ -74,7 +74,7 @@ impl Pending {
         self.last_s.is_some_and(|last_s| last_s >= t_s)
     }
 
-    /// Returns all samples up to `until_s` plus `rounding_s`, with a column for each of `channels`: NaN if there is no reading.
+    /// Returns all samples up to `until_s` plus `rounding_s`, with a column for each of `channels`: NaN without a reading.
     pub(crate) fn take(&mut self, until_s: f64, rounding_s: f64, channels: &[Channel]) -> SampleBatch {
         let mut whole = SampleBatch {
             first_sequence: self.next,
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn an_event_with_the_time_of_another_clock_is_told_with_the_samples_it_came_with() {
+    fn an_event_with_the_time_of_another_clock_is_reported_with_its_samples() {
         let mut pending = Pending::default();
         let tripped = Event { t_s: 1.8e9, kind: EventKind::RigTripped, message: "overspeed".to_owned() };
         let with_it = SampleBatch { events: vec![tripped], ..batch(0, &[0.0, 0.1], &[Channel::T1]) };
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_is_kept_than_anybody_may_ask_for() {
+    fn no_more_is_kept_than_a_poll_may_request() {
         let mut pending = Pending::default();
         let t_s: Vec<f64> = (0..100_000).map(f64::from).collect();
         let flood = (0..50).try_for_each(|i| {

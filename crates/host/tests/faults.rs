@@ -1,4 +1,4 @@
-//! Whatever a driver does, the host comes back in bounded time, with an error that says what it was. Real processes and pipes.
+//! Whatever a driver does, the host comes back in bounded time, with an error that names the cause. Real processes and pipes.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -28,7 +28,7 @@ fn patience(fault: &str) -> Patience {
 
 /// The driver of examples/misbehaving.rs under the name of its fault.
 fn program(fault: &str) -> PathBuf {
-    // target/debug/deps/faults-..., with target/debug/examples beside deps.
+    // target/debug/deps/faults-..., with target/debug/examples next to deps.
     let own = std::env::current_exe().unwrap();
     let built = own.parent().unwrap().parent().unwrap().join("examples/mapper-backend-misbehaving");
     assert!(built.is_file(), "{} is built with the tests", built.display());
@@ -52,7 +52,7 @@ fn running(fault: &str) -> Driver {
 }
 
 #[test]
-fn what_is_no_driver_is_refused_before_there_is_a_rig() {
+fn a_program_that_is_not_a_driver_is_refused_before_a_rig_exists() {
     for (fault, words) in [
         ("mute", "did not answer `hello` within 0.3 s"),
         ("garbage", "text that begins with `Welc` where frames belong"),
@@ -76,7 +76,7 @@ fn what_is_no_driver_is_refused_before_there_is_a_rig() {
 fn a_driver_that_ends_or_hangs_while_it_is_armed_is_lost_in_bounded_time() {
     let mut gone = running("exits_armed");
     assert!(matches!(gone.set(&SETPOINTS), Err(BackendError::Lost { .. })));
-    // Nobody can say that the rig is safe.
+    // The state of the rig is unknown.
     assert!(matches!(gone.make_safe(), Err(BackendError::Lost { .. })));
     let mut hangs = running("hangs");
     assert!(matches!(hangs.set(&SETPOINTS), Err(BackendError::Deadline { call: "set", .. })));
@@ -92,7 +92,7 @@ fn samples_that_cannot_be_are_the_loss_of_the_rig_which_can_still_be_made_safe()
         ("reordered", "sample 11 was expected and sample 16 came"),
         ("backward", "a sample at"),
         ("no_numbers", "sent what no driver sends"),
-        ("flood", "more samples than anybody has asked for"),
+        ("flood", "more samples than were requested"),
     ] {
         let mut driver = running(fault);
         driver.set(&SETPOINTS).unwrap();
@@ -109,7 +109,7 @@ fn samples_that_cannot_be_are_the_loss_of_the_rig_which_can_still_be_made_safe()
 }
 
 #[test]
-fn answers_that_nobody_waits_for_are_thrown_away_and_a_refusal_is_told() {
+fn late_answers_are_discarded_and_a_refusal_is_reported() {
     let mut talks = running("answers_twice");
     talks.set(&SETPOINTS).unwrap();
     assert_eq!(talks.poll(2.0).unwrap().t_s.len(), 10);
@@ -118,9 +118,9 @@ fn answers_that_nobody_waits_for_are_thrown_away_and_a_refusal_is_told() {
     assert!(error.contains("the valve does not answer"), "{error}");
 }
 
-/// A file that has the name and cannot be started: said as that, with what to do, and not that there is none.
+/// A file that has the name and cannot be started is reported as such, with what to do, not as missing.
 #[test]
-fn a_file_that_cannot_be_started_is_told_with_what_is_wrong_with_it() {
+fn a_file_that_cannot_be_started_is_reported_with_the_reason() {
     use std::os::unix::fs::PermissionsExt;
     let directory = std::env::temp_dir().join(format!("mapper-host-files-{}", std::process::id()));
     std::fs::create_dir_all(&directory).unwrap();
@@ -133,15 +133,15 @@ fn a_file_that_cannot_be_started_is_told_with_what_is_wrong_with_it() {
         let file = directory.join(format!("mapper-backend-{name}"));
         std::fs::write(&file, text).unwrap();
         std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
-        let said = Driver::find(&places, name, &Value::Null, "", "").err().unwrap().to_string();
-        assert!(said.contains(words) && said.contains(file.to_str().unwrap()), "{name}: {said}");
+        let message = Driver::find(&places, name, &Value::Null, "", "").err().unwrap().to_string();
+        assert!(message.contains(words) && message.contains(file.to_str().unwrap()), "{name}: {message}");
     }
     std::fs::remove_dir_all(&directory).unwrap();
 }
 
-/// Told where was looked and what to do, and a name from a campaign reaches no other directory.
+/// The message names the searched places and what to do, and a name from a campaign reaches no other directory.
 #[test]
-fn a_driver_that_is_not_there_is_told_with_where_was_looked() {
+fn a_missing_driver_is_reported_with_the_searched_places() {
     let places = Places { programs: vec!["/nowhere/at/all".into()], sockets: None };
     for name in ["opcuaa", "../../bin/sh"] {
         let error = Driver::find(&places, name, &Value::Null, "virtual_lab, replay", "").err().unwrap();

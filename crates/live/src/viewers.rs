@@ -30,7 +30,7 @@ const POINT_FIELDS: [(&str, &str, &str); 9] = [
     ("eta_low", "1", "lower end of its 95 % interval"),
     ("eta_high", "1", "upper end of its 95 % interval"),
     ("h_w_m2k", "W/(m2 K)", "heat-transfer coefficient between gas and compressor housing"),
-    ("residual_rms_k", "K", "what the fit leaves of T2"),
+    ("residual_rms_k", "K", "T2 residual of the fit"),
 ];
 
 /// Why the stream for viewers cannot be served.

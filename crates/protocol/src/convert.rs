@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 /// Most samples per second that a rig may have, Hz.
 const FASTEST_HZ: f64 = 100_000.0;
 
-/// What a driver says and what cannot be.
+/// A statement of a driver that cannot be right.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unusable {
     /// A channel that the program does not have.
@@ -21,7 +21,7 @@ pub enum Unusable {
     Unit {
         /// The channel.
         channel: Channel,
-        /// What it says.
+        /// The unit in the description.
         unit: String,
         /// The unit of the channel.
         right: &'static str,
@@ -68,8 +68,8 @@ pub enum Unusable {
         /// What came.
         found: u64,
     },
-    /// More than anybody has asked for.
-    #[error("it sends more samples than anybody has asked for")]
+    /// More than were requested.
+    #[error("it sends more samples than were requested")]
     TooMany,
 }
 
@@ -80,7 +80,7 @@ fn missing(expected: u64, found: u64) -> String {
     }
 }
 
-/// What a driver says of its rig. `backend` and `version`: of its hello.
+/// The description of a rig by its driver. `backend` and `version`: of its hello.
 ///
 /// # Errors
 /// [`Unusable`] for what this program does not know or no rig can have.
@@ -147,7 +147,7 @@ fn ranges(wire: &Ranges) -> SetpointRanges {
     }
 }
 
-/// What a rig says of itself, as a driver sends it.
+/// The description of a rig, as a driver sends it.
 pub fn description_on_the_wire(rig: &RigDescription) -> Description {
     let channel = |channel: &Channel| ChannelDescription {
         name: channel.to_string(),

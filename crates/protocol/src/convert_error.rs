@@ -3,7 +3,7 @@
 use crate::message::{Code, Failure};
 use mapper_core::BackendError;
 
-/// What a driver says of its failure.
+/// The failure as the driver reports it.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct ReportedError(String);
@@ -18,9 +18,9 @@ const SETPOINTS: [(&str, &str, &str); 4] = [
 
 /// An error of a rig as a driver sends it.
 pub fn error_on_the_wire(error: &BackendError) -> Failure {
-    let said = |code| Failure::new(code, error.to_string());
+    let failure = |code| Failure::new(code, error.to_string());
     match error {
-        BackendError::OutOfOrder { .. } => said(Code::OutOfOrder),
+        BackendError::OutOfOrder { .. } => failure(Code::OutOfOrder),
         BackendError::SetpointOutOfRange { quantity, value, low, high, .. } => {
             let key = SETPOINTS.iter().find(|(_, name, _)| name == quantity).map(|(key, ..)| *key);
             let finite = |value: &f64| value.is_finite().then_some(*value);
@@ -29,7 +29,7 @@ pub fn error_on_the_wire(error: &BackendError) -> Failure {
                 value: finite(value),
                 low: finite(low),
                 high: finite(high),
-                ..said(Code::SetpointOutOfRange)
+                ..failure(Code::SetpointOutOfRange)
             }
         }
         BackendError::Settings { path, source, .. } => {
@@ -41,7 +41,7 @@ pub fn error_on_the_wire(error: &BackendError) -> Failure {
         BackendError::Lost { t_s, source } => {
             Failure { t_s: Some(*t_s), ..Failure::new(Code::Lost, source.to_string()) }
         }
-        BackendError::Deadline { .. } => said(Code::Lost),
+        BackendError::Deadline { .. } => failure(Code::Lost),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Frames: four bytes of length, most significant first, and a message as MessagePack or JSON, told apart by their first byte.
+//! Frames: four bytes of length, most significant first, and a message as MessagePack or JSON; the first byte shows which.
 
 use crate::message::Message;
 use serde::Deserialize;
@@ -24,10 +24,10 @@ impl Encoding {
     }
 }
 
-/// Why a frame or what stands in it cannot be read.
+/// Why a frame or its content cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
-    /// It says that it is longer than may be sent.
+    /// Its declared length exceeds the limit.
     #[error("a frame of {bytes} bytes; at most {limit} may be sent")]
     TooLarge {
         /// Its length, bytes.
@@ -65,7 +65,7 @@ pub enum FrameError {
 /// The next frame; `None` where the stream ends between two.
 ///
 /// # Errors
-/// [`FrameError`]; the stream is of no further use then. No more than `limit_bytes` are kept, whatever the frame says of itself.
+/// [`FrameError`]; the stream is of no further use then. No more than `limit_bytes` are kept, whatever length the frame declares.
 pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec<u8>>, FrameError> {
     let mut length = Vec::with_capacity(4);
     stream.take(4).read_to_end(&mut length)?;
@@ -171,7 +171,7 @@ mod tests {
         for depth in [1_000, 100_000] {
             let json = format!("{{\"params\":{}{}}}", "[".repeat(depth), "]".repeat(depth));
             assert!(decode(json.as_bytes()).is_err(), "{depth}");
-            // Where nobody knows the field as well.
+            // Also in an unknown field.
             for field in ["params", "fields"] {
                 let mut packed = vec![0x81, 0xa6];
                 packed.extend(field.bytes());
@@ -184,9 +184,9 @@ mod tests {
 
     #[test]
     fn lengths_are_believed_only_as_far_as_they_are_allowed() {
-        let mut said = u32::MAX.to_be_bytes().to_vec();
-        said.extend(b"{}");
-        assert!(matches!(read_frame(&mut &said[..], 100), Err(FrameError::TooLarge { limit: 100, .. })));
+        let mut bytes = u32::MAX.to_be_bytes().to_vec();
+        bytes.extend(b"{}");
+        assert!(matches!(read_frame(&mut &bytes[..], 100), Err(FrameError::TooLarge { limit: 100, .. })));
         assert!(matches!(read_frame(&mut &[0u8, 0, 0, 0][..], 100), Err(FrameError::Empty)));
         assert!(matches!(
             read_frame(&mut &[0u8, 0, 0, 9, b'{'][..], 100),

@@ -28,7 +28,7 @@ pub const VERSION: Version = Version { major: 1, minor: 1 };
 pub const HOLD_SINCE_MINOR: u32 = 1;
 /// Largest frame that this side takes, bytes.
 pub const FRAME_LIMIT_BYTES: u32 = 1 << 20;
-/// Largest frame that anybody may send before he was told a limit, bytes.
+/// Largest frame that either side may send before it knows the limit of the other, bytes.
 pub const FIRST_FRAME_LIMIT_BYTES: u32 = 1 << 16;
 /// Time for the hello of the other side, s.
 pub const HELLO_S: f64 = 5.0;

@@ -1,4 +1,4 @@
-//! What is said. SI units; the unit of a number stands in its name. Fields that are not known are ignored.
+//! The messages. SI units; the name of a number contains its unit. Unknown fields are ignored.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,7 +31,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// A note, to which there is no answer.
+    /// A note, which gets no answer.
     pub fn note(method: &str, params: Value) -> Message {
         Message { method: Some(method.to_owned()), params, ..Message::default() }
     }
@@ -74,7 +74,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// A failure that is told in words alone.
+    /// A failure with a message alone.
     pub fn new(code: Code, message: impl Into<String>) -> Failure {
         Failure {
             code,
@@ -182,7 +182,7 @@ pub struct Description {
     /// Name of the one rig that this is; no two runs may have it at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exclusive: Option<String>,
-    /// Where it is reached, e.g. host and port of its controller; no two runs may be there at once, whatever they call the rig.
+    /// Its address, e.g. host and port of its controller; no two runs may be there at once, whatever they call the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reached_at: Option<String>,
     /// Guards that the run must have, by their keys in campaigns.
@@ -206,7 +206,7 @@ pub struct ChannelDescription {
     pub name: String,
     /// Unit: the one of the channel, in SI, e.g. `K`.
     pub unit: String,
-    /// How many sensors measure it; 1 if not said.
+    /// How many sensors measure it; 1 if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensors: Option<usize>,
 }
@@ -246,7 +246,7 @@ pub enum Mode {
     Running,
 }
 
-/// `set`: everything that the rig is told, effective at once.
+/// `set`: all commands to the rig, effective at once.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setpoints {
     /// Air.

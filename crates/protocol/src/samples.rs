@@ -38,12 +38,12 @@ pub struct Samples {
 pub struct Column {
     /// Symbol of the channel.
     pub channel: String,
-    /// SI; `null` where there is no reading.
+    /// SI; `null` without a reading.
     pub values: Vec<Option<f64>>,
-    /// When the source took each reading, s since arming; when it arrived if not said.
+    /// When the source took each reading, s since arming; when it arrived if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source_t_s: Option<Vec<f64>>,
-    /// `good`, `uncertain` or `bad` of each reading; good if not said.
+    /// `good`, `uncertain` or `bad` of each reading; good if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quality: Option<Vec<String>>,
 }
@@ -53,7 +53,7 @@ pub struct Column {
 pub struct ElementSamples {
     /// Channel and number, e.g. `T2/3`.
     pub element: String,
-    /// SI; `null` where there is no reading.
+    /// SI; `null` without a reading.
     pub values: Vec<Option<f64>>,
 }
 
@@ -91,7 +91,7 @@ fn quality(word: &str) -> Quality {
     match word {
         "good" => Quality::Good,
         "uncertain" => Quality::Uncertain,
-        // A word that is not known is no praise.
+        // An unknown word is not a good quality.
         _ => Quality::Bad,
     }
 }

@@ -97,12 +97,12 @@ impl<'a> DriftWatch<'a> {
     }
 
     fn act(&mut self, differences: &str) {
-        let said = match self.on_drift {
+        let consequence = match self.on_drift {
             OnDrift::Continue => "the run goes on, as the campaign says",
             OnDrift::Hold => "the run is held in its safe state; look before going on",
             OnDrift::Zero => "the run is stopped without flow: zero the sensors, then run the rest",
         };
-        let note = format!("drift: the repeated jump differs again, {differences}; {said}");
+        let note = format!("drift: the repeated jump differs again, {differences}; {consequence}");
         if self.on_drift != OnDrift::Continue {
             self.ended = Some(note.clone());
         }

@@ -25,7 +25,7 @@ pub(crate) enum ReaderLink {
     /// In simulated time, where all sources wait for each other.
     Here { backend: Box<dyn Backend>, answer: Option<Answer> },
     /// In real time.
-    Beside {
+    OwnThread {
         asks: Sender<Ask>,
         answers: Receiver<Answer>,
         /// A request is pending.
@@ -75,7 +75,7 @@ impl ReaderLink {
                 }
             })
             .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
-        Ok(ReaderLink::Beside { asks, answers, asked: false, armed: false, deadline })
+        Ok(ReaderLink::OwnThread { asks, answers, asked: false, armed: false, deadline })
     }
 
     /// Connects, within its deadline.
@@ -85,7 +85,7 @@ impl ReaderLink {
                 *answer = None;
                 answered(backend.as_mut(), &Ask::Arm).map(drop)
             }
-            ReaderLink::Beside { armed, asked, .. } => {
+            ReaderLink::OwnThread { armed, asked, .. } => {
                 (*armed, *asked) = (true, false);
                 self.wait(Ask::Arm, "arm").map(drop)
             }
@@ -98,7 +98,7 @@ impl ReaderLink {
             ReaderLink::Here { backend, answer } => {
                 *answer = Some(answered(backend.as_mut(), &Ask::Poll(until_s)));
             }
-            ReaderLink::Beside { asks, asked, .. } => {
+            ReaderLink::OwnThread { asks, asked, .. } => {
                 *asked = *asked || asks.send(Ask::Poll(until_s)).is_ok();
             }
         }
@@ -108,7 +108,7 @@ impl ReaderLink {
     pub(crate) fn answer(&mut self) -> Option<Answer> {
         match self {
             ReaderLink::Here { answer, .. } => answer.take(),
-            ReaderLink::Beside { answers, asked, .. } => {
+            ReaderLink::OwnThread { answers, asked, .. } => {
                 let answer = answers.try_recv().ok()?;
                 *asked = false;
                 Some(answer)
@@ -120,8 +120,8 @@ impl ReaderLink {
     pub(crate) fn disarm(&mut self) -> Result<(), BackendError> {
         match self {
             ReaderLink::Here { backend, .. } => answered(backend.as_mut(), &Ask::Disarm).map(drop),
-            ReaderLink::Beside { armed, .. } if !*armed => Ok(()),
-            ReaderLink::Beside { armed, asked, answers, deadline, .. } => {
+            ReaderLink::OwnThread { armed, .. } if !*armed => Ok(()),
+            ReaderLink::OwnThread { armed, asked, answers, deadline, .. } => {
                 *armed = false;
                 // The answer to the previous request arrives first.
                 if std::mem::take(asked) {
@@ -133,7 +133,7 @@ impl ReaderLink {
     }
 
     fn wait(&mut self, ask: Ask, call: &'static str) -> Answer {
-        let ReaderLink::Beside { asks, answers, deadline, .. } = self else {
+        let ReaderLink::OwnThread { asks, answers, deadline, .. } = self else {
             return Ok(SampleBatch::default());
         };
         asks.send(ask).map_err(|_| gone("its thread has ended".to_owned()))?;

@@ -64,9 +64,9 @@ mod tests {
     use mapper_core::{ChannelColumn, Event, OperatingPoint};
 
     #[test]
-    fn a_rig_that_says_so_and_a_shaft_that_stands_trip_once_and_latch() {
+    fn a_reported_trip_and_a_stopped_shaft_trip_once_and_latch() {
         let aim = Some(OperatingPoint { speed_rpm: 1e5, valve_opening_ratio: 0.7 });
-        let told = Told { running: true, step_since_s: Some(0.0), aim, jumped_s: None };
+        let state = Told { running: true, step_since_s: Some(0.0), aim, jumped_s: None };
         let speeds = |from_s: f64, rpm: f64| {
             let t_s: Vec<f64> = (0..100).map(|i| from_s + 0.1 * f64::from(i)).collect();
             let values = vec![rpm; 100];
@@ -74,16 +74,16 @@ mod tests {
             SampleBatch { t_s, columns, ..SampleBatch::default() }
         };
         let mut guard = RigWatch::default();
-        assert_eq!(guard.look(&speeds(0.0, 30.0), 10.0, &told), None, "it is still coming up");
-        assert_eq!(guard.look(&speeds(40.0, 60e3), 50.0, &told), None, "slow is for another guard");
-        let trip = guard.look(&speeds(50.0, 30.0), 60.0, &told).unwrap();
+        assert_eq!(guard.look(&speeds(0.0, 30.0), 10.0, &state), None, "it is still coming up");
+        assert_eq!(guard.look(&speeds(40.0, 60e3), 50.0, &state), None, "slow is for another guard");
+        let trip = guard.look(&speeds(50.0, 30.0), 60.0, &state).unwrap();
         assert_eq!(trip.reaction, Reaction::Latch);
         assert!((55.0..55.3).contains(&trip.t_s), "{}", trip.t_s);
-        assert_eq!(guard.look(&speeds(60.0, 30.0), 70.0, &told), None);
-        let mut said = speeds(0.0, 1e5);
+        assert_eq!(guard.look(&speeds(60.0, 30.0), 70.0, &state), None);
+        let mut tripped = speeds(0.0, 1e5);
         let message = "overspeed".to_owned();
-        said.events.push(Event { t_s: 3.0, kind: EventKind::RigTripped, message });
-        let trip = RigWatch::default().look(&said, 10.0, &told).unwrap();
+        tripped.events.push(Event { t_s: 3.0, kind: EventKind::RigTripped, message });
+        let trip = RigWatch::default().look(&tripped, 10.0, &state).unwrap();
         assert_eq!((trip.t_s, trip.reason.as_str()), (3.0, "overspeed"));
     }
 }

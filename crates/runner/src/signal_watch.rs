@@ -92,8 +92,8 @@ impl SignalWatch {
             None => self.anchor = Some((t_s, value)),
         }
         self.last_good_s = Some(t_s);
-        let stands = |(_, there): &(f64, f64)| (value - there).abs() <= STILL_RATIO * there.abs();
-        self.still = self.still.filter(stands).or(Some((t_s, value)));
+        let unchanged = |(_, there): &(f64, f64)| (value - there).abs() <= STILL_RATIO * there.abs();
+        self.still = self.still.filter(unchanged).or(Some((t_s, value)));
         self.last_value = Some(value);
         // Hysteresis: after a violation, the value has to return past the bound by this amount.
         let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
@@ -344,16 +344,16 @@ mod tests {
         assert_eq!(look(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
         assert!(look(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
         let mut guard = SignalWatch::new(SignalGuard { frozen_s: Some(2.0), ..spec() });
-        let told = |jumped_s| Told { running: true, jumped_s: Some(jumped_s), ..Told::default() };
+        let after_jump = |jumped_s| Told { running: true, jumped_s: Some(jumped_s), ..Told::default() };
         // Unchanged without a jump; moved after one; not moved.
-        assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &told(9.5)), None);
+        assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &after_jump(9.5)), None);
         let mut moved = guard.clone();
-        assert_eq!(moved.look(&batch(100, &[300.1; 30]), 12.9, &told(9.5)), None);
-        let trip = guard.clone().look(&batch(100, &[300.0; 30]), 12.9, &told(9.5)).unwrap();
+        assert_eq!(moved.look(&batch(100, &[300.1; 30]), 12.9, &after_jump(9.5)), None);
+        let trip = guard.clone().look(&batch(100, &[300.0; 30]), 12.9, &after_jump(9.5)).unwrap();
         assert_eq!(trip.reaction, Reaction::Safe);
         // A flickering last digit is not movement.
         let flicker: Vec<f64> = (0..30).map(|i| 300.0 + 1e-3 * f64::from(i % 2)).collect();
-        assert!(guard.look(&batch(100, &flicker), 12.9, &told(9.5)).is_some());
+        assert!(guard.look(&batch(100, &flicker), 12.9, &after_jump(9.5)).is_some());
         assert!((trip.t_s - 11.5).abs() < 0.11 && trip.reason.contains("frozen"), "{trip:?}");
     }
 }

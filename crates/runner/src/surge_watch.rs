@@ -134,7 +134,7 @@ mod tests {
     /// Time of the trip, s, for a flow of 0.05 kg/s and P2 of 150 kPa at 100 Hz with these relative variations.
     fn trips_at_s(flow: impl Fn(f64) -> f64, p2: impl Fn(f64) -> f64) -> Option<f64> {
         let mut guard = SurgeWatch::new(SPEC);
-        let told = Told { running: true, ..Told::default() };
+        let state = Told { running: true, ..Told::default() };
         (0..60).find_map(|second| {
             let t_s: Vec<f64> = (0..100).map(|i| f64::from(second) + 0.01 * f64::from(i)).collect();
             let column = |channel, mean: f64, course: &dyn Fn(f64) -> f64| ChannelColumn {
@@ -143,7 +143,7 @@ mod tests {
             };
             let columns = vec![column(Channel::CompressorFlow, 0.05, &flow), column(Channel::P2, 150e3, &p2)];
             let batch = SampleBatch { columns, t_s: t_s.clone(), ..SampleBatch::default() };
-            guard.look(&batch, t_s[99], &told).map(|trip| trip.t_s)
+            guard.look(&batch, t_s[99], &state).map(|trip| trip.t_s)
         })
     }
 

@@ -103,7 +103,7 @@ fn drift_is_confirmed_and_then_the_run_is_held() {
 }
 
 #[test]
-fn a_run_that_goes_on_tells_of_drift_once() {
+fn a_run_that_goes_on_reports_drift_once() {
     let (speeds, notes) = run(OnDrift::Continue, |t_s| if t_s > 350.0 { 1.0 } else { 0.0 });
     assert_eq!(speeds.len(), SPEEDS.len() + 2);
     assert_eq!(speeds[7..], [90e3, 70e3, 130e3], "then the plan goes on where it was");

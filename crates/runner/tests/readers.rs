@@ -23,7 +23,7 @@ struct Instrument {
 impl Backend for Instrument {
     fn describe(&self) -> RigDescription {
         RigDescription {
-            backend: "beside".to_owned(),
+            backend: "instrument".to_owned(),
             version: "1".to_owned(),
             channels: vec![Channel::TAmb, Channel::T1],
             sample_rate_hz: self.rate_hz,
@@ -41,7 +41,7 @@ impl Backend for Instrument {
         Ok(())
     }
     fn set(&mut self, _: &Setpoints) -> Result<(), BackendError> {
-        panic!("a reader is told nothing")
+        panic!("a reader gets no commands")
     }
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
         if until_s >= self.lost_s {
@@ -58,7 +58,7 @@ impl Backend for Instrument {
         Ok(SampleBatch { first_sequence, columns, t_s, ..SampleBatch::default() })
     }
     fn make_safe(&mut self) -> Result<(), BackendError> {
-        panic!("a reader is told nothing")
+        panic!("a reader gets no commands")
     }
     fn disarm(&mut self) -> Result<(), BackendError> {
         Ok(())
@@ -127,7 +127,7 @@ fn each_channel_has_the_times_of_its_own_source() {
 
 /// A late reading follows the samples already passed on, and keeps its source time. A lost instrument delays nothing.
 #[test]
-fn what_is_late_keeps_the_time_of_its_source_and_a_lost_reader_is_said() {
+fn late_readings_keep_the_time_of_their_source_and_a_lost_reader_is_reported() {
     let mut rig = rig(Instrument { late_s: 0.25, lost_s: 2.0, ..instrument(10.0) });
     let batches: Vec<SampleBatch> =
         (1..=30).map(|tenth| rig.poll(f64::from(tenth) * 0.1 + 0.01).unwrap()).collect();
@@ -141,16 +141,19 @@ fn what_is_late_keeps_the_time_of_its_source_and_a_lost_reader_is_said() {
     assert_eq!(from.source_t_s[at], column[at]);
     assert!(batch.t_s[at] > from.source_t_s[at]);
     assert!(air.iter().all(|(t_s, source_s)| t_s - source_s < 0.45), "{air:?}");
-    let said: Vec<&str> =
+    let messages: Vec<&str> =
         batches.iter().flat_map(|batch| &batch.events).map(|event| event.message.as_str()).collect();
-    assert_eq!(said.len(), 1, "{said:?}");
-    assert!(said[0].contains("`cell` is read no more") && said[0].contains("unplugged"), "{said:?}");
+    assert_eq!(messages.len(), 1, "{messages:?}");
+    assert!(
+        messages[0].contains("`cell` is read no more") && messages[0].contains("unplugged"),
+        "{messages:?}"
+    );
     assert_eq!(readings(&batches, Channel::T2).len(), 31, "the rig goes on");
 }
 
 /// In real time a hanging instrument does not delay the polling of the rig.
 #[test]
-fn nobody_waits_for_a_reader_in_real_time() {
+fn a_run_in_real_time_does_not_wait_for_a_reader() {
     struct Hangs(std::sync::mpsc::Receiver<()>, Instrument);
     impl Backend for Hangs {
         fn describe(&self) -> RigDescription {

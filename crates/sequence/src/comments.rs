@@ -2,7 +2,7 @@
 
 use rhai::Position;
 
-/// Where a block comment begins that does not end.
+/// Start of a block comment that does not end.
 pub(crate) fn unclosed_comment(text: &str) -> Option<Position> {
     let bytes = text.as_bytes();
     let mut at = 0;

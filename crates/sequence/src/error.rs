@@ -172,7 +172,7 @@ fn words(error: EvalAltResult) -> (String, String) {
             (format!("a value of the sequence script grew too large ({what})"), String::new())
         }
         EvalAltResult::ErrorFunctionNotFound(signature, _) => (
-            format!("there is no function `{signature}` for a sequence script"),
+            format!("no function `{signature}` exists for sequence scripts"),
             "docs/sequences.md lists the functions and what they take".to_owned(),
         ),
         other => {

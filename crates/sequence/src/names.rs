@@ -92,7 +92,7 @@ fn unknown(known: &Known, name: &str, count: usize) -> Option<(String, String)> 
     }
     let Some(counts) = known.get(name) else {
         let names: Vec<&str> = known.keys().map(String::as_str).filter(|name| !name.contains('$')).collect();
-        return Some((format!("there is no function `{name}` for a sequence script"), remedy(name, &names)));
+        return Some((format!("no function `{name}` exists for sequence scripts"), remedy(name, &names)));
     };
     if counts.contains(&count) {
         return None;

@@ -46,7 +46,7 @@ impl StepResult {
         known.map_or(f64::INFINITY, |uncertainty| uncertainty.combined_standard_error())
     }
 
-    /// `good`, `doubtful` or `unusable`; also `unusable` if there is no point.
+    /// `good`, `doubtful` or `unusable`; also `unusable` without a point.
     pub fn verdict(&self) -> &'static str {
         match self.identified.as_ref().map(|point| point.verdict) {
             Some(Verdict::Good) => "good",

@@ -139,8 +139,7 @@ impl Session {
     pub fn result(&self, number: i64) -> Result<StepResult, Thrown> {
         let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
         index.and_then(|index| self.results.get(index)).cloned().ok_or_else(|| {
-            let message =
-                format!("there is no result of step {number}: {} have been run", self.results.len());
+            let message = format!("no result of step {number}: {} have been run", self.results.len());
             throw(message, "steps are counted from 1; jump() returns its own result")
         })
     }

@@ -1,4 +1,4 @@
-//! Scripts against a caller that answers without a rig: what they may, what they may not, and what they are told.
+//! Scripts against a caller that answers without a rig: what they may and may not do, and what they receive.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{
@@ -337,12 +337,12 @@ fn a_script_whose_caller_goes_ends() {
     let step = runner.next_step(None).unwrap().unwrap();
     runner.next_step(Some(answer(&step))).unwrap().unwrap();
     assert_eq!(Arc::strong_count(&held), 2, "the script is at its second jump");
-    let (tell, told) = std::sync::mpsc::channel();
+    let (sender, dropped) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         drop(runner);
-        tell.send(()).unwrap();
+        sender.send(()).unwrap();
     });
-    told.recv_timeout(Duration::from_secs(60)).expect("the script goes on without its caller");
+    dropped.recv_timeout(Duration::from_secs(60)).expect("the script goes on without its caller");
     assert_eq!(Arc::strong_count(&held), 1, "the runner has gone and its script has not");
 }
 
@@ -386,15 +386,15 @@ fn t3_and_oil_hold_from_where_they_are_set() {
     let held = mapper_physics::steady::hold_speed(&Model::nominal(), 110e3, &boundary).unwrap();
     assert!((steps[2].p3_pa / held.boundary.p3_pa - 1.0).abs() < 1e-9 && steps[2].p3_pa > steps[1].p3_pa);
     let limits = Limits { t3_max_k: Some(own.t3_k + 10.0), ..request().limits };
-    let said = run("t3(\"550 degC\"); jump(point(\"110 krpm\", 1.0));", limits).unwrap_err();
-    assert!(said.contains("823.15 K") && said.contains("limit"), "{said}");
-    let said = run("oil(\"900 krpm\");", request().limits).unwrap_err();
-    assert!(said.contains("krpm"), "{said}");
-    let said = run("oil(\"-80 degC\");", request().limits).unwrap_err();
-    assert!(said.contains("193.15 K"), "{said}");
+    let message = run("t3(\"550 degC\"); jump(point(\"110 krpm\", 1.0));", limits).unwrap_err();
+    assert!(message.contains("823.15 K") && message.contains("limit"), "{message}");
+    let message = run("oil(\"900 krpm\");", request().limits).unwrap_err();
+    assert!(message.contains("krpm"), "{message}");
+    let message = run("oil(\"-80 degC\");", request().limits).unwrap_err();
+    assert!(message.contains("193.15 K"), "{message}");
 }
 
-/// Whoever drops a script does not wait until it has used up its operations, wherever it computes.
+/// Dropping a script does not wait until it has used up its operations, wherever it computes.
 #[test]
 fn a_script_that_computes_ends_when_it_is_dropped() {
     for text in [

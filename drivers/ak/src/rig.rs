@@ -152,7 +152,7 @@ impl Backend for Instrument {
         }
         self.armed("poll")?.error = error;
         let message = format!("{}: error status {error}", self.settings.address);
-        let said = (error != before).then_some(Event { t_s: until_s, kind: EventKind::Note, message });
+        let note = (error != before).then_some(Event { t_s: until_s, kind: EventKind::Note, message });
         let column = |channel: &Channel| ChannelColumn {
             channel: *channel,
             values: vec![values.get(channel).copied().unwrap_or(f64::NAN)],
@@ -161,7 +161,7 @@ impl Backend for Instrument {
             first_sequence,
             t_s: vec![until_s],
             columns: self.settings.read.keys().map(column).collect(),
-            events: said.into_iter().collect(),
+            events: note.into_iter().collect(),
             ..SampleBatch::default()
         })
     }

@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_said_in_few_digits() {
+    fn numbers_are_printed_with_few_digits() {
         for (value, words) in [
             (128_426_750.014_884_53, "1.284e8"),
             (2.26e-27, "2.260e-27"),

@@ -93,7 +93,7 @@ struct Rig<C> {
 }
 
 struct Armed {
-    told: Option<Setpoints>,
+    setpoints: Option<Setpoints>,
     /// Whether it was made safe since the last setpoint.
     safe: bool,
     sequence: u64,
@@ -160,19 +160,20 @@ impl<C: Controller> Rig<C> {
     }
 }
 
-fn command(channel: Channel, told: Option<Setpoints>) -> f64 {
-    let Some(told) = told else { return f64::NAN };
+fn command(channel: Channel, setpoints: Option<Setpoints>) -> f64 {
+    let Some(setpoints) = setpoints else { return f64::NAN };
     match channel {
-        Channel::P3Command => told.p3_pa,
-        Channel::T3Command => told.t3_k,
-        Channel::ValveCommand => told.valve_opening_ratio,
-        _ => told.oil_temperature_k,
+        Channel::P3Command => setpoints.p3_pa,
+        Channel::T3Command => setpoints.t3_k,
+        Channel::ValveCommand => setpoints.valve_opening_ratio,
+        _ => setpoints.oil_temperature_k,
     }
 }
 
 /// Provenance of the readings that are not plain good ones.
 fn provenance(readings: &BTreeMap<Channel, Reading>, t_s: f64) -> Vec<Provenance> {
-    let told = |reading: &Reading| reading.source_t_s.is_some() || reading.quality != Quality::Good;
+    let needs_provenance =
+        |reading: &Reading| reading.source_t_s.is_some() || reading.quality != Quality::Good;
     let of = |(channel, reading): (&Channel, &Reading)| Provenance {
         channel: *channel,
         source_t_s: vec![reading.source_t_s.unwrap_or(t_s)],
@@ -180,7 +181,7 @@ fn provenance(readings: &BTreeMap<Channel, Reading>, t_s: f64) -> Vec<Provenance
     };
     readings
         .iter()
-        .filter(|(channel, reading)| told(reading) && !COMMANDS.contains(channel))
+        .filter(|(channel, reading)| needs_provenance(reading) && !COMMANDS.contains(channel))
         .map(of)
         .collect()
 }
@@ -229,7 +230,7 @@ impl<C: Controller> Backend for Rig<C> {
             return Err(self.lost(error));
         }
         self.armed = Some(Armed {
-            told: None,
+            setpoints: None,
             safe: false,
             sequence: 0,
             last_s: -1.0,
@@ -258,13 +259,13 @@ impl<C: Controller> Backend for Rig<C> {
         let values: Vec<_> = off.into_iter().chain(values).chain(on).collect();
         self.write(&values)?;
         let armed = self.armed("set")?;
-        (armed.told, armed.safe) = (Some(*setpoints), false);
+        (armed.setpoints, armed.safe) = (Some(*setpoints), false);
         Ok(())
     }
 
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
         let armed = self.armed("poll")?;
-        let (first_sequence, told) = (armed.sequence, armed.told);
+        let (first_sequence, setpoints) = (armed.sequence, armed.setpoints);
         if !(until_s >= 0.0 && until_s > armed.last_s) {
             return Ok(SampleBatch { first_sequence, ..SampleBatch::default() });
         }
@@ -275,7 +276,7 @@ impl<C: Controller> Backend for Rig<C> {
         let readings = self.controller.read(until_s);
         let column = |channel: Channel| {
             let value = match COMMANDS.contains(&channel) {
-                true => command(channel, told),
+                true => command(channel, setpoints),
                 false => readings.get(&channel).map_or(f64::NAN, |reading| reading.value),
             };
             ChannelColumn { channel, values: vec![value] }
@@ -294,8 +295,8 @@ impl<C: Controller> Backend for Rig<C> {
 
     fn hold(&mut self) -> Result<(), BackendError> {
         let armed = self.armed("hold")?;
-        match armed.told.filter(|_| !armed.safe) {
-            Some(told) => self.set(&told),
+        match armed.setpoints.filter(|_| !armed.safe) {
+            Some(setpoints) => self.set(&setpoints),
             // Setpoints from before the safe state would restore the air.
             None => Ok(()),
         }
@@ -304,7 +305,7 @@ impl<C: Controller> Backend for Rig<C> {
     fn make_safe(&mut self) -> Result<(), BackendError> {
         let armed = self.armed("make_safe")?;
         armed.safe = true;
-        let open = armed.told.map_or(0.0, |told| told.valve_opening_ratio);
+        let open = armed.setpoints.map_or(0.0, |setpoints| setpoints.valve_opening_ratio);
         let highest = self.stand.accepts.range(Target::Valve).high;
         let valve = open.max(self.stand.safe.opening).min(highest);
         // The heater last: even if the controller refuses it, the valve is open.

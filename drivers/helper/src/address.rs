@@ -22,7 +22,7 @@ fn remedy(text: &str) -> String {
         {
             format!("`{text}` is a name; {wants} (`getent hosts {host}` shows them)")
         }
-        _ => format!("`{text}` is no address; {wants}"),
+        _ => format!("`{text}` is not an address; {wants}"),
     }
 }
 
@@ -40,11 +40,11 @@ mod tests {
             ("localhost:5021", "`localhost:5021` is a name"),
             ("localhost:5021", "here 127.0.0.1:5021"),
             ("plc.cell3:502", "`getent hosts plc.cell3`"),
-            ("127.0.0.1", "`127.0.0.1` is no address"),
+            ("127.0.0.1", "`127.0.0.1` is not an address"),
             ("127.0.0.1:99999", "with its port, as 192.168.0.7:502"),
         ] {
-            let said = read(json!(text)).unwrap_err();
-            assert!(said.contains(words), "{said}");
+            let message = read(json!(text)).unwrap_err();
+            assert!(message.contains(words), "{message}");
         }
     }
 }

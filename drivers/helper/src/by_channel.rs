@@ -33,7 +33,7 @@ where
         type Value = BTreeMap<Channel, T>;
 
         fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-            f.write_str("where each channel stands, by its symbol")
+            f.write_str("the place of each channel, by its symbol")
         }
 
         fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
@@ -41,7 +41,7 @@ where
             while let Some(symbol) = map.next_key::<String>()? {
                 let (channel, value) = map.next_value_seed(At(symbol, PhantomData))?;
                 if found.insert(channel, value).is_some() {
-                    return Err(A::Error::custom(format!("{channel} stands there twice")));
+                    return Err(A::Error::custom(format!("{channel} is given twice")));
                 }
             }
             Ok(found)

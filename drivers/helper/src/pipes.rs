@@ -11,8 +11,8 @@ use std::sync::mpsc::sync_channel;
 /// Serves one host on standard input and output, until it disconnects and the rig is safe. `name`: the file name of the program is
 /// `mapper-backend-NAME`.
 pub fn serve(name: &'static str, version: &'static str, open: impl Open + 'static) -> ExitCode {
-    let (tell, news) = sync_channel(WAITING);
-    if listen(std::io::stdin(), tell.clone()).and_then(|()| heed_signals(tell)).is_err() {
+    let (sender, news) = sync_channel(WAITING);
+    if listen(std::io::stdin(), sender.clone()).and_then(|()| heed_signals(sender)).is_err() {
         return ExitCode::FAILURE;
     }
     let Ok(outlet) = frames().and_then(Outlet::into_pipe) else { return ExitCode::FAILURE };

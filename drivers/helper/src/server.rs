@@ -79,7 +79,7 @@ impl Server {
             "poll" => self.poll(&message.params),
             "make_safe" => self.make_safe(),
             "disarm" => self.disarm(),
-            other => Err(refused(Code::UnknownMethod, format!("there is no method `{other}`"))),
+            other => Err(refused(Code::UnknownMethod, format!("unknown method `{other}`"))),
         };
         self.out.push(Message::answer(id, answer));
     }
@@ -167,8 +167,7 @@ impl Server {
             return Err(lease_ended());
         }
         if armed.told.is_none() {
-            let message =
-                "there are no setpoints to hold: none were told since arming or since it was made safe";
+            let message = "no setpoints to hold: none were set since arming or since it was made safe";
             return Err(refused(Code::OutOfOrder, message));
         }
         guarded(|| rig.hold())?;
@@ -278,7 +277,8 @@ impl Server {
         if let Some((due_s, doubt)) = armed.fly_on(rig, description, now_s, leaving) {
             next_s = next_s.min(due_s);
             if let Some(error) = doubt {
-                let message = format!("the rig did not confirm its safe state, and is told again: {error}");
+                let message =
+                    format!("the rig did not confirm its safe state; the command is repeated: {error}");
                 self.out.push(Message::note("note", json!({ "message": message })));
             }
         }
@@ -334,7 +334,7 @@ mod tests {
     impl Backend for LoggingRig {
         fn describe(&self) -> RigDescription {
             RigDescription {
-                backend: "told".to_owned(),
+                backend: "logging".to_owned(),
                 version: "1".to_owned(),
                 channels: vec![Channel::T2],
                 sample_rate_hz: 10.0,
@@ -388,7 +388,7 @@ mod tests {
         let log = Log::default();
         let rig = LoggingRig { log: log.clone(), simulated_time, samples: 0, takes, refuses };
         let open: Opened = Box::new(|_| Ok(Box::new(rig)));
-        let mut server = Server::new("told", "1", "s".to_owned(), open);
+        let mut server = Server::new("logging", "1", "s".to_owned(), open);
         let hello = json!({"magic": MAGIC, "protocol": VERSION, "name": "x", "version": "1", "frame_limit_bytes": 100_000});
         let setpoints = setpoints_on_the_wire();
         for (method, params) in
@@ -444,7 +444,7 @@ mod tests {
 
     /// Setpoints from before the safe state or the end of the lease must not be held: they would restore the air.
     #[test]
-    fn what_is_held_is_what_was_told_last_and_nothing_from_before_it_was_made_safe() {
+    fn hold_repeats_the_last_setpoints_and_none_from_before_the_safe_state() {
         let (mut server, log) = flying(false, 100);
         assert!(ask(&mut server, 0.1, "hold", json!({})).is_none());
         assert_eq!(*log.lock().unwrap(), ["hold"]);
@@ -453,7 +453,7 @@ mod tests {
         assert!(ask(&mut server, 0.4, "set", setpoints_on_the_wire()).is_none());
         server.tick(3.0);
         assert_eq!(ask(&mut server, 3.1, "hold", json!({})).unwrap().code, Code::LeaseEnded);
-        assert_eq!(log.lock().unwrap().iter().filter(|told| *told == "hold").count(), 1);
+        assert_eq!(log.lock().unwrap().iter().filter(|call| *call == "hold").count(), 1);
     }
 
     /// Another session can neither renew the lease nor set anything.
@@ -498,7 +498,7 @@ mod tests {
     /// A controller is away when the lease ends. The driver retries every 0.1 s until it is back, and does not poll it
     /// meanwhile, so that the heartbeat stops. It does not disarm the rig before the safe state is confirmed.
     #[test]
-    fn a_rig_in_doubt_is_told_again_and_its_heartbeat_stops() {
+    fn an_unconfirmed_safe_state_is_repeated_and_the_heartbeat_stops() {
         let (mut server, log) = refusing(false, 1, 30);
         let mut next_s = 2.0;
         for hundredth in 0..600 {
@@ -511,11 +511,11 @@ mod tests {
             }
         }
         let log = log.lock().unwrap();
-        let first = log.iter().position(|told| told == "refused").unwrap();
+        let first = log.iter().position(|call| call == "refused").unwrap();
         let (before, after) = log.split_at(first);
-        assert!(before.iter().all(|told| told == "poll"), "{before:?}");
-        assert_eq!(after.iter().filter(|told| *told == "refused").count(), 30);
-        let polled = after.iter().take_while(|told| *told != "safe").filter(|told| *told == "poll").count();
+        assert!(before.iter().all(|call| call == "poll"), "{before:?}");
+        assert_eq!(after.iter().filter(|call| *call == "refused").count(), 30);
+        let polled = after.iter().take_while(|call| *call != "safe").filter(|call| *call == "poll").count();
         assert_eq!(polled, 0, "{after:?}");
         assert!(after.contains(&"safe".to_owned()));
     }

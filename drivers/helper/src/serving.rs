@@ -82,27 +82,27 @@ fn send(server: &mut Server, outlet: &Outlet) {
 }
 
 /// Forwards the host's messages, and finally that it has disconnected.
-pub(crate) fn listen(mut host: impl Read + Send + 'static, tell: SyncSender<Came>) -> std::io::Result<()> {
+pub(crate) fn listen(mut host: impl Read + Send + 'static, sender: SyncSender<Came>) -> std::io::Result<()> {
     let read = move || {
         while let Ok(Some(body)) = read_frame(&mut host, FRAME_LIMIT_BYTES) {
             let Ok(message) = decode(&body) else { break };
-            if tell.send(Came::Message(Box::new(message))).is_err() {
+            if sender.send(Came::Message(Box::new(message))).is_err() {
                 return;
             }
         }
         // If this fails, the receiver is gone.
-        let _ = tell.send(Came::Closed);
+        let _ = sender.send(Came::Closed);
     };
     std::thread::Builder::new().name("from host".to_owned()).spawn(read).map(drop)
 }
 
 #[cfg(unix)]
-pub(crate) fn heed_signals(tell: SyncSender<Came>) -> std::io::Result<()> {
+pub(crate) fn heed_signals(sender: SyncSender<Came>) -> std::io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGHUP, SIGINT])?;
     let heed = move || {
         for _ in signals.forever() {
-            if tell.send(Came::Terminate).is_err() {
+            if sender.send(Came::Terminate).is_err() {
                 return;
             }
         }

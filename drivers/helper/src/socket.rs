@@ -30,14 +30,14 @@ pub fn serve_at(
     version: &'static str,
     open: impl Open + 'static,
 ) -> ExitCode {
-    let (tell, news) = sync_channel(WAITING);
+    let (sender, news) = sync_channel(WAITING);
     let busy = Arc::new(AtomicBool::new(false));
     let begun = bind(path).and_then(|(listener, file)| {
-        heed_signals(tell.clone())?;
-        let (tell, busy) = (tell.clone(), busy.clone());
+        heed_signals(sender.clone())?;
+        let (sender, busy) = (sender.clone(), busy.clone());
         std::thread::Builder::new()
             .name("door".to_owned())
-            .spawn(move || open_the_door(&listener, &tell, &busy))
+            .spawn(move || open_the_door(&listener, &sender, &busy))
             .map(|_| file)
     });
     // The socket file is removed when the driver ends.
@@ -58,7 +58,7 @@ pub fn serve_at(
         };
         let open = open.clone();
         let server = Server::new(name, version, session(), Box::new(move |settings| open(settings)));
-        let served = attend(server, &host, tell.clone(), &news);
+        let served = attend(server, &host, sender.clone(), &news);
         // Discards unread data: the host has disconnected or sent an invalid frame.
         let _ = host.shutdown(Shutdown::Both);
         busy.store(false, Ordering::SeqCst);
@@ -71,20 +71,20 @@ pub fn serve_at(
 fn attend(
     server: Server,
     host: &UnixStream,
-    tell: SyncSender<Came>,
+    sender: SyncSender<Came>,
     news: &std::sync::mpsc::Receiver<Came>,
 ) -> std::io::Result<bool> {
     let outlet = Outlet::into_pipe(host.try_clone()?)?;
-    listen(host.try_clone()?, tell)?;
+    listen(host.try_clone()?, sender)?;
     Ok(serve_one(server, news, &outlet))
 }
 
-fn open_the_door(listener: &UnixListener, tell: &SyncSender<Came>, busy: &AtomicBool) {
+fn open_the_door(listener: &UnixListener, sender: &SyncSender<Came>, busy: &AtomicBool) {
     loop {
         match listener.accept() {
             Ok((host, _)) if busy.swap(true, Ordering::SeqCst) => turn_away(host),
             Ok((host, _)) => {
-                if tell.send(Came::Connected(host)).is_err() {
+                if sender.send(Came::Connected(host)).is_err() {
                     return;
                 }
             }
@@ -129,7 +129,7 @@ fn bind(path: &Path) -> std::io::Result<(UnixListener, OwnFile)> {
     }
     if let Ok(there) = path.symlink_metadata() {
         if !there.file_type().is_socket() {
-            return Err(Error::new(ErrorKind::AlreadyExists, "there is a file that is no socket"));
+            return Err(Error::new(ErrorKind::AlreadyExists, "there is a file that is not a socket"));
         }
         if UnixStream::connect(path).is_ok() {
             return Err(Error::new(ErrorKind::AddrInUse, "another driver listens there"));

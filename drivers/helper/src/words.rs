@@ -67,7 +67,7 @@ impl About {
         format!(
             "{}\n{summary}\n\n\
              This is a driver: `mapper` starts it by itself where a campaign says `backend: {{{name}: ...}}`, and talks to it over\n\
-             standard input and output. There is nothing to start by hand. It has to stand beside `mapper` or on PATH:\n\
+             standard input and output. There is nothing to start by hand. It must be next to `mapper` or on PATH:\n\
              `mapper backend list` shows whether it is found.\n\n\
              With --socket it is there before a run and after it: another user, or a service, has started it. `mapper` looks for it at\n\
              `drivers/{name}.socket` below $MAPPER_STATE_DIR or ~/.local/state/mapper.\n\n\

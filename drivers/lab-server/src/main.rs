@@ -143,7 +143,7 @@ fn serve(
         serving.push(runtime.spawn(async { Ok(served.await?) }));
         writeln!(out, "modbus {at}")?;
         let [own, other] = modbus::UNITS;
-        notes.push(format!("modbus: `unit: {own}` (or {other}), no other; anybody who reaches it may write, without a password"));
+        notes.push(format!("modbus: `unit: {own}` (or {other}), no other; every client that reaches it may write, without a password"));
     }
     if let Some(at) = arguments.opcua {
         let (listener, at) = listen(runtime, arguments, at)?;
@@ -160,7 +160,7 @@ fn serve(
         let served = ak::serve(listener, shared.stand.clone());
         serving.push(runtime.spawn(async { Ok(served.await?) }));
         writeln!(out, "ak {at}")?;
-        notes.push("ak: read alone, by anybody, without a password".to_owned());
+        notes.push("ak: read-only, for every client, without a password".to_owned());
     }
     for note in notes {
         writeln!(out, "{note}")?;
@@ -177,13 +177,13 @@ fn run(arguments: &Arguments) -> Result<(), LabError> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
     let shared = Shared { stand: stand.clone(), begun: Instant::now(), stamps: arguments.stamps };
     let serving = serve(&runtime, arguments, &shared)?;
-    let mut said = false;
+    let mut reported = false;
     while !serving.iter().any(JoinHandle::is_finished) {
         let mut stand = stand.lock().map_err(|_| LabError::Thread)?;
         stand.advance(shared.begun.elapsed().as_secs_f64())?;
         let tripped = stand.tripped().map(str::to_owned);
         drop(stand);
-        match (&tripped, said) {
+        match (&tripped, reported) {
             (Some(why), false) => {
                 let how = "1 in register 113, or true in the node ns=2;s=acknowledge, acknowledges it";
                 writeln!(std::io::stdout(), "tripped: {why}; {how}")?
@@ -191,7 +191,7 @@ fn run(arguments: &Arguments) -> Result<(), LabError> {
             (None, true) => writeln!(std::io::stdout(), "acknowledged")?,
             _ => {}
         }
-        said = tripped.is_some();
+        reported = tripped.is_some();
         std::thread::sleep(STEP);
     }
     for ended in serving.into_iter().filter(JoinHandle::is_finished) {

@@ -76,7 +76,7 @@ impl Shared {
         }
     }
 
-    fn tell(&self, name: &str, target: Target, value: &DataValue) -> StatusCode {
+    fn write(&self, name: &str, target: Target, value: &DataValue) -> StatusCode {
         let number = match &value.value {
             Some(Variant::Boolean(on)) => f64::from(u8::from(*on)),
             Some(Variant::Double(number)) => *number,
@@ -138,7 +138,7 @@ pub enum Protection {
 pub fn who(protection: Protection) -> Result<String, ServeError> {
     Ok(match (protection, user()?) {
         (Protection::Clear, _) => {
-            "in the clear (`security: none`), for anybody without user and password".to_owned()
+            "in the clear (`security: none`), for every client, without user and password".to_owned()
         }
         (Protection::Encrypted, Some(_)) => {
             format!("signed and encrypted, for the user in ${} with the password in ${}", USER.0, USER.1)
@@ -259,7 +259,7 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
         let (reads, writes) = (shared.clone(), shared.clone());
         let read = move |stand: &Stand| Some(variant(kind, stand.told(target)));
         manager.inner().add_read_callback(id.clone(), move |_, _, _| reads.value(read));
-        manager.inner().add_write_callback(id, move |value, _| writes.tell(name, target, &value));
+        manager.inner().add_write_callback(id, move |value, _| writes.write(name, target, &value));
     }
     Ok(())
 }

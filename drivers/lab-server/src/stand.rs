@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn the_air_is_cut_without_a_heartbeat_and_above_the_speed_until_somebody_has_looked() {
+    fn the_air_is_cut_without_a_heartbeat_and_above_the_speed_until_it_is_acknowledged() {
         let mut stand = stand();
         for (target, value) in [(Target::P3, 180e3), (Target::T3, 700.0), (Target::Air, 1.0)] {
             stand.tell(target, value).unwrap();

@@ -30,8 +30,8 @@ struct Scratch {
 impl Scratch {
     fn new() -> Scratch {
         let directory = tempfile::tempdir().unwrap();
-        let (tell, news) = channel();
-        let mut watcher = notify::recommended_watcher(tell).unwrap();
+        let (sender, news) = channel();
+        let mut watcher = notify::recommended_watcher(sender).unwrap();
         watcher.watch(directory.path(), RecursiveMode::NonRecursive).unwrap();
         Scratch { directory, news, _watcher: watcher }
     }
@@ -47,15 +47,15 @@ impl Scratch {
     }
 
     /// The commands of a rig, as soon as they contain these words.
-    fn told(&self, name: &str, words: &str) -> String {
+    fn commands(&self, name: &str, words: &str) -> String {
         let text = || std::fs::read_to_string(self.file(name)).unwrap_or_default();
         self.until(|| text().contains(words));
         text()
     }
 
-    fn settings(&self, told: &str) -> Value {
+    fn settings(&self, file: &str) -> Value {
         let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/turbo_a.yaml");
-        json!({"campaign": campaign, "real_time": true, "told": self.file(told)})
+        json!({"campaign": campaign, "real_time": true, "told": self.file(file)})
     }
 }
 
@@ -105,9 +105,12 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
     assert!(refused.to_string().contains("this driver serves another host"), "{refused}");
     // As if a runner is killed: the connection ends without a message. The rig runs down and is disarmed, and the next host is served.
     drop(first);
-    let told = scratch.told("first", "disarm");
-    let way: Vec<&str> = told.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
-    assert!(told.contains("hold") && way.len() > 3 && way[way.len() - 2].contains("make safe"), "{told}");
+    let commands = scratch.commands("first", "disarm");
+    let way: Vec<&str> = commands.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
+    assert!(
+        commands.contains("hold") && way.len() > 3 && way[way.len() - 2].contains("make safe"),
+        "{commands}"
+    );
 
     let mut second = come(&places, &scratch.settings("second"));
     second.arm().unwrap();
@@ -118,21 +121,21 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
     let pid = listening.0.id().to_string();
     assert!(Command::new("kill").args(["-s", "TERM", &pid]).status().unwrap().success());
     assert!(listening.0.wait().unwrap().success());
-    assert!(scratch.told("second", "disarm").contains("make safe"));
+    assert!(scratch.commands("second", "disarm").contains("make safe"));
     assert!(!socket.exists());
-    assert!(second.make_safe().is_err(), "nobody can say that");
+    assert!(second.make_safe().is_err(), "the driver has gone, so that the safe state is unknown");
 }
 
 /// The socket of a killed driver is reported as such, and the next driver replaces it.
 #[test]
-fn a_socket_at_which_nobody_listens_is_said_and_can_be_taken_again() {
+fn a_socket_without_a_listener_is_reported_and_can_be_reused() {
     let scratch = Scratch::new();
     let socket = scratch.file("lab.socket");
     drop(Listening::at(&socket, &scratch));
     assert!(socket.exists());
     let places = Places { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
     let away = Driver::find(&places, "lab", &Value::Null, "", "").err().unwrap().to_string();
-    assert!(away.contains("nobody listens at the socket") && away.contains("--socket"), "{away}");
+    assert!(away.contains("no driver listens at the socket") && away.contains("--socket"), "{away}");
     let _again = Listening::at(&socket, &scratch);
-    come(&places, &scratch.settings("told"));
+    come(&places, &scratch.settings("third"));
 }

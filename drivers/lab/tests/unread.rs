@@ -33,7 +33,7 @@ const SETPOINTS: Setpoints = Setpoints {
 /// The lab of the shipped campaign at a hundred times its speed, and the log of its commands.
 struct Lab {
     settings: Value,
-    told: PathBuf,
+    commands_file: PathBuf,
     news: Receiver<notify::Result<notify::Event>>,
     _watcher: RecommendedWatcher,
     _scratch: tempfile::TempDir,
@@ -48,28 +48,28 @@ impl Lab {
         let campaign = scratch.path().join("fast.yaml");
         std::fs::write(&campaign, text.replace("virtual_lab: {}", "virtual_lab: {sample_rate: 1000 Hz}"))
             .unwrap();
-        let told = scratch.path().join("told.txt");
-        let settings = json!({"campaign": campaign, "real_time": true, "told": told});
-        let (tell, news) = channel();
-        let mut watcher = notify::recommended_watcher(tell).unwrap();
+        let commands_file = scratch.path().join("commands.txt");
+        let settings = json!({"campaign": campaign, "real_time": true, "told": commands_file});
+        let (sender, news) = channel();
+        let mut watcher = notify::recommended_watcher(sender).unwrap();
         watcher.watch(scratch.path(), RecursiveMode::NonRecursive).unwrap();
-        Lab { settings, told, news, _watcher: watcher, _scratch: scratch }
+        Lab { settings, commands_file, news, _watcher: watcher, _scratch: scratch }
     }
 
     /// The commands of the rig, as soon as they contain these words.
-    fn told(&self, words: &str) -> String {
+    fn commands(&self, words: &str) -> String {
         loop {
-            let text = std::fs::read_to_string(&self.told).unwrap_or_default();
+            let text = std::fs::read_to_string(&self.commands_file).unwrap_or_default();
             if text.contains(words) {
                 return text;
             }
-            self.news.recv_timeout(Duration::from_secs(60)).expect("the rig is told something").unwrap();
+            self.news.recv_timeout(Duration::from_secs(60)).expect("the rig receives a command").unwrap();
         }
     }
 
     /// The heater off at once, P3 down at its slew, then the air, at the times of the rig's own clock.
     fn flew_its_way(&self) {
-        let text = self.told("make safe");
+        let text = self.commands("make safe");
         let at_s = |line: &str| line.split_once(" s:").unwrap().0.parse::<f64>().unwrap();
         let lines: Vec<&str> = text.lines().collect();
         let set = lines.iter().position(|line| line.contains("set air on")).unwrap();
@@ -111,7 +111,7 @@ impl Pipes {
     }
 
     /// Sends a request without reading the answer.
-    fn tell(&mut self, method: &str, params: Value) -> u64 {
+    fn send(&mut self, method: &str, params: Value) -> u64 {
         self.asked += 1;
         let (id, method, session) = (Some(self.asked), Some(method.to_owned()), self.session.clone());
         let request = Message { id, session, method, params, ..Message::default() };
@@ -138,7 +138,7 @@ impl Pipes {
     }
 
     fn ask(&mut self, method: &str, params: Value) -> Value {
-        let id = self.tell(method, params);
+        let id = self.send(method, params);
         loop {
             let (message, _) = self.next();
             if message.id == Some(id) {
@@ -192,22 +192,22 @@ impl Read {
 /// The host neither reads nor writes. The lease ends and the run-down is on time; messages beyond the queue are dropped, and their
 /// numbers are missing. Later requests are executed and answered even if the queue is full.
 #[test]
-fn a_pipe_that_nobody_reads_holds_up_no_rig() {
+fn an_unread_pipe_does_not_delay_the_rig() {
     let lab = Lab::new();
     let mut pipes = Pipes::to(&lab.settings);
-    let set = pipes.tell("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
-    lab.told("set air on");
+    let set = pipes.send("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
+    lab.commands("set air on");
     let last_word = Instant::now();
-    lab.told("T3 293 K");
+    lab.commands("T3 293 K");
     let began_s = last_word.elapsed().as_secs_f64();
     // docs/safety.md promises 2.5 s on an idle computer; here the lab at 1000 Hz and other tests compete for it.
     assert!((LEASE_S - 0.1..10.0).contains(&began_s), "{began_s} s");
     lab.flew_its_way();
     // Refused, since the lease has ended; the next requests are executed.
-    let again = pipes.tell("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
+    let again = pipes.send("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
     let (mut answers, mut notes, mut unread) = (vec![set, again], Vec::new(), Duration::ZERO);
     let read = loop {
-        let safe = pipes.tell("make_safe", json!({}));
+        let safe = pipes.send("make_safe", json!({}));
         answers.push(safe);
         let read = pipes.read_until(safe);
         assert_eq!(read.answers, answers);
@@ -234,20 +234,20 @@ fn a_pipe_that_nobody_reads_holds_up_no_rig() {
 fn a_driver_that_is_left_with_a_full_pipe_ends() {
     let lab = Lab::new();
     let mut pipes = Pipes::to(&lab.settings);
-    pipes.tell("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
+    pipes.send("set", serde_json::to_value(setpoints_on_the_wire(&SETPOINTS)).unwrap());
     lab.flew_its_way();
     // Its output stays open and full.
     drop(std::mem::replace(
         &mut pipes.stdin,
         Command::new("true").stdin(Stdio::piped()).spawn().unwrap().stdin.unwrap(),
     ));
-    lab.told("disarm");
+    lab.commands("disarm");
     assert!(pipes.child.wait().unwrap().success());
 }
 
 /// The same through the host: the missed samples count as loss of the rig, the message gives their extent, and the rig can be disarmed.
 #[test]
-fn a_host_that_reads_nothing_is_told_what_it_missed() {
+fn a_host_that_reads_nothing_gets_a_note_of_what_it_missed() {
     let lab = Lab::new();
     let patience = Patience { silence: Duration::from_millis(300), ..PATIENCE };
     let mut driver = Driver::of_program(Path::new(PROGRAM), "lab", &lab.settings, patience).unwrap();

@@ -223,7 +223,7 @@ mod tests {
         assert_eq!(link.left(), Duration::from_millis(800));
         // One that is always too slow: the message gives the range of the setting.
         let mut quick = Link::new(mute.local_addr().unwrap(), 255, Duration::from_millis(20)).unwrap();
-        let said = quick.read(Table::Holding, Block { start: 0, count: 1 }).unwrap_err().to_string();
-        assert!(said.contains("within 20 ms (`timeout`, at most 800 ms"), "{said}");
+        let message = quick.read(Table::Holding, Block { start: 0, count: 1 }).unwrap_err().to_string();
+        assert!(message.contains("within 20 ms (`timeout`, at most 800 ms"), "{message}");
     }
 }

@@ -53,14 +53,15 @@ impl Registers {
         match (failed.map(|error| error.to_string()), &mut self.failing) {
             (None, None) => {}
             (None, Some((_, samples))) => {
-                self.remark =
-                    Some(format!("all registers are read again, after {samples} samples that lack some"));
+                self.remark = Some(format!(
+                    "all registers are read again, after {samples} samples with registers missing"
+                ));
                 self.failing = None;
             }
             (Some(why), Some((known, samples))) if why == *known => *samples += 1,
             (Some(why), failing) => {
                 let before = failing.as_ref().map_or(0, |(_, samples)| *samples);
-                self.remark = Some(format!("samples lack registers: {why}"));
+                self.remark = Some(format!("registers are missing from the samples: {why}"));
                 *failing = Some((why, before + 1));
             }
         }

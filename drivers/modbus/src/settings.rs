@@ -311,8 +311,8 @@ mod tests {
             (["write", "p3"], json!({"register": 100, "type": "u16"}), "write.p3", "cannot hold 105000"),
             (["write", "t3"], json!({"register": 101}), "write.t3", "written to register 101"),
         ] {
-            let (found, said) = refused(at, value);
-            assert!(found == path && said.contains(words), "{found}: {said}");
+            let (found, message) = refused(at, value);
+            assert!(found == path && message.contains(words), "{found}: {message}");
         }
         // The same address in the other table, and integers that are fine enough.
         let mut fine = settings();

@@ -136,7 +136,7 @@ fn reads_nothing(batch: &SampleBatch) -> bool {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_that_restarts_or_stands_still_is_read_again_soon() {
+fn a_server_that_restarts_or_stops_is_read_again_soon() {
     let mut stand = Stand::new("0");
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
     until(&mut rig, &mut t_s, reads);
@@ -164,7 +164,7 @@ fn a_server_that_restarts_or_stands_still_is_read_again_soon() {
 /// A failure is reported in time, so that the runner knows that the rig is in doubt.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_that_is_gone_for_good_is_said_in_time() {
+fn a_server_that_is_gone_for_good_is_reported_in_time() {
     let mut stand = Stand::new("0");
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
     until(&mut rig, &mut t_s, reads);
@@ -241,8 +241,8 @@ fn only_what_was_written_counts_as_acknowledged() {
     for misdeed in [OTHER_REGISTER, FEWER_REGISTERS, DEVICE_FAILURE] {
         stand.misbehave(misdeed);
         lost(rig.make_safe());
-        let said = lost(rig.set(&SETPOINTS));
-        assert_eq!(said.contains("exception 4"), misdeed == DEVICE_FAILURE, "{said}");
+        let message = lost(rig.set(&SETPOINTS));
+        assert_eq!(message.contains("exception 4"), misdeed == DEVICE_FAILURE, "{message}");
         stand.misbehave(HONEST);
         rig.set(&SETPOINTS).unwrap();
     }

@@ -46,7 +46,7 @@ pub(crate) enum LinkError {
     )]
     NotLetIn { server: String, words: String, own: String },
     #[error(
-        "nobody answers at {server}: {source}. Is the server on, and is this its address and port? (`mapper-lab-server` with --opcua prints where it is)"
+        "no server answers at {server}: {source}. Is the server on, and is this its address and port? (`mapper-lab-server` with --opcua prints where it is)"
     )]
     Away { server: String, source: std::io::Error },
     #[error(
@@ -251,18 +251,18 @@ impl Link {
             .connect_to_endpoint_directly(endpoint)
             .and_then(|builder| builder.build(client.certificate_store().clone()));
         let (session, events) = built.map_err(|error| self.failed(error.to_string()))?;
-        let (tell, state) = watch::channel(State::Connecting);
+        let (sender, state) = watch::channel(State::Connecting);
         let task = self.runtime.spawn(async move {
             let events = events.enter();
             pin_mut!(events);
             while let Some(event) = events.next().await {
                 let _ = match event {
-                    Ok(SessionPollResult::Reconnected(_)) => tell.send(State::Connected),
+                    Ok(SessionPollResult::Reconnected(_)) => sender.send(State::Connected),
                     Ok(
                         SessionPollResult::ConnectionLost(status)
                         | SessionPollResult::ReconnectFailed(status),
                     )
-                    | Err(status) => tell.send(State::Failed(status)),
+                    | Err(status) => sender.send(State::Failed(status)),
                     Ok(_) => Ok(()),
                 };
             }
@@ -328,7 +328,7 @@ impl Link {
             })
             .collect();
         let within = self.within;
-        let Some(open) = &self.open else { return Err(self.failed("there is no session")) };
+        let Some(open) = &self.open else { return Err(self.failed("no session is open")) };
         let session = open.session.clone();
         // A maximum age of 0 requests a new value.
         let read = Read::new(&session)
@@ -395,7 +395,7 @@ impl Link {
                 Some(status) => self.failed(words(status)),
                 None => LinkError::Late { server: self.server(), within: WRITING },
             })?;
-            let Some(open) = &self.open else { return Err(self.failed("there is no session")) };
+            let Some(open) = &self.open else { return Err(self.failed("no session is open")) };
             let session = open.session.clone();
             let left = until.saturating_duration_since(Instant::now());
             let answer = self.runtime.block_on(async { timeout(left, session.write(&write)).await });

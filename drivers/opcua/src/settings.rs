@@ -371,14 +371,14 @@ mod tests {
         assert_eq!(path(&|value| value["endpoint"] = json!("127.0.0.1:4840")).0, "endpoint");
         assert_eq!(path(&|value| value["security"] = json!("weak")).0, "security");
         assert_eq!(path(&|value| value["rate"] = json!("1 Hz")).0, "rate");
-        let (at, said) = path(&|value| value["read"]["P3"]["node"] = json!("N"));
-        assert!(at == "read.P3.node" && said.contains("ns=2;s=Stand.P3"), "{at}: {said}");
+        let (at, message) = path(&|value| value["read"]["P3"]["node"] = json!("N"));
+        assert!(at == "read.P3.node" && message.contains("ns=2;s=Stand.P3"), "{at}: {message}");
         assert_eq!(
             path(&|value| drop(value["read"]["P3"].as_object_mut().unwrap().remove("node"))).0,
             "read.P3"
         );
-        let (at, said) = path(&|value| value["read"]["P9"] = json!({"node": "ns=2;s=P9"}));
-        assert!(at == "read.P9" && said.contains("no channel is called `P9`"), "{at}: {said}");
+        let (at, message) = path(&|value| value["read"]["P9"] = json!({"node": "ns=2;s=P9"}));
+        assert!(at == "read.P9" && message.contains("no channel is called `P9`"), "{at}: {message}");
         assert!(path(&|value| value["read"]["P3"]["unit"] = json!("degC")).1.contains("kPa"));
         assert_eq!(path(&|value| value["write"]["t3"] = json!({"node": "ns=2;s=p3"})).0, "write.t3");
         assert_eq!(path(&|value| value["user"] = json!("plain")).0, "user");
@@ -389,15 +389,15 @@ mod tests {
             (value["user"], value["password"]) = (json!({"env": "PATH"}), json!({"env": "PATH"}));
         });
         assert_eq!(exposed.0, "security");
-        let (at, said) = path(&|value| value["read"]["T3"] = json!({"node": "ns=2;i=3"}));
+        let (at, message) = path(&|value| value["read"]["T3"] = json!({"node": "ns=2;i=3"}));
         assert!(
-            at == "read.T3.node" && said.contains("the node ns=2;i=3 is read as P3 already"),
-            "{at}: {said}"
+            at == "read.T3.node" && message.contains("the node ns=2;i=3 is read as P3 already"),
+            "{at}: {message}"
         );
-        let (at, said) = path(&|value| value["read"]["P3"] = json!({"node": "ns=2;s=p3"}));
-        assert!(at == "read.P3.node" && said.contains("`write.p3` goes to"), "{at}: {said}");
-        let (at, said) = path(&|value| value["write"]["p3"]["scale"] = json!(0.0));
-        assert!(at == "write.p3" && said.contains("a scale of 0 loses the value"), "{at}: {said}");
+        let (at, message) = path(&|value| value["read"]["P3"] = json!({"node": "ns=2;s=p3"}));
+        assert!(at == "read.P3.node" && message.contains("`write.p3` goes to"), "{at}: {message}");
+        let (at, message) = path(&|value| value["write"]["p3"]["scale"] = json!(0.0));
+        assert!(at == "write.p3" && message.contains("a scale of 0 loses the value"), "{at}: {message}");
         let unmeasured = path(&|value| drop(value["read"].as_object_mut().unwrap().remove("P3")));
         assert_eq!(unmeasured.0, "read");
     }

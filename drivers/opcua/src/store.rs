@@ -21,11 +21,11 @@ pub(crate) enum StoreError {
     Made(String),
     #[error("{} is not a certificate", .0.display())]
     Garbage(PathBuf),
-    #[error("nobody has said that the certificate of {0} is to be trusted: `mapper-backend-opcua trust {0}`")]
+    #[error("the certificate of {0} is not trusted yet: `mapper-backend-opcua trust {0}`")]
     NotTrusted(String),
     #[error(
         "{server} has another certificate than the trusted one: {found} where {pinned} was pinned. If the server was given a \
-         new one, `mapper-backend-opcua trust {server} --replace`; if not, somebody else answers"
+         new one, `mapper-backend-opcua trust {server} --replace`; if not, another server answers"
     )]
     Changed { server: String, found: String, pinned: String },
     #[error("the certificate of {server} {words}; give the server a new one and trust it")]

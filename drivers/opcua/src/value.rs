@@ -98,7 +98,7 @@ mod tests {
 
     /// Round trip of each type; a value that does not fit is not written.
     #[test]
-    fn numbers_keep_the_type_that_stands_there() {
+    fn numbers_keep_the_type_of_the_node() {
         for there in [
             Variant::SByte(0),
             Variant::Byte(0),

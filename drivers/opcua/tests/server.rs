@@ -228,8 +228,8 @@ fn a_server_whose_certificate_has_expired_is_not_talked_to() {
     let mut stand = Stand::new();
     stand.restart_valid("expired", "0");
     let refused = stand.command(&["trust", &stand.endpoint()]);
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(!refused.status.success() && said.contains("is not valid now (until 2"), "{said}");
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && message.contains("is not valid now (until 2"), "{message}");
     let pins = stand.scratch.path().join("state/opcua/servers");
     std::fs::create_dir_all(&pins).unwrap();
     let pin = pins.join(format!("127.0.0.1_{}.der", stand.port));
@@ -244,7 +244,7 @@ fn a_server_whose_certificate_has_expired_is_not_talked_to() {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_wrong_password_and_a_refused_setpoint_are_said_with_their_codes() {
+fn a_wrong_password_and_a_refused_setpoint_are_reported_with_their_codes() {
     let stand = Stand::new();
     stand.trust();
     let refused = words(stand.driver("wrong").arm().unwrap_err());
@@ -284,7 +284,7 @@ fn a_server_that_restarts_is_read_again_soon() {
 /// The server hangs with its connection alive, for longer than the client waits before it reconnects.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_that_stands_still_is_read_again_soon() {
+fn a_stopped_server_is_read_again_soon() {
     let stand = Stand::new();
     stand.trust();
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
@@ -295,7 +295,7 @@ fn a_server_that_stands_still_is_read_again_soon() {
         let back_s = t_s + pause_s;
         while t_s < back_s {
             t_s += 0.5;
-            assert!(!reads(&rig.poll(t_s).unwrap()), "a server that stands still gives no readings");
+            assert!(!reads(&rig.poll(t_s).unwrap()), "a stopped server gives no readings");
         }
         stand.signal("CONT");
         let took_s = until(&mut rig, &mut t_s, reads);
@@ -308,7 +308,7 @@ fn a_server_that_stands_still_is_read_again_soon() {
 /// A failure is reported in time, so that the runner knows that the rig is in doubt.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_that_is_gone_for_good_is_said_in_time() {
+fn a_server_that_is_gone_for_good_is_reported_in_time() {
     let mut stand = Stand::new();
     stand.trust();
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
@@ -335,8 +335,8 @@ fn readings_that_cannot_be_are_refused_with_their_node_and_unit() {
     let mut rig = Driver::of_program(&stand.program(PASSWORD), "opcua", &settings, PATIENCE).unwrap();
     let refused = words(rig.arm().unwrap_err());
     // 1 bar within its noise, a thousand times: few digits, and the plausible range.
-    let (_, said) = refused.split_once("at `read.P2`: P2 reads ").unwrap();
-    let (number, rest) = said.split_once(" Pa from the node ns=2;s=P2 (with `unit: kPa`)").unwrap();
+    let (_, message) = refused.split_once("at `read.P2`: P2 reads ").unwrap();
+    let (number, rest) = message.split_once(" Pa from the node ns=2;s=P2 (with `unit: kPa`)").unwrap();
     assert!((9e7..1.1e8).contains(&number.parse::<f64>().unwrap()) && number.len() < 9, "{refused}");
     assert!(rest.contains("1000 to 5000000 Pa") && rest.contains("Look at `node` and `unit`"), "{refused}");
     stand.armed().disarm().unwrap();
@@ -409,17 +409,17 @@ fn wrong_passwords_use_up_no_sessions() {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_server_is_trusted_by_its_whole_address_and_only_where_it_is() {
     let mut stand = Stand::new();
-    let said = |stand: &Stand, endpoint: &str| {
+    let trust_error = |stand: &Stand, endpoint: &str| {
         let output = stand.command(&["trust", endpoint]);
         assert!(!output.status.success(), "{output:?}");
         String::from_utf8(output.stderr).unwrap()
     };
     let place = format!("127.0.0.1:{}", stand.port);
-    let words = said(&stand, &place);
+    let words = trust_error(&stand, &place);
     assert!(words.contains("begins with opc.tcp://") && words.contains(&place), "{words}");
     stand.kill();
-    let words = said(&stand, &stand.endpoint());
-    assert!(words.contains(&format!("nobody answers at {place}: Connection refused")), "{words}");
+    let words = trust_error(&stand, &stand.endpoint());
+    assert!(words.contains(&format!("no server answers at {place}: Connection refused")), "{words}");
     assert!(!words.contains("Os {") && words.contains("Is the server on"), "{words}");
 }
 
@@ -438,7 +438,7 @@ fn a_write_that_is_not_simply_good_is_lost() {
 /// Changes of a node at run time: a Boolean and readings from the future are missing; uncertain ones are readings, marked as uncertain.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn readings_that_turn_bad_are_none_and_uncertain_ones_are_said() {
+fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
     for misdeed in ["boolean", "future", "uncertain"] {
         let stand = Stand::with(&["--misdeed", misdeed]);
         stand.trust();

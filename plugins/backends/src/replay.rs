@@ -132,22 +132,22 @@ impl ReplayBackend {
     /// Notes on setpoints that differ from the recorded commands at a sample.
     fn compare(&self, setpoints: &Setpoints, sample: usize) -> Vec<Event> {
         let Some(t_s) = self.t_s.get(sample).copied() else { return Vec::new() };
-        let told = [
+        let commands = [
             (Channel::P3Command, setpoints.p3_pa),
             (Channel::T3Command, setpoints.t3_k),
             (Channel::ValveCommand, setpoints.valve_opening_ratio),
             (Channel::TOilCommand, setpoints.oil_temperature_k),
         ];
         let recorded = |channel| self.columns.iter().find(|column| column.channel == channel);
-        told.into_iter()
-            .filter_map(|(channel, told)| {
+        commands.into_iter()
+            .filter_map(|(channel, value)| {
                 let then = recorded(channel)?.values.get(sample).copied()?;
-                let differs = (told - then).abs() > SETPOINT_TOLERANCE_RATIO * then.abs();
+                let differs = (value - then).abs() > SETPOINT_TOLERANCE_RATIO * then.abs();
                 differs.then(|| Event {
                     t_s,
                     kind: EventKind::Note,
                     message: format!(
-                        "{channel} is set to {told} {unit}, but was {then} {unit} in the recording being replayed",
+                        "{channel} is set to {value} {unit}, but was {then} {unit} in the recording being replayed",
                         unit = channel.unit()
                     ),
                 })
@@ -199,7 +199,8 @@ impl Backend for ReplayBackend {
         let events_end = self.events_played.max(self.events.partition_point(|event| event.t_s <= until_s));
         let mut events = self.events[self.events_played..events_end].to_vec();
         if start < end
-            && let Some(setpoints) = self.pending.take().filter(|told| told.mode == RigMode::Running)
+            && let Some(setpoints) =
+                self.pending.take().filter(|setpoints| setpoints.mode == RigMode::Running)
         {
             // Setpoints apply from the last poll on, so the first sample after it shows them.
             events.extend(self.compare(&setpoints, start));

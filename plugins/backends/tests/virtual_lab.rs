@@ -94,17 +94,17 @@ fn session(settings: LabSettings) -> Vec<SampleBatch> {
 fn with_four() -> LabSettings {
     let each = DeclaredUncertainty { noise_sigma: 0.1, offset_sigma: 0.25, gain_sigma_ratio: 0.0 };
     let declared = RedundantSensors::alike(Channel::T2, 4, each);
-    let sound = LabElement {
+    let healthy = LabElement {
         errors: SensorErrors { white_sigma: 0.08, ..SensorErrors::default() },
         probe_diameter_m: None,
         lag_s: 0.0,
         stuck_after_s: f64::INFINITY,
     };
     let elements = vec![
-        sound,
-        LabElement { errors: SensorErrors { offset: 3.0, ..sound.errors }, ..sound },
-        LabElement { stuck_after_s: 5.0, ..sound },
-        LabElement { probe_diameter_m: Some(4e-3), ..sound },
+        healthy,
+        LabElement { errors: SensorErrors { offset: 3.0, ..healthy.errors }, ..healthy },
+        LabElement { stuck_after_s: 5.0, ..healthy },
+        LabElement { probe_diameter_m: Some(4e-3), ..healthy },
     ];
     LabSettings { redundant: [(Channel::T2, LabElements { declared, elements })].into(), ..noisy() }
 }
@@ -123,18 +123,18 @@ fn each_of_several_sensors_reads_by_itself_and_the_other_channels_as_without_the
     let column = |number: usize| -> Vec<f64> {
         batches.iter().flat_map(|batch| batch.elements[number - 1].values.clone()).collect()
     };
-    let [sound, off, stuck, slow] = [1, 2, 3, 4].map(column);
+    let [healthy, off, stuck, slow] = [1, 2, 3, 4].map(column);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     // Noise of a mean of 120: 0.08/sqrt(60) K.
-    assert!((mean(&off) - mean(&sound) - 3.0).abs() < 0.05);
+    assert!((mean(&off) - mean(&healthy) - 3.0).abs() < 0.05);
     assert!(stuck[50..].iter().all(|value| *value == stuck[49]) && stuck[48] != stuck[49]);
     // From 3 s on the machine speeds up, and a tip of 4 mm needs some 9 s to follow.
-    assert!(sound[45] - slow[45] > 1.0, "{} {}", sound[45], slow[45]);
+    assert!(healthy[45] - slow[45] > 1.0, "{} {}", healthy[45], slow[45]);
     // The channel is the mean of the consistent sensors: 3 K are more than eight standard deviations.
     let together: Vec<f64> =
         batches.iter().flat_map(|batch| batch.column(Channel::T2).unwrap().to_vec()).collect();
     let first = mean(&together[..30]);
-    assert!((first - mean(&sound[..30])).abs() < 0.1, "{first}");
+    assert!((first - mean(&healthy[..30])).abs() < 0.1, "{first}");
 }
 
 #[test]

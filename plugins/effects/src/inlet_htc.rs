@@ -47,7 +47,7 @@ mod tests {
         };
         let rise_k = |inlet_ratio: f64| at(0.2, inlet_ratio).t1_prime_k - T1_K;
         assert!((rise_k(0.75) / rise_k(1.0) - 0.75).abs() < 1e-9);
-        assert_eq!(at(0.2, 0.75).h_w_m2k, at(0.2, 1.0).h_w_m2k, "h is told for behind the wheel");
+        assert_eq!(at(0.2, 0.75).h_w_m2k, at(0.2, 1.0).h_w_m2k, "the reported h is that behind the wheel");
         assert_eq!(at(0.0, 0.75), at(0.0, 1.0));
     }
 }

@@ -108,7 +108,7 @@ fn a_script_changes_the_reading_it_names_and_no_other() {
 #[test]
 fn mistakes_are_named_with_their_line() {
     for (result, expected) in [
-        (script("fn flow_kg_s(at, p, v) { v }"), "lacks `//! parameter"),
+        (script("fn flow_kg_s(at, p, v) { v }"), "has no `//! parameter"),
         (script("//! effect: Bad Name\n"), "suspect.rhai:1: `Bad Name` is not a valid name"),
         (script("//! effect: a\n//! submodel: engine\n"), "suspect.rhai:2: `engine` is not a submodel"),
         (script("//! effect: a\n//! parameter: c 0 .. 1\n"), "suspect.rhai:2: write `//! parameter"),

@@ -10,7 +10,7 @@ mod support;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let map = support::fitted();
     let name = std::env::args().nth(1).unwrap_or_else(|| "svg".to_owned());
-    let entry = mapper_formats::FORMATS.find(&name).ok_or("there is no such format")?;
+    let entry = mapper_formats::FORMATS.find(&name).ok_or("unknown format")?;
     std::io::stdout().write_all(&entry.write(&map)?)?;
     Ok(())
 }

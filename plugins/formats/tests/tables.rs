@@ -149,7 +149,7 @@ fn measured_points_become_a_map() {
 }
 
 #[test]
-fn what_is_no_compressor_map_is_refused_by_name() {
+fn a_table_that_is_not_a_compressor_map_is_refused_by_name() {
     let refused = |file: &str| read(file, Some(ReferenceState::SAE)).unwrap_err();
     assert!(matches!(refused("turbine.txt"), ImportError::Turbine { line: 1, .. }));
     assert!(matches!(refused("npss.map"), ImportError::RelativeSpeed { fastest: 1.25 }));

@@ -186,10 +186,13 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
             .filter(|other| other.at != candidate.at)
             .map(|other| format!("`{}`", name_of(other)))
             .collect();
-        let beside =
-            if others.is_empty() { String::new() } else { format!("; beside it: {}", others.join(" and ")) };
+        let others = if others.is_empty() {
+            String::new()
+        } else {
+            format!("; also present: {}", others.join(" and "))
+        };
         let of = if groups.len() == 1 { "clock".to_owned() } else { format!("clock of group `{name}`") };
-        clocks.findings.push(format!("{of}: {words}{beside} (time, time_unit)"));
+        clocks.findings.push(format!("{of}: {words}{others} (time, time_unit)"));
         let zero_ns = (zero_s * 1e9).round();
         let clock = GroupClock {
             clock: candidate.clock.clone(),
@@ -296,7 +299,7 @@ fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<
             .columns
             .iter()
             .position(is)
-            .ok_or_else(|| format!("there is no column `{name}`, which `time` names"))
+            .ok_or_else(|| format!("the column `{name}`, which `time` names, does not exist"))
     };
     let columns: Vec<usize> = names.iter().map(find).collect::<Result<_, _>>()?;
     let order = options.date_order.unwrap_or_else(|| order_of(columns[0], sample).0);
@@ -346,14 +349,14 @@ fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) 
                 dates.push(at);
                 continue;
             }
-            let beside = dates.pop().filter(|_| !has_date);
+            let date = dates.pop().filter(|_| !has_date);
             let clock = Clock::Instant {
-                date: beside,
+                date,
                 time: at,
-                order: beside.map_or(order, |date| options.date_order.unwrap_or(order_of(date, sample).0)),
+                order: date.map_or(order, |date| options.date_order.unwrap_or(order_of(date, sample).0)),
                 period_ns: period_ns(at, sample),
             };
-            candidates.push(candidate(clock, beside.unwrap_or(at), sample, has_date || beside.is_some()));
+            candidates.push(candidate(clock, date.unwrap_or(at), sample, has_date || date.is_some()));
         } else if is_clock_name(column) {
             let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(at, sample));
             let count = candidate(Clock::Count { column: at, unit_s }, at, sample, false);

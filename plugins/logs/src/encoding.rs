@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn the_degree_sign_of_latin_1_is_no_utf_8() {
+    fn the_degree_sign_of_latin_1_is_not_utf_8() {
         assert_eq!(guess(b"T2 [\xB0C]").0, Encoding::Latin1);
         assert_eq!(text(b"T2 [\xB0C]", Encoding::Latin1), "T2 [°C]");
         assert_eq!(guess("T2 [°C]".as_bytes()).0, Encoding::Utf8);

@@ -145,7 +145,7 @@ fn day_of_year(text: &str) -> Option<Instant> {
         Some(year) => {
             Instant { day: Some(civil_day(i64::from(year), 1, 1)? + day - 1), ns_of_day: Some(ns_of_day) }
         }
-        // Without a year it is no date: the days count on.
+        // Without a year it is not a date: the days count on.
         None => Instant { day: None, ns_of_day: Some(day * NS_PER_DAY + ns_of_day) },
     })
 }

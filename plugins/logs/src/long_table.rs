@@ -11,13 +11,13 @@ use std::collections::BTreeSet;
 /// Maximum number of quantities.
 const NAME_LIMIT: usize = 1000;
 
-/// Each quantity stands in so many rows of the sample, or the column does not hold names.
+/// Minimum rows of the sample per quantity; with fewer the column does not contain names.
 const REPEATS: usize = 3;
 
-/// Besides time, name and value a row may have as many further numbers, such as a quality.
+/// Maximum further numbers in a row, such as a quality, in addition to time, name and value.
 const FURTHER_NUMBERS: usize = 2;
 
-/// Where a table in long form has what.
+/// Columns of a table in long form.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LongForm {
     /// Time, in one column or in two.
@@ -33,7 +33,7 @@ pub(crate) struct LongForm {
 }
 
 impl LongForm {
-    /// Recognises a table in long form; `table` is what the sample gives when it is read as it stands.
+    /// Recognises a table in long form; `table` is what the sample gives when it is read unchanged.
     pub(crate) fn find(rows: &[Vec<String>], table: &Table, decimal: u8) -> Option<LongForm> {
         let data_row = table.data_row();
         let data = rows.get(data_row..)?;

@@ -185,7 +185,7 @@ where
     let instant = |value: T::Native| {
         let ns = i64::from(value).checked_mul(unit_ns)?;
         let day = dated.then(|| ns.div_euclid(NS_PER_DAY));
-        // There are no logs from before 1970.
+        // Logs from before 1970 do not exist.
         (ns >= 0).then_some(Instant { day, ns_of_day: Some(ns.rem_euclid(NS_PER_DAY)) })
     };
     Chunk::Instants(array.as_primitive::<T>().iter().map(|value| value.and_then(instant)).collect())

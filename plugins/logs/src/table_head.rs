@@ -100,7 +100,7 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
         if name.is_empty() {
             name = format!("column {}", column + 1);
         }
-        // The group tells apart what several columns are called.
+        // The group distinguishes columns with the same name.
         let group = group_row.map_or("", |row| label(rows, row, column));
         if !group.is_empty() && names.iter().filter(|other| **other == name).count() > 1 {
             name = format!("{group} {name}");
@@ -207,7 +207,7 @@ fn distant_units_row(rows: &[Vec<String>], before: usize, length: usize) -> Opti
     })
 }
 
-/// The unit that stands behind the numbers of a column; `None` where cells have none or several.
+/// The unit behind the numbers of a column; `None` where cells have none or several.
 fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<String> {
     let cells = rows.iter().filter_map(|row| row.get(column)).filter(|cell| !is_missing(cell.as_bytes()));
     let (mut unit, mut with, mut all) = (None, 0usize, 0usize);

@@ -114,7 +114,7 @@ fn rows_that_share_a_second_are_spread_over_it() {
 }
 
 #[test]
-fn what_is_said_counts_before_what_is_found() {
+fn options_take_precedence_over_detection() {
     let text = "a,b,c\n1,1,-9999\n2,4,5\n3,9,6\n";
     assert!(read_with(text.as_bytes(), &[]).unwrap_err().contains("no column is a clock"));
     let (layout, rows) = read_with(text.as_bytes(), &[("rate", "10 Hz"), ("missing", "-9999")]).unwrap();
@@ -125,7 +125,7 @@ fn what_is_said_counts_before_what_is_found() {
 }
 
 #[test]
-fn empty_cells_and_words_are_no_numbers() {
+fn empty_cells_and_words_are_not_numbers() {
     let (_, rows) = read("t [s];T2 [degC]\n0;20\n1;\n2;NaN\n3;Fehler\n4;21\n");
     let finite: Vec<bool> = rows[0].iter().map(|row| row.1[0].is_finite()).collect();
     assert_eq!(finite, [true, false, false, false, true]);

@@ -253,7 +253,7 @@ fn conventions() -> Vec<Vec<(&'static str, Holds)>> {
     ]
 }
 
-/// What stands beside it in logs and is no channel.
+/// Other columns of logs, which are not channels.
 const DECOYS: [(&str, Holds); 14] = [
     ("T2 set", temperature(300.0, 400.0)),
     ("P2_soll", pressure(105e3, 230e3)),

@@ -1,4 +1,4 @@
-//! Convection depends on flow other than the correlation says.
+//! Convection depends on flow otherwise than in the correlation.
 
 use super::WITHHELD;
 use mapper_physics::effect::{Rig, Submodel};
@@ -7,7 +7,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
 effect_parameters! {
-    /// Convection depends on flow other than the correlation says.
+    /// Convection depends on flow otherwise than in the correlation.
     #[derive(Debug)]
     pub(super) struct FlowDependentHtc {
         /// Excess of the exponent.

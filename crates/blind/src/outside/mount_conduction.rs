@@ -1,4 +1,4 @@
-//! The compressor housing stands on a cold mount.
+//! The compressor housing is attached to a cold mount.
 
 use super::WITHHELD;
 use mapper_physics::effect::{Rig, Submodel};
@@ -7,7 +7,7 @@ use mapper_physics::effect_parameters;
 use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
 
 effect_parameters! {
-    /// The compressor housing stands on a cold mount.
+    /// The compressor housing is attached to a cold mount.
     #[derive(Debug)]
     pub(super) struct MountConduction {
         /// Conductance to the mount, W/K.

@@ -187,7 +187,7 @@ fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_in_doubt() {
 }
 
 #[test]
-fn becoming_safe_is_tried_again_and_then_said_loudly() {
+fn the_safe_state_is_retried_and_then_its_failure_is_reported() {
     let nan = (FAULT_S, Fault::Nan(Channel::T2));
     let twice = night(&[nan.clone(), (0.0, Fault::NotSafe(2))], &usual());
     assert!(matches!(twice.end, Ok(RunEnd::Tripped(_))));
@@ -266,7 +266,7 @@ fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
         let RunEnd::Tripped(trip) = end.unwrap() else { panic!("not seen") };
         // The dwell of 0.2 s, and the next sample.
         assert!(trip.t_s - FAULT_S < 0.35, "{takes_s} s: {}", trip.t_s);
-        let first = rig.told.iter().find(|(_, told)| told.t3_k < 300.0).unwrap();
+        let first = rig.told.iter().find(|(_, sent)| sent.t3_k < 300.0).unwrap();
         assert!(first.0 - trip.t_s < 0.11, "{takes_s} s: {} after {}", first.0, trip.t_s);
         assert!(written > 70);
         assert!(wall_s - rig.safe_at_s[0] < 10.0 + late_s, "{takes_s} s: {wall_s}");
@@ -296,15 +296,15 @@ fn the_tries_of_the_safe_state_have_a_pause_between_them() {
 fn the_way_down_is_the_declared_one() {
     let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
     let RunEnd::Tripped(trip) = night.end.unwrap() else { panic!("not seen") };
-    let way: Vec<_> = night.rig.told.iter().filter(|(_, told)| told.t3_k < 300.0).collect();
-    let before = night.rig.told.iter().rev().find(|(_, told)| told.t3_k > 300.0).unwrap().1;
+    let way: Vec<_> = night.rig.told.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
+    let before = night.rig.told.iter().rev().find(|(_, sent)| sent.t3_k > 300.0).unwrap().1;
     let expected = ((before.p3_pa - 110e3) / 5e3).floor() as usize;
     assert_eq!(way.len(), expected, "from {} Pa", before.p3_pa);
     // The first command follows the poll with the violation; a simulated rig is polled every second.
     assert!(way[0].0 - trip.t_s < 1.01, "{} s after {} s", way[0].0, trip.t_s);
-    for (step, (_, told)) in way.iter().enumerate() {
-        assert!((told.p3_pa - (before.p3_pa - 5e3 * (step + 1) as f64)).abs() < 1e-6);
-        assert!(told.valve_opening_ratio >= 1.0 && told.valve_opening_ratio >= before.valve_opening_ratio);
+    for (step, (_, sent)) in way.iter().enumerate() {
+        assert!((sent.p3_pa - (before.p3_pa - 5e3 * (step + 1) as f64)).abs() < 1e-6);
+        assert!(sent.valve_opening_ratio >= 1.0 && sent.valve_opening_ratio >= before.valve_opening_ratio);
     }
     assert!(night.rig.safe_at_s[0] - trip.t_s < 20.0);
 }
@@ -343,16 +343,16 @@ fn mild_reactions_do_what_they_say() {
     let again = with(Reaction::SmallerSteps, &high);
     assert_eq!(again.end.unwrap(), RunEnd::Completed);
     assert_eq!((again.notebook.starts.len(), again.notebook.abandoned.len()), (3, 2));
-    let told: Vec<f64> = again.rig.told.iter().map(|(_, told)| told.p3_pa).collect();
-    let (low_pa, high_pa) = (told[0], told[2]);
+    let sent: Vec<f64> = again.rig.told.iter().map(|(_, sent)| sent.p3_pa).collect();
+    let (low_pa, high_pa) = (sent[0], sent[2]);
     for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let piece_pa = low_pa + share * (high_pa - low_pa);
-        assert!(told[3..].iter().any(|p3_pa| (p3_pa - piece_pa).abs() < 1e-6), "{share}: {told:?}");
+        assert!(sent[3..].iter().any(|p3_pa| (p3_pa - piece_pa).abs() < 1e-6), "{share}: {sent:?}");
     }
 
     // Held for the maximum time; then the run ends.
     let held = with(Reaction::Hold, &high);
-    assert_eq!(held.rig.held_at_s.len(), 1, "the rig is told once, when it begins");
+    assert_eq!(held.rig.held_at_s.len(), 1, "the rig gets one hold command, when the hold begins");
     assert!((FAULT_S + 5.0..FAULT_S + 7.0).contains(&held.rig.held_at_s[0]), "{:?}", held.rig.held_at_s);
     let RunEnd::Tripped(trip) = held.end.unwrap() else { panic!("held for ever") };
     assert!(trip.reason.contains("has held the setpoints for 300 s"), "{}", trip.reason);

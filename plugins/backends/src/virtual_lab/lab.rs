@@ -331,7 +331,7 @@ impl Armed {
             None => Err(BackendError::OutOfOrder {
                 call: "poll",
                 state: "armed without setpoints",
-                needed: "told its first setpoints (`set`)",
+                needed: "given its first setpoints (`set`)",
             }),
             Some(Machine::Running(simulator)) => {
                 let mut crossings = Vec::new();

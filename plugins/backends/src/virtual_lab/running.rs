@@ -46,7 +46,7 @@ pub trait Structure: std::fmt::Debug + Send + Sync {
     /// A machine in steady state under `boundary`.
     ///
     /// # Errors
-    /// If there is no steady state, e.g. with too little air.
+    /// If no steady state exists, e.g. with too little air.
     fn settled(
         &self,
         model: &Model,

@@ -65,7 +65,7 @@ pub enum SettingProblem {
         unit: String,
     },
     /// An effect that is not in the library.
-    #[error("there is no such effect; the effects are {known}")]
+    #[error("unknown effect; the effects are {known}")]
     UnknownEffect {
         /// Ids of the available effects.
         known: String,

@@ -64,7 +64,7 @@ pub(super) fn read(text: &str) -> Result<Header, Mistake> {
             }
         }
     }
-    let missing = |line: &str| (None, format!("the header lacks `{line}`"));
+    let missing = |line: &str| (None, format!("the header has no `{line}`"));
     if parameters.is_empty() {
         return Err(missing(PARAMETER_FORM));
     }
@@ -135,7 +135,7 @@ fn check(parameter: &EffectParameter, others: &[EffectParameter]) -> Result<(), 
         return Err(format!("there are two parameters `{name}`"));
     }
     if others.len() >= PARAMETER_LIMIT {
-        return Err(format!("more than {PARAMETER_LIMIT} parameters cannot be told apart"));
+        return Err(format!("more than {PARAMETER_LIMIT} parameters cannot be distinguished"));
     }
     if !(low < high && (low..=high).contains(&neutral)) {
         return Err(format!("{low} .. {high} must rise and hold the neutral value {neutral}"));

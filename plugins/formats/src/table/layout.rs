@@ -1,4 +1,4 @@
-//! Where a table has its headings, and whether its speed lines are below each other or side by side.
+//! The place of a table's headings, and whether its speed lines are below each other or side by side.
 
 use super::grid::{Grid, GridRow, is_missing};
 use super::quantity::{Column, ColumnError, Quantity, column};

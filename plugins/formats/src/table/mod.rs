@@ -30,7 +30,7 @@ pub(crate) fn read_workbook(bytes: &[u8], given: Option<ReferenceState>) -> Resu
     read(&Grid::of_workbook(bytes)?, given)
 }
 
-/// What the rows outside the table say.
+/// Information from the rows outside the table.
 #[derive(Default)]
 struct Notes {
     reference: Option<ReferenceState>,
@@ -260,7 +260,7 @@ fn notes(grid: &Grid, first_row: usize) -> Notes {
     notes
 }
 
-/// "Reference Pressure 100 kPa, Reference Temperature 298 K": a pressure and a temperature in a line that says what they are for.
+/// "Reference Pressure 100 kPa, Reference Temperature 298 K": a pressure and a temperature in a line that names their purpose.
 fn reference_in(grid: &Grid, text: &str) -> Option<ReferenceState> {
     let lower = text.to_lowercase();
     if !["ref", "corrected to", "standard cond", "bezug"].iter().any(|word| lower.contains(word)) {

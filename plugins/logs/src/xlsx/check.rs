@@ -150,7 +150,7 @@ impl Pieces {
             }
             let event = xml.read_event_into(&mut buffer).map_err(|error| match error {
                 quick_xml::Error::Io(error) => error.to_string(),
-                error => format!("is no XML: {error}"),
+                error => format!("is not XML: {error}"),
             })?;
             match event {
                 Event::Start(tag) => {
@@ -185,7 +185,7 @@ impl Pieces {
         }
         let mut most = before;
         for attribute in tag.attributes().with_checks(false) {
-            let attribute = attribute.map_err(|error| format!("is no XML: {error}"))?;
+            let attribute = attribute.map_err(|error| format!("is not XML: {error}"))?;
             if attribute.key.local_name().as_ref() == "uniqueCount" {
                 let count = attribute.value.trim().parse();
                 most = most.max(count.map_err(|_| format!("claims `{}` strings", short(&attribute.value)))?);

@@ -88,7 +88,7 @@ pub fn calibrate(
     engine: &Engine<'_>,
 ) -> Result<Option<(Calibration, Vec<Observed>)>, BlindError> {
     // Drawing takes some seconds: show progress from the start.
-    (engine.told)(0, plan.nulls + plan.others);
+    (engine.on_progress)(0, plan.nulls + plan.others);
     let cases = cases(campaign, catalogue, plan)?;
     let diagnosis = Calibrated::new(campaign, catalogue)?;
     let observed = engine.each(&cases, |_, case| diagnosis.observe(case))?;

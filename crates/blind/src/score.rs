@@ -211,9 +211,9 @@ fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosi
         let right = judged.as_ref().is_some_and(|judged| judged.right);
         let verdict = diagnosis.as_ref().map(|diagnosis| diagnosis.verdict.as_str());
         let sigma = truth.sigmas.values().copied().reduce(f64::min);
-        let mut unsaid = SigmaClass::default();
+        let mut unstated = SigmaClass::default();
         let of_class = sigma.and_then(|sigma| CLASSES_SIGMA.iter().position(|end| sigma < *end));
-        let class = of_class.map_or(&mut unsaid, |place| &mut score.classes[place]);
+        let class = of_class.map_or(&mut unstated, |place| &mut score.classes[place]);
         match kind {
             CaseKind::None => {
                 score.none.count(right);

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 /// Prints the failure, with `--json` as an object if none was printed yet.
 pub fn failed(failure: &Failure) -> ExitCode {
     let Some(code) = failure.say() else { return ExitCode::SUCCESS };
-    if output_options::json() && !output::has_told() {
+    if output_options::json() && !output::has_printed() {
         // A reader that has gone away receives nothing.
         let _ = output::print_json(&failure.json());
     }

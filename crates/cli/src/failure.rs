@@ -32,7 +32,7 @@ enum Manner {
     /// The message has its own layout (a rendered list of mistakes).
     Rendered,
     /// It has been reported already; only the exit code remains.
-    Told,
+    Printed,
     /// The reader of standard output went away: a normal end without a message.
     ClosedPipe,
 }
@@ -115,15 +115,15 @@ impl Failure {
     }
 
     /// A failure whose message is in the JSON on standard output.
-    pub fn told(code: Code) -> Self {
-        Failure { manner: Manner::Told, ..Failure::new(code, "") }
+    pub fn printed(code: Code) -> Self {
+        Failure { manner: Manner::Printed, ..Failure::new(code, "") }
     }
 
     /// Prints the message to standard error and gives the exit code; `None` if the reader went away: a normal end.
     pub fn say(&self) -> Option<ExitCode> {
         match self.manner {
             Manner::ClosedPipe => return None,
-            Manner::Told => {}
+            Manner::Printed => {}
             Manner::Rendered => standard_error::say(&self.message),
             Manner::Sentence => standard_error::say(&format!("mapper: {}\n", shortened(&self.message))),
         }

@@ -34,7 +34,7 @@ pub fn in_fleet<T>(
         let (kind, stop, progress) =
             (fleet.kind(kinds)?, interrupt::stop_flag()?, output_options::progress());
         let report = |done, of| progress.pieces(done, of);
-        let result = then(&fleet, kind, &Engine { jobs, stop: &stop, told: &report }, machine);
+        let result = then(&fleet, kind, &Engine { jobs, stop: &stop, on_progress: &report }, machine);
         progress.clear();
         Ok(result?)
     })

@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether the one JSON object has been printed.
-static TOLD: AtomicBool = AtomicBool::new(false);
+static PRINTED: AtomicBool = AtomicBool::new(false);
 
 /// Of a command that writes files.
 #[derive(Debug, Args)]
@@ -53,11 +53,11 @@ pub fn warn(text: &str) {
 /// Writes one JSON object and a line end to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
     print(&mapper_session::json_text(value)?)?;
-    TOLD.store(true, Ordering::Relaxed);
+    PRINTED.store(true, Ordering::Relaxed);
     Ok(())
 }
 
 /// Whether a JSON object was printed: there is room for one.
-pub fn has_told() -> bool {
-    TOLD.load(Ordering::Relaxed)
+pub fn has_printed() -> bool {
+    PRINTED.load(Ordering::Relaxed)
 }

@@ -77,7 +77,7 @@ pub struct Misbehaving<B> {
     /// Times of the hold commands, s.
     pub held_at_s: Vec<f64>,
     /// Setpoints received, with their times, s.
-    pub told: Vec<(f64, Setpoints)>,
+    pub commands: Vec<(f64, Setpoints)>,
 }
 
 impl<B: Backend> Misbehaving<B> {
@@ -92,7 +92,7 @@ impl<B: Backend> Misbehaving<B> {
             tripped: false,
             safe_at_s: Vec::new(),
             held_at_s: Vec::new(),
-            told: Vec::new(),
+            commands: Vec::new(),
         }
     }
 
@@ -205,7 +205,7 @@ impl<B: Backend> Backend for Misbehaving<B> {
     }
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
-        self.told.push((self.now_s, *setpoints));
+        self.commands.push((self.now_s, *setpoints));
         for (_, fault) in self.active() {
             match fault {
                 Fault::Lost => return Err(self.lost()),

@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rig_is_told_nothing_that_it_refuses() {
+    fn a_rig_is_reported_nothing_that_it_refuses() {
         let safe = SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 };
         let from = Setpoints {
             mode: RigMode::Running,

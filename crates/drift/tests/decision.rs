@@ -128,7 +128,7 @@ fn a_common_reference_that_drifts_is_named_as_one_cause() {
 }
 
 #[test]
-fn a_machine_that_fouls_is_told_from_its_sensors() {
+fn a_machine_that_fouls_is_reported_from_its_sensors() {
     let course = Course { kind: CourseKind::Ramp, onset_s: 0.0 };
     let planted = Planted { cause: Cause::Fouling, course, size: -0.01 };
     let report = judge(&campaign(13, Some(planted)).recording);

@@ -31,7 +31,7 @@ pub struct FoundParameter {
     /// Upper end.
     pub high: f64,
     /// Whether the log identifies it; otherwise the prior dominates.
-    pub told: bool,
+    pub identified: bool,
 }
 
 /// A part of the log compared with its prediction.
@@ -157,7 +157,7 @@ fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParamete
         Values::of_standard(&standard).0[place]
     };
     let identified = high - low < TOLD_RATIO * (prior(1.96) - prior(-1.96));
-    FoundParameter { parameter, value: at(0.5), low, high, told: identified }
+    FoundParameter { parameter, value: at(0.5), low, high, identified }
 }
 
 /// Each draw with its own noise, as if it were the truth.

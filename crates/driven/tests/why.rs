@@ -136,7 +136,7 @@ fn the_brake_is_predicted_with_the_cause_that_was_named_before_it() {
 }
 
 #[test]
-fn what_four_minutes_show_is_named_or_said_to_be_alike() {
+fn what_four_minutes_show_is_named_or_reported_to_be_alike() {
     let hills = Course::hills();
     let no_tc = &[Channel::Tc];
     for (effect, size) in [("inlet_preheat", 4.0), ("flowmeter_lag", 2.0)] {
@@ -148,14 +148,15 @@ fn what_four_minutes_show_is_named_or_said_to_be_alike() {
     assert!(count(&found, |found| open(found).contains(&"area_split".to_owned())) >= almost_all());
     // Offsets of T2, of T1 (opposite sign) and of P2 are indistinguishable if the efficiency is free.
     let found = all_of(COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc);
-    let alike =
-        |found: &Diagnosis| found.word == Word::NotToldApart && open(found).contains(&"t2_offset".to_owned());
+    let alike = |found: &Diagnosis| {
+        found.word == Word::NotDistinguished && open(found).contains(&"t2_offset".to_owned())
+    };
     assert!(count(&found, alike) >= almost_all());
 }
 
 /// A flow meter gain is equivalent to another efficiency over flow: it is not named, but listed as not diagnosable.
 #[test]
-fn what_cannot_be_asked_is_said() {
+fn what_cannot_be_asked_is_reported() {
     let found = all_of(COMPRESSOR, &Course::brake(), &[("flowmeter_gain", 1.15)], &[Channel::Tc]);
     assert!(count(&found, |found| found.open == 0) >= almost_all());
     let catalogue: Vec<String> = catalogue().iter().map(|effect| effect.info().id.to_string()).collect();
@@ -187,7 +188,7 @@ fn what_cannot_be_asked_is_said() {
 
 /// A loose contact: occasionally T2 reads too low for a second or two, unlike any library effect.
 #[test]
-fn a_cause_outside_the_catalogue_is_said_to_be_outside() {
+fn a_cause_outside_the_catalogue_is_reported_to_be_outside() {
     let outside = (0..seeds()).map(|seed| {
         let (mut recording, _) = engine(seed, &Course::brake(), &[], healthy);
         let t2 = recording.series.get_mut(&Channel::T2).unwrap();
@@ -240,7 +241,7 @@ fn the_turbine_is_identified() {
         let eta = found.unknowns.iter().find(|unknown| unknown.name == "eta_t").unwrap();
         let ratio = truth.turbine.peak_efficiency / Model::nominal().params.turbine.peak_efficiency;
         held += usize::from((eta.low..=eta.high).contains(&ratio));
-        assert!(eta.told && (eta.value / ratio - 1.0).abs() < 0.03, "{eta:?} {ratio}");
+        assert!(eta.identified && (eta.value / ratio - 1.0).abs() < 0.03, "{eta:?} {ratio}");
     }
     assert!(held >= almost_all(), "{held} of {}", seeds());
 }

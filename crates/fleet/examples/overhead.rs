@@ -66,7 +66,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let fleet = Made::make(&study, &kind, &directory.join("fleet"), "example", "overhead")?.fleet;
     per_item("make", started);
     let stop = AtomicBool::new(false);
-    let engine = Engine { jobs: Some(1), stop: &stop, told: &|_, _| {} };
+    let engine = Engine { jobs: Some(1), stop: &stop, on_progress: &|_, _| {} };
     let started = Instant::now();
     fleet.work(&kind, Which::All, false, &engine, &machine)?;
     per_item("parts", started);

@@ -16,7 +16,7 @@ pub struct Engine<'a> {
     /// Set from outside to start no further piece.
     pub stop: &'a AtomicBool,
     /// Receives the number of finished pieces and the total, from the first second on.
-    pub told: &'a (dyn Fn(usize, usize) + Sync),
+    pub on_progress: &'a (dyn Fn(usize, usize) + Sync),
 }
 
 impl Engine<'_> {
@@ -39,13 +39,13 @@ impl Engine<'_> {
         let jobs = self.at_a_time(pieces.len());
         let threads = (cores() / jobs).max(1);
         let done = AtomicUsize::new(0);
-        (self.told)(0, pieces.len());
+        (self.on_progress)(0, pieces.len());
         parallel::try_map_on(jobs, pieces, |index, piece| {
             if self.stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }
             let result = parallel::confined(threads, || work(index, piece))?;
-            (self.told)(done.fetch_add(1, Ordering::Relaxed) + 1, pieces.len());
+            (self.on_progress)(done.fetch_add(1, Ordering::Relaxed) + 1, pieces.len());
             Ok(Some(result))
         })
     }

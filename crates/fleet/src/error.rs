@@ -131,12 +131,12 @@ pub enum FleetError {
         directory: PathBuf,
     },
     /// The queue rejected the submission.
-    #[error("the queue did not take {}: {said}; its template is {template}", .script.display())]
+    #[error("the queue did not take {}: {answer}; its template is {template}", .script.display())]
     Queue {
         /// The command.
         script: PathBuf,
         /// Its output.
-        said: String,
+        answer: String,
         /// The template.
         template: String,
     },

@@ -58,12 +58,12 @@ pub enum PartRefusal {
     #[error("was made by {0}")]
     OtherProgram(String),
     /// Its length differs from its header.
-    #[error("has {found} bytes of {said}")]
+    #[error("has {found} bytes of {stated}")]
     Length {
         /// Actual length.
         found: u64,
         /// Length in its header.
-        said: u64,
+        stated: u64,
     },
     /// It is larger than any part.
     #[error("has {found} bytes, more than the {limit} that are read")]
@@ -156,7 +156,7 @@ fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), Pa
     }
     let found = length.saturating_sub(end as u64 + 1);
     if found != part.body_bytes {
-        return Err(PartRefusal::Length { found, said: part.body_bytes });
+        return Err(PartRefusal::Length { found, stated: part.body_bytes });
     }
     Ok((part, file, bytes.split_off(end + 1)))
 }

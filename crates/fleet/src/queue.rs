@@ -51,7 +51,7 @@ pub(crate) fn quoted(text: &str) -> String {
 pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<String, String>, FleetError> {
     let failed = |message: String| FleetError::Queue {
         script: PathBuf::from(script),
-        said: message,
+        answer: message,
         template: template.name.clone(),
     };
     let output = Command::new("sh")

@@ -76,7 +76,7 @@ fn machine(name: &str) -> Machine<'_> {
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 fn engine(jobs: usize) -> Engine<'static> {
-    Engine { jobs: Some(jobs), stop: &NEVER, told: &|_, _| {} }
+    Engine { jobs: Some(jobs), stop: &NEVER, on_progress: &|_, _| {} }
 }
 
 fn study(folder: &Path, numbers: u64) -> StudyFile {
@@ -181,7 +181,7 @@ fn a_stop_keeps_what_is_done() {
     let fleet = made(folder.path(), 40, PROGRAM).unwrap().fleet;
     let (kind, stop) = (Squares::default(), AtomicBool::new(false));
     let report = |done: usize, _: usize| stop.store(done >= 10, Ordering::Relaxed);
-    let stopped = Engine { jobs: Some(1), stop: &stop, told: &report };
+    let stopped = Engine { jobs: Some(1), stop: &stop, on_progress: &report };
     let error = fleet.work(&kind, Which::All, false, &stopped, &machine("worker")).unwrap_err();
     assert!(matches!(error, FleetError::Interrupted), "{error}");
     assert_eq!((fleet.status().done, fleet.status().begun()), (10, 0));

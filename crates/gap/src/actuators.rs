@@ -3,7 +3,7 @@
 use mapper_core::{Channel, Recording};
 use mapper_observe::declared::Declared;
 use mapper_observe::lagged_command::{Response, measured_p3_response, measured_valve_response};
-use mapper_observe::step_timing::{Times, as_told};
+use mapper_observe::step_timing::{Times, with_command_times};
 use mapper_observe::table::Table;
 
 /// Maximum number of alternations between estimating the response and the step times.
@@ -44,7 +44,7 @@ fn timed_p3(table: &Table, recording: &Recording, declared: &Declared) -> (Respo
         let p3 = measured_p3_response(table, recording, noise_sigma);
         p3.unwrap_or(Response::lag(declared.tolerances.actuator_lag_s))
     };
-    let commanded = as_told(recording);
+    let commanded = with_command_times(recording);
     let (mut p3, mut timed) = (follows(&commanded), commanded.clone());
     for _ in 0..TIMED_TURNS {
         let next = Times::read(table, &commanded, p3, noise_sigma).timed(&commanded);

@@ -26,7 +26,7 @@ use crate::weigh::{rivals, suspicions, weigh};
 use crate::whiten::Linearised;
 use mapper_core::Recording;
 use mapper_observe::declared::Declared;
-use mapper_observe::step_timing::as_told;
+use mapper_observe::step_timing::with_command_times;
 use mapper_observe::table::Table;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
@@ -107,7 +107,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         progress,
     } = question;
     progress(0.0, "reading");
-    let recording = &as_told(recording);
+    let recording = &with_command_times(recording);
     let table = Table::new(recording).ok_or(Problem::Empty)?;
     let mut warnings = usable(recording, &table, &declared)?;
     let actuators = if tolerances_declared {

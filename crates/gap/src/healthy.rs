@@ -22,7 +22,7 @@ use crate::usable::usable;
 use crate::whiten::{Linearised, dot};
 use mapper_core::{Channel, Recording};
 use mapper_observe::declared::Declared;
-use mapper_observe::step_timing::as_told;
+use mapper_observe::step_timing::with_command_times;
 use mapper_observe::table::Table;
 use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
@@ -59,7 +59,7 @@ impl Study {
         tolerances_declared: bool,
     ) -> Result<Changed, GapError> {
         let Healthy { name, recording, declared } = healthy;
-        let recording = &as_told(recording);
+        let recording = &with_command_times(recording);
         let table = Table::new(recording).ok_or(Problem::Empty)?;
         let warnings = usable(recording, &table, &declared)?;
         let actuators = if tolerances_declared {

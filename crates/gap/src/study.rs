@@ -17,7 +17,7 @@ use mapper_observe::perturbation::{Perturbation, Shifted};
 use mapper_observe::schedule::Schedule;
 use mapper_observe::smoothed_inputs::SmoothedInputs;
 use mapper_observe::start::state_as_read;
-use mapper_observe::step_timing::{Times, as_told};
+use mapper_observe::step_timing::{Times, with_command_times};
 use mapper_observe::table::Table;
 use mapper_physics::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::effect::{Effect, EffectError, EffectParameter, Rig, add};
@@ -156,7 +156,7 @@ impl Study {
         effects: Vec<Arc<dyn Effect>>,
         actuators: Actuators,
     ) -> Study {
-        let recording = &as_told(recording);
+        let recording = &with_command_times(recording);
         let times = Times::read(&table, recording, actuators.p3, declared.noise_sigma(Channel::P3));
         let timed = times.timed(recording);
         let mut nominal = Rig::new(model);

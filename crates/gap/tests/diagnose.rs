@@ -249,7 +249,7 @@ fn bad_recordings_get_a_clear_word_and_no_culprit() {
 }
 
 #[test]
-fn what_is_not_recorded_is_said_and_the_rest_is_diagnosed() {
+fn what_is_not_recorded_is_reported_and_the_rest_is_diagnosed() {
     let mut recording = record(&[("tip_diameter", &[2e-3])], 8);
     recording.series.remove(&Channel::T4);
     recording.series.remove(&Channel::TurbineFlow);

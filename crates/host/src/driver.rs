@@ -220,7 +220,7 @@ impl Driver {
     }
 
     fn lost(&self, error: DriverError) -> BackendError {
-        let source = Box::new(DriverError::Said(self.secrets.hide(&error.to_string())));
+        let source = Box::new(DriverError::Message(self.secrets.hide(&error.to_string())));
         // Before the description arrives no rig can be lost.
         match self.description {
             Some(_) => BackendError::Lost { t_s: self.now_s, source },
@@ -311,7 +311,7 @@ impl Driver {
             }
             Some("lost") => {
                 let words = params.get("message").and_then(Value::as_str).unwrap_or("the rig was lost");
-                self.spoiled = Some(DriverError::Said(words.to_owned()));
+                self.spoiled = Some(DriverError::Message(words.to_owned()));
             }
             Some("note") => {
                 if let Some(words) = params.get("message").and_then(Value::as_str) {

@@ -74,7 +74,7 @@ pub enum DriverError {
     Deaf,
     /// An error reported by the driver.
     #[error("{0}")]
-    Said(String),
+    Message(String),
     /// The campaign contains a secret.
     #[error(
         "a secret does not belong into a campaign; write `{{env: NAME}}` and put it into the environment variable NAME"

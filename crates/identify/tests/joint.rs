@@ -168,7 +168,12 @@ fn with_noise_on_t2_the_share_is_found() {
     assert!(alpha_rms < 0.015 && eta_rms < 0.006, "alpha {alpha_rms}, eta {eta_rms}");
     // The model is exact here except for noise, which the method does not assume. Intervals may be wider than the errors, so that all but one
     // of a seed's eighteen cover the truth, but at most four times the permitted error.
-    assert!(honesty.held() > 0.94 && honesty.said_rms() < 0.012, "{} {}", honesty.held(), honesty.said_rms());
+    assert!(
+        honesty.held() > 0.94 && honesty.stated_rms() < 0.012,
+        "{} {}",
+        honesty.held(),
+        honesty.stated_rms()
+    );
 }
 
 /// Noise on every channel, with its slow part: an ideal probe must not be identified as a slow one, and every interval is honest. A lag would
@@ -310,7 +315,7 @@ fn a_step_that_never_stabilises_is_doubted() {
 }
 
 #[test]
-fn spikes_are_left_out_and_said() {
+fn spikes_are_left_out_and_reported() {
     let points = spoilt(23, |recording, step| {
         for channel in [Channel::T2, Channel::Tc, Channel::T1] {
             let series = recording.series.get_mut(&channel).unwrap();
@@ -325,7 +330,7 @@ fn spikes_are_left_out_and_said() {
 
 /// A channel stuck for the whole step gives no number; if it is stuck for the last half, the first half is used.
 #[test]
-fn a_stuck_sensor_is_said() {
+fn a_stuck_sensor_is_reported() {
     for (seed, from) in [(24, 0), (25, 600)] {
         let points = spoilt(seed, |recording, step| {
             let series = recording.series.get_mut(&Channel::T2).unwrap();
@@ -341,7 +346,7 @@ fn a_stuck_sensor_is_said() {
 
 /// NaN in one channel for a whole step: no number. In a fifth of its samples: a number, and a doubt.
 #[test]
-fn samples_that_are_no_number_are_said() {
+fn samples_that_are_no_number_are_reported() {
     for (seed, share) in [(26, 1), (27, 5)] {
         let points = spoilt(seed, |recording, step| {
             let series = recording.series.get_mut(&Channel::CompressorFlow).unwrap();

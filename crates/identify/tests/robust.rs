@@ -182,7 +182,7 @@ fn a_channel_lost_for_the_window_makes_the_point_unusable() {
 }
 
 #[test]
-fn no_compression_is_said() {
+fn no_compression_is_reported() {
     let transient = Transient { pressure_ratio: 0.99, ..Transient::default() };
     for method in [Method::Dynamic, Method::Steady] {
         let config = IdentifyConfig { method, ..IdentifyConfig::default() };

@@ -64,7 +64,7 @@ fn a_common_error_is_what_the_offset_does() {
 /// Errors over many seeds have the reported covariance: whitened by it, their mean square is 1. Treated as independent (each divided by its
 /// own part alone) it would be tens of times larger.
 #[test]
-fn errors_have_the_covariance_that_is_said() {
+fn errors_have_the_covariance_that_is_reported() {
     let clean = campaign(&eighteen(), 120.0, Machine::default());
     let (mut square, mut alone, mut count) = (0.0, 0.0, 0.0);
     for seed in 0..12 {

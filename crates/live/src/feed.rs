@@ -2,7 +2,9 @@
 
 use crate::live_run::LiveRun;
 use crate::operator_commands::Pressed;
-use crate::state::{EVENTS_MAX, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Told, Traced, Units};
+use crate::state::{
+    EVENTS_MAX, LoggedMessage, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Traced, Units,
+};
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
 use mapper_page::{LiveMap, live_map, live_point, planned};
@@ -170,8 +172,8 @@ impl Feed {
                 kept.longer_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
                 Vec::new()
             }
-            SessionEvent::Told(event) => {
-                let entry = Told { t_s: event.t_s, message: event.message.clone() };
+            SessionEvent::Reported(event) => {
+                let entry = LoggedMessage { t_s: event.t_s, message: event.message.clone() };
                 let new = message("told", json!(entry));
                 kept.state.events.push_back(entry);
                 while kept.state.events.len() > EVENTS_MAX {

@@ -31,7 +31,7 @@ pub(crate) struct State {
     pub(crate) points: Vec<LivePoint>,
     /// Speed lines and contours of the points so far.
     pub(crate) map: LiveMap,
-    pub(crate) events: VecDeque<Told>,
+    pub(crate) events: VecDeque<LoggedMessage>,
     pub(crate) now: Now,
     pub(crate) outcome: Option<String>,
     pub(crate) page: Option<String>,
@@ -51,7 +51,7 @@ pub(crate) struct Traced {
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Told {
+pub(crate) struct LoggedMessage {
     pub(crate) t_s: f64,
     pub(crate) message: String,
 }

@@ -121,7 +121,7 @@ impl Viewers {
                 let (t_s, message) = step_message(marker, StepPhase::End);
                 self.say("/step", t_s, &message);
             }
-            SessionEvent::Told(event) => {
+            SessionEvent::Reported(event) => {
                 self.say("/event", event.t_s, &event_message(event));
             }
             SessionEvent::PointEstimated(point) => {

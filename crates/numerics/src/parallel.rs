@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_error_in_the_order_of_the_items_is_told() {
+    fn the_first_error_in_the_order_of_the_items_is_reported() {
         let items: Vec<usize> = (0..500).collect();
         let work = |i: &usize| if i % 100 == 37 { Err(*i) } else { Ok(*i) };
         for _ in 0..20 {

@@ -5,7 +5,7 @@
 #[allow(clippy::unwrap_used, reason = "shared with the tests")]
 mod common;
 
-use common::{Fault, Said, clean, judged};
+use common::{Fault, Verdict, clean, judged};
 
 fn main() {
     let seeds: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(200);
@@ -23,14 +23,15 @@ fn main() {
         ("slow: a tip of 2 mm for 1 mm", Fault::Slow(2e-3)),
         ("slow: a tip of 4 mm for 1 mm", Fault::Slow(4e-3)),
     ] {
-        let results: Vec<Said> = (0..seeds).map(|seed| judged(&clean, fault, seed)).collect();
-        let share =
-            |of: Said| 100.0 * results.iter().filter(|result| **result == of).count() as f64 / seeds as f64;
+        let results: Vec<Verdict> = (0..seeds).map(|seed| judged(&clean, fault, seed)).collect();
+        let share = |of: Verdict| {
+            100.0 * results.iter().filter(|result| **result == of).count() as f64 / seeds as f64
+        };
         println!(
             "{what:<30} right {:5.1} %, wrong {:4.1} %, missed {:4.1} %",
-            share(Said::Right),
-            share(Said::Wrong),
-            share(Said::Missed)
+            share(Verdict::Right),
+            share(Verdict::Wrong),
+            share(Verdict::Missed)
         );
     }
 }

@@ -31,7 +31,7 @@ const SCATTER_MIN_S: f64 = 1e-3;
 const RUNS_PER_S: f64 = 50.0;
 
 /// The recording with each step starting at the last sample before its command changed, so that it includes its whole transient.
-pub fn as_told(recording: &Recording) -> Recording {
+pub fn with_command_times(recording: &Recording) -> Recording {
     let mut corrected = recording.clone();
     for index in 0..corrected.steps.len() {
         let (before_s, start_s) =
@@ -94,7 +94,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Estimates the times of a recording [with command-based step starts](as_told) whose P3 follows its command with this response.
+    /// Estimates the times of a recording [with command-based step starts](with_command_times) whose P3 follows its command with this response.
     pub fn read(table: &Table, recording: &Recording, p3: Response, noise_sigma: f64) -> Times {
         let steps = &recording.steps;
         let mut times = Times { starts_s: steps.iter().map(|step| step.start_s).collect(), scatter_s: 0.0 };
@@ -284,7 +284,7 @@ mod tests {
     }
 
     fn read(recording: &Recording) -> (Recording, Times) {
-        let aligned = as_told(recording);
+        let aligned = with_command_times(recording);
         let table = Table::new(&aligned).unwrap();
         let times = Times::read(&table, &aligned, LAG, NOISE_PA);
         (aligned, times)

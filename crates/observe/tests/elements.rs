@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Clean, Fault, Said, clean, declared, judged, noise, record};
+use common::{Clean, Fault, Verdict, clean, declared, judged, noise, record};
 use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, Recording, RedundantSensors, Series};
 use mapper_numerics::statistics::standard_deviation;
 use mapper_observe::{Fault as Found, fuse, judge_elements};
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// Share of 50 recordings with the right outcome.
 fn right_ratio(clean: &Clean, fault: Fault) -> f64 {
-    let right = (1000..1050).filter(|seed| judged(clean, fault, *seed) == Said::Right).count();
+    let right = (1000..1050).filter(|seed| judged(clean, fault, *seed) == Verdict::Right).count();
     right as f64 / 50.0
 }
 

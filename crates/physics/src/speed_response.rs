@@ -55,7 +55,7 @@ mod tests {
     /// The integrated model after a small step of P3, with housings of constant temperature: the speed follows the gain, and
     /// reaches 63 % of the way in the shaft's time constant.
     #[test]
-    fn the_integrated_machine_answers_as_said() {
+    fn the_integrated_machine_answers_as_stated() {
         for (speed_rpm, valve_opening_ratio) in [(50e3, 0.7), (110e3, 1.0), (150e3, 2.0)] {
             let mut model = Model::nominal();
             // Housings of a tonne: only the shaft moves.

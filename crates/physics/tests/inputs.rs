@@ -49,7 +49,7 @@ fn more_rows_of_the_same_ramp_change_nothing() {
 }
 
 #[test]
-fn a_crossing_is_told_once_with_its_time() {
+fn a_crossing_is_reported_once_with_its_time() {
     let (_, events) = end_of(&ramp(20), Watch { overspeed_rpm: 90e3 });
     assert_eq!(events.len(), 1, "{events:?}");
     assert_eq!(events[0].crossing, Crossing::OverspeedEntered);

@@ -229,7 +229,7 @@ fn the_first_point_is_visited_again_at_the_end() {
 }
 
 #[test]
-fn a_way_back_that_is_not_allowed_is_left_out_and_told() {
+fn a_way_back_that_is_not_allowed_is_left_out_and_reported() {
     let (model, points) = (Model::nominal(), grid());
     // Up one speed line: steps of 20 krpm that move the housing by 25.3 K at most, and 100 krpm back.
     let line: Vec<OperatingPoint> =

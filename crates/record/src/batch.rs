@@ -16,7 +16,7 @@ const PARTS: usize = 16;
 /// A record of a chunk.
 pub(crate) enum Item<T> {
     /// A message on a topic that was known before the batch; `None` if the topic is not wanted.
-    Message { channel_id: u16, log_time_ns: u64, told: Option<T> },
+    Message { channel_id: u16, log_time_ns: u64, message: Option<T> },
     /// Any other record, to be read in its turn.
     Record { opcode: u8, body: Vec<u8> },
     /// The chunk ends within a record.
@@ -84,7 +84,7 @@ fn items<S: Sink>(mut rest: &[u8], sink: &S, known: impl Fn(u16) -> bool) -> Vec
         let message = (opcode == op::MESSAGE).then(|| parse_message(body)).flatten();
         items.push(match message.filter(|(channel_id, ..)| known(*channel_id)) {
             Some((channel_id, log_time_ns, data)) => {
-                Item::Message { channel_id, log_time_ns, told: sink.read(channel_id, data) }
+                Item::Message { channel_id, log_time_ns, message: sink.read(channel_id, data) }
             }
             None => Item::Record { opcode, body: body.to_owned() },
         });

@@ -168,10 +168,10 @@ impl Scanned {
                 self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
             }
             Item::Cut => {}
-            Item::Message { channel_id, log_time_ns, told } => {
+            Item::Message { channel_id, log_time_ns, message } => {
                 self.records += 1;
-                if let Some(told) = told.filter(|_| self.goes_on(options, sink)) {
-                    sink.take(channel_id, log_time_ns, told);
+                if let Some(message) = message.filter(|_| self.goes_on(options, sink)) {
+                    sink.take(channel_id, log_time_ns, message);
                 }
             }
         }

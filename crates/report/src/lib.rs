@@ -86,7 +86,7 @@ pub use key_figures::key_figures;
 pub use lines_of_points::{first_doubts_text, points_by_line_text, verdict_sentence};
 pub use lines_text::lines_text;
 pub use log_text::log_text;
-pub use map_comparison_picture::{map_comparison_figure, told_apart};
+pub use map_comparison_picture::{distinct_names, map_comparison_figure};
 pub use map_comparison_text::map_comparison_text;
 pub use map_fit_text::map_fit_text;
 /// A point with its truth, if known.

@@ -11,7 +11,7 @@ use std::path::Path;
 const BAR_EVERY: usize = 5;
 
 /// Names of two files for a legend, with as many of their folders as needed to distinguish them.
-pub fn told_apart(files: [&Path; 2]) -> [String; 2] {
+pub fn distinct_names(files: [&Path; 2]) -> [String; 2] {
     let last = |path: &Path, count: usize| {
         let parts: Vec<String> =
             path.iter().rev().take(count).map(|part| part.to_string_lossy().into_owned()).collect();
@@ -119,12 +119,12 @@ fn eta_panel(comparison: &MapComparison) -> Panel {
 
 #[cfg(test)]
 mod tests {
-    use super::told_apart;
+    use super::distinct_names;
     use std::path::Path;
 
     #[test]
     fn a_legend_tells_two_files_apart() {
-        let names = |a: &str, b: &str| told_apart([Path::new(a), Path::new(b)]);
+        let names = |a: &str, b: &str| distinct_names([Path::new(a), Path::new(b)]);
         assert_eq!(names("runs/a/map.json", "runs/b/map.json"), ["a/map.json", "b/map.json"]);
         assert_eq!(names("a/x.csv", "b/y.csv"), ["x.csv", "y.csv"]);
         assert_eq!(names("map.json", "b/map.json"), ["map.json", "b/map.json"]);

@@ -48,7 +48,7 @@ pub fn transient_text(outcome: &DrivenOutcome) -> String {
             format!("{:.3}", found.value),
             format!("{:.3} .. {:.3}", found.low, found.high),
             parameter.unit.to_owned(),
-            if found.told { "the log" } else { "beforehand" }.to_owned(),
+            if found.identified { "the log" } else { "beforehand" }.to_owned(),
             parameter.description.to_owned(),
         ]);
     }

@@ -44,7 +44,7 @@ pub fn why_figure(name: &str, found: &Diagnosis) -> Figure {
 
 fn named(found: &Diagnosis) -> String {
     match (found.word, found.causes.first()) {
-        (Word::Named | Word::NotToldApart, Some(cause)) => format!("with {}", cause.names.join(" and ")),
+        (Word::Named | Word::NotDistinguished, Some(cause)) => format!("with {}", cause.names.join(" and ")),
         _ => "no cause is named".to_owned(),
     }
 }

@@ -69,7 +69,7 @@ fn headline(found: &Diagnosis) -> String {
             open.first().map_or_else(String::new, |cause| begun(&cause.names.join(" and "))),
             open.first().map_or_else(String::new, |cause| percent(cause.probability))
         ),
-        Word::NotToldApart => format!(
+        Word::NotDistinguished => format!(
             "{} explain it equally well and are indistinguishable.",
             begun(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
         ),
@@ -207,7 +207,7 @@ fn behind(beyond: &Beyond) -> String {
 fn verdict(beyond: &Beyond, word: Word) -> &'static str {
     match (beyond.after_k > beyond.expected_high_k, word) {
         (false, _) => "the residual is within what the fitted part predicts",
-        (true, Word::Named | Word::NotToldApart) => {
+        (true, Word::Named | Word::NotDistinguished) => {
             "more is left than this cause lets expect: something else acts there too, or it is another one"
         }
         (true, _) => {
@@ -228,7 +228,7 @@ fn unknowns(text: &mut String, found: &Diagnosis) {
             format!("{:.3}", unknown.value),
             format!("{:.3} .. {:.3}", unknown.low, unknown.high),
             unknown.unit.to_owned(),
-            if unknown.told { "the log" } else { "beforehand" }.to_owned(),
+            if unknown.identified { "the log" } else { "beforehand" }.to_owned(),
             unknown.description.to_owned(),
         ]);
     }

@@ -1,6 +1,6 @@
 //! The guard for the sample stream itself: lost, repeated, disordered or impossible samples.
 
-use crate::guard::{Guard, Told, Trip};
+use crate::guard::{Commanded, Guard, Trip};
 use mapper_core::{GuardName, Reaction, SampleBatch};
 
 /// How far a sample may lie beyond the requested time, s: the clocks of rig and program differ.
@@ -52,7 +52,7 @@ impl BatchWatch {
 }
 
 impl Guard for BatchWatch {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Told) -> Option<Trip> {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
         let reason = self.fault(batch, now_s).filter(|_| !self.tripped)?;
         self.tripped = true;
         Some(Trip { t_s: now_s, guard: GuardName::Signals, reaction: Reaction::Safe, reason })
@@ -82,14 +82,14 @@ mod tests {
             (at(2, &[0.3, 0.4], 3), "3 values for 2 times"),
         ] {
             let mut guard = BatchWatch::default();
-            assert_eq!(guard.look(&at(0, &[0.0, 0.1], 2), 0.1, &Told::default()), None);
+            assert_eq!(guard.look(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
             // An empty batch is left to the age guards.
-            assert_eq!(guard.look(&SampleBatch::default(), 0.2, &Told::default()), None);
-            let trip = guard.look(&batch, 0.6, &Told::default()).unwrap();
+            assert_eq!(guard.look(&SampleBatch::default(), 0.2, &Commanded::default()), None);
+            let trip = guard.look(&batch, 0.6, &Commanded::default()).unwrap();
             assert!(trip.reason.contains(words), "{}", trip.reason);
         }
         let mut guard = BatchWatch::default();
-        assert_eq!(guard.look(&at(0, &[0.0, 0.1], 2), 0.1, &Told::default()), None);
-        assert_eq!(guard.look(&at(2, &[0.2], 1), 0.2, &Told::default()), None);
+        assert_eq!(guard.look(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
+        assert_eq!(guard.look(&at(2, &[0.2], 1), 0.2, &Commanded::default()), None);
     }
 }

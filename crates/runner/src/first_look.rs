@@ -1,6 +1,6 @@
 //! Checks the first seconds of a run, before the machine is driven far: every channel alive, in range, and on time.
 
-use crate::guard::{Guard, Told, Trip};
+use crate::guard::{Commanded, Guard, Trip};
 use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable, with_unit};
 
 /// Duration of the check, s.
@@ -73,7 +73,7 @@ fn digits(value: f64) -> String {
 }
 
 impl Guard for FirstLook {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Told) -> Option<Trip> {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
         if self.over {
             return None;
         }
@@ -123,7 +123,7 @@ mod tests {
                 t_s,
                 ..SampleBatch::default()
             };
-            FirstLook::new(vec![Channel::T2, Channel::T4]).look(&batch, 5.9, &Told::default())
+            FirstLook::new(vec![Channel::T2, Channel::T4]).look(&batch, 5.9, &Commanded::default())
         };
         assert_eq!(look(300.0, 600.0, 0.0), None);
         let trip = look(f64::NAN, 600.0, 0.0).unwrap();

@@ -34,7 +34,7 @@ pub use batch_watch::BatchWatch;
 pub use deadline::{Deadlined, Deadlines};
 pub use drift_watch::DriftWatch;
 pub use first_look::FirstLook;
-pub use guard::{Guard, Told, Trip};
+pub use guard::{Commanded, Guard, Trip};
 pub use observer::{ObserverError, RunObserver};
 pub use operator::Operator;
 pub use protection::Protection;

@@ -39,7 +39,7 @@ impl Operator {
     }
 
     /// The requests since the last call.
-    pub(crate) fn take_said(&self) -> Vec<String> {
+    pub(crate) fn take_messages(&self) -> Vec<String> {
         self.requests.lock().map(|mut requests| std::mem::take(&mut *requests)).unwrap_or_default()
     }
 }

@@ -1,6 +1,6 @@
 //! The guard for channels of auxiliary instruments that no other guard checks: it reports a channel without readings.
 
-use crate::guard::{Guard, Told, Trip};
+use crate::guard::{Commanded, Guard, Trip};
 use mapper_core::{Channel, GuardName, Reaction, SampleBatch};
 
 /// A channel of an auxiliary instrument.
@@ -30,7 +30,7 @@ impl ReaderWatch {
 }
 
 impl Guard for ReaderWatch {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Told) -> Option<Trip> {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
         let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         let mut trip: Option<Trip> = None;
         for (of, last_s, reported) in &mut self.channels {
@@ -75,7 +75,7 @@ mod tests {
         };
         let mut guard = ReaderWatch::new(vec![of(Channel::CompressorFlow), of(Channel::TAmb)]);
         let nan = f64::NAN;
-        let mut look = |t_s, flow, air| guard.look(&batch(t_s, flow, air), t_s, &Told::default());
+        let mut look = |t_s, flow, air| guard.look(&batch(t_s, flow, air), t_s, &Commanded::default());
         assert_eq!(look(0.0, 0.1, 298.0), None);
         assert_eq!(look(3.0, 0.1, nan), None);
         let trip = look(3.1, 0.1, nan).unwrap();

@@ -1,6 +1,6 @@
 //! The run itself: soak, warm-up, steps, cool-down.
 
-use crate::guard::{Bench, Guard, Told, Trip};
+use crate::guard::{Bench, Commanded, Guard, Trip};
 use crate::merge::append;
 use crate::observer::{ObserverError, RunObserver};
 use crate::operator::Operator;
@@ -85,14 +85,14 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) now_s: f64,
     /// The most recent setpoints.
     pub(crate) sent: Option<Setpoints>,
-    pub(crate) told: Told,
+    pub(crate) commanded: Commanded,
     sample_s: f64,
     reached: Reached,
     skipped: u32,
     /// The step that a guard has cut short, until its end is reported.
     pub(crate) open: Option<StepMarker>,
     /// Whether the operator was informed that the run ends with this step.
-    pub(crate) stop_told: bool,
+    pub(crate) stop_sent: bool,
 }
 
 impl Runner<'_> {
@@ -118,12 +118,12 @@ impl Runner<'_> {
             protection,
             now_s: 0.0,
             sent: None,
-            told: Told::default(),
+            commanded: Commanded::default(),
             sample_s: if sample_s > 0.0 { sample_s.min(POLL_INTERVAL_S) } else { POLL_INTERVAL_S },
             reached: Reached::default(),
             skipped: 0,
             open: None,
-            stop_told: false,
+            stop_sent: false,
         };
         // After a panic, the possibly inconsistent state is used only to make the rig safe.
         let end = match catch_unwind(AssertUnwindSafe(|| run.forward())) {
@@ -175,7 +175,7 @@ impl Run<'_, '_> {
             self.pass_notes()?;
         }
         self.with.backend.make_safe()?;
-        (self.sent, self.told) = (None, Told::default());
+        (self.sent, self.commanded) = (None, Commanded::default());
         let end_s = self.now_s + self.with.steps.cool_down_s();
         self.watch(end_s, false, false)
     }
@@ -211,7 +211,7 @@ impl Run<'_, '_> {
                 valve_opening_ratio: setpoints.valve_opening_ratio,
             };
             self.send(setpoints)?;
-            (self.told.step_since_s, self.told.aim) = (Some(self.now_s), Some(step.to));
+            (self.commanded.step_since_s, self.commanded.aim) = (Some(self.now_s), Some(step.to));
             self.reached.clear();
             self.with.observer.on_step_start(&marker)?;
             self.with.steps.begins(&marker);
@@ -220,7 +220,7 @@ impl Run<'_, '_> {
                 self.end()?;
                 self.speed_is_reached(step)
             });
-            (self.told.step_since_s, self.told.aim) = (None, None);
+            (self.commanded.step_since_s, self.commanded.aim) = (None, None);
             marker.end_s = self.now_s;
             let trip = match watched {
                 Err(Halt::Cut(trip)) => trip,
@@ -308,12 +308,12 @@ impl Run<'_, '_> {
             change(before.p3_pa, setpoints.p3_pa) > JUMP_RATIO
                 || change(before.valve_opening_ratio, setpoints.valve_opening_ratio) > 2.0 * JUMP_RATIO
         });
-        if jumps && running && self.told.running {
-            self.told.jumped_s = Some(self.now_s);
+        if jumps && running && self.commanded.running {
+            self.commanded.jumped_s = Some(self.now_s);
         } else if !running {
-            self.told.jumped_s = None;
+            self.commanded.jumped_s = None;
         }
-        (self.told.running, self.sent) = (running, Some(setpoints));
+        (self.commanded.running, self.sent) = (running, Some(setpoints));
         Ok(())
     }
 
@@ -361,7 +361,7 @@ impl Run<'_, '_> {
     fn pass_requests(&mut self) -> Result<(), ObserverError> {
         let Some(operator) = self.protection.operator else { return Ok(()) };
         let (t_s, kind) = (self.now_s, EventKind::Note);
-        let mut requests = operator.take_said().into_iter();
+        let mut requests = operator.take_messages().into_iter();
         requests.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
     }
 
@@ -443,7 +443,7 @@ impl Run<'_, '_> {
             self.with.clock.wait_until(next_s);
             let batch = self.with.backend.poll(next_s)?;
             self.now_s = next_s;
-            let trips = Bench::new(&mut self.with.guards).look(&batch, next_s, &self.told);
+            let trips = Bench::new(&mut self.with.guards).look(&batch, next_s, &self.commanded);
             match &mut whole {
                 None => whole = Some(batch),
                 Some(whole) => append(whole, batch),

@@ -1,6 +1,6 @@
 //! The safe shutdown after a fault: first the safe state, then the records of the reason.
 
-use crate::guard::Told;
+use crate::guard::Commanded;
 use crate::protection::Protection;
 use crate::run::{Halt, Run, RunEnd, words_of};
 use crate::run_error::RunError;
@@ -114,7 +114,7 @@ impl Run<'_, '_> {
     /// Sends the first command of the run-down; returns its starting setpoints if the run-down continues.
     fn first_command(&mut self) -> Option<Setpoints> {
         let from = self.sent?;
-        self.told = Told::default();
+        self.commanded = Commanded::default();
         let first = self.on_the_way(&from, STEP_S)?;
         let sent = catch_unwind(AssertUnwindSafe(|| self.with.backend.set(&first)));
         matches!(sent, Ok(Ok(()))).then_some(from)

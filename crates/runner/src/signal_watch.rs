@@ -1,6 +1,6 @@
 //! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
-use crate::guard::{Guard, Told, Trip};
+use crate::guard::{Commanded, Guard, Trip};
 use mapper_core::{
     Channel, Dimension, Quality, Reaction, SampleBatch, SignalGuard, measurable, plausible, readable,
 };
@@ -81,7 +81,7 @@ impl SignalWatch {
         }
     }
 
-    fn one(&mut self, t_s: f64, value: f64, state: &Told) -> Option<Trip> {
+    fn one(&mut self, t_s: f64, value: f64, state: &Commanded) -> Option<Trip> {
         // The slope over a single sample would be noise.
         match self.anchor {
             Some((then_s, then)) if t_s - then_s >= SLOPE_S => {
@@ -136,7 +136,7 @@ impl SignalWatch {
     }
 
     /// Trips if the reading has not moved although the setpoints have.
-    fn frozen(&mut self, t_s: f64, state: &Told) -> Option<Trip> {
+    fn frozen(&mut self, t_s: f64, state: &Commanded) -> Option<Trip> {
         let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.still?, state.jumped_s?);
         let since_jump_s = t_s - jumped_s;
         // The reading must be unchanged since before the jump.
@@ -160,7 +160,7 @@ fn can_be(channel: Channel, value: f64, running: bool) -> bool {
 }
 
 impl Guard for SignalWatch {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Told) -> Option<Trip> {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip> {
         let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         if let Some(values) = batch.column(self.spec.channel) {
             let provenance = batch.provenance_of(self.spec.channel);
@@ -235,7 +235,7 @@ mod tests {
     }
 
     fn look(guard: &mut SignalWatch, batch: &SampleBatch, now_s: f64) -> Option<Trip> {
-        guard.look(batch, now_s, &Told { running: true, ..Told::default() })
+        guard.look(batch, now_s, &Commanded { running: true, ..Commanded::default() })
     }
 
     #[test]
@@ -344,7 +344,8 @@ mod tests {
         assert_eq!(look(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
         assert!(look(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
         let mut guard = SignalWatch::new(SignalGuard { frozen_s: Some(2.0), ..spec() });
-        let after_jump = |jumped_s| Told { running: true, jumped_s: Some(jumped_s), ..Told::default() };
+        let after_jump =
+            |jumped_s| Commanded { running: true, jumped_s: Some(jumped_s), ..Commanded::default() };
         // Unchanged without a jump; moved after one; not moved.
         assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &after_jump(9.5)), None);
         let mut moved = guard.clone();

@@ -12,7 +12,7 @@ impl Run<'_, '_> {
         if self.with.stop.load(Ordering::Relaxed) || (with_step && !in_step) {
             return Err(Halt::Interrupted);
         }
-        if with_step && !std::mem::replace(&mut self.stop_told, true) {
+        if with_step && !std::mem::replace(&mut self.stop_sent, true) {
             let left_s = until_s - self.now_s;
             let message = format!(
                 "asked to stop: the run ends with this step, in {left_s:.0} s at most; ask again (Ctrl-C) and the rig is made \

@@ -349,7 +349,7 @@ pub enum SessionError {
     },
     /// The extension of a new file matches no known map format.
     #[error("{}: give the format by the extension or by `--to`: {}", .path.display(), .known.join(", "))]
-    FormatUnsaid {
+    FormatUnstated {
         /// The file.
         path: PathBuf,
         /// Formats and their extensions.
@@ -434,7 +434,7 @@ impl SessionError {
             | E::Import { .. }
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }
-            | E::FormatUnsaid { .. }
+            | E::FormatUnstated { .. }
             | E::Fit { .. }
             | E::Fmu(_)
             | E::FirstMap(_)

@@ -26,7 +26,7 @@ pub enum SessionEvent {
     /// A step has ended; `end_s` of the marker is the actual end.
     StepEnded(StepMarker),
     /// Message from the rig or the runner: tripped guard, surge, stop, safe state or note.
-    Told(Event),
+    Reported(Event),
     /// The rig is safe and released. All further work uses the recording.
     RigReleased,
     /// Latest valid reading of each channel.

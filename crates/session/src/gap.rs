@@ -90,7 +90,7 @@ impl Session<'_> {
     ) -> Result<Gap, SessionError> {
         // The drift search runs first and takes about this share of the total time.
         let progress = |done_ratio: f64, what: &str| {
-            self.tell(SessionEvent::Progress { done_ratio, what: what.to_owned() });
+            self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
         };
         progress(0.0, "drift");
         let Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest } =

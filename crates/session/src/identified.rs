@@ -180,7 +180,7 @@ impl Session<'_> {
         let found = identify_beside(&recording, &config, nominal)?;
         let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
         for point in &points {
-            self.tell(SessionEvent::PointIdentified(Box::new(point.clone())));
+            self.send(SessionEvent::PointIdentified(Box::new(point.clone())));
         }
         let truths = truths.wait()?;
         let surge = sought(&sources, &truths, off, campaign, &config);

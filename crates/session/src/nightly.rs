@@ -111,8 +111,8 @@ impl Session<'_> {
             .prefix("mapper-nightly-")
             .tempdir()
             .map_err(SessionError::file("create a directory in", &room))?;
-        let on_progress = |done, of| self.tell(SessionEvent::PiecesDone { done, of });
-        let engine = Engine { jobs, stop: self.stop, told: &on_progress };
+        let on_progress = |done, of| self.send(SessionEvent::PiecesDone { done, of });
+        let engine = Engine { jobs, stop: self.stop, on_progress: &on_progress };
         let one =
             |index: usize, run: &NightlyRun| self.nightly_run(run, &scratch.path().join(index.to_string()));
         // A missing row means that the operator stopped the night before this run.

@@ -137,7 +137,7 @@ impl RunObserver for Teller<'_> {
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
-        (self.on_event)(&SessionEvent::Told(event.clone()));
+        (self.on_event)(&SessionEvent::Reported(event.clone()));
         Ok(())
     }
 

@@ -63,7 +63,7 @@ pub struct Results {
 }
 
 /// Provenance of recordings.
-pub(crate) struct Told {
+pub(crate) struct Provenance {
     campaign: Option<Campaign>,
     plan: Option<Plan>,
     /// How the run ended, or how the points were made.
@@ -74,9 +74,9 @@ pub(crate) struct Told {
     sources: Vec<ReportSource>,
 }
 
-impl Told {
+impl Provenance {
     /// Provenance from the recordings themselves.
-    pub(crate) fn of(recorded: &[Recorded]) -> Told {
+    pub(crate) fn of(recorded: &[Recorded]) -> Provenance {
         let campaign = recorded.first().and_then(|first| first.campaign.clone());
         // Recordings of one run have the same plan.
         let plans: Vec<Option<&[u8]>> = recorded.iter().map(|one| one.read.plan_json.as_deref()).collect();
@@ -89,7 +89,7 @@ impl Told {
         let file = recorded.first().and_then(|first| first.path.file_stem());
         let named = || file.unwrap_or_default().to_string_lossy().into_owned();
         let sources: Vec<ReportSource> = recorded.iter().map(source).collect();
-        Told {
+        Provenance {
             outcome: String::new(),
             machine: campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone()),
             // Simulated time has no date; the name of the run directory has one.
@@ -162,7 +162,7 @@ impl Session<'_> {
         let mut files = paths.into_iter();
         let recording = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
-        let origin = Told {
+        let origin = Provenance {
             campaign: Some(campaign.clone()),
             plan: Some(plan.clone()),
             outcome: outcome.to_owned(),
@@ -195,9 +195,9 @@ impl Session<'_> {
         let mut files = recorded.iter().map(|one| one.path.clone());
         let first = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
-        let origin = Told::of(&recorded);
+        let origin = Provenance::of(&recorded);
         let identified = self.identify(recorded, map, method)?;
-        let origin = Told { outcome: identified_by(identified.config.method), ..origin };
+        let origin = Provenance { outcome: identified_by(identified.config.method), ..origin };
         std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
         self.written(&origin, identified, (first, further), remarks, directory)
     }
@@ -213,18 +213,18 @@ impl Session<'_> {
         channels: &ChannelMap,
         gap: Option<&Gap>,
     ) -> Result<String, SessionError> {
-        let origin = Told::of(&shown);
+        let origin = Provenance::of(&shown);
         let mut remarks: Vec<String> =
             shown.iter().flat_map(|one| remarks_of(one, shown.len() > 1)).collect();
         let identified = self.identify(shown, channels, None)?;
-        let origin = Told { outcome: identified_by(identified.config.method), ..origin };
+        let origin = Provenance { outcome: identified_by(identified.config.method), ..origin };
         remarks.extend(identified.remarks.iter().cloned());
         let map = compressor_map(&origin.machine, &identified, &mut remarks);
         let reference = identified.config.reference;
         let mut other_maps: Vec<(String, CompressorMap)> = Vec::new();
         for other in others {
             let name = other.first().map_or_else(String::new, |first| name_of(&first.path));
-            let machine = Told::of(&other).machine;
+            let machine = Provenance::of(&other).machine;
             let identified = self.identify(other, channels, None)?;
             match compressor_map(&machine, &identified, &mut Vec::new()) {
                 Some(map) => other_maps.push((name, map.at_reference(reference))),
@@ -242,7 +242,7 @@ impl Session<'_> {
     /// Writes the files of an identification.
     fn written(
         &self,
-        origin: &Told,
+        origin: &Provenance,
         identified: Identified,
         (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
         mut remarks: Vec<String>,
@@ -326,7 +326,7 @@ fn identified_by(method: Method) -> String {
 
 /// Contents of the report and the page.
 fn run_report_of<'a>(
-    origin: &'a Told,
+    origin: &'a Provenance,
     identified: &'a Identified,
     map: Option<&'a CompressorMap>,
     program: &'a str,

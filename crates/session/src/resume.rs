@@ -119,7 +119,7 @@ impl BrokenOff {
     }
 
     /// One sentence on the repeated work and its reason.
-    pub(crate) fn said(&self, campaign: &Campaign, plan: &Plan, saved: &BTreeSet<usize>) -> String {
+    pub(crate) fn summary(&self, campaign: &Campaign, plan: &Plan, saved: &BTreeSet<usize>) -> String {
         let soak = match (campaign.zero.is_some(), self.soaked()) {
             (false, _) => "without a soak, as before",
             (true, true) => "the soak is not repeated: what sensors read at rest holds for the run",

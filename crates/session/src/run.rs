@@ -230,7 +230,7 @@ impl PreparedRun<'_> {
         };
         let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
         held.give_back(doubt, &directory)?;
-        session.tell(SessionEvent::RigReleased);
+        session.send(SessionEvent::RigReleased);
         if let Ended::Failed(error @ RunError::NotArmed(_)) = end {
             return Err(self.never_begun(error, &directory));
         }
@@ -263,7 +263,7 @@ impl PreparedRun<'_> {
         parts: &[RunPart],
     ) -> Result<Results, SessionError> {
         let what = format!("identifying {} steps", self.plan.steps.len());
-        session.tell(SessionEvent::Progress { done_ratio: 0.0, what });
+        session.send(SessionEvent::Progress { done_ratio: 0.0, what });
         let (campaign, started_ns) = (self.request.campaign, self.request.started_ns);
         session.results(campaign, &executed?, &sentence(end), started_ns, directory, parts)
     }
@@ -337,8 +337,8 @@ impl PreparedRun<'_> {
         let mut missing;
         // A resumed run uses its unchanged plan, or replays its data.
         let resumes = self.request.resume.as_ref();
-        let told_again = resumes.filter(|_| depends_on_readings(self.request.campaign));
-        let by_plan = resumes.filter(|_| told_again.is_none());
+        let replayed = resumes.filter(|_| depends_on_readings(self.request.campaign));
+        let by_plan = resumes.filter(|_| replayed.is_none());
         // The soak data apply to the whole run.
         let without_soak;
         let mut campaign = self.request.campaign;
@@ -350,7 +350,7 @@ impl PreparedRun<'_> {
             (Some(scripted), _) => scripted,
             (None, Some(broken_off)) => {
                 let saved = broken_off.saved();
-                let note = broken_off.said(campaign, &self.plan, &saved);
+                let note = broken_off.summary(campaign, &self.plan, &saved);
                 missing = MissingSteps::new(&self.plan, &saved, note);
                 &mut missing
             }
@@ -381,7 +381,7 @@ impl PreparedRun<'_> {
             let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut teller];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
             let go = |steps: &mut dyn StepSource| {
-                going_on(told_again, steps, |steps| {
+                going_on(replayed, steps, |steps| {
                     drive_paced(campaign, model, steps, backend, &mut observers, pace)
                 })
             };

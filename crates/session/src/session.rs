@@ -39,7 +39,7 @@ impl<'a> Session<'a> {
     }
 
     /// Sends an event to the observer.
-    pub(crate) fn tell(&self, event: SessionEvent) {
+    pub(crate) fn send(&self, event: SessionEvent) {
         (self.on_event)(&event);
     }
 }

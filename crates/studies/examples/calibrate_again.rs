@@ -19,6 +19,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (name, text) in &made.files {
         std::fs::write(Path::new(out).join(name), text)?;
     }
-    println!("{}", made.said);
+    println!("{}", made.summary);
     Ok(())
 }

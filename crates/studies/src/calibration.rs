@@ -98,7 +98,7 @@ impl Kind for Calibration<'_> {
             out.write(name, text.as_bytes())?;
         }
         out.write("observed.json", json_text(&observed).map_err(FleetError::kind)?.as_bytes())?;
-        Ok(made.said)
+        Ok(made.summary)
     }
 }
 
@@ -107,7 +107,7 @@ pub struct Fitted {
     /// Files by name: calibration, reliability and its picture.
     pub files: Vec<(&'static str, String)>,
     /// Their description.
-    pub said: String,
+    pub summary: String,
 }
 
 /// Fits the calibration to diagnoses, and says whether its probabilities hold.
@@ -127,5 +127,5 @@ pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, Flee
         observed.len(),
         reliability_text(&reliabilities).trim_end()
     );
-    Ok(Fitted { files, said: description })
+    Ok(Fitted { files, summary: description })
 }

@@ -61,7 +61,7 @@ impl ProgressManner {
                     event,
                     E::RunStarted { .. }
                         | E::StepStarted(_)
-                        | E::Told(_)
+                        | E::Reported(_)
                         | E::Progress { .. }
                         | E::PiecesDone { .. }
                 )
@@ -210,7 +210,7 @@ impl Shown {
                     short(marker.end_s - marker.start_s)
                 ));
             }
-            SessionEvent::Told(event) => {
+            SessionEvent::Reported(event) => {
                 self.bar.println(terminal_text(&event_line(event.t_s, &event.message)))
             }
             SessionEvent::Progress { done_ratio, what } => {
@@ -283,7 +283,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             place(marker),
             short(marker.end_s - marker.start_s)
         ),
-        SessionEvent::Told(event) => event_line(event.t_s, &event.message),
+        SessionEvent::Reported(event) => event_line(event.t_s, &event.message),
         SessionEvent::Progress { what, .. } if *what != state.last_line => what.clone(),
         SessionEvent::PiecesDone { done, of } => {
             let began = *state.began.get_or_insert_with(Instant::now);

@@ -11,7 +11,7 @@ pub(crate) struct Armed {
     pub(crate) at_s: f64,
     /// Arming may take seconds: time and lease begin with the first message or tick after it.
     pub(crate) fresh: bool,
-    pub(crate) told: Option<Setpoints>,
+    pub(crate) commanded: Option<Setpoints>,
     /// Number of the next sample to poll for, in real time.
     pub(crate) ticks: u64,
     /// Run time of the last poll, s.
@@ -31,7 +31,7 @@ impl Armed {
         Armed {
             at_s: now_s,
             fresh: true,
-            told: None,
+            commanded: None,
             ticks: 0,
             polled_s: 0.0,
             lease_s: now_s + LEASE_S,
@@ -65,7 +65,7 @@ impl Armed {
         let due_s = if simulated && flight == Flight::GoesOn { 0.0 } else { STEP_S };
         let doubt = match flight {
             Flight::Safe => {
-                (self.told, self.in_doubt) = (None, false);
+                (self.commanded, self.in_doubt) = (None, false);
                 None
             }
             Flight::Doubt(error) => (!std::mem::replace(&mut self.in_doubt, true)).then_some(error),

@@ -157,7 +157,7 @@ impl Server {
             accepts.check(&wanted).map_err(|error| Box::new(error_on_the_wire(&error)))?;
         }
         guarded(|| rig.set(&wanted))?;
-        armed.told = Some(wanted);
+        armed.commanded = Some(wanted);
         Ok(json!({}))
     }
 
@@ -166,7 +166,7 @@ impl Server {
         if armed.ended || armed.descent.is_some() {
             return Err(lease_ended());
         }
-        if armed.told.is_none() {
+        if armed.commanded.is_none() {
             let message = "no setpoints to hold: none were set since arming or since it was made safe";
             return Err(refused(Code::OutOfOrder, message));
         }
@@ -199,14 +199,14 @@ impl Server {
     fn make_safe(&mut self) -> Result<Value, Refusal> {
         let (rig, _, armed) = self.held()?;
         guarded(|| rig.make_safe())?;
-        (armed.descent, armed.told, armed.in_doubt) = (None, None, false);
+        (armed.descent, armed.commanded, armed.in_doubt) = (None, None, false);
         Ok(json!({}))
     }
 
     /// Disarms the rig, unless it has not confirmed its safe state.
     fn disarm(&mut self) -> Result<Value, Refusal> {
         let (.., armed) = self.held()?;
-        if armed.told.is_some() || armed.descent.is_some() {
+        if armed.commanded.is_some() || armed.descent.is_some() {
             self.make_safe()?;
         }
         let (rig, ..) = self.held()?;
@@ -228,7 +228,7 @@ impl Server {
         let Ok((_, description, armed)) = self.held() else { return };
         if armed.descent.is_none() && !armed.ended {
             let t_s = if description.simulated_time { armed.polled_s } else { now_s - armed.at_s };
-            armed.descent = Some(Descent::new(armed.told, t_s));
+            armed.descent = Some(Descent::new(armed.commanded, t_s));
             armed.ended = true;
         }
     }
@@ -255,7 +255,7 @@ impl Server {
             if due >= armed.ticks {
                 armed.ticks = due + 1;
                 // A rig may measure nothing before its first setpoints.
-                let waits = armed.told.is_none() && !armed.ended;
+                let waits = armed.commanded.is_none() && !armed.ended;
                 match guarded(|| rig.poll(due as f64 * period_s)) {
                     Ok(batch) => {
                         let samples = pieces(&batch, limit);

@@ -31,12 +31,12 @@ impl Registers {
     fn register(stand: &Stand, at: u16) -> u16 {
         let pair = |value: f64, at: u16| words(value)[usize::from(at % 2)];
         match at {
-            AIR => stand.told(Target::Air) as u16,
-            HEARTBEAT => stand.told(Target::Heartbeat) as u16,
+            AIR => stand.commanded(Target::Air) as u16,
+            HEARTBEAT => stand.commanded(Target::Heartbeat) as u16,
             TRIPPED => u16::from(stand.tripped().is_some()),
             SETPOINTS..AIR => {
                 let target = SETPOINTS_IN_ORDER.get(usize::from(at - SETPOINTS) / 2);
-                target.map_or(0, |target| pair(stand.told(*target), at))
+                target.map_or(0, |target| pair(stand.commanded(*target), at))
             }
             _ => {
                 let channel = measured().get(usize::from(at) / 2).copied();

@@ -257,7 +257,7 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
     for (name, kind, target) in writable() {
         let id = put(name, kind, variant(kind, 0.0), true);
         let (reads, writes) = (shared.clone(), shared.clone());
-        let read = move |stand: &Stand| Some(variant(kind, stand.told(target)));
+        let read = move |stand: &Stand| Some(variant(kind, stand.commanded(target)));
         manager.inner().add_read_callback(id.clone(), move |_, _, _| reads.value(read));
         manager.inner().add_write_callback(id, move |value, _| writes.write(name, target, &value));
     }

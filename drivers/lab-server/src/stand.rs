@@ -136,7 +136,7 @@ impl Stand {
     }
 
     /// The last written value.
-    pub fn told(&self, target: Target) -> f64 {
+    pub fn commanded(&self, target: Target) -> f64 {
         match target {
             Target::P3 => self.setpoints.p3_pa,
             Target::T3 => self.setpoints.t3_k,
@@ -235,14 +235,14 @@ mod tests {
         let rpm = stand.reading(Channel::ShaftSpeed).unwrap();
         assert!(rpm > 50_000.0 && stand.tripped().is_none(), "{rpm}");
         assert!(stand.tell(Target::P3, 1e9).is_err());
-        assert_eq!(stand.told(Target::P3), 180e3);
+        assert_eq!(stand.commanded(Target::P3), 180e3);
         run(&mut stand, 4.0, 7.0, false);
         assert!(stand.tripped().unwrap().contains("no heartbeat"));
         stand.tell(Target::Air, 1.0).unwrap();
-        assert_eq!(stand.told(Target::Air), 0.0);
+        assert_eq!(stand.commanded(Target::Air), 0.0);
         stand.tell(Target::Acknowledge, 1.0).unwrap();
         stand.tell(Target::Air, 1.0).unwrap();
-        assert_eq!(stand.told(Target::Air), 1.0);
+        assert_eq!(stand.commanded(Target::Air), 1.0);
         stand.tell(Target::P3, 380e3).unwrap();
         run(&mut stand, 7.0, 12.0, true);
         assert!(stand.tripped().unwrap().contains("overspeed"), "{:?}", stand.reading(Channel::ShaftSpeed));

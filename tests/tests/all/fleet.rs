@@ -171,7 +171,7 @@ fn an_item_that_fails_says_why_and_is_done_again() {
 }
 
 #[test]
-fn wrong_input_is_said() {
+fn wrong_input_is_reported() {
     let scratch = scratch();
     let folder = scratch.path();
     let empty = mapper(fleet("status", folder, &[])).exits(3);

@@ -17,7 +17,7 @@ exit $code
 
 #[test]
 #[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
-fn a_full_disk_is_said_and_what_was_flushed_can_be_read() {
+fn a_full_disk_is_reported_and_what_was_flushed_can_be_read() {
     // Without the rest at the start, which alone would fill the disk.
     let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
     let campaign = CampaignFile::shipped_with(&replacements);

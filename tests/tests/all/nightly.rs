@@ -180,7 +180,7 @@ fn two_nights_at_once_are_both_kept() {
 }
 
 #[test]
-fn mistakes_are_told_before_anything_runs() {
+fn mistakes_are_reported_before_anything_runs() {
     let scratch = scratch();
     let folder = scratch.path();
     for (text, word) in [

@@ -65,7 +65,7 @@ fn a_channel_that_is_read_elsewhere_stands_in_the_recording_and_in_the_points() 
 
 /// Each at its place, before anything is touched.
 #[test]
-fn mistakes_of_readers_are_told_at_their_place() {
+fn mistakes_of_readers_are_reported_at_their_place() {
     let other = CampaignFile::shipped_with(&SHORT_GRID.iter().chain(BY_ITSELF).copied().collect::<Vec<_>>());
     let recording = made_once(&other).run.join("recording.mcap");
     let replay = format!("{{replay: {{recording: {}}}}}", recording.display());

@@ -47,7 +47,7 @@ fn the_shipped_lines_are_shown_and_measured_where_they_are_asked_for() {
 
 /// A turbine 10 % worse that may not have the pressure it needs: the points say which speed they have instead.
 #[test]
-fn a_speed_that_cannot_be_reached_is_told_with_its_point() {
+fn a_speed_that_cannot_be_reached_is_reported_with_its_point() {
     let mut replacements = SHORT_GRID.to_vec();
     replacements.extend([
         ("virtual_lab: {}", "virtual_lab: {effects: {turbine_efficiency: 0.9}}"),

@@ -71,7 +71,7 @@ fn the_points_know_nothing_of_the_search() {
 
 /// Without anything that comes before it, surge can only be met.
 #[test]
-fn surge_without_warning_opens_the_valve_and_is_said() {
+fn surge_without_warning_opens_the_valve_and_is_reported() {
     let scratch = scratch();
     let result = run("surge_search: {}\n", "surge_precursor: {size: 0 %}", 1, scratch.path());
     let surge = &result["surge"];

@@ -57,7 +57,7 @@ fn a_failure_is_one_object_too() {
 
 /// Whatever fails: one object on standard output, its code that of the process.
 #[test]
-fn failures_of_every_kind_are_told_alike() {
+fn failures_of_every_kind_are_reported_alike() {
     let folder = scratch();
     let file = |name: &str, text: &[u8]| {
         let path = folder.path().join(name);

@@ -13,7 +13,7 @@ fn transient(more: &[&str]) -> Finished {
 /// An independent fit of the same rows leaves 0.1 K, and with an ideal adiabatic probe 15.5 K on the brake. What is left here is
 /// beyond what was expected, and the program says so.
 #[test]
-fn an_engine_is_fitted_and_what_it_does_not_explain_is_said() {
+fn an_engine_is_fitted_and_what_it_does_not_explain_is_reported() {
     let scratch = scratch();
     let out = scratch.path().join("out");
     let given = ["--fit-until", "13.2 s", "--json", "--out", out.to_str().unwrap()];

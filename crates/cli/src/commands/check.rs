@@ -30,7 +30,7 @@ impl Check {
                 let mut mistakes = Failure::of_campaign(CampaignError::Mistakes(findings)).json();
                 (mistakes["campaign"], mistakes["omitted"]) = (json!(null), json!(omitted));
                 output::print_json(&mistakes)?;
-                return Err(Failure::told(Code::BadInput));
+                return Err(Failure::printed(Code::BadInput));
             }
             Err(error) => return Err(Failure::of_campaign(error)),
         };

@@ -88,6 +88,6 @@ impl Nightly {
         }
         let message =
             "tonight differs from the nights before; if the change is right, `--accept` begins a new band";
-        Err(if self.json { Failure::told(Code::Moved) } else { Failure::new(Code::Moved, message) })
+        Err(if self.json { Failure::printed(Code::Moved) } else { Failure::new(Code::Moved, message) })
     }
 }

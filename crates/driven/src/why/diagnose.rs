@@ -110,7 +110,7 @@ fn of_side<S: Side>(ask: &Ask<'_>) -> Result<Diagnosis, DrivenError> {
         0 => Word::WithinTolerance,
         _ if !borne_out => Word::NotBorneOut,
         1 => Word::Named,
-        _ => Word::NotToldApart,
+        _ => Word::NotDistinguished,
     };
     let (asked_for, silent) = smallest(&question, &asked, likeliest, &open_effects, &counts, calibration);
     not_asked.extend(silent);
@@ -227,7 +227,7 @@ fn unknowns<S: Side>(fit: &Fit) -> Vec<Unknown> {
         let ((low, high), (prior_low, prior_high)) = (ends(*z, sigma), ends(0.0, 1.0));
         let identified = high - low < TOLD_RATIO * (prior_high - prior_low);
         let (name, description, unit) = (unknown.name, unknown.description, unknown.unit);
-        Unknown { name, description, unit, value: unknown.at(*z), low, high, told: identified }
+        Unknown { name, description, unit, value: unknown.at(*z), low, high, identified }
     })
     .collect()
 }

@@ -14,7 +14,7 @@ pub enum Word {
     /// One cause explains it.
     Named,
     /// Several causes explain it equally well.
-    NotToldApart,
+    NotDistinguished,
     /// A cause explains the fitted part but does not improve held-out phases, so it is not named.
     NotBorneOut,
     /// No library cause explains it.
@@ -124,7 +124,7 @@ pub struct Unknown {
     /// Upper end.
     pub high: f64,
     /// Whether the log identifies it; otherwise the prior dominates.
-    pub told: bool,
+    pub identified: bool,
 }
 
 /// The first judged channel over time, K.

@@ -36,7 +36,7 @@ impl Honesty {
     }
 
     /// Root mean square of the stated standard errors; unit of the quantity.
-    pub fn said_rms(&self) -> f64 {
+    pub fn stated_rms(&self) -> f64 {
         (self.stated.iter().map(|stated| stated * stated).sum::<f64>() / self.stated.len() as f64).sqrt()
     }
 

@@ -293,14 +293,14 @@ fn settle_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units
         let data: &ColumnSurvey = survey.columns.get(proposed.column)?;
         Some((unit.to_inside(data.quantile(OUTER)), unit.to_inside(data.quantile(1.0 - OUTER))))
     };
-    let unsaid = |proposed: &ProposedChannel| {
+    let unstated = |proposed: &ProposedChannel| {
         kind_of(proposed.channel) == Kind::Pressure
-            && !units[proposed.column].is_some_and(|unit| unit.reference != Reference::Unsaid)
+            && !units[proposed.column].is_some_and(|unit| unit.reference != Reference::Unstated)
     };
     let inlet_is_gauge = proposal.of(Channel::P1).is_some_and(|inlet| {
         inlet.gauge || in_pa(inlet).is_some_and(|(low, high)| looks_like_gauge(Channel::P1, low, high))
     });
-    for proposed in proposal.channels.iter_mut().filter(|proposed| unsaid(proposed)) {
+    for proposed in proposal.channels.iter_mut().filter(|proposed| unstated(proposed)) {
         let Some((low, high)) = in_pa(proposed) else { continue };
         if looks_like_gauge(proposed.channel, low, high) {
             proposed.gauge = true;

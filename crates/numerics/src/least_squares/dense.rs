@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_solved_is_said() {
+    fn what_cannot_be_solved_is_reported() {
         let right = DVector::from_vec(vec![1.0, 1.0]);
         assert_eq!(damped_step(&DMatrix::zeros(2, 2), &right, 1e-3), None);
         assert_eq!(damped_step(&DMatrix::identity(2, 2), &(right * f64::NAN), 0.0), None);

@@ -187,7 +187,7 @@ fn normal(random: &mut impl Rng) -> f64 {
 
 /// Outcome of judging one recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Said {
+pub enum Verdict {
     /// Nothing, or exactly the right sensor.
     Right,
     /// Another sensor, or one too many, or a contradiction.
@@ -197,7 +197,7 @@ pub enum Said {
 }
 
 /// Judges one recording.
-pub fn judged(clean: &Clean, fault: Fault, seed: u64) -> Said {
+pub fn judged(clean: &Clean, fault: Fault, seed: u64) -> Verdict {
     let (recording, faulty) = record(clean, fault, seed);
     let channels =
         mapper_observe::judge_elements(&recording, &declared(), mapper_core::NoiseColour::default());
@@ -205,8 +205,8 @@ pub fn judged(clean: &Clean, fault: Fault, seed: u64) -> Said {
         channels.iter().flat_map(|fused| &fused.left_out).map(|faulty| faulty.element).collect();
     let contradicted = channels.iter().any(|fused| fused.contradiction.is_some());
     match faulty {
-        _ if named == faulty.into_iter().collect::<Vec<_>>() && !contradicted => Said::Right,
-        Some(faulty) if !named.contains(&faulty) => Said::Missed,
-        _ => Said::Wrong,
+        _ if named == faulty.into_iter().collect::<Vec<_>>() && !contradicted => Verdict::Right,
+        Some(faulty) if !named.contains(&faulty) => Verdict::Missed,
+        _ => Verdict::Wrong,
     }
 }

@@ -266,7 +266,7 @@ fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
         let RunEnd::Tripped(trip) = end.unwrap() else { panic!("not seen") };
         // The dwell of 0.2 s, and the next sample.
         assert!(trip.t_s - FAULT_S < 0.35, "{takes_s} s: {}", trip.t_s);
-        let first = rig.told.iter().find(|(_, sent)| sent.t3_k < 300.0).unwrap();
+        let first = rig.commands.iter().find(|(_, sent)| sent.t3_k < 300.0).unwrap();
         assert!(first.0 - trip.t_s < 0.11, "{takes_s} s: {} after {}", first.0, trip.t_s);
         assert!(written > 70);
         assert!(wall_s - rig.safe_at_s[0] < 10.0 + late_s, "{takes_s} s: {wall_s}");
@@ -296,8 +296,8 @@ fn the_tries_of_the_safe_state_have_a_pause_between_them() {
 fn the_way_down_is_the_declared_one() {
     let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
     let RunEnd::Tripped(trip) = night.end.unwrap() else { panic!("not seen") };
-    let way: Vec<_> = night.rig.told.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
-    let before = night.rig.told.iter().rev().find(|(_, sent)| sent.t3_k > 300.0).unwrap().1;
+    let way: Vec<_> = night.rig.commands.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
+    let before = night.rig.commands.iter().rev().find(|(_, sent)| sent.t3_k > 300.0).unwrap().1;
     let expected = ((before.p3_pa - 110e3) / 5e3).floor() as usize;
     assert_eq!(way.len(), expected, "from {} Pa", before.p3_pa);
     // The first command follows the poll with the violation; a simulated rig is polled every second.
@@ -343,7 +343,7 @@ fn mild_reactions_do_what_they_say() {
     let again = with(Reaction::SmallerSteps, &high);
     assert_eq!(again.end.unwrap(), RunEnd::Completed);
     assert_eq!((again.notebook.starts.len(), again.notebook.abandoned.len()), (3, 2));
-    let sent: Vec<f64> = again.rig.told.iter().map(|(_, sent)| sent.p3_pa).collect();
+    let sent: Vec<f64> = again.rig.commands.iter().map(|(_, sent)| sent.p3_pa).collect();
     let (low_pa, high_pa) = (sent[0], sent[2]);
     for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let piece_pa = low_pa + share * (high_pa - low_pa);

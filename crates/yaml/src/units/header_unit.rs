@@ -9,7 +9,7 @@ use serde::Serialize;
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
     /// The header does not say.
-    Unsaid,
+    Unstated,
     /// Vacuum.
     Absolute,
     /// The ambient pressure.
@@ -152,12 +152,12 @@ pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     let known = |kind, symbol, reference| Some(HeaderUnit { kind, unit: unit(kind, symbol)?, reference });
     for (kind, symbol, spellings) in SPELLINGS {
         if spellings.contains(&lower.as_str()) {
-            return known(*kind, symbol, Reference::Unsaid);
+            return known(*kind, symbol, Reference::Unstated);
         }
     }
     for (spelling, symbol) in PRESSURES {
         let reference = match lower.strip_prefix(spelling) {
-            Some("") => Reference::Unsaid,
+            Some("") => Reference::Unstated,
             Some(rest) if GAUGE.contains(&rest) => Reference::Gauge,
             Some(rest) if ABSOLUTE.contains(&rest) => Reference::Absolute,
             _ => continue,
@@ -221,29 +221,29 @@ mod tests {
     #[test]
     fn units_as_test_stands_write_them() {
         for (text, kind, symbol, reference) in [
-            ("°C", Kind::Temperature, "degC", Reference::Unsaid),
-            ("[Grad C]", Kind::Temperature, "degC", Reference::Unsaid),
+            ("°C", Kind::Temperature, "degC", Reference::Unstated),
+            ("[Grad C]", Kind::Temperature, "degC", Reference::Unstated),
             ("kPaG", Kind::Pressure, "kPa", Reference::Gauge),
             ("kPaA", Kind::Pressure, "kPa", Reference::Absolute),
             ("bar(g)", Kind::Pressure, "bar", Reference::Gauge),
             ("mbar rel", Kind::Pressure, "mbar", Reference::Gauge),
             ("bar abs", Kind::Pressure, "bar", Reference::Absolute),
-            ("kghr", Kind::MassFlow, "kg/h", Reference::Unsaid),
-            ("U/min", Kind::Speed, "rpm", Reference::Unsaid),
-            ("tr/min", Kind::Speed, "rpm", Reference::Unsaid),
-            ("℃", Kind::Temperature, "degC", Reference::Unsaid),
-            ("inHg", Kind::Pressure, "inHg", Reference::Unsaid),
-            ("in H2O", Kind::Pressure, "inH2O", Reference::Unsaid),
-            ("mmWS", Kind::Pressure, "mmH2O", Reference::Unsaid),
-            ("kgf/cm2", Kind::Pressure, "kgf/cm2", Reference::Unsaid),
+            ("kghr", Kind::MassFlow, "kg/h", Reference::Unstated),
+            ("U/min", Kind::Speed, "rpm", Reference::Unstated),
+            ("tr/min", Kind::Speed, "rpm", Reference::Unstated),
+            ("℃", Kind::Temperature, "degC", Reference::Unstated),
+            ("inHg", Kind::Pressure, "inHg", Reference::Unstated),
+            ("in H2O", Kind::Pressure, "inH2O", Reference::Unstated),
+            ("mmWS", Kind::Pressure, "mmH2O", Reference::Unstated),
+            ("kgf/cm2", Kind::Pressure, "kgf/cm2", Reference::Unstated),
             ("kg/cm2 abs", Kind::Pressure, "kgf/cm2", Reference::Absolute),
             ("lbf/in2 g", Kind::Pressure, "psia", Reference::Gauge),
-            ("Torr", Kind::Pressure, "Torr", Reference::Unsaid),
-            ("pps", Kind::MassFlow, "lb/s", Reference::Unsaid),
-            ("lb/hr", Kind::MassFlow, "lb/h", Reference::Unsaid),
-            ("t/h", Kind::MassFlow, "t/h", Reference::Unsaid),
-            ("mg/s", Kind::MassFlow, "mg/s", Reference::Unsaid),
-            ("degR", Kind::Temperature, "degR", Reference::Unsaid),
+            ("Torr", Kind::Pressure, "Torr", Reference::Unstated),
+            ("pps", Kind::MassFlow, "lb/s", Reference::Unstated),
+            ("lb/hr", Kind::MassFlow, "lb/h", Reference::Unstated),
+            ("t/h", Kind::MassFlow, "t/h", Reference::Unstated),
+            ("mg/s", Kind::MassFlow, "mg/s", Reference::Unstated),
+            ("degR", Kind::Temperature, "degR", Reference::Unstated),
         ] {
             let found = header_unit(text).unwrap();
             assert_eq!(

@@ -38,6 +38,6 @@ impl Merge {
             return Ok(());
         }
         let why = "items are missing or failed; `mapper fleet retry` submits them, `mapper fleet run --again` does them here";
-        Err(if self.json { Failure::told(Code::Incomplete) } else { Failure::new(Code::Incomplete, why) })
+        Err(if self.json { Failure::printed(Code::Incomplete) } else { Failure::new(Code::Incomplete, why) })
     }
 }

@@ -44,6 +44,6 @@ impl Run {
             return Ok(());
         }
         let why = "items are missing or failed; `--again` does those again that failed";
-        Err(if self.json { Failure::told(Code::Incomplete) } else { Failure::new(Code::Incomplete, why) })
+        Err(if self.json { Failure::printed(Code::Incomplete) } else { Failure::new(Code::Incomplete, why) })
     }
 }

@@ -6,7 +6,7 @@ use crate::given::reference;
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
-use mapper_report::{map_comparison_figure, map_comparison_text, told_apart};
+use mapper_report::{map_comparison_figure, map_comparison_text, distinct_names};
 use std::path::PathBuf;
 
 /// Show where two maps differ, in units and against their uncertainty
@@ -41,7 +41,7 @@ impl Compare {
         let comparison =
             mapper_assemble::compare(&first, &second).map_err(|error| Failure::new(Code::BadInput, error))?;
         if let Some(path) = &self.picture {
-            let names = told_apart([&self.first, &self.second]);
+            let names = distinct_names([&self.first, &self.second]);
             let figure = map_comparison_figure(&first, &second, &comparison, &names);
             let png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
             let bytes = if png {

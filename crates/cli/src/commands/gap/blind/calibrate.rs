@@ -50,7 +50,7 @@ impl Calibrate {
         let plan = Plan { seed: self.seed, nulls: self.nulls, others: self.cases };
         let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
         let report = |done, of| progress.pieces(done, of);
-        let engine = Engine { jobs: self.jobs, stop: &stop, told: &report };
+        let engine = Engine { jobs: self.jobs, stop: &stop, on_progress: &report };
         let made_by = plan.command(&self.campaign);
         let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &engine);
         progress.clear();

@@ -36,7 +36,7 @@ impl Run {
         let program = std::env::current_exe().map_err(|error| failure(error.to_string()))?;
         let (stop, progress) = (interrupt::stop_flag()?, output_options::progress());
         let report = |done, of| progress.pieces(done, of);
-        let engine = Engine { jobs: self.jobs, stop: &stop, told: &report };
+        let engine = Engine { jobs: self.jobs, stop: &stop, on_progress: &report };
         let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();
         let threads = (cores() / engine.at_a_time(names.len())).max(1);
         let diagnosed =

@@ -57,6 +57,10 @@ impl Work {
             return Ok(());
         }
         let message = format!("{} items failed; `--again` does them again", worked.failed.len());
-        Err(if self.json { Failure::printed(Code::Incomplete) } else { Failure::new(Code::Incomplete, message) })
+        Err(if self.json {
+            Failure::printed(Code::Incomplete)
+        } else {
+            Failure::new(Code::Incomplete, message)
+        })
     }
 }

@@ -6,7 +6,7 @@ use crate::given::reference;
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
-use mapper_report::{map_comparison_figure, map_comparison_text, distinct_names};
+use mapper_report::{distinct_names, map_comparison_figure, map_comparison_text};
 use std::path::PathBuf;
 
 /// Show where two maps differ, in units and against their uncertainty

@@ -165,7 +165,7 @@ listener.join(10)
 result["console"] = console
 result["serious"] = serious
 result["elsewhere"] = [url_ for url_ in requests if not url_.startswith(url)]
-result["recorded"] = [event["message"] for _, event in events if event["event"] == "told"]
+result["recorded"] = [event["message"] for _, event in events if event["event"] == "reported"]
 result["run"] = json.loads(output[0])
 result["run"]["points"] = len(result["run"]["points"])
 json.dump(result, sys.stdout)

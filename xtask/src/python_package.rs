@@ -30,21 +30,20 @@ pub fn check(offered: &Offered) -> Result<(), Error> {
     run(of(&["-m", "ruff", "check", "."]))?;
     run(of(&["-m", "mypy"]))?;
     run(of(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))?;
-    for notebook in files(&workspace::root().join("examples/notebooks"))? {
-        // Executed in a directory of its own, where its runs go.
-        let runs = home.join("notebooks");
-        fs::create_dir_all(&runs).map_err(|source| Error::File { path: runs.clone(), source })?;
+    let notebooks = workspace::root().join("examples/notebooks");
+    for notebook in files(&notebooks)? {
+        // They write into temporary directories.
         let script = "import nbformat, nbclient, sys\n\
                       book = nbformat.read(sys.argv[1], as_version=4)\n\
                       nbclient.NotebookClient(book, timeout=600, kernel_name='python3').execute()";
         let mut execute = of(&["-c", script, &notebook.to_string_lossy()]);
-        execute.current_dir(&runs);
+        execute.current_dir(&notebooks);
         run(execute)?;
     }
     Ok(())
 }
 
-/// Builds the wheel as users do, installs it into an empty environment and runs its tests there.
+/// Builds the wheel, adds the command to it, installs it into an empty environment and runs its tests there, with that command.
 pub fn wheel() -> Result<(), Error> {
     let python = python_env::prepare()?;
     let (wheels, empty) = (workspace::target_dir().join("wheels"), workspace::target_dir().join("wheel-env"));
@@ -57,6 +56,7 @@ pub fn wheel() -> Result<(), Error> {
     let mut build = command(&python, &["-m", "maturin", "build", "--release", "--out", &folder]);
     build.current_dir(workspace::root().join("python"));
     run(build)?;
+    add_command(&python, &wheels)?;
     run(command("python3", &["-m", "venv", &empty.to_string_lossy()]))?;
     let mut install: Command = command(empty.join("bin/python"), &["-m", "pip", "install", "--quiet"]);
     for wheel in files(&wheels)? {
@@ -65,8 +65,32 @@ pub fn wheel() -> Result<(), Error> {
     run(install)?;
     let mut tests = command(empty.join("bin/python"), &["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]);
     tests.current_dir(workspace::root().join("python"));
+    tests.env("MAPPER_TEST_PROGRAM", empty.join("bin/mapper")).env("MPLBACKEND", "agg");
     run(tests)?;
     say(&format!("the wheel is in {folder}\n"));
+    Ok(())
+}
+
+/// Adds the command to the wheel in a directory, so that users without Rust have both.
+fn add_command(python: &Path, wheels: &Path) -> Result<(), Error> {
+    run(command(workspace::cargo(), &["build", "--release", "--package", "mapper-cli", "--bin", "mapper"]))?;
+    let unpacked = workspace::target_dir().join("wheel-unpacked");
+    if unpacked.exists() {
+        fs::remove_dir_all(&unpacked).map_err(|source| Error::File { path: unpacked.clone(), source })?;
+    }
+    let (into, out) = (unpacked.to_string_lossy(), wheels.to_string_lossy());
+    for wheel in files(wheels)? {
+        run(command(python, &["-m", "wheel", "unpack", &wheel.to_string_lossy(), "--dest", &into]))?;
+        fs::remove_file(&wheel).map_err(|source| Error::File { path: wheel.clone(), source })?;
+    }
+    let failed = |source| Error::File { path: unpacked.clone(), source };
+    for package in fs::read_dir(&unpacked).map_err(failed)?.flatten().map(|entry| entry.path()) {
+        let name = package.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let scripts = package.join(format!("{name}.data/scripts"));
+        fs::create_dir_all(&scripts).map_err(|source| Error::File { path: scripts.clone(), source })?;
+        copy(&workspace::target_dir().join("release/mapper"), &scripts.join("mapper"))?;
+        run(command(python, &["-m", "wheel", "pack", &package.to_string_lossy(), "--dest-dir", &out]))?;
+    }
     Ok(())
 }
 

@@ -160,7 +160,7 @@ mod tests {
         drop(file);
         assert!(!path.exists());
         std::fs::write(&path, "notes").unwrap();
-        assert!(bind(&path).err().unwrap().to_string().contains("no socket"));
+        assert!(bind(&path).err().unwrap().to_string().contains("not a socket"));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "notes");
         std::fs::remove_dir_all(&directory).unwrap();
     }

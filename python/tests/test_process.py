@@ -17,8 +17,12 @@ import pytest
 
 # Says when the rig runs; then takes hours of the rig's time.
 SCRIPT = """
+import signal
 import sys
 import mapper
+
+# A program that is started in the background ignores SIGINT, and so would this one.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def show(event):
     if event["event"] == "step_started":
@@ -58,8 +62,11 @@ def test_ctrl_c_leaves_the_rig_safe_and_the_recording_readable(
 
 
 DIAGNOSIS = """
+import signal
 import sys
 import mapper
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 campaign = mapper.Campaign.load(sys.argv[1])
 recording = mapper.Recording.read(sys.argv[2])

@@ -36,12 +36,14 @@ impl Replace {
 
 /// Writes text to standard output. A closed pipe ends the command quietly.
 pub fn print(text: &str) -> Result<(), Failure> {
+    write(&terminal_text(text))
+}
+
+fn write(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    out.write_all(terminal_text(text).as_bytes()).and_then(|()| out.flush()).map_err(|error| {
-        match error.kind() {
-            ErrorKind::BrokenPipe => Failure::closed_pipe(),
-            _ => Failure::new(Code::Failure, format!("failed to write to standard output: {error}")),
-        }
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| match error.kind() {
+        ErrorKind::BrokenPipe => Failure::closed_pipe(),
+        _ => Failure::new(Code::Failure, format!("failed to write to standard output: {error}")),
     })
 }
 
@@ -52,7 +54,8 @@ pub fn warn(text: &str) {
 
 /// Writes one JSON object and a line end to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
-    print(&mapper_session::json_text(value)?)?;
+    // JSON has its own way to write control characters, and programs get every letter.
+    write(&mapper_session::json_text(value)?)?;
     PRINTED.store(true, Ordering::Relaxed);
     Ok(())
 }

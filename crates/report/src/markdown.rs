@@ -27,6 +27,22 @@ pub fn table<H: AsRef<str>, R: AsRef<[String]>>(
     text
 }
 
+/// Markdown in which nothing is HTML: a `<` that would begin a tag, a comment or a declaration is escaped (CommonMark, 6.6).
+pub fn without_html(text: &str) -> String {
+    let begins = |next: Option<char>| {
+        next.is_some_and(|next| next.is_ascii_alphabetic() || ['/', '!', '?'].contains(&next))
+    };
+    let mut escaped = String::with_capacity(text.len());
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        if letter == '<' && begins(letters.peek().copied()) && !escaped.ends_with('\\') {
+            escaped.push('\\');
+        }
+        escaped.push(letter);
+    }
+    escaped
+}
+
 fn row<C: AsRef<str>>(cells: &[C]) -> String {
     let cell = |cell: &C| match cell.as_ref() {
         "" => " |".to_owned(),
@@ -37,13 +53,19 @@ fn row<C: AsRef<str>>(cells: &[C]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Align, table};
+    use super::{Align, table, without_html};
 
     /// CommonMark's table extension requires a backslash before a bar inside a cell.
     #[test]
     fn a_bar_ends_no_cell() {
         let text = table(&["a", "b"], Align::Left, [["1|2".to_owned(), "3".to_owned()]]);
         assert_eq!(text, "| a | b |\n|---|---|\n| 1\\|2 | 3 |\n");
+    }
+
+    #[test]
+    fn a_name_is_no_tag() {
+        let text = "<script>x</script> a < b, T2 <- T1 <!-- --> \\<b>";
+        assert_eq!(without_html(text), "\\<script>x\\</script> a < b, T2 <- T1 \\<!-- --> \\<b>");
     }
 
     #[test]

@@ -21,7 +21,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
     Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, Recording,
-    ReferenceState,
+    ReferenceState, terminal_text,
 };
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
@@ -105,8 +105,12 @@ pub struct SurgeReport<'a> {
     pub surges: usize,
 }
 
-/// The report as Markdown.
+/// The report as Markdown. Names and messages from outside are in it, and no HTML.
 pub fn run_report(report: &RunReport<'_>) -> String {
+    markdown::without_html(&terminal_text(&markdown_report(report)))
+}
+
+fn markdown_report(report: &RunReport<'_>) -> String {
     let RunReport {
         machine,
         campaign,

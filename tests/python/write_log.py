@@ -9,6 +9,7 @@ FORMAT is one of
             first step, and a gap of 8 s
   xlsx      openpyxl: names, units, numbers
   mdf4      asammdf: one group a device, compressed blocks
+  mdf3      asammdf: the same in version 3.30, as older measuring systems write it
   mcap      mcap: one topic a device, units in the metadata
   tdms      npTDMS: one group a device, all channels waveforms with a start and an increment
   tdms_time npTDMS: one group a device, each with a channel of seconds
@@ -83,14 +84,20 @@ def write_xlsx(target, times, groups):
     book.save(target)
 
 
-def write_mdf4(target, times, groups):
+def write_mdf(target, times, groups, version, **saving):
     import asammdf
 
-    with asammdf.MDF(version="4.10") as mdf:
+    with asammdf.MDF(version=version) as mdf:
         for topic, fields in groups.items():
-            signals = [asammdf.Signal(values, times, name=field, unit=unit_of(field)) for field, values in fields.items()]
-            mdf.append(signals, acq_name=topic.split("/")[-1], common_timebase=True)
-        mdf.save(target, overwrite=True, compression=2)
+            device = topic.split("/")[-1]
+            # Groups have names since version 4.
+            name = "{1}" if version >= "4" else "{0}_{1}"
+            signals = [
+                asammdf.Signal(values, times, name=name.format(device, field), unit=unit_of(field))
+                for field, values in fields.items()
+            ]
+            mdf.append(signals, acq_name=device, common_timebase=True)
+        mdf.save(target, overwrite=True, **saving)
 
 
 START = np.datetime64("2026-11-22T09:58:21.300000", "us")
@@ -242,7 +249,9 @@ def main():
         case "mcap":
             write_mcap(target, times, groups)
         case "mdf4":
-            write_mdf4(target, times, groups)
+            write_mdf(target, times, groups, "4.10", compression=2)
+        case "mdf3":
+            write_mdf(target, times, groups, "3.30")
         case "tdms" | "tdms_time" | "tdms_date":
             write_tdms(target, times, groups, {"tdms_time": np.asarray, "tdms_date": stamps}.get(kind))
         case "parquet":

@@ -39,6 +39,7 @@ macro_rules! logs {
 }
 
 logs! {
+    mdf3,
     mdf4,
     #[cfg(feature = "tdms")]
     tdms,

@@ -24,16 +24,6 @@ fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ")
 }
 
-/// Bytes of the identification block that hold the version, as text and as a number.
-const OLD_HEAD: usize = 30;
-
-/// The version of a file before MDF 4, as its identification block writes it.
-fn old_version(head: &[u8]) -> Option<String> {
-    let text = std::str::from_utf8(head.get(8..16)?).ok()?.trim_matches(['\0', ' ']);
-    let major: u32 = text.split('.').next()?.parse().ok()?;
-    (head.starts_with(b"MDF") && major < 4).then(|| text.to_owned())
-}
-
 struct Mdf4 {
     path: LogFile,
     file: Mf4File,
@@ -47,16 +37,6 @@ struct Mdf4 {
 }
 
 fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
-    if let Some(version) = old_version(&path.head(OLD_HEAD)?) {
-        return Err(path.content(
-            "MDF",
-            format!(
-                "version {version} of MDF is not read, only 4; convert it, e.g. in Python: \
-                 `asammdf.MDF(\"{0}\").convert(\"4.10\").save(\"{0}.mf4\")`",
-                path.path().display()
-            ),
-        ));
-    }
     let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
     options.only(&["time", "time_unit", "missing"]).map_err(|why| path.content(NAME, why))?;
     let limits = OpenOptions { max_decompressed: BLOCK_LIMIT, ..OpenOptions::default() };

@@ -61,3 +61,14 @@ fn american_pressures_are_known() {
         proposal("Baro [inHg],Comp Inlet Press [inH2O],T1 [F]", |load| vec![29.12, -7.9 * load, 72.0]);
     assert!(found.of(Channel::P1).is_some_and(|inlet| inlet.gauge) && found.ambient.is_some());
 }
+
+/// A flow with its unit is as sure as its name; one without gets the unit that fits the wheel.
+#[test]
+fn a_flow_keeps_its_unit() {
+    let row = |load: f64| vec![30e3 + 90e3 * load, 0.03 + 0.12 * load, 99.0, 105.0 + 130.0 * load];
+    let found = proposal("n_TC [rpm],m_dot_C [kg/s],p1_C [kPa],p2_C [kPa]", row);
+    assert!(sure(&found).contains(&Channel::CompressorFlow));
+    let found = proposal("n_TC [rpm],m_dot_C,p1_C [kPa],p2_C [kPa]", row);
+    let flow = found.of(Channel::CompressorFlow).unwrap();
+    assert_eq!((flow.unit, flow.certainty), (Some("kg/s"), Certainty::Likely));
+}

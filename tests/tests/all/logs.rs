@@ -78,6 +78,9 @@ fn every_format_leads_to_the_same_points_to_the_last_digit() {
     let expected = run.identify(&mcap, &channels).exits(0).json()["points"].clone();
     assert_eq!(expected.as_array().unwrap().len(), 4);
     assert_eq!(run.identify(&mdf, &channels).exits(0).json()["points"], expected);
+    let (mdf, _) = run.log("mdf3", "log.mdf");
+    let channels = proposed(&mdf, "groups_3.yaml");
+    assert_eq!(run.identify(&mdf, &channels).exits(0).json()["points"], expected);
     let points = |kind: &str, name: &str| {
         let (log, _) = run.log(kind, name);
         let channels = proposed(&log, &format!("{kind}.yaml"));

@@ -60,7 +60,7 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
     proposal.channels.sort_by_key(|proposed| proposed.channel);
     shared_units::settle(&mut proposal, layout, survey);
     settle_gauge(&mut proposal, layout, survey, &units);
-    shared_units::settle_flow(&mut proposal, survey);
+    shared_units::settle_flow(&mut proposal, layout, survey);
     physics::judge(&mut proposal, layout, survey);
     proposal
 }

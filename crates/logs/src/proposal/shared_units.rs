@@ -79,7 +79,7 @@ const DENSITY: f64 = 1.15;
 const INLET_K: f64 = 298.0;
 
 /// Looks for the unit of a flow without one: pressure ratio and speed give the size of the wheel, and that the flow.
-pub(super) fn settle_flow(proposal: &mut Proposal, survey: &Survey) {
+pub(super) fn settle_flow(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
     let top = |channel: Channel, share: f64| -> Option<f64> {
         let proposed = proposal.of(channel).filter(|proposed| proposed.certainty > Certainty::Unsure)?;
         let unit = crate::units::unit(kind_of(channel), proposed.unit?).ok()?;
@@ -100,7 +100,8 @@ pub(super) fn settle_flow(proposal: &mut Proposal, survey: &Survey) {
         let Some(proposed) = proposal.channels.iter_mut().find(|proposed| proposed.channel == channel) else {
             continue;
         };
-        let Some(data) = survey.columns.get(proposed.column) else { continue };
+        let bare = layout.columns.get(proposed.column).is_some_and(|column| column.unit.is_none());
+        let Some(data) = survey.columns.get(proposed.column).filter(|_| bare) else { continue };
         let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
         let fitting = fitting_units(channel, low, high, 0.0);
         if !fitting.iter().any(|unit| Some(unit.symbol()) == proposed.unit) || fitting.len() < 2 {

@@ -47,4 +47,5 @@ mod tested;
 mod together;
 mod tour;
 mod transient;
+mod words;
 mod zero;

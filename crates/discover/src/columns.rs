@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
 /// Step for numerical slopes, as a share of a typical size.
-const BESIDE: f64 = 0.3;
+const SLOPE_STEP: f64 = 0.3;
 
 /// Base hypothesis of the search: the null hypothesis, or a library cause that stays free during the search.
 #[derive(Debug)]
@@ -78,10 +78,10 @@ impl<'a> Base<'a> {
         let places: Vec<usize> = (0..runs.len()).collect();
         let changes = parallel::map(&places, |place| {
             let mut there = self.hypothesis.clone();
-            let values = runs[*place].iter().map(|term| BESIDE * terms[*term].step).collect();
+            let values = runs[*place].iter().map(|term| SLOPE_STEP * terms[*term].step).collect();
             there.effects.push((first + place, values));
             let there = own.predict(&there).ok()?;
-            let change = there.values.iter().zip(&self.prediction.values).map(|(t, b)| (t - b) / BESIDE);
+            let change = there.values.iter().zip(&self.prediction.values).map(|(t, b)| (t - b) / SLOPE_STEP);
             Some(change.collect::<Vec<f64>>())
         });
         let mut of_terms: Vec<Option<Vec<f64>>> = vec![None; terms.len()];

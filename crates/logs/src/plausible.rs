@@ -4,6 +4,12 @@ use crate::units::{kind_of, unit};
 use mapper_core::{Channel, plausible};
 use mapper_yaml::units::{Kind, Unit};
 
+/// Share of a course left out at each end when its range is judged: spikes and dropouts.
+pub(crate) const OUTER: f64 = 0.02;
+
+/// The standard atmosphere (ISO 2533), Pa: the ambient pressure of a log that does not hold it.
+pub(crate) const STANDARD_ATMOSPHERE_PA: f64 = 101_325.0;
+
 /// Range of an ambient pressure, Pa.
 pub const AMBIENT_PA: (f64, f64) = (5e4, 1.1e5);
 

@@ -9,8 +9,8 @@ use crate::steps::StepMessage;
 use mapper_core::Event;
 use std::collections::BTreeMap;
 
-/// Breaks of several channels belong to one step of the clock if no more messages than this lie between them: a period of the
-/// slowest topic beside the fastest one.
+/// Breaks of several channels belong to one step of the clock if no more messages than this lie between them: the fastest topic sends
+/// as many while the slowest sends one.
 const NEAR: u64 = 1000;
 
 /// Clocks of channels and markers may differ by this much, ns.
@@ -37,7 +37,7 @@ pub(crate) fn repair_set_back(
         };
         let on_both_sides = |builder: &&SeriesBuilder| {
             let (first, last) = builder.positions();
-            first + NEAR < found.position && found.position + NEAR < last
+            first < found.position && found.position < last
         };
         let breaks: Vec<Option<Break>> = builders
             .values()

@@ -5,7 +5,7 @@ use mapper_driven::why::{Beyond, Cause, Diagnosis, HeldOut, Which, Word};
 use std::fmt::Write;
 
 /// Maximum number of causes shown in addition to the undecided ones.
-const BESIDE: usize = 3;
+const FURTHER_ROWS: usize = 3;
 /// Causes less likely than this are not shown.
 const NOT_WORTH: f64 = 0.005;
 
@@ -96,7 +96,9 @@ fn begun(words: &str) -> String {
 
 fn causes(text: &mut String, found: &Diagnosis) {
     let shown = |(place, cause): &(usize, &Cause)| {
-        *place < found.open || *place == 0 || (*place < found.open + BESIDE && cause.probability > NOT_WORTH)
+        *place < found.open
+            || *place == 0
+            || (*place < found.open + FURTHER_ROWS && cause.probability > NOT_WORTH)
     };
     let heads = ["cause", "probability", "size", "95 % interval", "left, K"].map(str::to_owned);
     let mut rows = table::with_heads(&heads);

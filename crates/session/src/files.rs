@@ -24,6 +24,10 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
     if existing == Existing::Kept || !path.exists() {
         return write_new(path, bytes);
     }
+    // A pipe or a device is written to and not replaced.
+    if path.metadata().is_ok_and(|about| !about.is_file()) {
+        return std::fs::write(path, bytes).map_err(SessionError::file("write", path));
+    }
     aside(path, bytes)
         .and_then(|file| file.persist(path).map_err(|error| error.error))
         .map(drop)

@@ -73,6 +73,8 @@ pub struct Latch {
 #[derive(Debug, Clone)]
 pub struct RigStates {
     directory: PathBuf,
+    /// Whether every user of the machine may write to them.
+    shared: bool,
 }
 
 /// A rig locked by this process. If dropped without [`release`](Claim::release), the owner's entry remains and the rig needs acknowledgement.
@@ -97,9 +99,10 @@ pub struct RigStatus {
 }
 
 impl RigStates {
-    /// States in a directory, which is created on demand.
+    /// States in a directory, which is created on demand. Only in that of [`shared_state`] may others write: a directory that was
+    /// given may hold keys and sockets as well.
     pub fn new(directory: &Path) -> Self {
-        RigStates { directory: directory.to_owned() }
+        RigStates { directory: directory.to_owned(), shared: directory == shared_state() }
     }
 
     fn file(&self, rig: &str, extension: &str) -> PathBuf {
@@ -110,10 +113,11 @@ impl RigStates {
 
     /// Opens a rig's lock; creates it, and the directory, on demand.
     fn open(&self, rig: &str) -> Result<(File, PathBuf), SessionError> {
-        make_shared_directory(&self.directory).map_err(SessionError::file("create", &self.directory))?;
+        make_directory(&self.directory, self.shared)
+            .map_err(SessionError::file("create", &self.directory))?;
         let path = self.file(rig, "lock");
         let file = open_plain(&path).or_else(|error| match error.kind() {
-            ErrorKind::NotFound => match create_shared(&path) {
+            ErrorKind::NotFound => match create_new(&path, self.shared) {
                 // Another runner was faster.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => open_plain(&path),
                 created => created,
@@ -351,20 +355,23 @@ fn open_plain(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Creates a file that every user of the machine may lock.
-fn create_shared(path: &Path) -> io::Result<File> {
+/// Creates a file; one that is shared every user of the machine may lock.
+fn create_new(path: &Path, shared: bool) -> io::Result<File> {
     let file = OpenOptions::new().read(true).write(true).create_new(true).open(path)?;
-    share(path, 0o666)?;
+    if shared {
+        share(path, 0o666)?;
+    }
     Ok(file)
 }
 
-/// Creates a directory in which every user may create files, and none may remove those of others.
-fn make_shared_directory(path: &Path) -> io::Result<()> {
+/// Creates a directory; in one that is shared every user may create files, and remove those of others: whoever has looked at the rig
+/// may acknowledge.
+fn make_directory(path: &Path, shared: bool) -> io::Result<()> {
     if path.is_dir() {
         return Ok(());
     }
     std::fs::create_dir_all(path)?;
-    share(path, 0o1777)
+    if shared { share(path, 0o777) } else { Ok(()) }
 }
 
 #[cfg(unix)]

@@ -128,7 +128,7 @@ pub(crate) const NS_PER_HOUR: i64 = NS_PER_DAY / 24;
 /// What has to be added from here on because a clock's readings began again, ns: a period where the reading has no date, an hour
 /// where local time goes back by one at the end of daylight saving; else 0.
 pub(crate) fn begun_again_ns(last_ns: i64, ns: i64, period_ns: i64) -> i64 {
-    let dated = ns >= 366 * NS_PER_DAY + NS_PER_DAY;
+    let dated = ns >= DATED_FROM_NS;
     let back_ns = last_ns.saturating_sub(ns);
     match dated {
         false if back_ns > period_ns / 2 => period_ns,
@@ -137,6 +137,9 @@ pub(crate) fn begun_again_ns(last_ns: i64, ns: i64, period_ns: i64) -> i64 {
         _ => 0,
     }
 }
+
+/// A reading from here on has a date, ns: days of the year and durations are below.
+const DATED_FROM_NS: i64 = 367 * NS_PER_DAY;
 
 /// A minute, ns: logs that are sampled less often have no transients.
 const NS_PER_MINUTE: i64 = NS_PER_HOUR / 60;

@@ -14,6 +14,10 @@ const NAME_LIMIT: usize = 1000;
 /// Minimum rows of the sample per quantity; with fewer the column does not contain names.
 const REPEATS: usize = 3;
 
+/// Where a column names the quantity, the name changes from row to row in at least this share of the rows. A column with the state
+/// of a stand keeps its word for many rows.
+const CHANGES: f64 = 0.5;
+
 /// Maximum further numbers in a row, such as a quality, in addition to time, name and value.
 const FURTHER_NUMBERS: usize = 2;
 
@@ -55,7 +59,10 @@ impl LongForm {
         let name = words.iter().copied().filter(|at| !is_unit(*at)).max_by_key(|at| distinct(*at))?;
         let value = numbers.iter().copied().max_by_key(|at| distinct(*at))?;
         let count = distinct(name);
-        if numbers.len() > 1 + FURTHER_NUMBERS
+        let names_of_rows: Vec<&String> = column(name).collect();
+        let changes = names_of_rows.windows(2).filter(|pair| pair[0] != pair[1]).count() as f64;
+        if changes < CHANGES * names_of_rows.len() as f64
+            || numbers.len() > 1 + FURTHER_NUMBERS
             || clock.is_empty()
             || !(2..=NAME_LIMIT).contains(&count)
             || REPEATS * count > data.len()

@@ -32,11 +32,11 @@ pub(crate) struct HeadColumn {
 /// Analyses the first rows of a table.
 pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<TableHead, String> {
     let length = typical_length(rows);
-    let rows = &without_comment_signs(rows, length);
     let given_row = options.data_row.map(|row| row - 1);
     let data_row = given_row
         .or_else(|| first_data_row(rows, length, decimal))
         .ok_or("no rows of numbers were found; say where they begin (`data_row`)")?;
+    let rows = &without_comment_signs(rows, data_row, length);
     let header: Vec<usize> = header_rows(rows, data_row, length);
     let units_row = match options.units_row {
         Some(row) => row.checked_sub(1),
@@ -81,7 +81,6 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
     let mut repeated = 0;
     for column in 0..width {
         let header = one_line(cell(names_row, column));
-        let header_text = header.clone();
         let own_unit = cell(units_row, column).trim_matches(['[', ']', '(', ')', ' ']);
         let (mut name, mut unit) = split_unit(&header);
         if units_row.is_some() {
@@ -111,7 +110,7 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
             repeated += 1;
             name = format!("{name} ({count})");
         }
-        let listed = listed_name(preamble, &header_text);
+        let listed = listed_name(preamble, &header);
         let description: Vec<&str> = labels
             .iter()
             .map(|row| label(rows, *row, column))
@@ -130,31 +129,52 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
     while columns.last().is_some_and(|column| column.header.is_empty()) && empty(columns.len() - 1) {
         columns.pop();
     }
+    let found = Found { names_row, units_row, distant_units, group_row, header: &header, data_row, repeated };
+    let findings = findings(&found, &columns, cell_units.len());
+    Ok(TableHead { columns, data_row, cell_units, findings })
+}
+
+/// The rows of a head.
+struct Found<'a> {
+    names_row: Option<usize>,
+    units_row: Option<usize>,
+    /// Row of units that is not next to the names.
+    distant_units: Option<usize>,
+    group_row: Option<usize>,
+    header: &'a [usize],
+    data_row: usize,
+    /// How many names are repeated.
+    repeated: usize,
+}
+
+/// What was found, in words.
+fn findings(found: &Found<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<String> {
     let mut findings = Vec::new();
     let row_number = |row: Option<usize>| row.map_or("none".to_owned(), |row| (row + 1).to_string());
-    let in_names = units_row.is_none() && columns.iter().any(|column| column.unit.is_some());
-    let units = if in_names { "in the names".to_owned() } else { row_number(units_row) };
+    let in_names = found.units_row.is_none() && columns.iter().any(|column| column.unit.is_some());
+    let units = if in_names { "in the names".to_owned() } else { row_number(found.units_row) };
     findings.push(format!(
         "header: names in row {}, units {}{}, data from row {} (names_row, units_row, data_row)",
-        row_number(names_row),
-        if units_row.is_some() { "in row " } else { "" },
+        row_number(found.names_row),
+        if found.units_row.is_some() { "in row " } else { "" },
         units,
-        data_row + 1
+        found.data_row + 1
     ));
-    if let Some(row) = distant_units.filter(|_| columns.iter().any(|column| column.unit.is_some())) {
+    if let Some(row) = found.distant_units.filter(|_| columns.iter().any(|column| column.unit.is_some())) {
         findings.push(format!("units of columns without one are in row {}", row + 1));
     }
-    if !cell_units.is_empty() {
-        findings.push(format!("{} columns have their unit behind each number", cell_units.len()));
+    if cell_units > 0 {
+        findings.push(format!("{} columns have their unit behind each number", cell_units));
     }
-    let before = group_row.or(header.first().copied()).unwrap_or(data_row);
+    let before = found.group_row.or(found.header.first().copied()).unwrap_or(found.data_row);
     if before > 0 {
         findings.push(format!("{before} rows before the header are passed over"));
     }
-    if repeated > 0 {
-        findings.push(format!("{repeated} names stand twice; the later ones are numbered: `name (2)`"));
+    if found.repeated > 0 {
+        findings
+            .push(format!("{} names are repeated; the later ones are numbered: `name (2)`", found.repeated));
     }
-    Ok(TableHead { columns, data_row, cell_units, findings })
+    findings
 }
 
 /// The long name that a list of channels above the table gives: the cell behind the one that holds the name.
@@ -168,10 +188,10 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Rows without the signs by which programs mark a header as a comment: `# time, p2`, `% t`, `// t`.
-fn without_comment_signs(rows: &[Vec<String>], length: usize) -> Vec<Vec<String>> {
+/// Rows whose header is without the signs by which programs mark it as a comment: `# time, p2`, `% t`, `// t`.
+fn without_comment_signs(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<Vec<String>> {
     let mut rows = rows.to_vec();
-    for row in &mut rows {
+    for row in rows.iter_mut().take(data_row) {
         let Some(first) = row.first() else { continue };
         let bare = first.trim_start_matches(['#', '%', '/']).trim_start().to_owned();
         if bare.len() == first.len() || header_unit(first).is_some() {
@@ -193,7 +213,7 @@ fn group_row(rows: &[Vec<String>], header: &[usize], length: usize) -> Option<us
     let filled: Vec<usize> = (0..cells.len()).filter(|column| !cells[*column].is_empty()).collect();
     let apart = filled.windows(2).all(|pair| pair[1] > pair[0] + 1);
     // A row of the preamble has a name, and its value next to it.
-    let groups = filled.len() > 1 && apart || filled.len() == 1 && filled[0] > 0;
+    let groups = filled.len() > 1 && apart;
     let words = filled.iter().all(|column| cells[*column].chars().any(char::is_alphabetic));
     (groups && words && cells.len() <= length && 2 * filled.len() < length).then_some(row)
 }

@@ -223,6 +223,21 @@ fn a_table_in_long_form_is_gathered() {
     assert_measured(&with_units, "p2", "T2", true);
 }
 
+/// A column of words is no name of quantities if it keeps its word: the state of a stand.
+#[test]
+fn a_state_is_no_name_of_a_quantity() {
+    let states = ["idle", "warm up", "step"];
+    let text = text("Time;State;p2 [kPa];T2 [degC]\n", |row| {
+        format!("{row};{};{};{}", states[row / 10 % 3], p2_kpa(row), t2_degc(row))
+    });
+    assert_measured(&text, "p2", "T2", true);
+    // Tags that begin with the sign of a comment.
+    let tags = (0..ROWS).fold("tag,time,value\n".to_owned(), |text, row| {
+        text + &format!("/daq/p2,{row},{}\n/daq/T2,{row},{}\n", p2_kpa(row), t2_degc(row))
+    });
+    assert_measured(&tags, "/daq/p2", "/daq/T2", false);
+}
+
 #[test]
 fn a_unit_that_changes_gives_no_number() {
     // An instrument that ranges by itself: 998 mbar, then 1.02 bar.

@@ -1,7 +1,7 @@
 //! Which library effects a side can diagnose, their smallest detectable size, and why the others cannot be diagnosed.
 
 use super::diagnosis::NotAsked;
-use super::fit::{BESIDE, Fit, Question, normal, whitened};
+use super::fit::{Fit, Question, SLOPE_STEP, normal, whitened};
 use super::side::Side;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::Coordinate;
@@ -78,7 +78,7 @@ pub(crate) fn smallest<S: Side>(
     let base = Hypothesis { effects: Vec::new(), nuisances: found.hypothesis.nuisances.clone() };
     let Some(predicted) = question.predict(&base) else { return (Vec::new(), Vec::new()) };
     let whitenings = question.whitenings(counts, &found.left_k);
-    let slopes = question.slopes(&base, &predicted, &[], BESIDE);
+    let slopes = question.slopes(&base, &predicted, &[], SLOPE_STEP);
     let none: Vec<Vec<f64>> = predicted.iter().map(|column| vec![0.0; column.len()]).collect();
     let (normal, columns) = normal(&whitenings, &slopes, &none, &vec![(0.0, 1.0); unknowns]);
     let Some(cholesky) = normal.matrix.cholesky() else { return (Vec::new(), Vec::new()) };

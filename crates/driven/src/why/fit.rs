@@ -58,8 +58,8 @@ const MAX_MOVED: f64 = 2.0;
 const ITERATIONS: usize = 15;
 const ENOUGH: f64 = 0.02;
 /// Step from a hypothesis to the runs from which slopes are taken, in the coordinates' units, and the step if such slopes lead nowhere.
-pub(crate) const BESIDE: f64 = 0.02;
-const BESIDE_COARSE: f64 = 0.2;
+pub(crate) const SLOPE_STEP: f64 = 0.02;
+const COARSE_SLOPE_STEP: f64 = 0.2;
 
 impl<S: Side> Question<'_, S> {
     /// Nothing but what is not known.
@@ -181,7 +181,7 @@ impl<S: Side> Question<'_, S> {
     pub(crate) fn beside(&self, fit: &Fit, counts: &[bool]) -> Option<LinearisedFit<'_, '_, S>> {
         let whitenings = self.whitenings(counts, &fit.left_k);
         let coordinates = self.coordinates(&fit.hypothesis);
-        let slopes = self.slopes(&fit.hypothesis, &fit.predicted, &coordinates, BESIDE);
+        let slopes = self.slopes(&fit.hypothesis, &fit.predicted, &coordinates, SLOPE_STEP);
         let columns = slopes.iter().map(|slope| whitened(&whitenings, slope)).collect();
         let residual = whitened(&whitenings, &self.residual(&fit.predicted));
         let precision = fit.precision.clone().cholesky()?;
@@ -347,7 +347,7 @@ impl<S: Side> Model for Fitted<'_, '_, S> {
     }
 
     fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
-        let step = if reach == Reach::Fine { BESIDE } else { BESIDE_COARSE };
+        let step = if reach == Reach::Fine { SLOPE_STEP } else { COARSE_SLOPE_STEP };
         let slopes = self.question.slopes(&point.hypothesis, &point.predicted, &self.coordinates, step);
         normal(&self.whitenings, &slopes, &point.residual, &self.pulls(unknowns)).0
     }

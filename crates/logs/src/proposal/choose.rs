@@ -3,14 +3,11 @@
 use super::names::{Weight, channels_of, is_ambient, is_derived, plain};
 use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
 use super::{physics, shared_units};
-use crate::plausible::{AMBIENT_PA, fits, fitting_units, looks_like_gauge};
+use crate::plausible::{AMBIENT_PA, OUTER, fits, fitting_units, looks_like_gauge};
 use crate::units::kind_of;
 use crate::{Column, ColumnSurvey, Layout, Survey};
 use mapper_core::{CHANNELS, Channel, plausible};
 use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, volume_flow_m3_s};
-
-/// Share of a trace left out at each end when its range is judged.
-const OUTER: f64 = 0.02;
 
 /// A column as a candidate for a channel.
 struct Candidate {

@@ -2,12 +2,10 @@
 
 use super::names::plain;
 use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+use crate::plausible::STANDARD_ATMOSPHERE_PA;
 use crate::units::{kind_of, unit};
 use crate::{Layout, Survey};
 use mapper_core::Channel;
-
-/// The standard atmosphere, Pa.
-const STANDARD_ATMOSPHERE_PA: f64 = 101_325.0;
 
 /// Share of the samples that must agree.
 const AGREEMENT: f64 = 0.9;

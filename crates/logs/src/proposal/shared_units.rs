@@ -1,21 +1,16 @@
 //! Units of a log that gives none: columns of one kind share a unit, and physics settles the rest.
 
 use super::proposed::{Certainty, Proposal, ProposedChannel};
-use crate::plausible::fitting_units;
+use crate::plausible::{OUTER, STANDARD_ATMOSPHERE_PA, fitting_units};
 use crate::units::kind_of;
 use crate::{Layout, Survey};
 use mapper_core::Channel;
 use mapper_yaml::units::{Kind, Unit};
 use std::f64::consts::PI;
 
-/// Share of a course left out at each end.
-const OUTER: f64 = 0.02;
-
-/// Largest ratio of pressures of a single-stage compressor, and of the turbine behind it.
+/// Largest ratio of pressures: one stage of a turbocharger reaches 6, where the tip speed of aluminium wheels ends; a third more is margin for
+/// an inlet below the atmosphere.
 const LARGEST_RATIO: f64 = 8.0;
-
-/// The standard atmosphere, Pa: the inlet of a log that does not hold it.
-const STANDARD_ATMOSPHERE_PA: f64 = 101_325.0;
 
 /// Looks for one unit that fits all channels of a kind without a unit.
 pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
@@ -69,10 +64,12 @@ const HEAD_COEFFICIENT: f64 = 0.45;
 /// Flow over density, tip speed and disc area: wheels from 0.01 to 0.15 are radial.
 const FLOW_COEFFICIENT: f64 = 0.06;
 
-/// Both ranges together allow a flow this many times as large or small; units differ by factors of 60 and more.
+/// A flow may be this many times as large or small: both ranges together, from 0.1 to 4 times the middle, and a margin. If units that
+/// differ by less (g/s and kg/h: 3.6) are plausible too, nothing is settled.
 const FLOW_FACTOR: f64 = 8.0;
 
-/// Specific heat of air at constant pressure, J/(kg K), and its exponent (gamma - 1) / gamma; density at the inlet, kg/m3.
+/// Dry air at room temperature: specific heat at constant pressure, J/(kg K), (gamma - 1) / gamma, and density at the inlet, kg/m3,
+/// each within some per cent, which the factor above makes little of.
 const CP: f64 = 1005.0;
 const EXPONENT: f64 = 0.2857;
 const DENSITY: f64 = 1.15;

@@ -49,6 +49,8 @@ def plot_map(points: pd.DataFrame, fitted: pd.DataFrame | None, title: str, ax: 
         place = (end["flow_corrected_kg_s"], end["pressure_ratio"])
         label = f"{float(str(speed)) / 1e3:.0f} krpm"
         drawn.annotate(label, place, xytext=(-4, 4), textcoords="offset points", ha="right", fontsize="x-small")
+    # Room for the labels at the left ends.
+    drawn.margins(x=0.16)
     drawn.figure.colorbar(shown, ax=drawn, label="isentropic efficiency [%]")
     drawn.set(xlabel="corrected mass flow [kg/s]", ylabel="pressure ratio", title=title)
     return drawn

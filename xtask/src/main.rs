@@ -1,4 +1,4 @@
-//! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `wheel` and `performance`.
+//! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `python`, `wheel` and `performance`.
 
 mod constants;
 mod docs;
@@ -28,6 +28,7 @@ usage: cargo xtask COMMAND
   fmt            format every file, those included that a macro declares and `cargo fmt` does not see
   docs           make the generated documents again
   docs --check   fail where a generated document is not what the program makes now
+  python         the tests of the Python package alone
   wheel          build the Python package's wheel and test it in an empty environment
   performance    measure, with peers for comparison if they can be built, and write docs/performance.md
 ";
@@ -43,6 +44,7 @@ fn main() -> ExitCode {
         ["fmt"] => formatting::formatting(formatting::Mode::Write),
         ["docs"] => docs::docs(docs::Mode::Write),
         ["docs", "--check"] => docs::docs(docs::Mode::Check),
+        ["python"] => test::python(),
         ["wheel"] => python_package::wheel(),
         ["performance"] => performance::performance(),
         ["--help" | "-h" | "help"] => {

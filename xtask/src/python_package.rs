@@ -27,15 +27,27 @@ pub fn check(offered: &Offered) -> Result<(), Error> {
             .current_dir(workspace::root().join("python"));
         command
     };
-    run(of(&["-m", "ruff", "check", "."]))?;
-    run(of(&["-m", "mypy"]))?;
-    run(of(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))?;
+    let tests = || {
+        run(of(&["-m", "ruff", "check", "."]))?;
+        run(of(&["-m", "mypy"]))?;
+        run(of(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))
+    };
+    // Both at once: neither keeps two processors busy.
+    let (tested, executed) = std::thread::scope(|scope| {
+        let tests = scope.spawn(tests);
+        let executed = execute_notebooks(&of);
+        (tests.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), executed)
+    });
+    tested.and(executed)
+}
+
+/// Runs every notebook in its directory; they write into temporary ones.
+fn execute_notebooks(of: &dyn Fn(&[&str]) -> Command) -> Result<(), Error> {
+    let script = "import nbformat, nbclient, sys\n\
+                  book = nbformat.read(sys.argv[1], as_version=4)\n\
+                  nbclient.NotebookClient(book, timeout=600, kernel_name='python3').execute()";
     let notebooks = workspace::root().join("examples/notebooks");
     for notebook in files(&notebooks)? {
-        // They write into temporary directories.
-        let script = "import nbformat, nbclient, sys\n\
-                      book = nbformat.read(sys.argv[1], as_version=4)\n\
-                      nbclient.NotebookClient(book, timeout=600, kernel_name='python3').execute()";
         let mut execute = of(&["-c", script, &notebook.to_string_lossy()]);
         execute.current_dir(&notebooks);
         run(execute)?;

@@ -59,12 +59,7 @@ pub fn test() -> Result<(), Error> {
         command.env("RUSTDOCFLAGS", "-D warnings");
         run(command)
     });
-    steps.run("building", || {
-        // The program in one go with all tests: alone it would have other features of some libraries, and they
-        // would be built twice.
-        let all = ["build", "--workspace", "--all-features", "--lib", "--bins", "--tests", "--quiet"];
-        run(offered.to(cargo(&[&all[..], EXAMPLES].concat())))
-    });
+    steps.run("building", || build(&offered));
     steps.run("tests", || tests(&offered));
     steps.run("Python package", || python_package::check(&offered));
     steps.run("generated documents", || docs::docs(docs::Mode::Check));
@@ -83,6 +78,19 @@ pub fn test() -> Result<(), Error> {
         );
     }
     result
+}
+
+/// The tests of the Python package alone.
+pub fn python() -> Result<(), Error> {
+    let offered = Offered::with(python_env::prepare()?);
+    build(&offered)?;
+    python_package::check(&offered)
+}
+
+/// The program in one go with all tests: alone it would have other features of some libraries, and they would be built twice.
+fn build(offered: &Offered) -> Result<(), Error> {
+    let all = ["build", "--workspace", "--all-features", "--lib", "--bins", "--tests", "--quiet"];
+    run(offered.to(cargo(&[&all[..], EXAMPLES].concat())))
 }
 
 fn cargo(arguments: &[&str]) -> Command {

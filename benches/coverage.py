@@ -1,7 +1,7 @@
 """Do the 95 % intervals hold on machines that differ? Campaigns with drawn machines, on the virtual lab.
 
     cargo build --release
-    python3 benches/coverage.py --mapper target/release/mapper --write docs/coverage.md
+    python3 benches/coverage.py --mapper target/release/mapper --write docs/validation/coverage.md
 
 Each campaign has a machine of its own: a map that falls by 0 to 8 points more towards low speed and drops more or less
 steeply at choke, a housing 0.7 to 1.6 times as heavy, convection by another law (exponent 0.75 to 1.15, 0.7 to 1.4 times as
@@ -166,7 +166,7 @@ PAGE = """\
 
 Generated; do not edit. The command, some ten minutes on two cores:
 
-    python3 benches/coverage.py --mapper target/release/mapper --campaigns {campaigns} --first {first} --write docs/coverage.md
+    python3 benches/coverage.py --mapper target/release/mapper --campaigns {campaigns} --first {first} --write docs/validation/coverage.md
 
 {campaigns} campaigns, each with a machine, a grid, tolerances, noise and offsets of its own: maps that fall by 0 to 8 points more
 towards low speed and drop more or less steeply at choke, housings 0.7 to 1.6 times as heavy, convection with exponents from 0.75

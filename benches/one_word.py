@@ -25,7 +25,7 @@ PARTS = [
     ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
     ("method: joint ", "method: dynamic "),
 ]
-GUIDE = (ROOT / "docs/rig.md").read_text()
+GUIDE = (ROOT / "docs/how-to/rig.md").read_text()
 
 
 def campaign(path, backend):

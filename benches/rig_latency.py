@@ -42,7 +42,7 @@ GUARD = "guards: {overspeed: {above: 60 krpm, dwell: 0 s}}\n"
 
 def campaign(driver, port, directory, guard, security):
     text = (ROOT / "campaigns/turbo_a.yaml").read_text()
-    guide = (ROOT / "docs/rig.md").read_text().split(f"```yaml\nbackend:\n  {driver}:\n")[1].split("\n```")[0]
+    guide = (ROOT / "docs/how-to/rig.md").read_text().split(f"```yaml\nbackend:\n  {driver}:\n")[1].split("\n```")[0]
     guide = guide.replace(":5020 ", f":{port} ").replace(":4840", f":{port}")
     if driver == "opcua":
         lines = guide.replace("basic256_sha256 ", f"{security} ").splitlines()

@@ -1,4 +1,4 @@
-"""Drivers for mapper in Python: one file, only the standard library. docs/protocol.md describes the messages.
+"""Drivers for mapper in Python: one file, only the standard library. docs/reference/protocol.md describes the messages.
 
 An author writes a class with the methods of Rig and calls serve(). Frames, hello, lease, and the safe trajectory without a host
 (lease over, input closed, SIGTERM) are done here, over pipes or at a socket. A call that hangs keeps the rig from becoming safe:
@@ -39,7 +39,7 @@ UNITS = {
 
 
 class Refused(Exception):
-    """A refused request: code of docs/protocol.md, one sentence, and the data of the code."""
+    """A refused request: code of docs/reference/protocol.md, one sentence, and the data of the code."""
 
     def __init__(self, code, message, **more):
         super().__init__(message)
@@ -50,7 +50,7 @@ class Rig:
     """The interface that an author implements. Times are seconds since arming."""
 
     def describe(self):
-        """A dict as `description` of docs/protocol.md; see description()."""
+        """A dict as `description` of docs/reference/protocol.md; see description()."""
         raise NotImplementedError
 
     def arm(self):
@@ -77,7 +77,7 @@ class Rig:
 
 
 def description(channels, sample_rate_hz, simulated_time, accepts, safe, needs_guarded=(), exclusive=None):
-    """A description; channels by their symbols, accepts and safe as in docs/protocol.md."""
+    """A description; channels by their symbols, accepts and safe as in docs/reference/protocol.md."""
     return {
         "channels": [{"name": name, "unit": UNITS[name]} for name in channels],
         "sample_rate_hz": sample_rate_hz, "simulated_time": simulated_time, "controls": True, "exclusive": exclusive,

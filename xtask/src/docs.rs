@@ -18,8 +18,14 @@ pub enum Mode {
 }
 
 /// What is generated below docs: files, and folders with all that is in them.
-const GENERATED: &[&str] =
-    &["constants.md", "reproduction.md", "reproduction", "sequences.md", "turbo_a.svg", "real-data"];
+const GENERATED: &[&str] = &[
+    "images/turbo_a.svg",
+    "reference/constants.md",
+    "reference/sequences.md",
+    "validation/real-data",
+    "validation/reproduction",
+    "validation/reproduction.md",
+];
 
 /// The README's picture is the map of this campaign.
 const SHIPPED: &str = "campaigns/turbo_a.yaml";
@@ -27,7 +33,7 @@ const SHIPPED: &str = "campaigns/turbo_a.yaml";
 /// The example that writes the page of sequences.
 pub const EXAMPLE: &str = "sequence_docs";
 
-/// Folder of the measured data that docs/real-data.md describes, with the inputs of `mapper transient`.
+/// Folder of the measured data that docs/validation/real-data.md describes, with the inputs of `mapper transient`.
 const MEASURED: &str = "examples/real/turbotools";
 
 /// Writes or checks everything that is generated.
@@ -43,12 +49,13 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     let (reproduced, others) = std::thread::scope(|scope| {
         let others = scope.spawn(|| {
             let page = output(command(&programs.sequence_docs, &[]))? + "\n";
-            write(&made.join("sequences.md"), page.as_bytes())?;
-            write(&made.join("constants.md"), constants::page()?.as_bytes())?;
+            write(&made.join("reference/sequences.md"), page.as_bytes())?;
+            write(&made.join("reference/constants.md"), constants::page()?.as_bytes())?;
             mapped(&programs, &made)?;
             measured(&programs, &made)
         });
-        let reproduced = run(command(&programs.mapper, &["reproduce", "--out", &made.to_string_lossy()]));
+        let figures = made.join("validation");
+        let reproduced = run(command(&programs.mapper, &["reproduce", "--out", &figures.to_string_lossy()]));
         (reproduced, others.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     });
     reproduced?;
@@ -92,7 +99,7 @@ fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
     run(command(&programs.mapper, &["run", SHIPPED, "--out", &runs.to_string_lossy()]))?;
     for run in fs::read_dir(&runs).map_err(at(&runs))? {
         let map = run.map_err(at(&runs))?.path().join("map.svg");
-        write(&made.join("turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
+        write(&made.join("images/turbo_a.svg"), &fs::read(&map).map_err(at(&map))?)?;
     }
     Ok(())
 }
@@ -111,7 +118,7 @@ fn measured(programs: &Programs, made: &Path) -> Result<(), Error> {
     run(command(&programs.mapper, &[&given[..], &["--out", &shown]].concat()))?;
     for name in ["transient.svg", "transient.txt"] {
         let path = out.join(name);
-        write(&made.join("real-data").join(name), &fs::read(&path).map_err(at(&path))?)?;
+        write(&made.join("validation/real-data").join(name), &fs::read(&path).map_err(at(&path))?)?;
     }
     Ok(())
 }

@@ -30,7 +30,7 @@ usage: cargo xtask COMMAND
   docs --check   fail where a generated document is not what the program makes now
   python         the tests of the Python package alone
   wheel          build the Python package's wheel and test it in an empty environment
-  performance    measure, with peers for comparison if they can be built, and write docs/performance.md
+  performance    measure, with peers for comparison if they can be built, and write docs/validation/performance.md
 ";
 
 #[allow(clippy::print_stderr)]

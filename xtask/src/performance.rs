@@ -1,4 +1,4 @@
-//! `cargo xtask performance`: measures, with peers for comparison if they can be built, and writes docs/performance.md.
+//! `cargo xtask performance`: measures, with peers for comparison if they can be built, and writes docs/validation/performance.md.
 
 use crate::error::Error;
 use crate::step::{self, command, output, run, say};
@@ -29,7 +29,7 @@ pub fn performance() -> Result<(), Error> {
     identification(&mut page)?;
     // Measured by hand: a release build from nothing takes minutes, and its parts need a judgement.
     page.push_str(include_str!("build_time.md"));
-    let path = workspace::root().join("docs/performance.md");
+    let path = workspace::root().join("docs/validation/performance.md");
     fs::write(&path, &page).map_err(|source| Error::File { path: path.clone(), source })?;
     say(&page);
     Ok(())

@@ -179,7 +179,7 @@ pub(crate) struct CampaignFile {
     /// Order of the points. `thermal_gradient`, the default, maximises the sum of the housing's temperature changes (Burke et al., figure 13 b), `min_gradient` the smallest of them; `speed_lines` follows speed lines (figure 13 a), `conventional` too, and holds each point until it no longer drifts; `listed` keeps the order of the grid.
     #[serde(default)]
     order: VisitOrder,
-    /// A rhai script that chooses the next step, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/sequences.md lists the functions it may call.
+    /// A rhai script that chooses the next step, in place of `order`: its file, ending in `.rhai`, from the campaign's own directory. docs/reference/sequences.md lists the functions it may call.
     #[schemars(regex(pattern = r"\.rhai$"), example = &"scripts/zigzag.rhai")]
     sequence: Option<String>,
     /// A jump that is repeated to show drift: by default at least twice, and every 12 steps; `off` for none. A sequence script makes its own repeats.

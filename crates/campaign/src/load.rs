@@ -130,7 +130,7 @@ pub fn backend_mistake(
         source =
             Source::new(&DOCUMENT, origin, &[&text[..span.start], &asterisks, &text[span.end..]].concat());
     }
-    let remedy = "the settings of each backend are listed in docs/tour.md".to_owned();
+    let remedy = "the settings of each backend are listed in docs/tutorials/first_map.md".to_owned();
     let kind = FindingKind::WrongValue;
     notes.push(source.finding(kind, path_text(&steps), span, message.to_owned(), remedy));
     Findings::new(source, notes)

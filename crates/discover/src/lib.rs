@@ -1,4 +1,4 @@
-//! Discovery outside the effect library: the residual source term in each balance, its location, and a law for it. See `docs/gap.md` for
+//! Discovery outside the effect library: the residual source term in each balance, its location, and a law for it. See `docs/explanation/gap.md` for
 //! the method and its limits.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

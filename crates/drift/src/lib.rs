@@ -2,7 +2,7 @@
 //!
 //! The recorded boundary conditions drive the nominal model through all steps. Constants over the campaign explain part of the residual:
 //! declared tolerances and offsets, and a deviation of each operating point that its repeats share. The most probable set of causes, each with
-//! a time history ([`mapper_inference::hypotheses`]), explains the rest. Only repeats give evidence against the constants. docs/drift.md has
+//! a time history ([`mapper_inference::hypotheses`]), explains the rest. Only repeats give evidence against the constants. docs/how-to/drift.md has
 //! the method with its measured error rates.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,5 +1,5 @@
 //! The decision on simulated campaigns: no drift, drifts at three times the printed limit, and what cannot be judged.
-//! Error rates over many campaigns are the business of `examples/drift_study`, with their figures in docs/drift.md.
+//! Error rates over many campaigns are the business of `examples/drift_study`, with their figures in docs/how-to/drift.md.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;

@@ -27,7 +27,7 @@ fn diagnosis(recording: &Recording, side: Which, fit_until_s: f64) -> Diagnosis 
 }
 
 const COMPRESSOR: Which = Which::Compressor;
-/// Two; docs/real-data.md has ten.
+/// Two; docs/validation/real-data.md has ten.
 fn seeds() -> u64 {
     std::env::var("MAPPER_WHY_SEEDS").map_or(2, |seeds| seeds.parse().unwrap())
 }

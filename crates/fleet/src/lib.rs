@@ -3,7 +3,7 @@
 //! A study becomes items, each a small file named by the SHA-256 of its bytes. A worker writes one part file per item.
 //! Parts merge into the result that one machine alone would write. All state is in the directory: no daemon, no
 //! database, no clock. A [`Kind`] defines the items and the work; this crate contains no physics.
-//! docs/fleet.md specifies the contract.
+//! docs/how-to/fleet.md specifies the contract.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,4 +1,4 @@
-//! Diagnosis of the gap between the model and a rig: its location, its cause, the gap reduction and the next step. See `docs/gap.md` for
+//! Diagnosis of the gap between the model and a rig: its location, its cause, the gap reduction and the next step. See `docs/explanation/gap.md` for
 //! the method and its limits.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

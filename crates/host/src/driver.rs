@@ -35,7 +35,7 @@ pub struct Patience {
     pub silence: Duration,
 }
 
-/// Values of docs/protocol.md.
+/// Values of docs/reference/protocol.md.
 pub const PATIENCE: Patience = Patience {
     hello: Duration::from_secs(5),
     slow: Duration::from_secs(10),

@@ -7,7 +7,15 @@ pub const KNOWN: &[(&str, &str, &str)] = &[
         "the virtual lab behind the protocol, to rehearse on",
         "cargo build --release -p mapper-backend-lab",
     ),
-    ("modbus", "a PLC that speaks Modbus TCP, docs/rig.md", "cargo build --release -p mapper-backend-modbus"),
-    ("ak", "an instrument, read alone, docs/rig.md", "cargo build --release -p mapper-backend-ak"),
-    ("opcua", "a PLC that speaks OPC UA, docs/rig.md", "cargo build --release -p mapper-backend-opcua"),
+    (
+        "modbus",
+        "a PLC that speaks Modbus TCP, docs/how-to/rig.md",
+        "cargo build --release -p mapper-backend-modbus",
+    ),
+    ("ak", "an instrument, read alone, docs/how-to/rig.md", "cargo build --release -p mapper-backend-ak"),
+    (
+        "opcua",
+        "a PLC that speaks OPC UA, docs/how-to/rig.md",
+        "cargo build --release -p mapper-backend-opcua",
+    ),
 ];

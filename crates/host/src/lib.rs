@@ -1,5 +1,5 @@
 //! Drivers as backends: separate programs, found by name, behind the interface [`Backend`](mapper_core::Backend). Whatever the driver sends, all
-//! calls have timeouts and all queues have limits. docs/protocol.md defines the protocol.
+//! calls have timeouts and all queues have limits. docs/reference/protocol.md defines the protocol.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,7 +1,7 @@
 //! The page of a run: one self-contained HTML file for a browser, a phone and print.
 //!
 //! All text is in the page itself, as headings and tables. Its script makes the drawings from the data in the page.
-//! No request leaves the page: its content policy allows none. `docs/report.md` describes the source of each
+//! No request leaves the page: its content policy allows none. `docs/how-to/report.md` describes the source of each
 //! number.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]

@@ -1,6 +1,6 @@
 //! Orders grids of any size on the nominal machine and says what that gives and takes.
 //!
-//! `planner_speed POINTS [ORDER] [EFFORT] [SEED] [DWELL]`: 18 is the grid of docs/planner.md, others are rectangular grids from
+//! `planner_speed POINTS [ORDER] [EFFORT] [SEED] [DWELL]`: 18 is the grid of docs/explanation/planner.md, others are rectangular grids from
 //! 50 to 150 krpm and opening 0.5 to 2.5. Prints one line: points, order, effort, seed, sum, smallest, bounds, seconds.
 
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]

@@ -37,7 +37,7 @@ pub struct Effort {
 
 impl Effort {
     /// A fraction of a second for 50 points, some seconds for 2000; `factor` scales the moves. Ten times as many find sums that are
-    /// larger by less than 0.3 % (docs/planner.md).
+    /// larger by less than 0.3 % (docs/explanation/planner.md).
     pub fn usual(points: usize, factor: f64) -> Self {
         let (moves, starts) = match points {
             0..=40 => (10_000.0, 16),

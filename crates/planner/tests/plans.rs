@@ -1,4 +1,4 @@
-//! Plans on the nominal machine: the 18-point grid of docs/planner.md and small ones.
+//! Plans on the nominal machine: the 18-point grid of docs/explanation/planner.md and small ones.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -1,5 +1,5 @@
 //! The protocol between the runner and a driver, a program of its own that speaks for a rig: frames, messages and what they
-//! mean in the words of [`mapper_core`]. Specified in docs/protocol.md; the JSON schema of the messages is made from these types.
+//! mean in the words of [`mapper_core`]. Specified in docs/reference/protocol.md; the JSON schema of the messages is made from these types.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

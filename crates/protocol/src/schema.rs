@@ -182,11 +182,16 @@ mod tests {
     /// `MAPPER_WRITE_SCHEMA=1 cargo test -p mapper-protocol the_committed_schema`.
     #[test]
     fn the_committed_schema_is_that_of_the_types() {
-        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/protocol.schema.json");
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../docs/reference/protocol.schema.json");
         let made = format!("{}\n", serde_json::to_string_pretty(&super::schema()).unwrap());
         if std::env::var_os("MAPPER_WRITE_SCHEMA").is_some() {
             std::fs::write(&file, &made).unwrap();
         }
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), made, "make docs/protocol.schema.json again");
+        assert_eq!(
+            std::fs::read_to_string(&file).unwrap(),
+            made,
+            "make docs/reference/protocol.schema.json again"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Prints docs/sequences.md.
+//! Prints docs/reference/sequences.md.
 
 use std::io::Write;
 

@@ -27,7 +27,7 @@ const HEAD: &str = "# The paper's figures, redone
 Generated; do not edit. The command that makes this page and its pictures:
 
 ```
-mapper reproduce --out docs
+mapper reproduce --out docs/validation
 ```
 
 R. D. Burke and others, dynamic identification of thermodynamic parameters for turbocharger compressor models: the

@@ -3,7 +3,10 @@
 
 #[test]
 fn the_documentation_is_what_the_functions_say() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/sequences.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/sequences.md");
     let written = std::fs::read_to_string(path).unwrap();
-    assert!(written == mapper_report::sequence_page(), "docs/sequences.md is stale: run `cargo xtask docs`");
+    assert!(
+        written == mapper_report::sequence_page(),
+        "docs/reference/sequences.md is stale: run `cargo xtask docs`"
+    );
 }

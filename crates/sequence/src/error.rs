@@ -173,7 +173,7 @@ fn words(error: EvalAltResult) -> (String, String) {
         }
         EvalAltResult::ErrorFunctionNotFound(signature, _) => (
             format!("no function `{signature}` exists for sequence scripts"),
-            "docs/sequences.md lists the functions and what they take".to_owned(),
+            "docs/reference/sequences.md lists the functions and what they take".to_owned(),
         ),
         other => {
             let mut other = other;

@@ -102,7 +102,7 @@ fn unknown(known: &Known, name: &str, count: usize) -> Option<(String, String)> 
     Some((message, LISTED.to_owned()))
 }
 
-const LISTED: &str = "docs/sequences.md lists the functions and what they take";
+const LISTED: &str = "docs/reference/sequences.md lists the functions and what they take";
 
 fn remedy(name: &str, among: &[&str]) -> String {
     match closest(name, among) {

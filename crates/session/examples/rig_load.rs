@@ -1,4 +1,4 @@
-//! Measures CPU time and latency of a run on a stand with 24 sensors, and with an additional pressure at 1 kHz: docs/performance.md.
+//! Measures CPU time and latency of a run on a stand with 24 sensors, and with an additional pressure at 1 kHz: docs/validation/performance.md.
 //!
 //! ```text
 //! cargo run --release -p mapper-session --example rig_load

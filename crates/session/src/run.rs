@@ -34,7 +34,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Deadlines for rig calls. Arming and release get slightly more time than a driver has (docs/protocol.md).
+/// Deadlines for rig calls. Arming and release get slightly more time than a driver has (docs/reference/protocol.md).
 const DEADLINES: Deadlines = Deadlines { arming: Duration::from_secs(11), call: Duration::from_secs(2) };
 
 /// Request for a run.

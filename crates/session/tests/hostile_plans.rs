@@ -12,7 +12,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 use shipped::campaign;
 
-/// Two weeks and a day, s: the longest run and the longest step that docs/safety.md allows.
+/// Two weeks and a day, s: the longest run and the longest step that docs/reference/safety.md allows.
 const RUN_MAX_S: f64 = 14.0 * 86_400.0;
 const STEP_MAX_S: f64 = 86_400.0;
 

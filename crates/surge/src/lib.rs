@@ -2,7 +2,7 @@
 //!
 //! A [`SurgeReading`] holds the readings at one opening. [`SurgeEstimate`] extrapolates the growth of the variation to the flow at
 //! which it would diverge. [`next_move`] limits the next closing of the valve, and [`surge_marks`] applies the same rules to a whole
-//! recording. docs/maps.md describes them.
+//! recording. docs/reference/maps.md describes them.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

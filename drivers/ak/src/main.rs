@@ -1,4 +1,4 @@
-//! `mapper-backend-ak`: measuring instruments that speak the AK protocol over TCP; docs/rig.md has its settings.
+//! `mapper-backend-ak`: measuring instruments that speak the AK protocol over TCP; docs/how-to/rig.md has its settings.
 
 mod rig;
 mod settings;
@@ -8,7 +8,7 @@ fn main() -> std::process::ExitCode {
         name: settings::NAME,
         version: env!("CARGO_PKG_VERSION"),
         summary: "Instruments of a test bed that speak the AK telegram over TCP; they are read alone.",
-        settings: r#"docs/rig.md, "Instruments beside the PLC""#,
+        settings: r#"docs/how-to/rig.md, "Instruments beside the PLC""#,
     };
     about.serve(rig::open)
 }

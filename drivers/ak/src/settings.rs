@@ -58,7 +58,7 @@ fn one() -> f64 {
 /// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
-    #[error("{0}; docs/rig.md has an example of all settings")]
+    #[error("{0}; docs/how-to/rig.md has an example of all settings")]
     Form(serde_json::Error),
     #[error("{value} {unit} is outside {low} to {high} {unit}")]
     Outside { value: f64, unit: &'static str, low: f64, high: f64 },

@@ -1,5 +1,5 @@
 //! The common part of every driver. An author writes a [`Backend`] and calls [`About::serve`], or [`serve`] if it is never started by hand.
-//! Frames, hello, lease and the safe trajectory without a host are done here, over pipes or a socket; docs/protocol.md describes the messages.
+//! Frames, hello, lease and the safe trajectory without a host are done here, over pipes or a socket; docs/reference/protocol.md describes the messages.
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {

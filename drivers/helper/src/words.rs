@@ -17,7 +17,7 @@ pub struct About {
     pub settings: &'static str,
 }
 
-/// The option for the socket of a driver that was started in advance, docs/protocol.md.
+/// The option for the socket of a driver that was started in advance, docs/reference/protocol.md.
 pub const SOCKET: &str = "--socket";
 /// Exit code of wrong arguments, as usual.
 const WRONG_ARGUMENTS: u8 = 2;

@@ -1,5 +1,5 @@
 //! `mapper-lab-server`: the virtual lab of a campaign behind a real server, in real or scaled time. It serves to rehearse a night, including
-//! interlocks and effects; docs/rig.md has the addresses.
+//! interlocks and effects; docs/how-to/rig.md has the addresses.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

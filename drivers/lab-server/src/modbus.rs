@@ -1,4 +1,4 @@
-//! The stand as holding registers, as in the example of docs/rig.md: readings from 0 and setpoints from 100 as singles of two registers,
+//! The stand as holding registers, as in the example of docs/how-to/rig.md: readings from 0 and setpoints from 100 as singles of two registers,
 //! air 110, heartbeat 111, tripped 112, acknowledge 113. As a device of its own it answers as unit 255 or 0 (Modbus Messaging on TCP/IP 1.0b,
 //! 4.4.1.2). Other units do not exist behind it; it reports that as a gateway does.
 

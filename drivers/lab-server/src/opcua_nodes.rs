@@ -1,4 +1,4 @@
-//! The stand as nodes, as in the example of docs/rig.md: `ns=2;s=NAME` in SI, `air`, `heartbeat`, `tripped`, `acknowledge`.
+//! The stand as nodes, as in the example of docs/how-to/rig.md: `ns=2;s=NAME` in SI, `air`, `heartbeat`, `tripped`, `acknowledge`.
 
 use crate::stand::{SETPOINTS, Stand, Target, measured};
 use mapper_core::Channel;
@@ -19,11 +19,11 @@ use std::time::Instant;
 
 const NAMESPACE: &str = "urn:mapper:lab:stand";
 const APPLICATION: &str = "urn:mapper:lab:server";
-/// Namespace index of the nodes in docs/rig.md.
+/// Namespace index of the nodes in docs/how-to/rig.md.
 const INDEX: u16 = 2;
 /// OPC UA time ticks per second.
 const TICKS_HZ: f64 = 1e7;
-/// Environment variables of user and password, as in the example of docs/rig.md, so that server and driver share them.
+/// Environment variables of user and password, as in the example of docs/how-to/rig.md, so that server and driver share them.
 const USER: (&str, &str) = ("PLC_USER", "PLC_PASSWORD");
 
 /// Why the server cannot start.

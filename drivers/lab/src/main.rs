@@ -12,7 +12,7 @@ fn main() -> std::process::ExitCode {
         name: settings::NAME,
         version: env!("CARGO_PKG_VERSION"),
         summary: "The virtual lab of another campaign behind the protocol of drivers, to rehearse on; an example of a driver.",
-        settings: r#"campaign: FILE; also real_time: true, told: FILE (the commands that it receives). docs/protocol.md has the protocol"#,
+        settings: r#"campaign: FILE; also real_time: true, told: FILE (the commands that it receives). docs/reference/protocol.md has the protocol"#,
     };
     about.serve(open)
 }

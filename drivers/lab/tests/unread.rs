@@ -17,7 +17,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_mapper-backend-lab");
-/// Maximum length of the queue before the pipe, docs/protocol.md.
+/// Maximum length of the queue before the pipe, docs/reference/protocol.md.
 const QUEUE: usize = 256;
 /// Capacity of a pipe on Linux, bytes. It is smaller elsewhere.
 const PIPE_BYTES: usize = 65_536;
@@ -200,7 +200,7 @@ fn an_unread_pipe_does_not_delay_the_rig() {
     let last_word = Instant::now();
     lab.commands("T3 293 K");
     let began_s = last_word.elapsed().as_secs_f64();
-    // docs/safety.md promises 2.5 s on an idle computer; here the lab at 1000 Hz and other tests compete for it.
+    // docs/reference/safety.md promises 2.5 s on an idle computer; here the lab at 1000 Hz and other tests compete for it.
     assert!((LEASE_S - 0.1..10.0).contains(&began_s), "{began_s} s");
     lab.flew_its_way();
     // Refused, since the lease has ended; the next requests are executed.

@@ -1,4 +1,4 @@
-//! `mapper-backend-modbus`: a gas stand behind a PLC or another controller that speaks Modbus TCP; docs/rig.md has its settings.
+//! `mapper-backend-modbus`: a gas stand behind a PLC or another controller that speaks Modbus TCP; docs/how-to/rig.md has its settings.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -13,7 +13,7 @@ fn main() -> std::process::ExitCode {
         name: settings::NAME,
         version: env!("CARGO_PKG_VERSION"),
         summary: "A gas stand behind a PLC or another controller that speaks Modbus TCP.",
-        settings: r#"docs/rig.md, "The campaign", has an example of all of them"#,
+        settings: r#"docs/how-to/rig.md, "The campaign", has an example of all of them"#,
     };
     about.serve(rig::open)
 }

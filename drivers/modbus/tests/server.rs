@@ -120,7 +120,7 @@ fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool
     }
 }
 
-/// Maximum time until a restarted server is read, s. The documented 3 s hold on an idle computer (docs/rig-tried.md); other tests run in
+/// Maximum time until a restarted server is read, s. The documented 3 s hold on an idle computer (docs/validation/rig.md); other tests run in
 /// parallel here. Without the driver's own reconnection it would take half a minute, or fail.
 const AGAIN_S: f64 = 10.0;
 /// For tests of the driver's own deadlines: on an idle computer they end within 2 s.

@@ -9,8 +9,8 @@ use std::io::Write;
 use std::process::ExitCode;
 
 /// Drive a gas stand behind a PLC or another controller that speaks OPC UA. `mapper` starts this driver without arguments for a campaign with
-/// `backend: {opcua: ...}`; docs/rig.md, "Over OPC UA", has its settings. With `--socket PATH` it serves the hosts that connect there,
-/// docs/protocol.md. The commands below are for manual use.
+/// `backend: {opcua: ...}`; docs/how-to/rig.md, "Over OPC UA", has its settings. With `--socket PATH` it serves the hosts that connect there,
+/// docs/reference/protocol.md. The commands below are for manual use.
 #[derive(Parser)]
 #[command(name = "mapper-backend-opcua", version)]
 struct Arguments {

@@ -1,6 +1,6 @@
-//! `mapper-backend-opcua`: a gas stand behind a PLC or another controller that speaks OPC UA; docs/rig.md has its settings.
+//! `mapper-backend-opcua`: a gas stand behind a PLC or another controller that speaks OPC UA; docs/how-to/rig.md has its settings.
 //!
-//! Without arguments, or with `--socket PATH`, it is a driver and speaks docs/protocol.md; with `trust ENDPOINT` it pins a server's certificate.
+//! Without arguments, or with `--socket PATH`, it is a driver and speaks docs/reference/protocol.md; with `trust ENDPOINT` it pins a server's certificate.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -22,7 +22,7 @@ fn main() -> ExitCode {
         name: settings::NAME,
         version: env!("CARGO_PKG_VERSION"),
         summary: "A gas stand behind a PLC or another controller that speaks OPC UA.",
-        settings: r#"docs/rig.md, "Over OPC UA", has an example of all of them"#,
+        settings: r#"docs/how-to/rig.md, "Over OPC UA", has an example of all of them"#,
     };
     about.serve(rig::open)
 }

@@ -116,7 +116,7 @@ pub(crate) struct Writes {
 /// Why settings are rejected.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SettingError {
-    #[error("{0}; docs/rig.md has an example of all settings")]
+    #[error("{0}; docs/how-to/rig.md has an example of all settings")]
     Form(serde_json::Error),
     #[error(transparent)]
     Limit(#[from] LimitError),

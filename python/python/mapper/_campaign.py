@@ -19,7 +19,7 @@ from mapper._run import Run
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Wheel of the machine of Burke et al., whose sizes a template scales (docs/constants.md).
+# Wheel of the machine of Burke et al., whose sizes a template scales (docs/reference/constants.md).
 _WHEEL_M = 0.052
 
 

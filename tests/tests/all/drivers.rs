@@ -1,4 +1,4 @@
-//! Rigs behind drivers: programs of their own that speak docs/protocol.md.
+//! Rigs behind drivers: programs of their own that speak docs/reference/protocol.md.
 #![cfg(unix)]
 
 use crate::interrupted::Running;
@@ -114,7 +114,7 @@ fn the_rig_in_python_keeps_every_rule_and_gives_the_points_of_the_same_model() {
     let both: Vec<_> = both.collect();
     assert!(both.len() >= 3, "{found:?}");
     for (found, expected) in both {
-        // One model, docs/physics.md, written twice: noise moves a step by some tenths of a percent.
+        // One model, docs/explanation/physics.md, written twice: noise moves a step by some tenths of a percent.
         assert!((found - expected).abs() < 0.01, "{found} and {expected}");
     }
 }
@@ -236,7 +236,7 @@ fn flew_its_way(text: &str) {
     assert!(way[steps].contains("make safe"), "{text}");
 }
 
-/// No host is left to command the rig. The driver does, at once: 2.5 s is what docs/safety.md promises.
+/// No host is left to command the rig. The driver does, at once: 2.5 s is what docs/reference/safety.md promises.
 #[test]
 fn a_runner_that_is_killed_leaves_a_driver_that_makes_the_rig_safe() {
     let (running, _campaign, _built_in, file) = flying();
@@ -278,9 +278,9 @@ fn a_runner_that_stood_still_records_what_it_missed() {
     assert!(missing.is_some() && missing < safe, "{events:#?}");
 }
 
-/// What docs/rig.md shows for a driver, at another port, in the words of a server that shares its machine with tests.
+/// What docs/how-to/rig.md shows for a driver, at another port, in the words of a server that shares its machine with tests.
 pub(crate) fn of_the_guide(driver: &str, replacements: &[(&str, &str)]) -> CampaignFile {
-    let guide = std::fs::read_to_string(repository().join("docs/rig.md")).unwrap();
+    let guide = std::fs::read_to_string(repository().join("docs/how-to/rig.md")).unwrap();
     let depth = |line: &str| line.len() - line.trim_start().len();
     let head = format!("{driver}:");
     let at = guide.lines().position(|line| line.trim() == head).unwrap();
@@ -291,7 +291,7 @@ pub(crate) fn of_the_guide(driver: &str, replacements: &[(&str, &str)]) -> Campa
         backend += &format!("\n  {}", &line[deep..]);
     }
     for (old, new) in replacements {
-        assert_eq!(backend.matches(old).count(), 1, "`{old}` in docs/rig.md");
+        assert_eq!(backend.matches(old).count(), 1, "`{old}` in docs/how-to/rig.md");
         backend = backend.replace(old, new);
     }
     short(&backend)

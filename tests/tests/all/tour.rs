@@ -1,4 +1,4 @@
-//! `docs/tour.md`: every command in it, in its order.
+//! `docs/tutorials/first_map.md`: every command in it, in its order.
 
 use crate::pages::FOUR_POINTS;
 use mapper_tests::{CampaignFile, made_once, mapper_in, only_run, python, repository, scratch};
@@ -97,7 +97,7 @@ fn every_command_of_the_tour_does_what_it_says() {
     for (day, seed) in [("monday", 11), ("tuesday", 12), ("wednesday", 13)] {
         run_of_a_day(folder, day, seed);
     }
-    let commands = commands(&fs::read_to_string(root.join("docs/tour.md")).unwrap());
+    let commands = commands(&fs::read_to_string(root.join("docs/tutorials/first_map.md")).unwrap());
     assert!(commands.len() > 12, "{commands:?}");
     for command in commands {
         let (words, to) =

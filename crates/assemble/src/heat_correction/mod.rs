@@ -7,7 +7,7 @@
 //!
 //! Here the curve is `a + b phi2 + k/phi1` (Euler with slip and backsweep; disc friction and recirculation) and the heat is in watts at
 //! the map's reference state. All of it is found together by robust least squares of relative residuals. Limits of the
-//! method (docs/maps.md): work that grows at low speed for other reasons is taken for heat, and heat that fast lines lose to their
+//! method (docs/reference/maps.md): work that grows at low speed for other reasons is taken for heat, and heat that fast lines lose to their
 //! housing is not seen. Both are in the standard errors, by round numbers: half the heat, and one point of efficiency.
 
 mod apply;

@@ -15,7 +15,7 @@ pub struct Outputs {
     /// Parent directory of the run directories; `runs` if none is given.
     #[schemars(length(min = 1), example = &"runs")]
     pub directory: String,
-    /// Formats of the map, each once; csv, json, svg and fitted if none is given. docs/maps.md lists all supported formats.
+    /// Formats of the map, each once; csv, json, svg and fitted if none is given. docs/reference/maps.md lists all supported formats.
     #[schemars(extend("uniqueItems" = true, "examples" = [["csv", "json", "svg"]]))]
     pub formats: Vec<FormatName>,
 }

@@ -2,7 +2,7 @@
 //!
 //! Each step keeps its own efficiency. The shared parameters are estimated once, from all steps: the convection law, the area share before the
 //! wheel, the probe's lag, the effect of a hotter wall, the sensors' offsets, and how efficiency varies over the map. See
-//! `docs/identification.md` for the reasons, assumptions and limits.
+//! `docs/explanation/identification.md` for the reasons, assumptions and limits.
 
 pub(crate) mod common_part;
 pub(crate) mod expected;

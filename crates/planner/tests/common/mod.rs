@@ -1,4 +1,4 @@
-//! The grid of docs/planner.md, a request, and a housing with one time constant per point.
+//! The grid of docs/explanation/planner.md, a request, and a housing with one time constant per point.
 
 use mapper_core::{Dwell, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
 use mapper_physics::follow_outlet::FollowOutlet;

@@ -17,7 +17,7 @@ pub struct Submit {
     /// Submit to Slurm
     #[arg(long, required_unless_present = "template", conflicts_with = "template")]
     pub slurm: bool,
-    /// Submit to another queue by this template (docs/fleet.md)
+    /// Submit to another queue by this template (docs/how-to/fleet.md)
     #[arg(long, value_name = "FILE")]
     pub template: Option<PathBuf>,
     /// Partition, or queue [default: the site's own]

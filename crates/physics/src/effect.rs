@@ -128,7 +128,7 @@ pub struct EffectInfo {
     pub name: Cow<'static, str>,
     /// A one-line description.
     pub description: Cow<'static, str>,
-    /// The equation, in the symbols of `docs/explanation/physics.md`.
+    /// The equation, in the symbols of `docs/reference/model.md`.
     pub equation: Cow<'static, str>,
     /// Source of the equation.
     pub source: Cow<'static, str>,

@@ -15,7 +15,7 @@ pub struct About {
     pub name: &'static str,
     /// A one-line description.
     pub description: &'static str,
-    /// The equation, in the symbols of `docs/explanation/physics.md`.
+    /// The equation, in the symbols of `docs/reference/model.md`.
     pub equation: &'static str,
     /// Source of the equation.
     pub source: &'static str,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// The machine: geometry, masses, conductances, probe. Effects and fits change these parameters, never the equations.
 ///
-/// Defaults are those of Burke et al., Appendix A, as completed in the model's description (`docs/explanation/physics.md`).
+/// Defaults are those of Burke et al., Appendix A, as completed in the model's description (`docs/reference/model.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Params {

@@ -10,7 +10,7 @@ use mapper_core::{Channel, IdentifiedPoint, OperatingPoint, Recording, Series, S
 use mapper_physics::air::Air;
 use mapper_report::{turbine_points, turbine_text};
 
-/// Steady states of the nominal model at openings 0.5 and 1 (docs/explanation/physics.md; T1 298.15 K, P1 100 kPa, T3 773.15 K, P4
+/// Steady states of the nominal model at openings 0.5 and 1 (docs/reference/model.md; T1 298.15 K, P1 100 kPa, T3 773.15 K, P4
 /// 110 kPa): speed rpm, P3 Pa, P2 Pa, compressor flow kg/s, turbine flow kg/s, efficiency, T4 K. The turbine's
 /// temperature drop is in T4 alone, which the code under test does not see.
 const STATES: [[f64; 7]; 8] = [
@@ -57,7 +57,7 @@ fn identified(state: &[f64; 7]) -> IdentifiedPoint {
     point
 }
 
-/// Efficiency from the inlet's total temperature by the turbine's own law (docs/explanation/physics.md) and the gas temperature
+/// Efficiency from the inlet's total temperature by the turbine's own law (docs/reference/model.md) and the gas temperature
 /// behind the housing, T3', that gives T4: `eta_t T3' / T3`.
 fn from_the_gas_temperatures(state: &[f64; 7]) -> f64 {
     let drop = 1.0 - (state[1] / P4_PA).powf(-EXPONENT);
@@ -83,7 +83,7 @@ fn flow_parameter_expansion_ratio_and_efficiency_are_those_of_the_reference() {
         assert!((point.expansion_ratio - state[1] / P4_PA).abs() < 1e-12);
         assert!((point.speed_parameter_rpm_sqrt_k - state[0] / T3_K.sqrt()).abs() < 1e-9);
         // The model has no bearing friction, so that compressor power is wheel power. Its heat capacities are held
-        // through a process at the inlet's value, ours are means (docs/explanation/physics.md: 0.4 to 1.7 %): 2 % of efficiency.
+        // through a process at the inlet's value, ours are means (docs/reference/model.md: 0.4 to 1.7 %): 2 % of efficiency.
         let (ours, theirs) = (point.efficiency.unwrap(), from_the_gas_temperatures(state));
         assert!((ours / theirs - 1.0).abs() < 0.02, "{} rpm: {ours} {theirs}", state[0]);
     }

@@ -114,7 +114,7 @@ fn the_rig_in_python_keeps_every_rule_and_gives_the_points_of_the_same_model() {
     let both: Vec<_> = both.collect();
     assert!(both.len() >= 3, "{found:?}");
     for (found, expected) in both {
-        // One model, docs/explanation/physics.md, written twice: noise moves a step by some tenths of a percent.
+        // One model, docs/reference/model.md, written twice: noise moves a step by some tenths of a percent.
         assert!((found - expected).abs() < 0.01, "{found} and {expected}");
     }
 }

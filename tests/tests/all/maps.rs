@@ -149,7 +149,7 @@ fn a_run_gives_the_turbine_that_the_rig_has_and_its_pictures() {
     assert!(!turbine.is_empty());
     for point in turbine {
         let number = |key: &str| point[key].as_f64().unwrap();
-        // The simulated rig's swallowing law (docs/explanation/physics.md), 0.078 kg/s at 101.325 kPa and 288.15 K; sensors scatter by
+        // The simulated rig's swallowing law (docs/reference/model.md), 0.078 kg/s at 101.325 kPa and 288.15 K; sensors scatter by
         // some permille.
         let law = 0.078 * (1.0 - number("expansion_ratio").powf(-1.1)).sqrt() * 288.15f64.sqrt() / 101.325;
         let flow_parameter = number("flow_parameter_kg_sqrt_k_s_kpa");

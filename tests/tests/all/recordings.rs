@@ -250,7 +250,7 @@ fn a_recording_of_another_program_gives_the_same_points() {
     }
 }
 
-/// A table of the nominal machine's own map (docs/explanation/physics.md, closed form), which the campaign names in a folder of its own.
+/// A table of the nominal machine's own map (docs/reference/model.md, closed form), which the campaign names in a folder of its own.
 fn table_of_turbo_a() -> String {
     let mut table = "speed,flow,pressure ratio,efficiency\n".to_owned();
     for krpm in (50..=170).step_by(10).map(f64::from) {

@@ -1,7 +1,7 @@
 //! Checks T2 against the physical limits of any compressor.
 //!
 //! T2 lies between isentropic compression and about three times that rise: turbocharger compressors have 0.3 to 0.85. A housing far from the
-//! gas temperature changes this apparent efficiency, but for a rise of 20 K or more it stays within 0.2 to 1.3 (docs/explanation/physics.md: the housing
+//! gas temperature changes this apparent efficiency, but for a rise of 20 K or more it stays within 0.2 to 1.3 (docs/reference/model.md: the housing
 //! exchanges at most half of the capacity flow times its distance). Hot turbine inlet gas read as T2 is beyond that; a turbine may be driven
 //! by cold gas.
 

@@ -1,4 +1,4 @@
-//! A realistic map made from closed formulas (`docs/explanation/physics.md`, compressor map of turbo_a), independent of the
+//! A realistic map made from closed formulas (`docs/reference/model.md`, compressor map of turbo_a), independent of the
 //! physics crate, which this crate may not depend on.
 
 use mapper_core::{

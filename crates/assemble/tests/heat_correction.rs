@@ -1,13 +1,11 @@
 //! A hot map corrected by the heat that it shows.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use crate::support::{Row, map_of};
 #[allow(dead_code, reason = "shared with other tests, which use more of it")]
-mod support;
-
 use mapper_assemble::{HeatCorrectionError, correct_for_heat};
 use mapper_core::Method;
 use proptest::prelude::*;
-use support::{Row, map_of};
 
 const CP: f64 = 1005.0;
 const T_REF_K: f64 = 298.0;

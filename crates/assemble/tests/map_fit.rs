@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::{Row, map_of};
 use mapper_assemble::{MapFit, MapFitError, MapFitOptions, compare, fit_map, leave_out};
 use mapper_core::{CompressorMap, LeftOutLine};
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::ClosedFormMap;
-use support::{Row, map_of};
 
 /// A map as users have them (tests/data/LICENSE-sample).
 fn sample() -> CompressorMap {

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod common;
-
-use common::{Course, ELEMENT_LAG, declared, engine, healthy};
+use crate::common::{self, Course, ELEMENT_LAG, declared, engine, healthy};
 use mapper_core::{Channel, Recording};
 use mapper_driven::why::{Ask, Diagnosis, Which, Word, diagnose};
 use mapper_driven::{DrivenError, why::compressor_sensors, why::turbine_sensors};

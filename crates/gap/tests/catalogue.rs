@@ -3,9 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{Visits, declared};
+use crate::common::{self, Visits, declared};
 use mapper_gap::additions::additions;
 use mapper_gap::fit::{Effort, fit};
 use mapper_gap::selection::Selection;

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{Visits, declared, record_another_night, record_of};
+use crate::common::{Visits, declared, record_another_night, record_of};
 use mapper_core::{Channel, Recording};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, GapError, Question, diagnose};

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{Visits, boundary, declared};
+use crate::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_gap::calibration::Calibration;
 use mapper_gap::diagnose::{Diagnosed, Question, diagnose};

@@ -1,9 +1,7 @@
 //! Intervals cover the truth as often as stated, under noise with time correlation.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod common;
-
-use common::{RIG, Transient, add_noise};
+use crate::common::{RIG, Transient, add_noise};
 use mapper_core::IdentifiedPoint;
 use mapper_identify::{DeclaredUncertainty, IdentifyConfig, WindowRule, identify};
 use rand::SeedableRng;

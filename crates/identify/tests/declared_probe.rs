@@ -1,11 +1,7 @@
 //! The two-parameter method with a lagging probe: as good as without one if the probe is declared, biased if not.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-#[path = "common/lab.rs"]
-mod lab;
-
-use lab::{Campaign, Machine, campaign, eighteen, measured};
+use crate::lab::{self, Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{IdentifiedPoint, Method, Recording};
 use mapper_identify::{Identified, IdentifyConfig, identify_recording};
 use rand::SeedableRng;

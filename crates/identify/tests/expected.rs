@@ -1,9 +1,7 @@
 //! The expected result of a forecast agrees with the scatter of recordings.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{RIG, Transient, add_noise};
+use crate::common::{RIG, Transient, add_noise};
 use mapper_core::Channel;
 use mapper_identify::{DeclaredUncertainty, ExpectedRow, IdentifyConfig, WindowRule, expected, identify};
 use rand::SeedableRng;

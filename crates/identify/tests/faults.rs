@@ -1,16 +1,12 @@
 //! Sensor faults on random machines: the rates of false alarms and of detections.
 //!
-//! `MAPPER_FAULT_MACHINES=200 cargo test --release -p mapper-identify --test faults -- --nocapture` prints the table of
+//! `MAPPER_FAULT_MACHINES=200 cargo test --release -p mapper-identify --test all faults:: -- --nocapture` prints the table of
 //! docs/validation/faults.md.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![allow(clippy::print_stdout, reason = "the table is what a person looks at who changes a balance")]
 
-mod common;
-#[path = "common/lab.rs"]
-mod lab;
-
-use lab::{Machine as LabMachine, campaign, measured};
+use crate::lab::{Machine as LabMachine, campaign, measured};
 use mapper_core::{Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_beside};
 use mapper_observe::sensor_fault::CATALOGUE;

@@ -1,14 +1,8 @@
 //! Whether the joint method finds the law of h before the wheel, and reports honestly if it cannot.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-#[path = "common/honesty.rs"]
-mod honesty;
-#[path = "common/lab.rs"]
-mod lab;
-
-use honesty::Honesty;
-use lab::{Campaign, Machine, campaign, eighteen, measured};
+use crate::honesty::Honesty;
+use crate::lab::{Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{IdentifiedPoint, InletConvection, Method, Origin, Recording, ThermalModel};
 use mapper_identify::{Choice, Identified, IdentifyConfig, JointSettings, identify_recording};
 use rand::SeedableRng;

@@ -1,14 +1,8 @@
 //! The joint method on campaigns of the lumped model: required results without noise, and with it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-#[path = "common/honesty.rs"]
-mod honesty;
-#[path = "common/lab.rs"]
-mod lab;
-
-use honesty::Honesty;
-use lab::{Campaign, Machine, campaign, eighteen, measured};
+use crate::honesty::Honesty;
+use crate::lab::{Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, Recording, ThermalModel, Verdict};
 use mapper_identify::{
     Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, WindowRule, code,

@@ -1,11 +1,7 @@
 //! Moist air: a known humidity makes the points right, an unknown one makes their intervals wider.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-#[path = "common/lab.rs"]
-mod lab;
-
-use lab::{Machine, campaign, eighteen, measured};
+use crate::lab::{Machine, campaign, eighteen, measured};
 use mapper_core::Method;
 use mapper_identify::{IdentifyConfig, identify};
 use mapper_physics::air::Air;

@@ -6,15 +6,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 #![allow(clippy::print_stdout, reason = "the table is what a person looks at who changes a check")]
 
-mod common;
-#[path = "nonsense/doctor.rs"]
 mod doctor;
-#[path = "common/lab.rs"]
-mod lab;
-#[path = "nonsense/table.rs"]
 mod table;
 
-use lab::{Campaign, Machine, campaign, measured};
+use crate::lab::{Campaign, Machine, campaign, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, Recording, Verdict, Warning};
 use mapper_identify::{
     Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds, code,

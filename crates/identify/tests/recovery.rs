@@ -1,9 +1,7 @@
 //! Data that follow eqs. 1-3 exactly give back the efficiency and the heat-transfer coefficient they were made from.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{STEP_S, Transient};
+use crate::common::{STEP_S, Transient};
 use mapper_core::{Channel, EstimateUncertainty, Event, EventKind, Method, OperatingPoint, Verdict};
 use mapper_identify::{
     DeclaredUncertainty, IdentifyConfig, IdentifyError, PressureTap, WindowRule, code, identify,

@@ -1,9 +1,7 @@
 //! No recording causes a panic, a NaN or a number without interval and verdict.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::Transient;
+use crate::common::Transient;
 use mapper_core::{Channel, IdentifiedPoint, Method, Recording, Series, Verdict};
 use mapper_identify::{
     DeclaredUncertainty, IdentifyConfig, PressureTap, SettleBands, WindowRule, code, identify, identify_each,

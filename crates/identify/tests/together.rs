@@ -2,11 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-#[path = "common/lab.rs"]
-mod lab;
-
-use lab::{Campaign, Machine, campaign, eighteen, measured};
+use crate::lab::{Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, StepKind, Verdict};
 use mapper_identify::{IdentifyConfig, NominalRig, code, identify, identify_beside};
 use mapper_physics::model::Model;

@@ -1,11 +1,7 @@
 //! The isothermal zero: offsets from a soak, and their remaining effect on the points.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-#[path = "common/lab.rs"]
-mod lab;
-
-use lab::{Machine, campaign, eighteen, measured};
+use crate::lab::{Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, DeclaredUncertainty, Method, Recording, Series};
 use mapper_identify::{
     IdentifyConfig, NoZero, ZeroSettings, identify, isothermal_zero, isothermal_zero_with_a_fault, zeroed,

@@ -2,9 +2,7 @@
 //! (`crates/physics/tests/reference/zigzag.csv`).
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod common;
-
-use common::{RIG, add_noise};
+use crate::common::{RIG, add_noise};
 use mapper_core::{Channel, IdentifiedPoint, Recording, StepKind, StepMarker};
 use mapper_identify::{DeclaredUncertainty, IdentifyConfig, WindowRule, code, identify};
 use mapper_numerics::statistics::median;

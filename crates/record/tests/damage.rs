@@ -1,9 +1,7 @@
 //! Damaged, foreign and hostile files: no panic, no hang, what can be saved is saved.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod common;
-
-use common::{batch, step, write};
+use crate::common::{batch, step, write};
 use mapper_core::{Channel, SampleBatch};
 use mapper_record::{
     ChannelMap, ReadOptions, ReadReport, ReadWarning, RecordError, read_recording, read_recording_from,

@@ -1,9 +1,7 @@
 //! What is written is what is read.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod common;
-
-use common::{batch, header, part, step, write};
+use crate::common::{batch, header, part, step, write};
 use mapper_core::{
     CHANNELS, Channel, ChannelColumn, Element, ElementColumn, MAX_ELEMENTS, Provenance, Quality,
     ReadingOrigin, SampleBatch, TruthColumn,

@@ -1,6 +1,7 @@
 //! Runs on the virtual lab: the complete run, and each early end.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "faults/mod.rs"]
 mod faults;
 
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};

@@ -2,15 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "common/shipped.rs"]
-mod shipped;
-
+use crate::common::shipped::campaign;
 use mapper_campaign::Campaign;
 use mapper_core::Plan;
 use mapper_session::{nominal_model, plan, stored_plan};
 use proptest::prelude::*;
 use serde_json::Value;
-use shipped::campaign;
 
 /// Two weeks and a day, s: the longest run and the longest step that docs/reference/safety.md allows.
 const RUN_MAX_S: f64 = 14.0 * 86_400.0;

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "common/shipped.rs"]
-mod shipped;
-
+use crate::common::shipped::campaign;
 use mapper_backends::virtual_lab;
 use mapper_campaign::Campaign;
 use mapper_core::{Dwell, Plan, Timing, VisitOrder};
@@ -12,7 +10,6 @@ use mapper_formats::FORMATS;
 use mapper_identify::MAX_RESTING_ETA;
 use mapper_planner::other_orders;
 use mapper_session::{PlanInputs, Registry, RunRequest, Session, nominal_model, plan, plan_of};
-use shipped::campaign;
 
 const GRID: [(&str, &str); 3] = [
     (

@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::shipped::campaign;
-use common::{Driven, driven};
+use crate::common::shipped::campaign;
+use crate::common::{Driven, driven};
 use mapper_core::EventKind;
 
 /// Six points from 50 to 155 krpm, repeats and return included, two minutes each.

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support;
 use mapper_core::{CompressorMap, ExportError, ImportRemark, MapPoint, Method, ReferenceState, Verdict};
 use mapper_formats::FORMATS;
 use std::collections::BTreeSet;

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support;
 use mapper_core::{CompressorMap, Verdict};
 use mapper_formats::efficiency_surface;
 use proptest::prelude::*;

@@ -1,4 +1,5 @@
-//! What manifests take out of the tests, since an empty test program is compiled and linked too, has nothing to test.
+//! What manifests take out of the tests has nothing to test: an empty test program is compiled and linked too, and files that are one
+//! program are all in it.
 
 use cargo_metadata::{MetadataCommand, TargetKind};
 use mapper_tests::tree::packages;
@@ -49,4 +50,40 @@ fn what_is_left_out_of_the_tests_has_none() {
         }
     }
     assert!(left_out > 0, "nothing is left out any more");
+}
+
+/// With `autotests = false` Cargo takes no file in `tests` for a program: a file that `all.rs` does not declare would never run.
+#[test]
+fn every_test_file_is_in_the_one_program_of_its_crate() {
+    let manifest = mapper_tests::repository().join("Cargo.toml");
+    let metadata = MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap();
+    let mut joined = 0;
+    for package in &metadata.packages {
+        let programs: Vec<&Path> = package
+            .targets
+            .iter()
+            .filter(|one| one.kind.contains(&TargetKind::Test))
+            .map(|one| one.src_path.as_std_path())
+            .collect();
+        let all = package.manifest_path.as_std_path().with_file_name("tests").join("all.rs");
+        let text = if programs.contains(&all.as_path()) {
+            std::fs::read_to_string(&all).unwrap()
+        } else {
+            String::new()
+        };
+        let files = all.parent().unwrap().read_dir().into_iter().flatten().map(|entry| entry.unwrap().path());
+        for file in files.filter(|file| file.extension().is_some_and(|extension| extension == "rs")) {
+            let declared = format!("mod {};", file.file_stem().unwrap().to_str().unwrap());
+            let is_program = programs.contains(&file.as_path());
+            let is_inside = text.lines().any(|line| line == declared);
+            assert!(
+                is_program || is_inside,
+                "write `{declared}` into {}: {} is in no program",
+                all.display(),
+                file.display()
+            );
+            joined += usize::from(is_inside);
+        }
+    }
+    assert!(joined > 0, "no test files are joined any more");
 }

@@ -1,0 +1,6 @@
+//! All integration tests of `mapper-physics`: one program, since each further one would be compiled and linked by itself.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+mod balance;
+mod inputs;
+mod reference;

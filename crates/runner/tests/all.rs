@@ -1,0 +1,6 @@
+//! All integration tests of `mapper-runner`: one program, since each further one would be compiled and linked by itself.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+mod drift_watch;
+mod readers;
+mod run;

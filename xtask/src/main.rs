@@ -5,6 +5,7 @@ mod docs;
 mod error;
 mod fleet_test;
 mod formatting;
+mod lints;
 mod machine;
 mod offered;
 mod performance;

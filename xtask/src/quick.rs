@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::formatting::{Mode, formatting};
 use crate::step::{Steps, command, run, say};
 use crate::tally::Tally;
-use crate::{machine, test_programs, workspace};
+use crate::{lints, machine, test_programs, workspace};
 
 const LEFT_OUT: &str = "
 LEFT OUT, run by `cargo xtask test`: tests of the whole program and of documents, tests of more than some seconds
@@ -15,9 +15,7 @@ LEFT OUT, run by `cargo xtask test`: tests of the whole program and of documents
 pub fn quick() -> Result<(), Error> {
     let mut steps = Steps::default();
     steps.run("formatting", || formatting(Mode::Check));
-    steps.run("lints", || {
-        run(cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"]))
-    });
+    steps.run("lints", || run(lints::lints(&[])));
     steps.run("tests", || {
         let mut tally = Tally::default();
         let tests = if machine::has_nextest() {

@@ -6,7 +6,7 @@ use crate::formatting::{Mode, formatting};
 use crate::offered::{Offered, with_program};
 use crate::step::{Steps, command, run, say};
 use crate::tally::Tally;
-use crate::{machine, python_env, python_package, test_programs, workspace};
+use crate::{lints, machine, python_env, python_package, test_programs, workspace};
 use std::process::Command;
 
 /// Examples that a test or the documents run.
@@ -30,18 +30,7 @@ pub fn test() -> Result<(), Error> {
     // Made in parallel with the first steps: it waits for the network, they for the processor.
     let making = std::thread::spawn(python_env::prepare);
     steps.run("formatting", || formatting(Mode::Check));
-    steps.run("lints", || {
-        run(cargo(&[
-            "clippy",
-            "--workspace",
-            "--all-features",
-            "--all-targets",
-            "--quiet",
-            "--",
-            "-D",
-            "warnings",
-        ]))
-    });
+    steps.run("lints", || run(lints::lints(&["--all-features"])));
     let mut python = None;
     steps.run("Python environment", || {
         let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
@@ -54,11 +43,7 @@ pub fn test() -> Result<(), Error> {
     if knows_licences {
         steps.run("dependencies", || run(cargo(&["deny", "check", "bans", "licenses", "sources"])));
     }
-    steps.run("documentation", || {
-        let mut command = cargo(&["doc", "--no-deps", "--workspace", "--all-features", "--quiet"]);
-        command.env("RUSTDOCFLAGS", "-D warnings");
-        run(command)
-    });
+    steps.run("documentation", || run(lints::documentation()));
     steps.run("building", || build(&offered));
     steps.run("tests", || tests(&offered));
     steps.run("Python package", || python_package::check(&offered));

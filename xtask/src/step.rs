@@ -6,24 +6,57 @@ use std::ffi::OsStr;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// A step that was run: its name, its time, and whether it ended well.
+type Done = (&'static str, Duration, bool);
+
+/// What a step does.
+pub type Work<'a> = Box<dyn FnOnce() -> Result<(), Error> + Send + 'a>;
+
 /// Steps that were run, for the summary.
-#[derive(Default)]
 pub struct Steps {
-    done: Vec<(&'static str, Duration, bool)>,
+    begun: Instant,
+    done: Vec<Done>,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Steps { begun: Instant::now(), done: Vec::new() }
+    }
+}
+
+/// Runs one step, and says how it ended.
+fn run_step(name: &'static str, work: impl FnOnce() -> Result<(), Error>) -> Done {
+    say(&format!("\n==> {name}\n"));
+    let started = Instant::now();
+    let result = work();
+    let took = started.elapsed();
+    match &result {
+        Ok(()) => say(&format!("==> {name}: ok, {:.1} s\n", took.as_secs_f64())),
+        Err(error) => say(&format!("==> {name}: FAILED, {:.1} s: {error}\n", took.as_secs_f64())),
+    }
+    (name, took, result.is_ok())
 }
 
 impl Steps {
     /// Runs one step. A failure is kept for the end, so that one run shows all that is wrong.
     pub fn run(&mut self, name: &'static str, work: impl FnOnce() -> Result<(), Error>) {
-        say(&format!("\n==> {name}\n"));
-        let started = Instant::now();
-        let result = work();
-        let took = started.elapsed();
-        match &result {
-            Ok(()) => say(&format!("==> {name}: ok, {:.1} s\n", took.as_secs_f64())),
-            Err(error) => say(&format!("==> {name}: FAILED, {:.1} s: {error}\n", took.as_secs_f64())),
-        }
-        self.done.push((name, took, result.is_ok()));
+        self.done.push(run_step(name, work));
+    }
+
+    /// Runs one step, and beside it others, one after the other: for a step that often waits. Their output is mixed.
+    pub fn run_with(
+        &mut self,
+        name: &'static str,
+        work: impl FnOnce() -> Result<(), Error>,
+        others: Vec<(&'static str, Work<'_>)>,
+    ) {
+        let (done, of_others) = std::thread::scope(|scope| {
+            let others = scope
+                .spawn(|| others.into_iter().map(|(name, work)| run_step(name, work)).collect::<Vec<Done>>());
+            (run_step(name, work), others.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        });
+        self.done.push(done);
+        self.done.extend(of_others);
     }
 
     /// Whether every step so far ended well.
@@ -38,8 +71,7 @@ impl Steps {
             let verdict = if *well { "ok" } else { "FAILED" };
             say(&format!("{:>8.1} s  {verdict:6}  {name}\n", took.as_secs_f64()));
         }
-        let total: Duration = self.done.iter().map(|(_, took, _)| *took).sum();
-        say(&format!("{:>8.1} s  in total\n", total.as_secs_f64()));
+        say(&format!("{:>8.1} s  in total\n", self.begun.elapsed().as_secs_f64()));
         let failed: Vec<_> =
             self.done.into_iter().filter(|(.., well)| !well).map(|(name, ..)| name).collect();
         if failed.is_empty() { Ok(()) } else { Err(Error::Steps { failed }) }

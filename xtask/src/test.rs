@@ -45,9 +45,15 @@ pub fn test() -> Result<(), Error> {
     }
     steps.run("documentation", || run(lints::documentation()));
     steps.run("building", || build(&offered));
-    steps.run("tests", || tests(&offered));
-    steps.run("Python package", || python_package::check(&offered));
-    steps.run("generated documents", || docs::docs(docs::Mode::Check));
+    // Tests in real time wait for their rigs: the processor has time for other programs then.
+    steps.run_with(
+        "tests",
+        || tests(&offered),
+        vec![
+            ("Python package", Box::new(|| python_package::check(&offered))),
+            ("generated documents", Box::new(|| docs::docs(docs::Mode::Check))),
+        ],
+    );
     let result = steps.finish();
     if !offered.mountable {
         say(

@@ -9,11 +9,19 @@ use std::path::{Path, PathBuf};
 /// What the pinned numpy and scipy ask for.
 const OLDEST: (&str, &str) = ("3.11", "(3, 11)");
 
+/// Its Python, whether it has been made or not.
+pub fn python() -> PathBuf {
+    home().join("bin/python")
+}
+
+fn home() -> PathBuf {
+    workspace::target_dir().join("python-env")
+}
+
 /// Makes the environment, or keeps the one that is there where it was made from the same list. Returns its Python.
 pub fn prepare() -> Result<PathBuf, Error> {
     let wanted = read(&workspace::root().join("tests/python/requirements.txt"))?;
-    let home = workspace::target_dir().join("python-env");
-    let python = home.join("bin/python");
+    let (home, python) = (home(), python());
     // Written last: an environment without it was left half made.
     let stamp = home.join("made-from.txt");
     let made_from = fs::read_to_string(&stamp).unwrap_or_default();

@@ -4,7 +4,7 @@ use crate::docs;
 use crate::error::Error;
 use crate::formatting::{Mode, formatting};
 use crate::offered::{Offered, with_program};
-use crate::step::{Steps, command, run, say};
+use crate::step::{Steps, command, in_background, run, say};
 use crate::tally::Tally;
 use crate::{lints, machine, python_env, python_package, test_programs, workspace};
 use std::process::Command;
@@ -19,7 +19,7 @@ const EXAMPLES: &[&str] = &[
     docs::EXAMPLE,
 ];
 
-/// Formatting, lints, dependencies, documentation, tests, generated documents. All are run even where one fails; only
+/// Formatting, dependencies, tests, the Python package, lints, documentation, generated documents. All are run even where one fails; only
 /// preparations end it early.
 pub fn test() -> Result<(), Error> {
     let mut steps = Steps::default();
@@ -30,27 +30,30 @@ pub fn test() -> Result<(), Error> {
     // Made in parallel with the first steps: it waits for the network, they for the processor.
     let making = std::thread::spawn(python_env::prepare);
     steps.run("formatting", || formatting(Mode::Check));
-    steps.run("lints", || run(lints::lints(&["--all-features"])));
-    let mut python = None;
-    steps.run("Python environment", || {
-        let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        python = Some(made?);
-        Ok(())
-    });
-    let Some(python) = python else { return steps.finish() };
-    let offered = Offered::with(python);
+    let offered = Offered::with(python_env::python());
     let knows_licences = machine::has_deny();
     if knows_licences {
         steps.run("dependencies", || run(cargo(&["deny", "check", "bans", "licenses", "sources"])));
     }
-    steps.run("documentation", || run(lints::documentation()));
     steps.run("building", || build(&offered));
-    // Tests in real time wait for their rigs: the processor has time for other programs then.
+    let mut has_python = false;
+    steps.run("Python environment", || {
+        making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        has_python = true;
+        Ok(())
+    });
+    if !has_python {
+        return steps.finish();
+    }
+    // Tests in real time wait for their rigs, and the processor has time for other programs then. Deadlines of such tests hold, since what
+    // keeps it busy for minutes takes only what they leave.
     steps.run_with(
         "tests",
         || tests(&offered),
         vec![
             ("Python package", Box::new(|| python_package::check(&offered))),
+            ("lints", Box::new(|| run(in_background(offered.to(lints::lints(&["--all-features"])))))),
+            ("documentation", Box::new(|| run(in_background(offered.to(lints::documentation()))))),
             ("generated documents", Box::new(|| docs::docs(docs::Mode::Check))),
         ],
     );

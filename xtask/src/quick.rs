@@ -19,7 +19,7 @@ pub fn quick() -> Result<(), Error> {
     steps.run("tests", || {
         let mut tally = Tally::default();
         let tests = if machine::has_nextest() {
-            test_programs::tests("quick")
+            test_programs::tests("quick", |cores| cores + 2)
         } else {
             // Without nextest no test can be left out by its name: those of the libraries' own files are fast.
             cargo(&["test", "--workspace", "--no-fail-fast", "--lib"])

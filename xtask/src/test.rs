@@ -95,7 +95,7 @@ fn cargo(arguments: &[&str]) -> Command {
 fn tests(offered: &Offered) -> Result<(), Error> {
     let mut tally = Tally::default();
     let mut well = true;
-    let mut programs = test_programs::tests("default");
+    let mut programs = test_programs::tests("full", |cores| 2 * cores + 2);
     // Not the examples, which lints have looked at: those that are needed are built.
     programs.arg("--tests");
     for tests in [programs, test_programs::documentation_tests()] {

@@ -8,16 +8,15 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
 /// The tests of the workspace: by nextest if it is installed, which runs them in parallel across all programs, and
-/// by `cargo test` otherwise. `profile` is one of `.config/nextest.toml`.
-pub fn tests(profile: &str) -> Command {
+/// by `cargo test` otherwise. `profile` is one of `.config/nextest.toml`; `threads_of` gives its threads on so many cores.
+pub fn tests(profile: &str, threads_of: impl Fn(usize) -> usize) -> Command {
     if machine::has_nextest() {
         let arguments =
             ["nextest", "run", "--workspace", "--all-features", "--no-fail-fast", "--profile", profile];
         let mut command =
             step::command(workspace::cargo(), &[&arguments[..], &["--color", "never"]].concat());
-        // Two more than there are cores: tests in real time mostly wait, and two of them run at a time.
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        command.arg("--test-threads").arg((cores + 2).to_string());
+        command.arg("--test-threads").arg(threads_of(cores).to_string());
         command
     } else {
         step::command(

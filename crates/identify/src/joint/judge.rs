@@ -2,9 +2,7 @@
 
 use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
-use crate::joint::parameters::{
-    ALPHA, ALPHA_MODEL_ERROR, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2,
-};
+use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
 use crate::joint::refinements::Refinements;
 use crate::joint::smoothness::{Judged, STRAIN_SIGMAS, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
@@ -25,8 +23,6 @@ const SLOW_SQUARE: f64 = 1.3;
 const STRETCH_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which the law does not apply, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
-/// Standard errors by which alpha_A may be outside 0 to 1 by chance.
-const BY_CHANCE_SIGMAS: f64 = 3.0;
 /// Standard errors by which a parameter must be outside its range to count against the model.
 const OUTSIDE_SIGMAS: f64 = 2.0;
 /// Exponents of the Reynolds number possible in pipe-like flow: 0.33 is laminar, 0.8 turbulent, and Burke et al. have 1.13.
@@ -164,13 +160,6 @@ pub(crate) fn doubts(
         ));
     }
     let error = |index: usize| covariance.error_of(index);
-    if let Some((off, sigma)) = refinements.and_then(|refinements| refinements.free(ALPHA)) {
-        let alpha = problem.priors[ALPHA].mean + off;
-        let outside = (-alpha).max(alpha - 1.0);
-        if outside > BY_CHANCE_SIGMAS * sigma.hypot(ALPHA_MODEL_ERROR) {
-            doubts.push(format!("alpha_A comes out as {alpha:.3} +/- {:.3}, outside 0 to 1", 1.96 * sigma));
-        }
-    }
     if let Some(sigma) = error(EXPONENT) {
         let exponent = problem.shared[EXPONENT];
         let outside = (EXPONENT_RANGE.0 - exponent).max(exponent - EXPONENT_RANGE.1);

@@ -35,19 +35,26 @@ def own_map(text, flow_ratio, eta_change):
     return "\n".join(rows) + "\n"
 
 
-def machine(program, number):
+def make_campaign(program, directory, number):
+    """Campaign file, wheel diameter, shape and output of `mapper init` of the machine with this number."""
     draw = random.Random(number)
     wheel_mm = round(draw.uniform(35, 90), 1)
     shape = list(SHAPES)[number % len(SHAPES)]
+    call(program, directory, "init", "similar", "--wheel", f"{wheel_mm}mm")
+    similar = Path(directory, "similar_map.csv").read_text()
+    Path(directory, "map.csv").write_text(own_map(similar, *SHAPES[shape]))
+    made = call(program, directory, "init", "own", "--wheel", f"{wheel_mm}mm", "--map", "map.csv")
+    campaign = Path(directory, "own.yaml")
+    if not made.returncode:
+        campaign.write_text(re.sub(r"^seed: 1 ", f"seed: {number + 1} ", campaign.read_text(), flags=re.M))
+    return campaign, wheel_mm, shape, made
+
+
+def machine(program, number):
     with tempfile.TemporaryDirectory() as directory:
-        call(program, directory, "init", "similar", "--wheel", f"{wheel_mm}mm")
-        similar = Path(directory, "similar_map.csv").read_text()
-        Path(directory, "map.csv").write_text(own_map(similar, *SHAPES[shape]))
-        made = call(program, directory, "init", "own", "--wheel", f"{wheel_mm}mm", "--map", "map.csv")
-        campaign = Path(directory, "own.yaml")
+        _, wheel_mm, shape, made = make_campaign(program, directory, number)
         if made.returncode:
             return wheel_mm, shape, 0, 0, 0, made.stderr
-        campaign.write_text(re.sub(r"^seed: 1 ", f"seed: {number + 1} ", campaign.read_text(), flags=re.M))
         run = call(program, directory, "run", "own.yaml", "--truth", "--json", "--progress", "off")
         points = json.loads(run.stdout).get("points", [])
         good = [p for p in points if p["verdict"] == "good"]
@@ -68,4 +75,5 @@ def main():
     print(f"{passed} of {machines} machines with at least 80 % good points; coverage median {100 * statistics.median(coverages):.0f} %, lowest {100 * min(coverages):.0f} %")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -51,6 +51,7 @@ mod surge;
 mod terminal_text;
 mod thermal_model;
 mod timing;
+mod verdict_forecast;
 mod visit_order;
 mod window_rule;
 mod with_unit;
@@ -106,6 +107,7 @@ pub use thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };
 pub use timing::{Dwell, Timing};
+pub use verdict_forecast::{Advice, CampaignChange, VerdictForecast};
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;
 pub use with_unit::{readable, temperature, with_unit};

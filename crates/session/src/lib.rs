@@ -91,6 +91,7 @@ mod transient;
 mod twin_campaign;
 mod twin_files;
 mod variant;
+mod verdict_forecast;
 mod zero_forecast;
 
 pub use declared::identification;

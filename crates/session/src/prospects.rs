@@ -3,9 +3,12 @@
 use crate::drive::soak_s;
 use crate::planning::{PlanInputs, plan_of};
 use crate::rehearsal::rehearse;
+use crate::verdict_forecast::{advise, forecast_verdicts};
 use crate::{Session, SessionError};
 use mapper_campaign::{Campaign, Concern};
-use mapper_core::{Dwell, JointSettings, Method, Plan, PlanStep, StepKind, WindowRule};
+use mapper_core::{
+    Advice, Dwell, JointSettings, Method, Plan, PlanStep, StepKind, VerdictForecast, WindowRule,
+};
 use mapper_identify::ZeroSettings;
 use mapper_physics::model::Model;
 use mapper_physics::standstill::{StandstillState, relax};
@@ -40,6 +43,10 @@ pub struct Prospects {
     pub duration_s: f64,
     /// Expected problems.
     pub concerns: Vec<Concern>,
+    /// Expected verdicts of the points; `None` for a script and for methods other than `joint`.
+    pub verdicts: Option<VerdictForecast>,
+    /// Changes after which more points are expected to be good, the cheapest first.
+    pub advice: Vec<Advice>,
 }
 
 impl Session<'_> {
@@ -60,6 +67,13 @@ impl Session<'_> {
             required_error(campaign, &plan),
             uninformative_steps(campaign, &plan),
         ];
+        let verdicts = forecast_verdicts(campaign, &plan);
+        let advice = match verdicts {
+            Some(now) if now.surely_good() < now.points => {
+                advise(campaign, now, |changed| plan_of_sample(changed, model, every))?
+            }
+            _ => Vec::new(),
+        };
         let is_planned = every == 1 || campaign.sequence.is_some();
         let (steps, duration_s) = if is_planned {
             (plan.steps.len(), plan.duration_s())
@@ -74,6 +88,8 @@ impl Session<'_> {
             is_planned,
             duration_s: soak_s(campaign) + duration_s,
             concerns: concerns.into_iter().flatten().collect(),
+            verdicts,
+            advice,
         })
     }
 }
@@ -133,6 +149,17 @@ fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
     ))
 }
 
+/// Time at the end of a step, s, that must be settled for a good verdict.
+fn settled_time_s(dwell_s: f64, joint: bool) -> f64 {
+    if joint { WindowRule::rest_at_end_s(dwell_s) } else { WindowRule::SHORTEST_S }
+}
+
+/// Dwell, s, that a step needs for `window: auto`.
+pub(crate) fn needed_s(step: &PlanStep, joint: bool) -> f64 {
+    let earliest_s = if joint { 0.0 } else { WindowRule::EARLIEST_S };
+    step.predicted.settle_s.unwrap_or(f64::INFINITY).max(earliest_s) + settled_time_s(step.dwell_s, joint)
+}
+
 /// Steps that settle too late for `window: auto`.
 fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let transient = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
@@ -142,12 +169,7 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         return None;
     }
     let joint = campaign.identification.method == Method::Joint;
-    let rest_s =
-        |dwell_s: f64| if joint { WindowRule::rest_at_end_s(dwell_s) } else { WindowRule::SHORTEST_S };
-    let settles_s = |step: &PlanStep| {
-        step.predicted.settle_s.unwrap_or(f64::INFINITY).max(if joint { 0.0 } else { WindowRule::EARLIEST_S })
-    };
-    let needed_s = |step: &PlanStep| settles_s(step) + rest_s(step.dwell_s);
+    let needed_s = |step: &PlanStep| needed_s(step, joint);
     let measured = || plan.steps.iter().filter(|step| step.kind != StepKind::Repeat && step.from.is_some());
     let late: Vec<_> = measured().filter(|step| needed_s(step) > step.dwell_s).collect();
     let worst = late.iter().max_by(|a, b| needed_s(a).total_cmp(&needed_s(b)))?;
@@ -162,7 +184,7 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
              (`not_stabilised`); {} {settles}",
             late.len(),
             measured().count(),
-            rest_s(worst.dwell_s),
+            settled_time_s(worst.dwell_s, joint),
             worst.to
         ),
         "lengthen `timing.dwell`, or widen `identification.stabilisation`".to_owned(),

@@ -22,6 +22,29 @@ fn a_wheel_is_enough_for_a_map() {
     }
 }
 
+/// Verdicts come out as `check` forecasts them, before and after its first advice. Two of 18 points may differ: the standard errors of
+/// some are within a tenth of their limit.
+#[test]
+fn the_forecast_of_verdicts_comes_true() {
+    let scratch = scratch();
+    let shipped = std::fs::read_to_string(mapper_tests::repository().join("campaigns/gap_rig.yaml")).unwrap();
+    let holds = |text: &str| {
+        std::fs::write(scratch.path().join("own.yaml"), text).unwrap();
+        let checked = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(0).json();
+        let expected = checked["expected"]["good"].as_u64().unwrap();
+        let run =
+            mapper_in(scratch.path(), ["run", "own.yaml", "--json", "--progress", "off"]).exits(0).json();
+        let points = run["points"].as_array().unwrap();
+        let good = points.iter().filter(|point| point["verdict"] == "good").count() as u64;
+        assert!(good.abs_diff(expected) <= 2, "{good} good of {}, {expected} expected", points.len());
+        (good, checked)
+    };
+    let (before, checked) = holds(&shipped);
+    let soak_s = checked["advice"][0]["change"]["soak_s"].as_f64().unwrap();
+    let (after, _) = holds(&format!("{shipped}zero: {{soak: {soak_s} s}}\n"));
+    assert!(after > before, "{after} after the advice, {before} before");
+}
+
 #[test]
 fn every_template_passes_its_check_and_nothing_is_overwritten() {
     for rig in ["virtual-lab", "gas-stand", "log"] {

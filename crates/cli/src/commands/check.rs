@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::{interrupt, output, output_options, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
-use mapper_report::{assumed_text, declared_sensors_text, duration, lines_text};
+use mapper_report::{assumed_text, declared_sensors_text, duration, lines_text, verdict_forecast_text};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
 use std::path::PathBuf;
@@ -60,6 +60,8 @@ impl Check {
                 "steps": steps,
                 "minutes": duration_s / 60.0,
                 "backend": campaign.backend.name,
+                "expected": prospects.verdicts,
+                "advice": prospects.advice,
                 "findings": [],
                 "omitted": 0,
                 "warnings": warnings.list,
@@ -79,11 +81,12 @@ impl Check {
             count => format!(", {count} warnings"),
         };
         output::print(&format!(
-            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}{}",
+            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}{}{}",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,
             duration(duration_s),
+            verdict_forecast_text(prospects.verdicts, &prospects.advice),
             declared_sensors_text(&campaign),
             assumed_text(&campaign),
             lines_text(&campaign, &lines),

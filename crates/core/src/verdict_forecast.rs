@@ -1,0 +1,44 @@
+//! Verdicts that the points of a campaign are expected to get, and changes of the campaign that improve them.
+
+use serde::Serialize;
+
+/// Expected verdicts of a campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct VerdictForecast {
+    /// Points that the campaign measures.
+    pub points: usize,
+    /// Those expected to be good.
+    pub good: usize,
+    /// Whether the steps may turn out to contain too little information to check what is declared: all points would then be doubtful.
+    pub near_limit: bool,
+    /// Expected standard error of efficiency, root mean square of the points, fraction; `None` if the steps cannot check what is declared.
+    pub eta_standard_error: Option<f64>,
+    /// Rig time, s.
+    pub duration_s: f64,
+}
+
+impl VerdictForecast {
+    /// Points that are good also if the steps contain less information than expected.
+    pub fn surely_good(&self) -> usize {
+        if self.near_limit { 0 } else { self.good }
+    }
+}
+
+/// A change of a campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CampaignChange {
+    /// `timing.dwell`, s.
+    DwellS(f64),
+    /// `zero.soak`, s.
+    SoakS(f64),
+}
+
+/// A change of the campaign with the verdicts expected after it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Advice {
+    /// The change.
+    pub change: CampaignChange,
+    /// Verdicts after the change.
+    pub forecast: VerdictForecast,
+}

@@ -18,6 +18,7 @@ mod rig_states;
 mod shown;
 mod standard_error;
 mod subcommands;
+mod tasks;
 mod wall;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -38,7 +39,7 @@ struct Arguments {
 fn main() -> ExitCode {
     let raw: Vec<OsString> = std::env::args_os().collect();
     let (json, colour) = output_options::of_raw(&raw);
-    let read = Arguments::command().color(colour).try_get_matches_from(raw);
+    let read = tasks::by_task(Arguments::command()).color(colour).try_get_matches_from(raw);
     let read = read.and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)));
     match read {
         Ok((arguments, matches)) => {

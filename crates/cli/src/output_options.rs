@@ -1,4 +1,4 @@
-//! How the program speaks: colours, progress, JSON. ChosenOptions once on the command line, for all commands.
+//! Output of the program: colours, progress, JSON. Chosen once on the command line, for all commands.
 
 use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
@@ -11,10 +11,10 @@ use std::sync::OnceLock;
 #[derive(Debug, Args)]
 pub struct OutputOptions {
     /// When to colour; `auto`: on a terminal, unless NO_COLOR is set
-    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t, help_heading = "Manner")]
+    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t, help_heading = "Output")]
     color: ColorChoice,
     /// Progress on standard error [default: a bar on a terminal, lines in a pipe, none with --json]
-    #[arg(long, global = true, value_parser = ProgressManner::NAMES, value_name = "FORM", help_heading = "Manner")]
+    #[arg(long, global = true, value_parser = ProgressManner::NAMES, value_name = "FORM", help_heading = "Output")]
     progress: Option<String>,
 }
 

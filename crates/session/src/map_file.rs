@@ -9,7 +9,7 @@ use std::io::Read;
 use std::path::Path;
 
 impl Registry {
-    /// Reads a map. The extension selects the format; `given` is the reference state if the file has none.
+    /// Reads a map file, or the map of a run directory. The extension selects the format; `given` is the reference state if the file has none.
     ///
     /// # Errors
     /// [`SessionError::UnknownExtension`], [`SessionError::File`], or [`SessionError::Import`] with the file's mistakes.
@@ -30,6 +30,7 @@ impl Registry {
         path: &Path,
         given: Option<ReferenceState>,
     ) -> Result<ImportedMap, SessionError> {
+        let path = &if path.is_dir() { path.join("map.json") } else { path.to_owned() };
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         let format = self.formats.read_from(extension).ok_or_else(|| SessionError::UnknownExtension {
             path: path.to_owned(),

@@ -2,12 +2,10 @@
 
 use mapper_tests::{SHIPPED, mapper};
 
-/// Commands as the top level lists them.
+/// Commands as the top level lists them, by task, before its options.
 fn commands(help: &str) -> Vec<String> {
     help.lines()
-        .skip_while(|line| *line != "Commands:")
-        .skip(1)
-        .take_while(|line| !line.trim().is_empty())
+        .take_while(|line| *line != "Options:")
         // Descriptions go on in deeper lines.
         .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
         .filter_map(|line| line.split_whitespace().next())

@@ -16,9 +16,9 @@ pub struct Report {
     /// Run directory, MCAP file or log of another program; further ones are drawn for comparison
     #[arg(required = true, value_name = "RUN")]
     pub runs: Vec<PathBuf>,
-    /// Write the page here
+    /// Write the page here [default: RUN/report.html for one run directory, otherwise report.html]
     #[arg(short, long, value_name = "FILE")]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
     /// Channel map: where recordings made by another program hold the rig's channels (YAML)
     #[arg(long, value_name = "FILE")]
     pub channels: Option<PathBuf>,
@@ -48,10 +48,16 @@ impl Report {
         let first = shown.first().ok_or(SessionError::NoRecording)?;
         let gap = self.gap.as_deref().map(|file| diagnosed(file, &registry, first, &map)).transpose()?;
         let page = Session::new(&registry).page(shown, others, &map, gap.as_ref())?;
-        self.replace.write(&self.out, page.as_bytes())?;
+        let out = self.out.clone().unwrap_or_else(|| match self.runs.as_slice() {
+            [run] if run.is_dir() => run.join("report.html"),
+            _ => PathBuf::from("report.html"),
+        });
+        // The page of a run directory is made from its recording: it may be made again.
+        let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
+        Replace { force: self.replace.force || is_own }.write(&out, page.as_bytes())?;
         match self.json {
-            true => output::print_json(&json!({ "page": self.out })),
-            false => output::print(&format!("page       {}\n", self.out.display())),
+            true => output::print_json(&json!({ "page": out })),
+            false => output::print(&format!("page       {}\n", out.display())),
         }
     }
 }

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use mapper_session::{RigStates, RigStatus};
 use std::path::PathBuf;
 
-/// Look at the lock and the latch of a rig, and acknowledge that it is safe to be run again
+/// Show the lock and the lockout of a rig, and acknowledge that it is safe to be run again
 #[derive(Debug, Args)]
 pub struct Rig {
     /// What to do.

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Fit all speed lines together and print the error at each line when it is left out
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// Map (CSV, JSON or SAE text)
+    /// Map, or run directory
     pub map: PathBuf,
     /// Reference state of the file's corrected quantities, if the file does not give it: SAE, Garrett, BorgWarner or "T, P"
     #[arg(long, value_name = "STATE")]

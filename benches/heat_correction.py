@@ -1,7 +1,7 @@
 """Hot maps corrected by `mapper map correct`, compared with the apparent ones and the joint method, on the virtual lab: errors against its truth.
 
     cargo build --release
-    python3 benches/heat_correction.py --mapper target/release/mapper --write docs/reference/maps.md
+    python3 benches/heat_correction.py --mapper target/release/mapper --write docs/validation/maps.md
 
 Two machines. The closed form of turbo_a, whose work coefficient rises at low speed without any heat. And a table with the same flows and
 pressure ratios whose work is one curve of the flow coefficient at the wheel's exit (Euler, with a disc friction), which is the correction's premise. Each is run

@@ -1,7 +1,7 @@
 """Surge sought on the virtual lab, and the slowest line left out: many seeds, errors against the truth.
 
     cargo build --release
-    python3 benches/surge_lines.py --mapper target/release/mapper --write docs/reference/maps.md
+    python3 benches/surge_lines.py --mapper target/release/mapper --write docs/validation/maps.md
 
 Each seed draws noise and offsets; the margin at which the variation before surge begins is drawn from 18 to 30 %, its size from
 0.2 to 0.5 % of the flow at half that margin. The rows differ in what else is drawn, and in the law of the growth, of which the

@@ -7,6 +7,7 @@ use crate::workspace;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Stdio;
 
 /// Whether documents are written or compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +20,10 @@ pub enum Mode {
 
 /// What is generated below docs: files, and folders with all that is in them.
 const GENERATED: &[&str] = &[
+    "images/plan.svg",
     "images/turbo_a.svg",
+    "reference/campaign.md",
+    "reference/cli.md",
     "reference/constants.md",
     "reference/sequences.md",
     "validation/real-data",
@@ -27,14 +31,25 @@ const GENERATED: &[&str] = &[
     "validation/reproduction.md",
 ];
 
-/// The README's picture is the map of this campaign.
+/// Pictures of the README and of the planner's page are made from this campaign.
 const SHIPPED: &str = "campaigns/turbo_a.yaml";
 
-/// The example that writes the page of sequences.
-pub const EXAMPLE: &str = "sequence_docs";
+/// The example that writes the pages of sequences and of campaigns.
+pub const EXAMPLE: &str = "reference_docs";
 
 /// Folder of the measured data that docs/validation/real-data.md describes, with the inputs of `mapper transient`.
 const MEASURED: &str = "examples/real/turbotools";
+
+/// Head of the page of commands.
+const COMMAND_LINE_HEAD: &str = "\
+# Command line
+
+<!-- Generated from the program's own help by `cargo xtask docs`; do not edit. -->
+
+`--json` prints one object on standard output for every command, failures included (`code`, `message`, `help`). Progress goes to
+standard error, as JSON lines with `--progress json`. Ctrl-C brings the rig into its safe state at the end of the step and keeps the
+measurements; press it again to stop immediately.
+";
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
@@ -48,8 +63,11 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     // Side by side: each has one core to do.
     let (reproduced, others) = std::thread::scope(|scope| {
         let others = scope.spawn(|| {
-            let page = output(command(&programs.sequence_docs, &[]))? + "\n";
-            write(&made.join("reference/sequences.md"), page.as_bytes())?;
+            for page in ["sequences", "campaign"] {
+                let text = output(command(&programs.reference_docs, &[page]))? + "\n";
+                write(&made.join(format!("reference/{page}.md")), text.as_bytes())?;
+            }
+            write(&made.join("reference/cli.md"), command_line(&programs)?.as_bytes())?;
             write(&made.join("reference/constants.md"), constants::page()?.as_bytes())?;
             mapped(&programs, &made)?;
             measured(&programs, &made)
@@ -90,12 +108,45 @@ pub fn docs(mode: Mode) -> Result<(), Error> {
     Ok(())
 }
 
-/// The map of the shipped campaign.
+/// Help of every command.
+fn command_line(programs: &Programs) -> Result<String, Error> {
+    let pages = workspace::target_dir().join("xtask-docs-man");
+    if pages.exists() {
+        fs::remove_dir_all(&pages).map_err(at(&pages))?;
+    }
+    output(command(&programs.mapper, &["man", "--out", &pages.to_string_lossy()]))?;
+    // One manual page per command: mapper-gap-diagnose.1.
+    let mut names = Vec::new();
+    for page in fs::read_dir(&pages).map_err(at(&pages))? {
+        let name = page.map_err(at(&pages))?.file_name().to_string_lossy().into_owned();
+        names.extend(name.strip_suffix(".1").map(|name| name.replace('-', " ")));
+    }
+    names.sort();
+    let mut text = COMMAND_LINE_HEAD.to_owned();
+    for name in names {
+        let mut words: Vec<&str> = name.split(' ').skip(1).collect();
+        words.push("--help");
+        let mut help = command(&programs.mapper, &words);
+        // Lines as long as on a terminal of 100 columns, whatever this one has.
+        let help = help.env("COLUMNS", "100").stdin(Stdio::null()).output();
+        let help = help.map_err(|source| Error::Start { command: name.clone(), source })?.stdout;
+        text.push_str(&format!(
+            "\n## {name}\n\n```text\n{}\n```\n",
+            String::from_utf8_lossy(&help).trim_end()
+        ));
+    }
+    Ok(text)
+}
+
+/// The picture of the plan, and the map, of the shipped campaign.
 fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
     let runs = workspace::target_dir().join("xtask-docs-runs");
     if runs.exists() {
         fs::remove_dir_all(&runs).map_err(at(&runs))?;
     }
+    fs::create_dir_all(made.join("images")).map_err(at(made))?;
+    let plan = made.join("images/plan.svg");
+    output(command(&programs.mapper, &["plan", SHIPPED, "--svg", &plan.to_string_lossy()]))?;
     run(command(&programs.mapper, &["run", SHIPPED, "--out", &runs.to_string_lossy()]))?;
     for run in fs::read_dir(&runs).map_err(at(&runs))? {
         let map = run.map_err(at(&runs))?.path().join("map.svg");
@@ -126,7 +177,7 @@ fn measured(programs: &Programs, made: &Path) -> Result<(), Error> {
 /// Programs that make documents.
 struct Programs {
     mapper: PathBuf,
-    sequence_docs: PathBuf,
+    reference_docs: PathBuf,
 }
 
 /// Builds them as the tests are built: what is computed is the same to the bit in every profile, and a clone that is
@@ -140,7 +191,7 @@ fn build() -> Result<Programs, Error> {
     run(command(workspace::cargo(), &[&arguments[..], &examples].concat()))?;
     let built = workspace::target_dir().join("debug");
     let program = |name: &str| built.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-    Ok(Programs { mapper: program("mapper"), sequence_docs: program(&format!("examples/{EXAMPLE}")) })
+    Ok(Programs { mapper: program("mapper"), reference_docs: program(&format!("examples/{EXAMPLE}")) })
 }
 
 fn write(path: &Path, content: &[u8]) -> Result<(), Error> {

@@ -8,7 +8,7 @@ fn main() -> std::process::ExitCode {
         name: settings::NAME,
         version: env!("CARGO_PKG_VERSION"),
         summary: "Instruments of a test bed that speak the AK telegram over TCP; they are read alone.",
-        settings: r#"docs/how-to/rig.md, "Instruments beside the PLC""#,
+        settings: r#"docs/how-to/rig.md, "Instruments next to the PLC""#,
     };
     about.serve(rig::open)
 }

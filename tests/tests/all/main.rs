@@ -6,6 +6,7 @@
 
 mod circles;
 mod dependencies;
+mod documentation;
 mod doomed;
 mod drift;
 mod drift_refusals;

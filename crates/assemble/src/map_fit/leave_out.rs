@@ -11,7 +11,7 @@ use mapper_numerics::statistics::{NORMAL_975, median};
 /// speed. Lines without which too little is left are passed over.
 ///
 /// Each search starts from the fit of all lines, parameters and variances: it ends close to where one from the beginning
-/// does (docs/reference/maps.md says how close), in a third of the rounds.
+/// does (docs/validation/maps.md says how close), in a third of the rounds.
 pub fn leave_out(fit: &MapFit) -> Vec<LeftOutLine> {
     let count = fit.data.lines_rpm.len();
     let one = |line: usize| {

@@ -1,0 +1,314 @@
+//! Pages of the documentation: links, commands, campaigns and codes in them, and their length.
+
+use mapper_tests::{mapper_in, repository, scratch};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Pages that a program writes, below docs: not counted as prose.
+const GENERATED: [&str; 5] = [
+    "reference/campaign.md",
+    "reference/cli.md",
+    "reference/constants.md",
+    "reference/sequences.md",
+    "validation/reproduction.md",
+];
+/// Limit of all other pages together: an engineer reads them in three hours.
+const MAX_WORDS: usize = 35_000;
+/// Limit of a page that explains.
+const MAX_WORDS_OF_EXPLANATION: usize = 1_500;
+
+/// Markdown of the repository: the pages of docs, and those of the folders above and next to it.
+fn pages() -> Vec<PathBuf> {
+    let root = repository();
+    let mut found = Vec::new();
+    below(&root.join("docs"), &mut found);
+    for folder in ["", "python", "benches/peers", "crates/physics/tests/reference"] {
+        let entries = fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        found.extend(entries.filter(|path| is_page(path)));
+    }
+    found.sort();
+    found
+}
+
+fn is_page(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end == "md")
+}
+
+fn below(folder: &Path, found: &mut Vec<PathBuf>) {
+    for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        match path.is_dir() {
+            true => below(&path, found),
+            false if is_page(&path) => found.push(path),
+            false => {}
+        }
+    }
+}
+
+/// Lines outside of code blocks, each with what is between backticks left out, and code blocks with their language.
+fn prose_and_code(page: &str) -> (Vec<String>, Vec<(String, String)>) {
+    let (mut prose, mut code) = (Vec::new(), Vec::new());
+    let mut block: Option<(String, String)> = None;
+    for line in page.lines() {
+        match (&mut block, line.strip_prefix("```")) {
+            (None, Some(language)) => block = Some((language.to_owned(), String::new())),
+            (None, None) => prose.push(line.split('`').step_by(2).collect()),
+            (Some(_), Some(_)) => code.extend(block.take()),
+            (Some((_, text)), None) => *text += &format!("{line}\n"),
+        }
+    }
+    (prose, code)
+}
+
+/// The anchor that a heading gets: letters, digits, `-` and `_`, blanks as `-`.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim().to_lowercase();
+    let kept = kept.chars().filter(|letter| letter.is_alphanumeric() || " -_".contains(*letter));
+    kept.map(|letter| if letter == ' ' { '-' } else { letter }).collect()
+}
+
+fn anchors(page: &Path) -> Vec<String> {
+    let mut inside = false;
+    let mut found = Vec::new();
+    for line in fs::read_to_string(page).unwrap().lines() {
+        inside ^= line.starts_with("```");
+        if !inside && line.starts_with('#') {
+            found.push(anchor(line.trim_start_matches('#')));
+        }
+    }
+    found
+}
+
+#[test]
+fn every_link_leads_to_a_file_and_a_heading() {
+    let mut broken = Vec::new();
+    let mut links = 0;
+    for page in pages() {
+        let (prose, _) = prose_and_code(&fs::read_to_string(&page).unwrap());
+        for target in
+            prose.iter().flat_map(|line| line.split("](").skip(1)).filter_map(|rest| rest.split(')').next())
+        {
+            if target.contains("://") {
+                continue;
+            }
+            links += 1;
+            let (path, heading) = target.split_once('#').unwrap_or((target, ""));
+            let file = if path.is_empty() { page.clone() } else { page.parent().unwrap().join(path) };
+            if !file.exists() || !(heading.is_empty() || anchors(&file).iter().any(|known| known == heading))
+            {
+                broken.push(format!("{}: {target}", page.strip_prefix(repository()).unwrap().display()));
+            }
+        }
+    }
+    assert!(links > 200, "{links} links were found");
+    assert!(broken.is_empty(), "links that lead nowhere:\n{}", broken.join("\n"));
+}
+
+#[test]
+fn every_page_is_in_the_table_of_contents() {
+    let docs = repository().join("docs");
+    let contents = fs::read_to_string(docs.join("SUMMARY.md")).unwrap();
+    for page in pages().iter().filter_map(|page| page.strip_prefix(&docs).ok()) {
+        let name = page.to_str().unwrap();
+        assert!(
+            name == "SUMMARY.md" || contents.contains(&format!("]({name})")),
+            "{name} is not in docs/SUMMARY.md"
+        );
+    }
+}
+
+/// Files that sources, messages and scripts name.
+#[test]
+fn every_page_that_a_source_names_exists() {
+    let root = repository();
+    let mut named = BTreeSet::new();
+    for folder in
+        ["benches", "campaigns", "crates", "drivers", "examples", "plugins", "python", "tests", "xtask"]
+    {
+        sources(&root.join(folder), &mut named);
+    }
+    assert!(named.len() > 15, "{named:?}");
+    let missing: Vec<_> = named.iter().filter(|name| !root.join(name).exists()).collect();
+    assert!(missing.is_empty(), "sources name pages that do not exist: {missing:?}");
+}
+
+fn sources(folder: &Path, named: &mut BTreeSet<String>) {
+    for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            if !["target", "venv", "__pycache__"].contains(&name.as_str()) && !name.starts_with('.') {
+                sources(&path, named);
+            }
+        } else if [".rs", ".py", ".yaml", ".md", ".service"].iter().any(|end| name.ends_with(end)) {
+            let text = fs::read_to_string(&path).unwrap_or_default();
+            let rests = text.split("docs/").skip(1);
+            let pages = rests.filter_map(|rest| Some(format!("docs/{}.md", rest.split_once(".md")?.0)));
+            // A page name has no blanks: what is between was text.
+            named.extend(pages.filter(|page| {
+                page.chars().all(|letter| letter.is_ascii_alphanumeric() || "/_-.".contains(letter))
+            }));
+        }
+    }
+}
+
+fn words(text: &str) -> usize {
+    text.split_whitespace().filter(|word| word.chars().any(char::is_alphabetic)).count()
+}
+
+#[test]
+fn the_documentation_can_be_read_in_an_afternoon() {
+    let docs = repository().join("docs");
+    let mut total = 0;
+    for page in pages() {
+        let Ok(name) = page.strip_prefix(&docs) else { continue };
+        let name = name.to_str().unwrap();
+        let count = words(&fs::read_to_string(&page).unwrap());
+        assert!(
+            !name.starts_with("explanation") || count <= MAX_WORDS_OF_EXPLANATION,
+            "{name}: {count} words"
+        );
+        total += if GENERATED.contains(&name) { 0 } else { count };
+    }
+    assert!(total <= MAX_WORDS, "{total} words; at most {MAX_WORDS}: shorten, or delete what nobody acts on");
+}
+
+#[test]
+fn every_warning_code_has_a_remedy() {
+    let root = repository();
+    let page = fs::read_to_string(root.join("docs/reference/warnings.md")).unwrap();
+    let source = fs::read_to_string(root.join("crates/identify/src/findings.rs")).unwrap();
+    let codes: Vec<&str> =
+        source.lines().filter_map(|line| line.split_once(": &str = \"")?.1.strip_suffix("\";")).collect();
+    assert!(codes.len() > 30, "{codes:?}");
+    for code in codes {
+        let row = page.lines().find(|line| line.starts_with(&format!("| `{code}` |")));
+        let row = row.unwrap_or_else(|| panic!("{code} is not in docs/reference/warnings.md"));
+        assert_eq!(row.matches(" | ").count(), 3, "{row}");
+    }
+}
+
+/// Commands in code blocks, and in indented ones, without the text behind `#`.
+fn commands(page: &str) -> Vec<String> {
+    let lines =
+        page.lines().filter_map(|line| line.strip_prefix("    ").unwrap_or(line).strip_prefix("mapper "));
+    lines.map(|line| line.split(" #").next().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn every_command_in_the_pages_and_its_options_exist() {
+    let docs = repository().join("docs");
+    let reference = fs::read_to_string(docs.join("reference/cli.md")).unwrap();
+    let help_of = |name: &str| {
+        let start = format!("## mapper {name}\n");
+        let (_, rest) = reference.split_once(&start)?;
+        Some(rest.split("\n## ").next().unwrap())
+    };
+    let mut count = 0;
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        if page.ends_with("reference/cli.md") {
+            continue;
+        }
+        for command in commands(&text) {
+            let words: Vec<&str> = command.split_whitespace().collect();
+            let two = words.iter().take(2).copied().collect::<Vec<_>>().join(" ");
+            let three = words.iter().take(3).copied().collect::<Vec<_>>().join(" ");
+            let help = help_of(&three).or_else(|| help_of(&two)).or_else(|| help_of(words[0]));
+            let help = help.unwrap_or_else(|| panic!("{}: no command `mapper {command}`", page.display()));
+            let options = words.iter().filter(|word| word.starts_with("--"));
+            for option in
+                options.map(|word| word.split('=').next().unwrap().trim_matches([']', '[', '`', ',', ';']))
+            {
+                count += 1;
+                assert!(help.contains(option), "{}: `mapper {command}` has no {option}", page.display());
+            }
+        }
+    }
+    assert!(count > 40, "{count} options were found");
+}
+
+/// The same campaign with a part of a page in place of its own keys of that name.
+fn with_part(campaign: &str, part: &str) -> String {
+    let key = |line: &str| {
+        let start = line.chars().next().is_some_and(char::is_alphabetic);
+        start.then(|| line.split(':').next().unwrap().to_owned())
+    };
+    let replaced: Vec<String> = part.lines().filter_map(key).collect();
+    // Of sensors a page shows some; the others stay.
+    let kept = |line: &&str| {
+        !part.lines().any(|new| new.starts_with("  ") && new.split(':').next() == line.split(':').next())
+    };
+    let (mut text, mut inside) = (String::new(), false);
+    for line in campaign.lines() {
+        if let Some(key) = key(line) {
+            inside = replaced.contains(&key);
+        }
+        if !inside {
+            text += &format!("{line}\n");
+        }
+    }
+    text += part;
+    if replaced.contains(&"sensors".to_owned()) {
+        let own = campaign.lines().skip_while(|line| *line != "sensors:").skip(1);
+        let own = own.take_while(|line| line.is_empty() || line.starts_with(' '));
+        let single = own.filter(|line| {
+            line.starts_with("  ") && line.contains('{') && !line.trim_start().starts_with(['-', '#'])
+        });
+        text += &single.filter(kept).map(|line| format!("{line}\n")).collect::<String>();
+    }
+    text
+}
+
+/// Parts of campaigns in the pages: a campaign with them has no mistakes. Drivers have tests of their own.
+#[test]
+fn the_campaigns_in_the_pages_pass_their_check() {
+    let root = repository();
+    let shipped = fs::read_to_string(root.join("campaigns/turbo_a_redundant.yaml")).unwrap();
+    let shipped = shipped.replace("[50 krpm, 80 krpm, 110 krpm, 140 krpm]", "[80 krpm, 110 krpm]");
+    let known: Vec<&str> = shipped.lines().filter(|line| line.starts_with(char::is_alphabetic)).collect();
+    let known: BTreeSet<&str> = known.iter().filter_map(|line| line.split(':').next()).collect();
+    let further = ["campaign", "drift", "guards", "safe_state", "speed_control", "surge_search"];
+    let scratch = scratch();
+    let mut count = 0;
+    for page in pages() {
+        let (_, code) = prose_and_code(&fs::read_to_string(&page).unwrap());
+        for (_, part) in code.iter().filter(|(language, _)| language == "yaml") {
+            let first = part.lines().find_map(|line| {
+                line.starts_with(char::is_alphabetic).then(|| line.split(':').next().unwrap())
+            });
+            let simulated = !part.contains("backend:") || part.contains("virtual_lab");
+            if !simulated || !first.is_some_and(|key| known.contains(key) || further.contains(&key)) {
+                continue;
+            }
+            let whole = if part.starts_with("campaign:") { part.clone() } else { with_part(&shipped, part) };
+            fs::write(scratch.path().join("page.yaml"), &whole).unwrap();
+            eprintln!("{}:\n{part}", page.display());
+            mapper_in(scratch.path(), ["check", "page.yaml"]).exits(0);
+            count += 1;
+        }
+    }
+    assert!(count >= 8, "{count} campaigns were found");
+}
+
+/// The table of the README is that of the validation.
+#[test]
+fn the_readme_has_the_measured_errors() {
+    let root = repository();
+    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let measured = fs::read_to_string(root.join("docs/validation/orders.md")).unwrap();
+    let cells = |text: &str, start: &str| -> Vec<String> {
+        let row =
+            text.lines().find(|line| line.starts_with(start)).unwrap_or_else(|| panic!("no row {start}"));
+        row.split('|').map(|cell| cell.trim().to_owned()).filter(|cell| !cell.is_empty()).collect()
+    };
+    for (ours, theirs) in [
+        ("| conventional |", "| turbo_a | conventional |"),
+        ("| dynamic (Burke et al.) |", "| turbo_a | thermal_gradient, dynamic, 120 s |"),
+        ("| joint |", "| turbo_a | thermal_gradient, no zero |"),
+        ("| joint after a zero of 30 min |", "| turbo_a | thermal_gradient |"),
+    ] {
+        let (ours, theirs) = (cells(&readme, ours), cells(&measured, theirs));
+        let [_, minutes, median, worst] = &ours[..] else { panic!("{ours:?}") };
+        assert_eq!([minutes, median, worst], [&theirs[2], &theirs[6], &theirs[8]], "{theirs:?}");
+    }
+}

@@ -22,7 +22,7 @@ pub fn campaign_page() -> String {
         let needed = if required(&schema, key) { " Required." } else { "" };
         text.push_str(&format!("\n## `{key}`\n\n{}{needed}\n", without_html(description(value))));
         let mut rows = Vec::new();
-        below(key, value, &mut rows);
+        below("", value, &mut rows);
         if rows.is_empty() {
             let values = values(value);
             if !values.is_empty() {
@@ -39,7 +39,7 @@ pub fn campaign_page() -> String {
 fn below(path: &str, schema: &Value, rows: &mut Vec<[String; 3]>) {
     for form in forms(schema) {
         for (key, value) in properties(form) {
-            let path = format!("{path}.{key}");
+            let path = joined(path, key);
             let name = format!("`{path}`");
             if rows.iter().any(|[known, ..]| *known == name) {
                 continue;
@@ -52,9 +52,14 @@ fn below(path: &str, schema: &Value, rows: &mut Vec<[String; 3]>) {
             below(&format!("{path}[]"), items, rows);
         }
         if let Some(items) = form.get("additionalProperties").filter(|items| items.is_object()) {
-            below(&format!("{path}.NAME"), items, rows);
+            below(&joined(path, "NAME"), items, rows);
         }
     }
+}
+
+/// A key below another, without the key of the section itself.
+fn joined(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
 }
 
 /// The schema, and each of its alternatives.

@@ -5,8 +5,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Pages that a program writes, below docs: not counted as prose.
-const GENERATED: [&str; 5] = [
+/// Pages below docs that a program writes, and the table of contents: not counted as prose.
+const NOT_PROSE: [&str; 6] = [
+    "SUMMARY.md",
     "reference/campaign.md",
     "reference/cli.md",
     "reference/constants.md",
@@ -167,7 +168,7 @@ fn the_documentation_can_be_read_in_an_afternoon() {
             !name.starts_with("explanation") || count <= MAX_WORDS_OF_EXPLANATION,
             "{name}: {count} words"
         );
-        total += if GENERATED.contains(&name) { 0 } else { count };
+        total += if NOT_PROSE.contains(&name) { 0 } else { count };
     }
     assert!(total <= MAX_WORDS, "{total} words; at most {MAX_WORDS}: shorten, or delete what nobody acts on");
 }

@@ -6,12 +6,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Pages below docs that a program writes, and the table of contents: not counted as prose.
-const NOT_PROSE: [&str; 6] = [
+const NOT_PROSE: [&str; 11] = [
     "SUMMARY.md",
     "reference/campaign.md",
     "reference/cli.md",
     "reference/constants.md",
     "reference/sequences.md",
+    "validation/coverage.md",
+    "validation/drift_orders.md",
+    "validation/identification.md",
+    "validation/orders.md",
+    "validation/performance.md",
     "validation/reproduction.md",
 ];
 /// Limit of all other pages together: an engineer reads them in three hours.

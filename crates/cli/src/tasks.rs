@@ -20,7 +20,7 @@ Examples:
   mapper check my_turbo.yaml            mistakes, and the verdicts to expect
   mapper run my_turbo.yaml              the whole map
   mapper identify log.csv --channels channels.yaml --campaign my_turbo.yaml
-Documentation: the folder docs, from docs/SUMMARY.md.";
+Documentation: docs/README.md in the repository.";
 
 /// Columns of a description's first one, and of the whole text.
 const COLUMNS: (usize, usize) = (15, 80);

@@ -140,5 +140,5 @@ fn value(form: &Value) -> String {
         ("maximum", "at most"),
     ];
     let bounds = bounds.iter().filter_map(|(key, word)| Some(format!(", {word} {}", text(key)?)));
-    kind + &bounds.collect::<String>()
+    kind + bounds.collect::<String>().as_str()
 }

@@ -131,9 +131,7 @@ fn every_command_of_the_tutorials_does_what_it_says() {
         }
     }
     // The files that the tutorials announce are there.
-    for left in
-        ["campaign.schema.json", "turbo_a.m", "maps/log/report.html", "maps/both/report.html", "gap.html"]
-    {
+    for left in ["campaign.schema.json", "maps/log/report.html", "maps/both/report.html", "gap.html"] {
         assert!(folder.join(left).metadata().unwrap().len() > 1000, "{left}");
     }
 }

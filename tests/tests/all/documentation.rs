@@ -270,7 +270,16 @@ fn with_part(campaign: &str, part: &str) -> String {
 fn the_campaigns_in_the_pages_pass_their_check() {
     let root = repository();
     let shipped = fs::read_to_string(root.join("campaigns/turbo_a_redundant.yaml")).unwrap();
-    let shipped = shipped.replace("[50 krpm, 80 krpm, 110 krpm, 140 krpm]", "[80 krpm, 110 krpm]");
+    // Four short steps: their forecast takes a fifth of a second.
+    let smaller = [
+        ("[50 krpm, 80 krpm, 110 krpm, 140 krpm]", "[80 krpm, 110 krpm]"),
+        ("openings: [0.5, 0.7, 1.0, 1.4]", "openings: [0.7, 1.0]"),
+        ("dwell: 120 s", "dwell: 40 s"),
+    ];
+    let shipped = smaller.iter().fold(shipped, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
     let known: Vec<&str> = shipped.lines().filter(|line| line.starts_with(char::is_alphabetic)).collect();
     let known: BTreeSet<&str> = known.iter().filter_map(|line| line.split(':').next()).collect();
     let further = ["campaign", "drift", "guards", "safe_state", "speed_control", "surge_search"];

@@ -125,7 +125,7 @@ recordings of each order: how many are found, and in how many of them that cause
 
 False alarms: {facts}.
 
-**What this says of the claim.** For this method it is true of the housing's temperature and of T2, which jumps show earlier, and not of pressures,
+**Result.** For this method it is true of the housing's temperature and of T2, which jumps show earlier, and not of pressures,
 flow and fouling, which speed lines show as early or earlier. The difference is at most a quarter. Drift is found by the repeats of one jump, and
 both orders make the same repeats; the other points show what is constant.
 """

@@ -1,6 +1,7 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
+use crate::output;
 use crate::{output_options, standard_error};
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
@@ -13,6 +14,7 @@ use mapper_session::{ErrorKind, SessionError};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::ExitCode;
+use terminal_size::terminal_size_of;
 
 /// A command's error: a message for people and an exit code for scripts.
 #[derive(Debug)]
@@ -125,7 +127,10 @@ impl Failure {
             Manner::ClosedPipe => return None,
             Manner::Printed => {}
             Manner::Rendered => standard_error::say(&self.message),
-            Manner::Sentence => standard_error::say(&format!("mapper: {}\n", shortened(&self.message))),
+            Manner::Sentence => {
+                let sentence = format!("mapper: {}\n", shortened(&self.message));
+                standard_error::say(&output::on_terminal(&sentence, terminal_size_of(std::io::stderr())));
+            }
         }
         Some(ExitCode::from(self.code as u8))
     }

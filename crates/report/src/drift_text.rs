@@ -64,7 +64,10 @@ fn group_table(group: &RepeatGroup) -> comfy_table::Table {
         group.visits.first().map(|visit| visit.channels.keys().copied().collect()).unwrap_or_default();
     let mut heads: Vec<String> =
         ["t s", "eta %", "+/- points", "h W/(m2 K)", "+/- W/(m2 K)"].map(str::to_owned).to_vec();
-    heads.extend(symbols.iter().map(|symbol| format!("d {symbol}")));
+    heads.extend(symbols.iter().map(|symbol| match symbol.starts_with("m_") {
+        true => format!("d {symbol} g/s"),
+        false => format!("d {symbol}"),
+    }));
     let mut table = table::with_heads(&heads);
     for visit in &group.visits {
         let mut row = vec![
@@ -82,8 +85,9 @@ fn group_table(group: &RepeatGroup) -> comfy_table::Table {
                 .get(symbol)
                 .zip(first)
                 .map(|(now, first)| now.end_less_model - first.end_less_model);
-            let decimals = if symbol.starts_with("m_") { 6 } else { 2 };
-            number::number(change, decimals)
+            // Flows in g/s.
+            let (scale, decimals) = if symbol.starts_with("m_") { (1e3, 3) } else { (1.0, 2) };
+            number::number(change.map(|change| scale * change), decimals)
         }));
         table.add_row(row);
     }

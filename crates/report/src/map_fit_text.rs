@@ -36,10 +36,10 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
             number(left_out.map(|l| 100.0 * l.distance_ratio), 2),
             number(left_out.and_then(|l| l.eta).map(|eta| 100.0 * eta), 2),
             match (line.measured, line.nodes.iter().all(|n| n.extrapolated)) {
-                (true, _) if left_out.is_some_and(|l| l.outermost) => "measured, outermost".to_owned(),
+                (true, _) if left_out.is_some_and(|l| l.outermost) => "outermost".to_owned(),
                 (true, _) => "measured".to_owned(),
                 (false, true) => "extrapolated".to_owned(),
-                (false, false) => "between lines".to_owned(),
+                (false, false) => "between".to_owned(),
             },
         ]);
     }

@@ -36,10 +36,12 @@ impl Effects {
             let list: Vec<_> = effects.iter().map(|effect| effect.info().clone()).collect();
             return output::print_json(&json!({ "effects": list }));
         }
-        let heads = ["effect", "where", "parameter", "unit", "neutral", "range", "what it is"];
+        let heads = ["effect", "where", "parameter", "unit", "neutral", "range"];
         let mut table = with_heads(&heads.map(str::to_owned));
+        let mut legend = String::new();
         for effect in &effects {
             let info = effect.info();
+            legend += &format!("{}: {}\n", info.id, info.description);
             for parameter in &info.parameters {
                 table.add_row([
                     info.id.to_string(),
@@ -48,11 +50,10 @@ impl Effects {
                     if parameter.unit == "1" { "-".to_owned() } else { parameter.unit.to_string() },
                     parameter.neutral.to_string(),
                     format!("{}..{}", parameter.low, parameter.high),
-                    info.description.to_string(),
                 ]);
             }
         }
-        output::print(&format!("{table}\n"))
+        output::print(&format!("{table}\n\n{legend}"))
     }
 
     /// The matrix of effects against balances on a recording of the campaign without causes.

@@ -72,7 +72,7 @@ impl Campaign {
     #[staticmethod]
     fn check(py: Python<'_>, text: String, origin: PathBuf) -> PyResult<Campaign> {
         let inner = compute(py, None, move |_| {
-            let campaign = mapper_campaign::check(&text, &origin, &mapper_campaign::read_text)
+            let campaign = mapper_campaign::check(&text, &origin, &mapper_campaign::read_named_file)
                 .map_err(|findings| Fault::InCampaign(CampaignError::Mistakes(Box::new(findings))))?;
             Ok(Inner { campaign, text, origin })
         })?;

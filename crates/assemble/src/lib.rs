@@ -16,6 +16,9 @@ mod heat_correction;
 mod map_fit;
 mod repeated_jumps;
 mod repeats;
+mod turbine_compare;
+mod turbine_fit;
+mod turbine_surface;
 
 pub use assemble::assemble;
 pub use compare::{ComparedLine, ComparedPlace, MapComparison, compare};
@@ -26,3 +29,5 @@ pub use heat_correction::{CorrectedLine, HeatCorrection, HeatCorrectionError, co
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
 pub use repeated_jumps::{RepeatedJump, repeated_jumps};
 pub use repeats::points_for_map;
+pub use turbine_compare::{ComparedTurbinePoint, TurbineComparison, compare_turbines};
+pub use turbine_fit::{TurbineFit, TurbineFitError, fit_turbine};

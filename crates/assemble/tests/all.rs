@@ -6,3 +6,4 @@ mod efficiency;
 mod heat_correction;
 mod map_fit;
 mod support;
+mod turbine;

@@ -38,7 +38,7 @@ use std::path::Path;
 pub use crate::elements::backend::BackendChoice;
 pub use crate::elements::display::DisplayUnits;
 pub use crate::elements::identification::Identification;
-pub use crate::elements::machine::{Machine, MapSource};
+pub use crate::elements::machine::{DescriptionSource, Machine, MapSource};
 pub use crate::elements::outputs::{FormatName, Outputs};
 pub use crate::elements::readers::ReaderChoice;
 pub use crate::elements::report::Report;

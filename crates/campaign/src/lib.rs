@@ -27,7 +27,7 @@ pub use campaign::Campaign;
 pub use concern::Concern;
 pub use load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
-    read_text, warnings,
+    read_named_file, read_text, warnings,
 };
 pub use machine_sizes::{AssumedSize, similar_machine, similar_sizes};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};

@@ -8,6 +8,7 @@ use crate::prospects;
 use crate::reach::{self, Unreachable};
 use crate::resolved;
 use crate::schema::SCHEMA;
+use mapper_map_table::file_text;
 use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, ReadError, Source, Step, path_text, steps};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -46,7 +47,7 @@ pub fn load(path: &Path) -> Result<Campaign, CampaignError> {
     let text = mapper_yaml::open(&DOCUMENT, path, FILE_SIZE_LIMIT)
         .map_err(|source| CampaignError::Read { path: path.to_owned(), source })?
         .map_err(mistakes)?;
-    check(&text, path, &read_text).map_err(mistakes)
+    check(&text, path, &read_named_file).map_err(mistakes)
 }
 
 /// Checks a campaign's text. `origin` names it in messages and is the base of relative paths; `files` reads the
@@ -265,6 +266,18 @@ fn finish(
         notes.push(source.finding(kind, path_text(steps), root.place(steps), reason, remedy));
     }
     notes.is_empty().then_some(campaign)
+}
+
+/// A file that a campaign names, as text: of a workbook its first visible sheet with numbers, of a compressed file its content.
+///
+/// # Errors
+/// The system's error; [`io::ErrorKind::InvalidData`] for a file that is neither.
+pub fn read_named_file(path: &Path) -> io::Result<String> {
+    match String::from_utf8(mapper_yaml::read_limited(path, MAP_SIZE_LIMIT)?) {
+        Ok(text) => Ok(text),
+        Err(error) => file_text(error.as_bytes())
+            .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.to_string())),
+    }
 }
 
 /// A file that a campaign names, or a campaign itself, as text.

@@ -1,97 +1,56 @@
-//! The nominal map from a file: a table with names and units in its heading, or four bare columns.
+//! The nominal map of a campaign, from a file in any layout that map files have.
 
-use mapper_core::{MAP_COLUMNS, ReferenceState};
+use mapper_core::{IdentifiedPoint, ImportError, MapDescription};
+use mapper_map_table::read_any_text;
 use mapper_physics::tabulated_map::{MapError, MapRow, TabulatedMap};
-use mapper_yaml::units::{
-    FoundColumn, HeadingError, Kind, TableText, WantedColumn, find_columns, with_units_row,
-};
-
-/// Quantities of the four columns.
-const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
 
 /// Why a file is not a nominal map.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum NominalTableError {
-    /// The heading does not identify the columns.
+    /// The file cannot be read as a map.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// The map has no efficiencies, and the model needs them.
     #[error(
-        "line {line}: {source}; or leave the heading out and give rpm, kg/s, pressure ratio and efficiency in this order"
+        "the map has no efficiencies, and the nominal model needs them: give a map that has some, or `map: closed_form`"
     )]
-    Heading {
-        /// Line of the file, from 1.
-        line: usize,
-        /// What is wrong with it.
-        source: HeadingError,
-    },
-    /// An invalid row.
-    #[error(
-        "line {line} of the map: `{text}` does not hold the four numbers of a point (speed, flow, pressure ratio, efficiency)"
-    )]
-    Row {
-        /// Line of the file, from 1.
-        line: usize,
-        /// Its text, shortened.
-        text: String,
-    },
+    NoEfficiency,
     /// The numbers are not those of a compressor.
     #[error(transparent)]
     Map(#[from] MapError),
 }
 
-/// Reads separated text (`,`, or `;` or tab with decimal point or comma). A first line without numbers names the columns and their
-/// units, in any order and among others; units may be on a line of their own below it. Without names they are corrected rpm, corrected
-/// kg/s, pressure ratio and efficiency. `#` starts a comment.
+/// The nominal map of a text. `given` is what is stated about the file, at least the reference state.
 ///
 /// # Errors
 /// [`NominalTableError`] with the line of the file.
-pub fn nominal_table(text: &str, reference: ReferenceState) -> Result<TabulatedMap, NominalTableError> {
-    let content = text.lines().enumerate().filter_map(|(index, line)| {
-        let content = line.split('#').next().unwrap_or_default().trim().trim_start_matches('\u{feff}');
-        (!content.is_empty()).then_some((index + 1, content))
-    });
-    let mut content = content.peekable();
-    let table = TableText::of(content.peek().map_or("", |(_, line)| line));
-    let has_number = |line: &str| table.fields(line).into_iter().any(|field| table.number(field).is_some());
-    let bare = |index| FoundColumn { index, unit: None };
-    let mut columns = [bare(0), bare(1), bare(2), bare(3)];
-    if let Some((line, names)) = content.next_if(|(_, first)| !has_number(first)) {
-        let names: Vec<String> = table.fields(names).into_iter().map(str::to_owned).collect();
-        let plain: Vec<&str> = names.iter().map(String::as_str).collect();
-        let below = content.peek().and_then(|(_, below)| with_units_row(&plain, &table.fields(below)));
-        if below.is_some() {
-            content.next();
-        }
-        columns = columns_of(&below.unwrap_or(names))
-            .map_err(|source| NominalTableError::Heading { line, source })?;
+pub fn nominal_table(
+    text: &str,
+    given: impl Into<MapDescription>,
+) -> Result<TabulatedMap, NominalTableError> {
+    let map = read_any_text(text, &given.into())?.map;
+    let points = map.lines.iter().flat_map(|line| &line.points);
+    let mut points: Vec<(&IdentifiedPoint, f64)> =
+        points.filter_map(|point| Some((&point.identified, point.eta?))).collect();
+    if points.is_empty() {
+        return Err(NominalTableError::NoEfficiency);
     }
-    let mut rows = Vec::new();
-    for (line, content) in content {
-        let fields = table.fields(content);
-        let number =
-            |column: FoundColumn| table.number(fields.get(column.index)?).map(|value| column.inside(value));
-        let [Some(speed_corrected_rpm), Some(flow_corrected_kg_s), Some(pressure_ratio), Some(efficiency)] =
-            columns.map(number)
-        else {
-            return Err(NominalTableError::Row { line, text: content.chars().take(60).collect() });
-        };
-        rows.push(MapRow { speed_corrected_rpm, flow_corrected_kg_s, pressure_ratio, efficiency });
-    }
-    Ok(TabulatedMap::new(&rows, reference)?)
-}
-
-/// The four columns by their names and units.
-fn columns_of(names: &[String]) -> Result<[FoundColumn; 4], HeadingError> {
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let wanted: [WantedColumn<'_>; 4] = std::array::from_fn(|i| WantedColumn {
-        quantity: MAP_COLUMNS[i].0,
-        names: MAP_COLUMNS[i].1,
-        kind: KINDS[i],
-    });
-    find_columns(&names, wanted)
+    // In the order of the file, which messages count by.
+    points.sort_by_key(|(point, _)| point.step);
+    let row = |(point, efficiency): &(&IdentifiedPoint, f64)| MapRow {
+        speed_corrected_rpm: point.speed_corrected_rpm,
+        flow_corrected_kg_s: point.flow_corrected_kg_s,
+        pressure_ratio: point.pressure_ratio,
+        efficiency: *efficiency,
+    };
+    let rows: Vec<MapRow> = points.iter().map(row).collect();
+    Ok(TabulatedMap::new(&rows, map.reference)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_core::ReferenceState;
     use mapper_physics::characteristic::CompressorCharacteristic;
     use proptest::prelude::*;
 
@@ -99,7 +58,7 @@ mod tests {
                           70000,0.06,1.7,0.6\n70000,0.09,1.65,0.7\n70000,0.12,1.5,0.65\n";
 
     fn read(text: &str) -> Result<TabulatedMap, NominalTableError> {
-        nominal_table(text, ReferenceState::SAE)
+        nominal_table(text, Some(ReferenceState::SAE))
     }
 
     #[test]
@@ -107,12 +66,12 @@ mod tests {
         let map = read(SAMPLE).unwrap();
         assert_eq!(map.speeds_corrected_rpm(), [50e3, 70e3]);
         assert!((map.evaluate(50e3, 1.30).flow_corrected_kg_s - 0.06).abs() < 1e-12);
-        assert!(matches!(read(&SAMPLE.replace("0.09", "oops")), Err(NominalTableError::Row { line: 6, .. })));
-        let negative = read(&SAMPLE.replace("0.09", "-1"));
         assert!(matches!(
-            negative,
-            Err(NominalTableError::Map(MapError::Value { row: 5, quantity: "flow", .. }))
+            read(&SAMPLE.replace("0.09", "oops")),
+            Err(NominalTableError::Import(ImportError::NotANumber { line: 6, .. }))
         ));
+        let negative = read(&SAMPLE.replace("0.09", "-1"));
+        assert!(matches!(negative, Err(NominalTableError::Import(ImportError::Value { line: 6, .. }))));
     }
 
     /// The same map by columns in another order, with units, among others.
@@ -136,16 +95,16 @@ mod tests {
         assert_eq!(read(&german).unwrap().fingerprint(), named.fingerprint());
         assert!(matches!(
             read(&text.replace("g/s", "slugs")),
-            Err(NominalTableError::Heading { line: 1, .. })
+            Err(NominalTableError::Import(ImportError::Row { line: 1, .. }))
         ));
         assert!(matches!(
             read(&text.replace("krpm", "rpm")),
-            Err(NominalTableError::Map(MapError::Slow { .. }))
+            Err(NominalTableError::Import(ImportError::Slow { .. }))
         ));
         // rpm under a heading of krpm.
         assert!(matches!(
             read(&SAMPLE.replace("RPM", "N [krpm]")),
-            Err(NominalTableError::Map(MapError::Fast { .. }))
+            Err(NominalTableError::Import(ImportError::Value { .. }))
         ));
     }
 

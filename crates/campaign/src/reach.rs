@@ -1,7 +1,7 @@
 //! Checks that the nominal model can reach each point within the limits.
 
-use crate::campaign::{Campaign, MapSource};
-use crate::nominal_table::{NominalTableError, nominal_table};
+use crate::campaign::Campaign;
+use crate::nominal_table::NominalTableError;
 use mapper_core::OperatingPoint;
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::ClosedFormMap;
@@ -26,11 +26,9 @@ pub struct Unreachable {
 /// [`NominalTableError`] if the map file's text is not a map; this cannot happen in a checked campaign.
 pub fn nominal_model(campaign: &Campaign) -> Result<Model, NominalTableError> {
     let params = campaign.machine.params;
-    let map: Arc<dyn CompressorCharacteristic> = match &campaign.machine.map {
-        MapSource::ClosedForm => {
-            Arc::new(ClosedFormMap { wheel_diameter_m: params.compressor.wheel_diameter_m })
-        }
-        MapSource::Table { text, reference, .. } => Arc::new(nominal_table(text, *reference)?),
+    let map: Arc<dyn CompressorCharacteristic> = match campaign.machine.map.table() {
+        None => Arc::new(ClosedFormMap { wheel_diameter_m: params.compressor.wheel_diameter_m }),
+        Some(table) => Arc::new(table?),
     };
     Ok(Model::new(params, map))
 }

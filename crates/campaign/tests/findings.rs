@@ -53,6 +53,12 @@ fn files(path: &Path) -> io::Result<String> {
     match path.to_str() {
         Some("dir/maps/there.csv") => Ok(TABLE.into()),
         Some("dir/maps/bad.csv") => Ok(TABLE.replace("0.0659", "much")),
+        // The same points under headings that say nothing, speeds in krpm.
+        Some("dir/maps/open.csv") => Ok(TABLE.replace("rpm,kg/s,PR,eta", "a,b,c,d").replace("000,", ",")),
+        Some("dir/maps/open.yaml") => {
+            Ok("speed: \"a [krpm]\"\nflow: \"b [kg/s]\"\npressure_ratio: c\nefficiency: d\n".into())
+        }
+        Some("dir/maps/wrong.yaml") => Ok("flow: \"b [slug]\"\ndesign: 1\n".into()),
         _ => Err(io::ErrorKind::NotFound.into()),
     }
 }
@@ -556,8 +562,8 @@ fn what_must_fit_together() {
         "map: {file: maps/bad.csv, reference: SAE}",
         Kind::WrongValue,
         "maps/bad.csv",
-        "line 3 of the map",
-        "each row needs",
+        "line 3: the mass flow",
+        "mapper map inspect",
     );
     one(
         "P1: {noise: 20 Pa}",
@@ -742,6 +748,29 @@ fn a_table_is_read_with_its_reference_state_and_its_points_are_judged() {
     let findings = mistakes(&text.replace("max: 500 kPa", "max: 115 kPa"));
     assert!(findings.list.iter().all(|finding| finding.kind == Kind::Unreachable), "{findings}");
     assert_eq!(findings.list.len(), 4, "{findings}");
+}
+
+/// What a map file leaves open stands in a map description.
+#[test]
+fn a_description_completes_a_map_file() {
+    let described = |description: &str| {
+        let new = format!("map: {{file: maps/open.csv, reference: SAE{description}}}");
+        with("map: closed_form", &new).0
+    };
+    let plain = with("map: closed_form", "map: {file: maps/there.csv, reference: SAE}").0;
+    let [open, plain] = [described(", description: maps/open.yaml"), plain].map(|text| {
+        let campaign = run(&text).unwrap_or_else(|findings| panic!("{findings}"));
+        campaign.machine.map.table().unwrap().unwrap().speeds_corrected_rpm()
+    });
+    assert_eq!(open, plain);
+    for (description, at) in [
+        ("", "machine.map.file"),
+        (", description: maps/wrong.yaml", "machine.map.description"),
+        (", description: maps/gone.yaml", "machine.map.description"),
+    ] {
+        let findings = mistakes(&described(description));
+        assert_eq!((findings.list.len(), findings.list[0].path.as_str()), (1, at), "{findings}");
+    }
 }
 
 #[test]

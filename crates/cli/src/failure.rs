@@ -10,7 +10,7 @@ use mapper_fleet::{FleetError, StudyFileError};
 use mapper_host::DriverError;
 use mapper_live::LiveError;
 use mapper_record::{ChannelMapError, RecordError};
-use mapper_session::{ErrorKind, SessionError};
+use mapper_session::{DescriptionError, ErrorKind, MapWorkError, SessionError};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::ExitCode;
@@ -179,6 +179,7 @@ impl From<SessionError> for Failure {
             SessionError::Campaign(error) => Failure::of_campaign(error),
             SessionError::Nightly(NightlyError::Mistakes(findings))
             | SessionError::ChannelMap(ChannelMapError::Mistakes(findings))
+            | SessionError::MapWork(MapWorkError::Description(DescriptionError::Mistakes(findings)))
             | SessionError::Record(RecordError::ChannelMap(findings)) => Failure::of_findings(&findings),
             error => Failure::new(code, error),
         }

@@ -6,7 +6,7 @@ use crate::standard_error;
 use clap::Args;
 use mapper_core::terminal_text;
 use mapper_report::wrapped;
-use mapper_session::{Existing, SessionError, write_file};
+use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -28,6 +28,11 @@ impl Replace {
     /// What becomes of a file that is there.
     pub fn existing(&self) -> Existing {
         if self.force { Existing::Replaced } else { Existing::Kept }
+    }
+
+    /// A new file with a map.
+    pub fn map<'a>(&self, path: &'a Path, format: Option<&'a str>) -> MapOut<'a> {
+        MapOut { path, format, existing: self.existing() }
     }
 
     /// Writes a file.
@@ -67,6 +72,12 @@ fn write(text: &str) -> Result<(), Failure> {
 /// Writes what is already laid out to standard error: warnings, which no program reads.
 pub fn warn(text: &str) {
     standard_error::say(text);
+}
+
+/// Writes the result of a command on map files, and what it assumed about them.
+pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
+    work.warnings.iter().for_each(|warning| warn(&format!("{warning}\n")));
+    if as_json { print_json(&work.json) } else { print(&work.text) }
 }
 
 /// Writes one JSON object and a line end to standard output.

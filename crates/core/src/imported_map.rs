@@ -25,8 +25,12 @@ impl From<CompressorMap> for ImportedMap {
 pub struct ImportedColumn {
     /// Its heading; empty if it has none.
     pub heading: String,
+    /// Its number, from 1.
+    pub number: usize,
     /// The quantity it holds.
     pub quantity: &'static str,
+    /// Key of the quantity in a map description.
+    pub key: &'static str,
     /// Its unit as written; empty if it names none.
     pub unit: String,
     /// Smallest value in SI, speeds in rpm; volume flows as mass flows, reduced quantities as corrected ones.
@@ -54,6 +58,15 @@ pub enum ImportRemark {
     },
     /// Measured points were corrected; their efficiency is the apparent one, heat transfer included.
     Measured,
+    /// The file names no unit of flow; kg/s was taken.
+    FlowUnitAssumed,
+    /// Speeds without a unit were taken as rpm/K^0.5, from their size.
+    SpeedParameterAssumed,
+    /// Relative speeds were multiplied by this one.
+    DesignSpeed {
+        /// Speed of 1, rpm.
+        rpm: f64,
+    },
     /// Nodes that the fit of the map extrapolated were left out.
     ExtrapolatedNodes {
         /// Their number.

@@ -28,6 +28,7 @@ mod jump;
 mod limits;
 mod map;
 mod map_columns;
+mod map_description;
 mod map_format;
 mod map_format_error;
 mod model_tolerances;
@@ -51,6 +52,7 @@ mod surge;
 mod terminal_text;
 mod thermal_model;
 mod timing;
+mod turbine_map;
 mod verdict_forecast;
 mod visit_order;
 mod window_rule;
@@ -84,7 +86,10 @@ pub use jump::{Jump, Repeats};
 pub use limits::{Limits, SURGE_ALLOWED_S};
 pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
 pub use map_columns::MAP_COLUMNS;
-pub use map_format::{DrawMap, MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, MapUnits, ReadMap, WriteMap};
+pub use map_description::{DescribedColumn, DesignPoint, MapDescription, StaticTaps};
+pub use map_format::{
+    DrawMap, MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, MapUnits, ReadMap, TurbineFormat, WriteMap,
+};
 pub use map_format_error::{ExportError, ImportError};
 pub use model_tolerances::ModelTolerances;
 pub use on_drift::OnDrift;
@@ -107,6 +112,9 @@ pub use thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };
 pub use timing::{Dwell, Timing};
+pub use turbine_map::{
+    FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportedTurbine, TurbineMap, TurbineMapPoint,
+};
 pub use verdict_forecast::{Advice, CampaignChange, VerdictForecast};
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;

@@ -1,6 +1,8 @@
 //! The interface of map files: a format is a name, a writer, a reader, or both. Formats do no IO.
 
-use crate::{CompressorMap, ExportError, ImportError, ImportedMap, ReferenceState};
+use crate::{
+    CompressorMap, ExportError, ImportError, ImportedMap, ImportedTurbine, MapDescription, TurbineMap,
+};
 
 /// Largest map file that is read, bytes: a measured map has some ten thousand.
 pub const MAP_FILE_SIZE_LIMIT: usize = 32 << 20;
@@ -36,12 +38,26 @@ impl Default for MapUnits {
     }
 }
 
-/// Parses the bytes of a file into a map; the second argument is the reference state that the user gives.
+/// Parses the bytes of a file into a map; the second argument is what the user states about the file.
 ///
 /// A map without a reference state is rejected: a wrong one shifts speeds by 1.7 % and more, and goes unnoticed.
-pub type ReadMap = fn(&[u8], Option<ReferenceState>) -> Result<ImportedMap, ImportError>;
+pub type ReadMap = fn(&[u8], &MapDescription) -> Result<ImportedMap, ImportError>;
 
-/// One file format of compressor maps.
+/// The writer and the reader of turbine maps in a format.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct TurbineFormat {
+    /// Turns a map into the bytes of a file.
+    pub write: Option<fn(&TurbineMap) -> Result<Vec<u8>, ExportError>>,
+    /// Parses the bytes of a file.
+    pub read: Option<fn(&[u8], &MapDescription) -> Result<ImportedTurbine, ImportError>>,
+}
+
+impl TurbineFormat {
+    /// A format without turbine maps.
+    pub const NONE: TurbineFormat = TurbineFormat { write: None, read: None };
+}
+
+/// One file format of maps.
 #[derive(Debug, Clone, Copy)]
 pub struct MapFormat {
     /// Name as written in campaigns and on the command line.
@@ -58,6 +74,8 @@ pub struct MapFormat {
     pub draw: Option<DrawMap>,
     /// Its reader, if maps can be read from it.
     pub read: Option<ReadMap>,
+    /// The same for maps of turbines.
+    pub turbine: TurbineFormat,
 }
 
 impl MapFormat {
@@ -88,17 +106,44 @@ impl MapFormat {
         self.draw.map_or_else(|| self.write(map), |draw| draw(map, units))
     }
 
-    /// Parses the map of a file; `given` is the reference state that the user gives.
+    /// Parses the map of a file; `given` is what the user states about it, or the reference state alone.
     ///
     /// # Errors
     /// [`ImportError`]: the format is write-only, the file is too large, not text, not a map (with its line), or
     /// without a reference state.
-    pub fn read(&self, bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    pub fn read(&self, bytes: &[u8], given: impl Into<MapDescription>) -> Result<ImportedMap, ImportError> {
         let read = self.read.ok_or(ImportError::OnlyWritten { format: self.name })?;
         if bytes.len() > MAP_FILE_SIZE_LIMIT {
             return Err(ImportError::TooLarge { bytes: bytes.len(), limit: MAP_FILE_SIZE_LIMIT });
         }
-        read(bytes, given)
+        read(bytes, &given.into())
+    }
+
+    /// The content of a file with the map of a turbine.
+    ///
+    /// # Errors
+    /// [`ExportError`]: the format has no turbine maps, or it cannot represent this one.
+    pub fn write_turbine(&self, map: &TurbineMap) -> Result<Vec<u8>, ExportError> {
+        match self.turbine.write {
+            Some(write) => write(map),
+            None => Err(ExportError::NoTurbine { format: self.name }),
+        }
+    }
+
+    /// Parses the map of a turbine.
+    ///
+    /// # Errors
+    /// As [`MapFormat::read`].
+    pub fn read_turbine(
+        &self,
+        bytes: &[u8],
+        given: impl Into<MapDescription>,
+    ) -> Result<ImportedTurbine, ImportError> {
+        let read = self.turbine.read.ok_or(ImportError::NoTurbine { format: self.name })?;
+        if bytes.len() > MAP_FILE_SIZE_LIMIT {
+            return Err(ImportError::TooLarge { bytes: bytes.len(), limit: MAP_FILE_SIZE_LIMIT });
+        }
+        read(bytes, &given.into())
     }
 }
 

@@ -34,6 +34,12 @@ pub enum ExportError {
         /// The format.
         format: &'static str,
     },
+    /// The format has no maps of turbines.
+    #[error("maps of turbines are not written as `{format}`; choose csv, sae, json, modelica or simscape")]
+    NoTurbine {
+        /// The format.
+        format: &'static str,
+    },
     /// The format is read-only.
     #[error("maps are only read from `{format}`; choose another format to write")]
     OnlyRead {
@@ -85,12 +91,34 @@ pub enum ImportError {
         form: &'static str,
     },
     /// The map of a turbine.
-    #[error("line {line}: `{text}` is the map of a turbine; maps of compressors are read")]
+    #[error("line {line}: `{text}` is the map of a turbine; this command needs the map of a compressor")]
     Turbine {
         /// Line, from 1.
         line: usize,
         /// The title or heading, shortened.
         text: String,
+    },
+    /// The format has no maps of turbines.
+    #[error(
+        "maps of turbines are not read from `{format}`; give a table of points as CSV, text or workbook, or JSON of `mapper`"
+    )]
+    NoTurbine {
+        /// The format.
+        format: &'static str,
+    },
+    /// A column whose unit decides its size by powers of ten.
+    #[error(
+        "line {line}: the column `{heading}` has no unit; write it into the heading, or give it: `--with {key}={example}`"
+    )]
+    NoUnit {
+        /// Line of the heading, from 1.
+        line: usize,
+        /// The heading.
+        heading: String,
+        /// Key of the quantity.
+        key: &'static str,
+        /// A unit.
+        example: &'static str,
     },
     /// A table without a column that every map has.
     #[error(
@@ -128,15 +156,60 @@ pub enum ImportError {
     },
     /// Speeds relative to a design point that the file does not give.
     #[error(
-        "the speeds are relative to a design speed that the file does not give (the fastest is {fastest}); multiply them by it, in rpm, and the flows by their scale factor, if they have one"
+        "the speeds are relative to a design speed that the file does not give (the fastest is {fastest}); give the corrected speed of its \
+         design point, e.g. `--design-speed \"150000 rpm\"`"
     )]
     RelativeSpeed {
         /// The largest of them.
         fastest: f64,
     },
+    /// A design speed for speeds that are not relative.
+    #[error(
+        "`--design-speed` belongs to maps with relative speeds; the speeds of this file are in rpm already (the fastest is {fastest} rpm): \
+         leave it out"
+    )]
+    DesignSpeedUnused {
+        /// The largest speed, rpm.
+        fastest: f64,
+    },
+    /// Scaled flows without unit and without the flow of the design point.
+    #[error(
+        "the file does not give the unit of its flows, and programs for gas turbines use lb/s as well as kg/s; give the unit \
+         (`--with flow=kg/s`), or the corrected flow of the design point (`--with \"design_flow=0.2 kg/s\"`)"
+    )]
+    FlowUnit,
+    /// A design point that the tables do not have.
+    #[error(
+        "the design point (speed {speed}, Rline {rline}) is not in the tables, so they cannot be scaled by `design_flow`, \
+         `design_pressure_ratio` or `design_efficiency`; leave these out, or correct NcMapDes and RlineMapDes"
+    )]
+    DesignPoint {
+        /// Its speed as in the file.
+        speed: f64,
+        /// Its auxiliary coordinate.
+        rline: f64,
+    },
+    /// A statement of the user that is not one about this file.
+    #[error("{key}: `{text}` {problem}")]
+    Description {
+        /// Key of the statement.
+        key: &'static str,
+        /// Its text.
+        text: String,
+        /// Why it is none.
+        problem: String,
+    },
     /// A workbook that cannot be read.
     #[error("the workbook cannot be read as a map: {problem}")]
     Workbook {
+        /// The problem.
+        problem: String,
+    },
+    /// A compressed file that cannot be unpacked.
+    #[error(
+        "the compressed file cannot be unpacked: {problem}; unpack it by hand (`gunzip FILE`) to see whether it is whole"
+    )]
+    Packed {
         /// The problem.
         problem: String,
     },

@@ -13,7 +13,7 @@ use crate::power::power;
 const FLOW_REFERENCE_K: f64 = 288.15;
 const FLOW_REFERENCE_PA: f64 = 101_325.0;
 /// Exponent of the swallowing curve `1 - (P3/P4)^-1.1`.
-const SWALLOWING_EXPONENT: f64 = -1.1;
+pub const SWALLOWING_EXPONENT: f64 = -1.1;
 
 /// Terms that depend only on the boundary conditions; computed once while these are constant.
 #[derive(Debug, Clone, Copy)]

@@ -1,27 +1,14 @@
 //! How a map file was understood, as text.
 
 use crate::table;
-use mapper_core::{ImportRemark, ImportedMap, MapPoint};
+use mapper_core::{ImportRemark, ImportedColumn, ImportedMap, MapPoint};
 use std::fmt::Write;
 
 /// The columns, the speed lines, and sentences on what was assumed.
 pub fn imported_map_text(found: &ImportedMap) -> String {
     let map = &found.map;
     let mut text = String::new();
-    if !found.columns.is_empty() {
-        let mut columns =
-            table::with_heads(&["heading", "quantity", "unit", "from", "to"].map(str::to_owned));
-        for column in &found.columns {
-            columns.add_row(vec![
-                column.heading.clone(),
-                column.quantity.to_owned(),
-                if column.unit.is_empty() { "none named".to_owned() } else { column.unit.clone() },
-                significant(column.low),
-                significant(column.high),
-            ]);
-        }
-        let _ = writeln!(text, "{columns}\n\nFrom and to are in rpm, kg/s, Pa, K and as fractions.\n");
-    }
+    text.push_str(&columns_text(&found.columns, "rpm, kg/s, Pa, K and as fractions"));
     let heads = ["corrected rpm", "points", "flow kg/s", "pressure ratio", "efficiency %"];
     let mut lines = table::with_heads(&heads.map(str::to_owned));
     for line in &map.lines {
@@ -49,9 +36,27 @@ pub fn imported_map_text(found: &ImportedMap) -> String {
         None => writeln!(text, "The file does not name the definition of its efficiency."),
     };
     for remark in &found.remarks {
-        let _ = writeln!(text, "{}", sentence(*remark));
+        let _ = writeln!(text, "{}", import_remark_text(*remark));
     }
     text
+}
+
+/// The columns of a table with their ranges in `units`; empty if there are none.
+pub(crate) fn columns_text(columns: &[ImportedColumn], units: &str) -> String {
+    if columns.is_empty() {
+        return String::new();
+    }
+    let mut rows = table::with_heads(&["heading", "quantity", "unit", "from", "to"].map(str::to_owned));
+    for column in columns {
+        rows.add_row(vec![
+            column.heading.clone(),
+            column.quantity.to_owned(),
+            if column.unit.is_empty() { "none named".to_owned() } else { column.unit.clone() },
+            significant(column.low),
+            significant(column.high),
+        ]);
+    }
+    format!("{rows}\n\nFrom and to are in {units}.\n\n")
 }
 
 fn significant(value: f64) -> String {
@@ -59,7 +64,8 @@ fn significant(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-fn sentence(remark: ImportRemark) -> String {
+/// A sentence on what was assumed.
+pub fn import_remark_text(remark: ImportRemark) -> String {
     match remark {
         ImportRemark::NoHeading => {
             "The columns have no headings; taken as rpm, kg/s, pressure ratio and efficiency.".to_owned()
@@ -68,6 +74,16 @@ fn sentence(remark: ImportRemark) -> String {
             "The efficiencies are taken as percentages, from their size.".to_owned()
         }
         ImportRemark::SpeedOfRowAbove => "Rows without a speed have that of the row above.".to_owned(),
+        ImportRemark::FlowUnitAssumed => {
+            "The file names no unit of flow; kg/s was taken. If it has lb/s, give `--with flow=lb/s`.".to_owned()
+        }
+        ImportRemark::SpeedParameterAssumed => {
+            "The speeds have no unit; they were taken as rpm/K^0.5, from their size. If they are corrected speeds, give `--with speed=rpm`."
+                .to_owned()
+        }
+        ImportRemark::DesignSpeed { rpm } => {
+            format!("The relative speeds of the file were multiplied by {rpm} rpm.")
+        }
         ImportRemark::NoEfficiency => "The file has no efficiencies.".to_owned(),
         ImportRemark::ReducedQuantities { reference } => {
             format!("Reduced speed and flow were corrected to {reference}; give `--reference` for another state.")

@@ -2,6 +2,7 @@
 
 use crate::error_kind::ErrorKind;
 use crate::error_words::{in_doubt_text, word};
+use crate::map_work_error::MapWorkError;
 use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
@@ -11,6 +12,7 @@ use mapper_gap::twin::TwinError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
 use mapper_logs::{LogError, OptionError};
+use mapper_map_table::DescriptionError;
 use mapper_observe::OtherMachine;
 use mapper_planner::PlanError;
 use mapper_record::{ChannelMapError, RecordError};
@@ -321,6 +323,9 @@ pub enum SessionError {
         /// What is wrong with it.
         why: String,
     },
+    /// A command on map files ended early.
+    #[error(transparent)]
+    MapWork(#[from] MapWorkError),
     /// A map file has mistakes.
     #[error("{}: {source}", .path.display())]
     Import {
@@ -412,6 +417,7 @@ impl SessionError {
         match self {
             E::Campaign(CampaignError::Read { .. })
             | E::Nightly(NightlyError::Read { .. })
+            | E::MapWork(MapWorkError::Description(DescriptionError::Read { .. }))
             | E::ChannelMap(ChannelMapError::Read { .. }) => ErrorKind::Failure,
             E::Campaign(CampaignError::Mistakes(_))
             | E::Nightly(NightlyError::Mistakes(_))
@@ -432,6 +438,7 @@ impl SessionError {
             | E::MachineUnknown { .. }
             | E::NothingToAcknowledge { .. }
             | E::Import { .. }
+            | E::MapWork(_)
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }
             | E::FormatUnstated { .. }

@@ -112,7 +112,7 @@ fn own_text(registry: &Registry, path: &Path, reference: ReferenceState) -> Resu
 fn own(registry: &Registry, request: &FirstCampaignRequest, path: &Path) -> Result<FirstMap, SessionError> {
     let reference = request.reference.state;
     let text = own_text(registry, path, reference)?;
-    let map = nominal_table(&text, reference)
+    let map = nominal_table(&text, Some(reference))
         .map_err(|source| Box::new(FirstMapError::NotAMap { path: path.to_owned(), source }))?;
     let in_map = map.speeds_corrected_rpm();
     let map_rpm = (in_map.first().copied().unwrap_or(0.0), in_map.last().copied().unwrap_or(0.0));

@@ -7,7 +7,6 @@ use crate::recorded::Recorded;
 use crate::{Session, SessionError};
 use mapper_assemble::{Grouping, MapFitOptions, assemble, fit_map};
 use mapper_campaign::Campaign;
-use mapper_campaign::campaign::MapSource;
 use mapper_core::{CompressorMap, IdentifiedPoint, ThermalModel};
 use mapper_fmu::{FmuMachine, FmuMap, archive, files, table_of_fit};
 use mapper_physics::closed_form_map::ClosedFormMap;
@@ -54,14 +53,12 @@ impl Session<'_> {
     ) -> Result<WrittenFmu, SessionError> {
         let machine = &campaign.machine;
         let params = machine.params;
-        let (map, form) = match &machine.map {
-            MapSource::ClosedForm => {
+        let (map, form) = match machine.map.table() {
+            None => {
                 let wheel_diameter_m = params.compressor.wheel_diameter_m;
                 (FmuMap::ClosedForm(ClosedFormMap { wheel_diameter_m }), "closed-form map")
             }
-            MapSource::Table { text, reference, .. } => {
-                (FmuMap::Table(mapper_campaign::nominal_table(text, *reference)?), "map from its table")
-            }
+            Some(table) => (FmuMap::Table(table?), "map from its table"),
         };
         let origin = format!("nominal machine of a campaign: {form}, thermal model as declared");
         write(Made { name: machine.name.clone(), origin, params, map }, campaign, compile, out, existing)

@@ -1,22 +1,27 @@
 //! Reads and writes map files by format.
 
 use crate::files::{Existing, write_file};
+use crate::map_work_error::MapWorkError;
 use crate::{Registry, SessionError};
 use mapper_assemble::{MapFitOptions, fit_map};
 use mapper_campaign::Campaign;
-use mapper_core::{CompressorMap, ExportError, ImportedMap, MAP_FILE_SIZE_LIMIT, MapFormat, ReferenceState};
+use mapper_core::{
+    CompressorMap, ExportError, ImportedMap, ImportedTurbine, MAP_FILE_SIZE_LIMIT, MapDescription, MapFormat,
+};
+use mapper_map_table::{read_description, set_key, unpacked};
 use std::io::Read;
 use std::path::Path;
 
 impl Registry {
-    /// Reads a map file, or the map of a run directory. The extension selects the format; `given` is the reference state if the file has none.
+    /// Reads a map file, or the map of a run directory. The extension selects the format; `given` is what the user states about it, or the
+    /// reference state alone. A compressed file has the extension of its format before `.gz`.
     ///
     /// # Errors
     /// [`SessionError::UnknownExtension`], [`SessionError::File`], or [`SessionError::Import`] with the file's mistakes.
     pub fn read_map(
         &self,
         path: &Path,
-        given: Option<ReferenceState>,
+        given: impl Into<MapDescription>,
     ) -> Result<CompressorMap, SessionError> {
         Ok(self.inspect_map(path, given)?.map)
     }
@@ -28,13 +33,38 @@ impl Registry {
     pub fn inspect_map(
         &self,
         path: &Path,
-        given: Option<ReferenceState>,
+        given: impl Into<MapDescription>,
     ) -> Result<ImportedMap, SessionError> {
+        let (format, bytes) = self.map_bytes(path)?;
+        format.read(&bytes, given).map_err(|source| SessionError::Import { path: path.to_owned(), source })
+    }
+
+    /// Reads the map of a turbine.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map`].
+    pub fn inspect_turbine(
+        &self,
+        path: &Path,
+        given: impl Into<MapDescription>,
+    ) -> Result<ImportedTurbine, SessionError> {
+        let (format, bytes) = self.map_bytes(path)?;
+        format
+            .read_turbine(&bytes, given)
+            .map_err(|source| SessionError::Import { path: path.to_owned(), source })
+    }
+
+    /// Format and content of a map file.
+    fn map_bytes(&self, path: &Path) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
         let path = &if path.is_dir() { path.join("map.json") } else { path.to_owned() };
-        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        let format = self.formats.read_from(extension).ok_or_else(|| SessionError::UnknownExtension {
+        let of = |path: &Path| path.extension().map(|extension| extension.to_string_lossy().into_owned());
+        let extension = match of(path).unwrap_or_default() {
+            packed if packed.eq_ignore_ascii_case("gz") => of(&path.with_extension("")).unwrap_or_default(),
+            extension => extension,
+        };
+        let format = self.formats.read_from(&extension).ok_or_else(|| SessionError::UnknownExtension {
             path: path.to_owned(),
-            extension: extension.to_owned(),
+            extension: extension.clone(),
             known: self.formats.read_extensions().collect(),
         })?;
         let mut bytes = Vec::new();
@@ -43,7 +73,10 @@ impl Registry {
         std::fs::File::open(path)
             .and_then(|file| file.take(limit).read_to_end(&mut bytes))
             .map_err(SessionError::file("read", path))?;
-        format.read(&bytes, given).map_err(|source| SessionError::Import { path: path.to_owned(), source })
+        let bytes = unpacked(&bytes)
+            .map(std::borrow::Cow::into_owned)
+            .map_err(|source| SessionError::Import { path: path.to_owned(), source })?;
+        Ok((format, bytes))
     }
 
     /// Finds the writable map format of this name.
@@ -84,6 +117,22 @@ impl Registry {
                 .collect(),
         })
     }
+}
+
+/// What the user states about a map file: a description, and statements that count before it.
+///
+/// # Errors
+/// [`MapWorkError::Description`] and [`MapWorkError::Key`].
+pub fn map_description<'a>(
+    file: Option<&Path>,
+    statements: impl IntoIterator<Item = (&'a str, &'a str)>,
+) -> Result<MapDescription, SessionError> {
+    let mut description =
+        file.map(read_description).transpose().map_err(MapWorkError::from)?.unwrap_or_default();
+    for (key, value) in statements {
+        set_key(&mut description, key, value).map_err(MapWorkError::from)?;
+    }
+    Ok(description)
 }
 
 /// Writes a map to a file.

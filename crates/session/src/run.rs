@@ -303,8 +303,11 @@ impl PreparedRun<'_> {
             run_directory::create(self.request.parent, &campaign.name, self.request.started_name)?;
         write_new(&directory.join(run_directory::CAMPAIGN), self.request.campaign_text.as_bytes())?;
         write_new(&directory.join(run_directory::PLAN), json_text(&self.plan)?.as_bytes())?;
-        if let MapSource::Table { named, text, .. } = &campaign.machine.map {
+        if let MapSource::Table { named, text, description, .. } = &campaign.machine.map {
             run_directory::keep_beside(&directory, named, text)?;
+            if let Some(description) = description {
+                run_directory::keep_beside(&directory, &description.named, &description.text)?;
+            }
         }
         if let Some(source) = &campaign.sequence {
             write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;

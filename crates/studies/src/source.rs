@@ -1,7 +1,7 @@
 //! A campaign as an item carries it: its text, and those of the files that it names.
 
 use crate::error::StudyError;
-use mapper_campaign::{Campaign, CampaignError, check_with, load, read_text};
+use mapper_campaign::{Campaign, CampaignError, check_with, load, read_named_file, read_text};
 use mapper_fleet::FleetError;
 use mapper_session::Registry;
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ impl CampaignSource {
         let folder = path.parent().unwrap_or(Path::new(""));
         let files = Mutex::new(BTreeMap::new());
         let keep = |file: &Path| {
-            let text = read_text(file)?;
+            let text = read_named_file(file)?;
             let name = file.strip_prefix(folder).unwrap_or(file).to_owned();
             files.lock().unwrap_or_else(PoisonError::into_inner).insert(name, text.clone());
             Ok(text)

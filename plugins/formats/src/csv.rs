@@ -14,4 +14,5 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     write: Some(write::write),
     draw: None,
     read: Some(read::read),
+    turbine: crate::turbine::CSV,
 };

@@ -11,6 +11,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     write: Some(write),
     draw: None,
     read: None,
+    turbine: crate::turbine::FITTED,
 };
 
 /// Column names, in order.

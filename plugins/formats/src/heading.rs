@@ -1,6 +1,7 @@
 //! The header of every text format: machine, reference state, definition of the efficiency.
 
-use mapper_core::{CompressorMap, EfficiencyDefinition, Method, one_line};
+use mapper_core::{CompressorMap, Method, one_line};
+use mapper_map_table::DEFINITION;
 use std::fmt::Write;
 
 /// Comment lines that begin with `mark`.
@@ -15,15 +16,6 @@ pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
         let _ = writeln!(text, "{mark} {DEFINITION}{definition} ({})", definition.description());
     }
     text
-}
-
-/// Start of the comment that names the definition of the efficiency.
-const DEFINITION: &str = "definition of efficiency: ";
-
-/// The definition of the efficiency that a comment names.
-pub(crate) fn efficiency_in_comment(comment: &str) -> Option<EfficiencyDefinition> {
-    let (_, definition) = comment.split_once(DEFINITION)?;
-    definition.split('(').next()?.parse().ok()
 }
 
 /// Name of a method's efficiency.

@@ -1,8 +1,9 @@
 //! JSON: the unchanged map. Keys carry units, efficiencies are fractions, undefined values are null.
 
-use crate::lines::POINT_LIMIT;
-use crate::reference;
-use mapper_core::{CompressorMap, ExportError, ImportError, ImportedMap, MapFormat, ReferenceState};
+use mapper_core::{
+    CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat, ReferenceState,
+};
+use mapper_map_table::{POINT_LIMIT, settle};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -14,6 +15,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     write: Some(write),
     draw: None,
     read: Some(read),
+    turbine: crate::turbine::JSON,
 };
 
 /// Layout 2 numbers steps from 1. Files of version 0.1.0 have no `format`, and their steps count from 0.
@@ -49,14 +51,17 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     Ok(bytes)
 }
 
-fn read(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut value: Value = serde_json::from_slice(bytes)?;
+    if value.get("kind").and_then(Value::as_str) == Some(crate::turbine::KIND) {
+        return Err(ImportError::Turbine { line: 1, text: format!("kind: {}", crate::turbine::KIND) });
+    }
     let found: Option<ReferenceState> = match value.get("reference") {
         None | Some(Value::Null) => None,
         Some(state) => Some(serde_json::from_value(state.clone())?),
     };
-    let settled = reference::settle(found, given)?;
+    let settled = settle(found, given.reference)?;
     if !settled.is_plausible() {
         return Err(ImportError::Reference { text: settled.to_string() });
     }

@@ -4,20 +4,16 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod beta_tables;
 mod fitted_items;
 mod heading;
 mod labels;
-mod lines;
 mod map_picture;
-mod reference;
 mod simulation_table;
-mod table;
+mod turbine;
 
-pub use lines::POINT_LIMIT;
 pub use map_picture::map_figure;
+pub use mapper_map_table::{POINT_LIMIT, parse_reference};
 pub use mapper_mesh::efficiency_surface;
-pub use reference::parse_reference;
 
 use mapper_core::MapFormats;
 

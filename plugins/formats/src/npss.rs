@@ -2,7 +2,7 @@
 
 use crate::heading::heading;
 use crate::simulation_table::{SimulationTable, joined};
-use mapper_core::{CompressorMap, ExportError, MapFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, TurbineFormat};
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
@@ -12,7 +12,8 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "NPSS tables of flow, pressure ratio and efficiency over beta and corrected speed",
     write: Some(write),
     draw: None,
-    read: Some(crate::beta_tables::read_nested),
+    read: Some(mapper_map_table::read_any_bytes),
+    turbine: TurbineFormat::NONE,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -1,7 +1,7 @@
 //! The picture as pixels.
 
 use crate::map_picture::map_figure;
-use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits};
+use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits, TurbineFormat};
 
 /// Pixels per unit of the picture: sharp on paper and on high-resolution screens.
 const SCALE: f32 = 2.0;
@@ -14,6 +14,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     write: Some(write),
     draw: Some(draw),
     read: None,
+    turbine: TurbineFormat::NONE,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

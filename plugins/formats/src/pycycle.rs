@@ -5,7 +5,7 @@
 
 use crate::heading::heading;
 use crate::simulation_table::{SimulationTable, joined};
-use mapper_core::{CompressorMap, ExportError, MapFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, TurbineFormat};
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
@@ -15,7 +15,8 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "Python module with a pyCycle map: [alpha][Nc][Rline]",
     write: Some(write),
     draw: None,
-    read: Some(crate::beta_tables::read_arrays),
+    read: Some(mapper_map_table::read_any_bytes),
+    turbine: TurbineFormat::NONE,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -1,11 +1,12 @@
 //! SAE text, compressor (J1826, J922): `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a
 //! row, from choke to surge within a line.
 //!
-//! Manufacturers' files may begin with a title, wheel diameters and column names: [`table`] reads them.
+//! Manufacturers' files may begin with a title, wheel diameters and column names: [`mapper_map_table`] reads them.
 
 use crate::heading::heading;
-use crate::{beta_tables, table};
-use mapper_core::{CompressorMap, ExportError, ImportError, ImportedMap, MapFormat, ReferenceState};
+
+use mapper_core::{CompressorMap, ExportError, MapFormat};
+use mapper_map_table::read_any_bytes;
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
@@ -15,7 +16,8 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "SAE text: corrected rpm, corrected kg/s, pressure ratio, efficiency, from choke to surge",
     write: Some(write),
     draw: None,
-    read: Some(read),
+    read: Some(read_any_bytes),
+    turbine: crate::turbine::TEXT,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
@@ -42,15 +44,4 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
         }
     }
     Ok(text.into_bytes())
-}
-
-/// How every table of an NPSS map begins.
-const NPSS_TABLE: &[u8] = b"Table TB_";
-
-fn read(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
-    // Files of NPSS have the same extension.
-    if bytes.windows(NPSS_TABLE.len()).any(|window| window == NPSS_TABLE) {
-        return beta_tables::read_nested(bytes, given);
-    }
-    table::read_text(&table::text_of(bytes)?, given)
 }

@@ -16,7 +16,8 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "MATLAB script: tables over corrected speed and beta, and over corrected speed and pressure ratio",
     write: Some(write),
     draw: None,
-    read: Some(crate::beta_tables::read_arrays),
+    read: Some(mapper_map_table::read_any_bytes),
+    turbine: crate::turbine::SIMSCAPE,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

@@ -1,7 +1,7 @@
 //! The measured surge-side ends as CSV: one row per speed line.
 
 use crate::heading::heading;
-use mapper_core::{CompressorMap, ExportError, MapFormat, SurgeFoundBy, SurgeMark};
+use mapper_core::{CompressorMap, ExportError, MapFormat, SurgeFoundBy, SurgeMark, TurbineFormat};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "surge",
@@ -11,6 +11,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     write: Some(write),
     draw: None,
     read: None,
+    turbine: TurbineFormat::NONE,
 };
 
 /// Column names, in order.

@@ -1,7 +1,7 @@
 //! The map as a picture.
 
 use crate::map_picture::map_figure;
-use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits};
+use mapper_core::{CompressorMap, ExportError, MapFormat, MapUnits, TurbineFormat};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "svg",
@@ -11,6 +11,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     write: Some(write),
     draw: Some(draw),
     read: None,
+    turbine: TurbineFormat::NONE,
 };
 
 fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {

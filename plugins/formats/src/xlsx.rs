@@ -1,6 +1,5 @@
-//! Maps in workbooks of Excel: the first sheet with a table of numbers.
+//! Maps in workbooks of Excel: the first visible sheet with a table of numbers.
 
-use crate::table;
 use mapper_core::MapFormat;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
@@ -10,5 +9,6 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "workbook of Excel with a table of points",
     write: None,
     draw: None,
-    read: Some(table::read_workbook),
+    read: Some(mapper_map_table::read_workbook),
+    turbine: crate::turbine::WORKBOOK,
 };

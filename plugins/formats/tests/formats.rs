@@ -274,7 +274,7 @@ fn the_fitted_table_marks_what_is_extrapolated() {
 #[test]
 fn simulation_tables_read_back() {
     let map = support::fitted();
-    let read = ["simscape", "pycycle", "npss"].map(|name| {
+    let read = ["simscape", "pycycle", "npss", "modelica"].map(|name| {
         let format = FORMATS.find(name).unwrap();
         let back = format.read(&format.write(&map).unwrap(), None).unwrap().map;
         assert_eq!((back.reference, back.efficiency), (map.reference, map.efficiency), "{name}");
@@ -287,6 +287,7 @@ fn simulation_tables_read_back() {
     assert!(read[0].len() >= 100);
     assert_eq!(read[0], read[1]);
     assert_eq!(read[0], read[2]);
+    assert_eq!(read[0], read[3]);
 }
 
 /// Nodes that the fit extrapolated are not measured points.

@@ -16,7 +16,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-mesh",      &["core", "chart"]),
     ("mapper-fmu",       &["core", "physics"]),
-    ("mapper-campaign",  &["core", "physics", "yaml"]),
+    // Read by campaigns and by map formats.
+    ("mapper-map-table", &["core", "physics", "yaml"]),
+    ("mapper-campaign",  &["core", "map-table", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-surge",     &["core", "numerics", "physics"]),
     ("mapper-conformance", &["core"]),
@@ -41,7 +43,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // A backend may read recordings: replay does.
     ("mapper-backends",  &["core", "numerics", "physics", "record", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
-    ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "mesh"]),
+    ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "map-table", "mesh"]),
     ("mapper-log-formats", &["logs"]),
     // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
     ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects", "fleet"]),
@@ -50,7 +52,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The page of a run, for a browser.
     ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "numerics", "observe", "record", "report"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet", "fmu"]),
+    ("mapper-session",   &["core", "chart", "map-table", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet", "fmu"]),
     // What fleets work on: one file a kind, above the application and the blind cases.
     ("mapper-studies",   &["blind", "campaign", "chart", "core", "fleet", "history", "record", "session"]),
     // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.

@@ -4,11 +4,14 @@ use super::geometry::GeometryFile;
 use super::reference::ReferenceFile;
 use crate::checking::{Check, beside};
 use crate::machine_sizes::AssumedSize;
-use crate::nominal_table::nominal_table;
-use mapper_core::ReferenceState;
+use crate::nominal_table::{NominalTableError, nominal_table};
+use mapper_core::{ImportError, MapDescription, ReferenceState};
+use mapper_map_table::description_from_yaml;
 use mapper_physics::params::Params;
+use mapper_physics::tabulated_map::TabulatedMap;
 use mapper_yaml::FindingKind;
 use mapper_yaml::steps;
+use mapper_yaml::units::Kind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -48,7 +51,35 @@ pub enum MapSource {
         text: String,
         /// State to which its corrected quantities refer.
         reference: ReferenceState,
+        /// How to read the file, if the campaign names a map description.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        description: Option<DescriptionSource>,
     },
+}
+
+/// A map description of a campaign.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DescriptionSource {
+    /// The path as the campaign writes it. Not part of the canonical JSON.
+    #[serde(skip)]
+    pub named: String,
+    /// The file's text.
+    pub text: String,
+}
+
+impl MapSource {
+    /// The map of the table; `None` for the closed form.
+    ///
+    /// # Errors
+    /// [`NominalTableError`] if the text is not a map; this cannot happen in a checked campaign.
+    pub fn table(&self) -> Option<Result<TabulatedMap, NominalTableError>> {
+        let MapSource::Table { text, reference, description, .. } = self else { return None };
+        let given =
+            description.as_ref().map(|file| description_from_yaml(&file.text, Path::new(&file.named)));
+        // The check of the campaign has read the description.
+        let given = given.and_then(Result::ok).unwrap_or_default();
+        Some(nominal_table(text, MapDescription { reference: Some(*reference), ..given }))
+    }
 }
 
 /// The turbocharger under test.
@@ -86,12 +117,15 @@ pub(crate) enum NamedMap {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TableFile {
-    /// CSV file, relative to the campaign file.
+    /// Map file in any layout that `mapper map inspect` understands, relative to the campaign file.
     #[schemars(length(min = 1), example = &"maps/x.csv")]
     pub file: String,
     /// State to which the table's corrected flow and speed refer. The usual choices: SAE (298 K, 100 kPa), Garrett (545 degR, 13.95 psia), BorgWarner (293 K, 98.1 kPa); or `temperature` and `pressure`.
     #[schemars(example = &"SAE")]
     pub reference: ReferenceFile,
+    /// Map description, relative to the campaign file, for a map file that does not name its columns or units; `mapper map inspect` writes it.
+    #[schemars(length(min = 1), example = &"maps/x.description.yaml")]
+    pub description: Option<String>,
 }
 
 impl MachineFile {
@@ -110,7 +144,17 @@ impl MachineFile {
             MapFile::Table(table) => {
                 let path = beside(origin, &table.file);
                 let text = files(&path)?;
-                MapSource::Table { path, named: table.file, text, reference: table.reference.into() }
+                let described = |named: String| {
+                    Ok::<_, io::Error>(DescriptionSource { text: files(&beside(origin, &named))?, named })
+                };
+                let description = table.description.map(described).transpose()?;
+                MapSource::Table {
+                    path,
+                    named: table.file,
+                    text,
+                    reference: table.reference.into(),
+                    description,
+                }
             }
         };
         let mut params = self.geometry.unwrap_or_default().machine();
@@ -124,19 +168,55 @@ pub(crate) fn check(check: &mut Check<'_>) {
     let steps = steps!["machine", "map", "file"];
     let Some(name) = check.text(&steps).filter(|name| !name.is_empty()) else { return };
     let (path, text) = check.file(name);
-    match text {
+    let Some(given) = description(check) else { return };
+    let text = match text {
+        Ok(text) => text,
         Err(error) => {
             let message = format!("the map file `{}` cannot be read: {error}", path.display());
             let remedy = "write its path relative to the campaign file, or `map: closed_form`";
             check.note(FindingKind::MissingFile, &steps, message, remedy);
+            return;
         }
-        // This check does not depend on the reference state, which may still be missing.
-        Ok(text) => {
-            if let Err(error) = nominal_table(&text, ReferenceState::SAE) {
-                let message = format!("the map file `{}` is not a map: {error}", path.display());
-                let remedy = "each row needs corrected speed, corrected flow, pressure ratio and efficiency; in rpm, kg/s and as a fraction where the heading names no unit";
-                check.note(FindingKind::WrongValue, &steps, message, remedy);
-            }
+    };
+    let reference = reference(check);
+    let given = MapDescription { reference: Some(reference.unwrap_or(ReferenceState::SAE)), ..given };
+    match nominal_table(&text, given) {
+        Ok(_) => {}
+        // The campaign's own state may still be missing.
+        Err(NominalTableError::Import(ImportError::ReferenceConflict { .. })) if reference.is_none() => {}
+        Err(error) => {
+            let message = format!("the map file `{}` is not a map: {error}", path.display());
+            let remedy = "look at it with `mapper map inspect`; what the file leaves open goes into a map description (`map: {file, reference, description}`)";
+            check.note(FindingKind::WrongValue, &steps, message, remedy);
         }
     }
+}
+
+/// The map description; an empty one if the campaign names none, `None` if it cannot be read.
+fn description(check: &mut Check<'_>) -> Option<MapDescription> {
+    let steps = steps!["machine", "map", "description"];
+    let Some(name) = check.text(&steps).filter(|name| !name.is_empty()) else {
+        return Some(MapDescription::default());
+    };
+    let (path, text) = check.file(name);
+    let (kind, problem) = match text.map(|text| description_from_yaml(&text, &path)) {
+        Ok(Ok(description)) => return Some(description),
+        Ok(Err(findings)) => (FindingKind::WrongValue, findings.to_string()),
+        Err(error) => (FindingKind::MissingFile, format!("it cannot be read: {error}")),
+    };
+    let message = format!("the map description `{}` has a mistake: {problem}", path.display());
+    check.note(kind, &steps, message, "`mapper map inspect FILE --write-description FILE` writes one");
+    None
+}
+
+/// The state of the table's corrected quantities, if it is given and right.
+fn reference(check: &Check<'_>) -> Option<ReferenceState> {
+    let here = steps!["machine", "map", "reference"];
+    if let Some(name) = check.text(&here) {
+        return ReferenceState::named(name);
+    }
+    let of = |key: &str| [&here[..], &steps![key]].concat();
+    let (t_ref_k, _) = check.quantity(Kind::Temperature, &of("temperature"))?;
+    let (p_ref_pa, _) = check.quantity(Kind::Pressure, &of("pressure"))?;
+    Some(ReferenceState { t_ref_k, p_ref_pa })
 }

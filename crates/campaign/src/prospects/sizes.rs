@@ -3,7 +3,6 @@
 use crate::campaign::{Campaign, MapSource};
 use crate::concern::{Concern, mm};
 use crate::machine_sizes::{SIZES, Size, similar_machine};
-use crate::nominal_table::nominal_table;
 use mapper_physics::characteristic::CompressorCharacteristic;
 use mapper_physics::closed_form_map::ClosedFormMap;
 use mapper_yaml::{Step, steps};
@@ -75,8 +74,8 @@ pub(super) fn concerns(campaign: &Campaign) -> Vec<Concern> {
 
 /// A nominal map with a flow that no compressor of this wheel has: its unit is not the assumed one, and no point would be reached.
 fn map_flow(campaign: &Campaign) -> Option<Concern> {
-    let MapSource::Table { named, text, reference, .. } = &campaign.machine.map else { return None };
-    let map = nominal_table(text, *reference).ok()?;
+    let MapSource::Table { named, .. } = &campaign.machine.map else { return None };
+    let map = campaign.machine.map.table()?.ok()?;
     let speed_rpm = *map.speeds_corrected_rpm().last()?;
     let wheel_diameter_m = campaign.machine.params.compressor.wheel_diameter_m;
     let (found_kg_s, usual_kg_s) = (

@@ -2,7 +2,6 @@
 
 use crate::campaign::{Campaign, MapSource};
 use crate::concern::{Concern, mm};
-use crate::nominal_table::nominal_table;
 use mapper_core::OperatingPoint;
 use mapper_yaml::{Step, steps};
 use std::f64::consts::PI;
@@ -65,8 +64,8 @@ fn tips(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
 
 /// The grid's speeds and those of the nominal table.
 fn table(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<Concern> {
-    let MapSource::Table { named, text, reference, .. } = &campaign.machine.map else { return Vec::new() };
-    let Ok(map) = nominal_table(text, *reference) else { return Vec::new() };
+    let MapSource::Table { named, reference, .. } = &campaign.machine.map else { return Vec::new() };
+    let Some(Ok(map)) = campaign.machine.map.table() else { return Vec::new() };
     let lines_rpm = map.speeds_corrected_rpm();
     let (Some(&low_rpm), Some(&high_rpm)) = (lines_rpm.first(), lines_rpm.last()) else { return Vec::new() };
     let correction = (reference.t_ref_k / campaign.boundary.t1_k).sqrt();

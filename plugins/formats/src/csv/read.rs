@@ -1,16 +1,16 @@
-//! Reads files of `mapper` with all their columns; [`table`] reads those of other programs.
+//! Reads files of `mapper` with all their columns; [`mapper_map_table`] reads those of other programs.
 
-use crate::lines::{Row, line, room_for_one_more};
-use crate::{heading, reference, table};
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
-    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MAP_COLUMNS, MapPoint,
+    CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MapDescription, MapPoint,
     Method, ReferenceState, SpeedShift, Verdict, Warning,
 };
-use mapper_yaml::units::{FoundColumn, Kind, WantedColumn, find_columns};
+use mapper_map_table::{
+    Row, efficiency_in_comment, in_comment, line, read_text, room_for_one_more, settle, text_of,
+};
 
-/// Physical quantities of the four columns.
-const KINDS: [Kind; 4] = [Kind::Speed, Kind::MassFlow, Kind::Fraction, Kind::Fraction];
+/// Names of the four columns.
+const FOUR: [&str; 4] = ["speed_corrected_rpm", "flow_corrected_kg_s", "pressure_ratio", "eta"];
 
 /// Maximum number of common errors of a point; `mapper` writes up to 13.
 const MAX_COMMON: usize = 64;
@@ -29,20 +29,20 @@ struct Head {
 /// The column names of the file, and the positions of the four.
 struct Columns {
     names: Vec<String>,
-    four: [FoundColumn; 4],
+    four: [usize; 4],
 }
 
-pub(super) fn read(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
-    let text = &table::text_of(bytes)?;
-    if is_own(text) { read_own(text, given).map(ImportedMap::from) } else { table::read_text(text, given) }
+pub(super) fn read(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let text = &text_of(bytes)?;
+    if is_own(text) { read_own(text, given.reference).map(ImportedMap::from) } else { read_text(text, given) }
 }
 
 fn read_own(text: &str, given: Option<ReferenceState>) -> Result<CompressorMap, ImportError> {
     let (mut reference, mut machine, mut method, mut first_step) = (None, String::new(), None, 0.0);
     let mut efficiency = None;
     for comment in text.lines().filter_map(|line| line.trim_start().strip_prefix('#')) {
-        reference = reference.or_else(|| reference::in_comment(comment));
-        efficiency = efficiency.or_else(|| heading::efficiency_in_comment(comment));
+        reference = reference.or_else(|| in_comment(comment));
+        efficiency = efficiency.or_else(|| efficiency_in_comment(comment));
         if let Some((_, name)) = comment.split_once("compressor map of ") {
             machine = name.trim().chars().take(200).collect();
         }
@@ -96,14 +96,16 @@ fn at(record: &StringRecord) -> usize {
 }
 
 fn named(record: &StringRecord) -> Result<Columns, ImportError> {
-    let headings: Vec<&str> = record.iter().collect();
-    let wanted: [WantedColumn<'_>; 4] = std::array::from_fn(|i| {
-        let (quantity, names) = MAP_COLUMNS[i];
-        WantedColumn { quantity, names, kind: KINDS[i] }
-    });
-    let four = find_columns(&headings, wanted)
-        .map_err(|source| ImportError::Row { line: at(record), source: source.into() })?;
-    Ok(Columns { names: headings.iter().map(|&name| name.to_owned()).collect(), four })
+    let names: Vec<String> = record.iter().map(str::to_owned).collect();
+    let mut four = [0; 4];
+    for (place, name) in four.iter_mut().zip(FOUR) {
+        *place = names.iter().position(|known| known == name).ok_or_else(|| ImportError::NoColumn {
+            line: at(record),
+            missing: name,
+            found: names.join(", ").chars().take(120).collect(),
+        })?;
+    }
+    Ok(Columns { names, four })
 }
 
 impl Columns {
@@ -138,16 +140,15 @@ fn finite(text: &str, record: &StringRecord, name: &str) -> Result<f64, ImportEr
 
 fn row(record: &StringRecord, columns: &Columns) -> Result<Row, ImportError> {
     let field = |index: usize, what: &str| {
-        let column = columns.four[index];
-        let text = record.get(column.index).unwrap_or_default();
+        let text = record.get(columns.four[index]).unwrap_or_default();
         let shown: String = text.chars().take(40).collect();
-        text.parse().ok().map(|value| column.inside(value)).ok_or_else(|| ImportError::NotANumber {
+        text.parse().map_err(|_| ImportError::NotANumber {
             line: at(record),
             quantity: what.to_owned(),
             text: shown,
         })
     };
-    let eta_text = record.get(columns.four[3].index).unwrap_or_default();
+    let eta_text = record.get(columns.four[3]).unwrap_or_default();
     let row = Row {
         at: at(record),
         speed_corrected_rpm: field(0, "corrected speed")?,
@@ -165,7 +166,7 @@ fn own(
     rows: &[(Row, StringRecord)],
     given: Option<ReferenceState>,
 ) -> Result<CompressorMap, ImportError> {
-    let reference = reference::settle(head.reference, given)?;
+    let reference = settle(head.reference, given)?;
     if rows.is_empty() {
         return Err(ImportError::Empty);
     }

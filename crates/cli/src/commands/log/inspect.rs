@@ -1,6 +1,7 @@
 //! `mapper log inspect`: what a log holds, and the channel map that it suggests.
 
 use crate::failure::Failure;
+use crate::given::key_and_value;
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
@@ -24,11 +25,6 @@ pub struct Inspect {
     pub json: bool,
     #[command(flatten)]
     pub replace: Replace,
-}
-
-fn key_and_value(text: &str) -> Result<(String, String), String> {
-    let (key, value) = text.split_once('=').ok_or("write KEY=VALUE, e.g. `separator=;`")?;
-    Ok((key.trim().to_owned(), value.to_owned()))
 }
 
 impl Inspect {

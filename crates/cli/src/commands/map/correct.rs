@@ -2,7 +2,7 @@
 
 use crate::exit_code::Code;
 use crate::failure::Failure;
-use crate::given::reference;
+use crate::given::MapReading;
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Take the heat off a hot map's apparent efficiencies, as far as the map alone shows it (after Sirakov and Casey)
 #[derive(Debug, Args)]
 pub struct Correct {
-    /// Map (CSV, JSON or SAE text) with apparent efficiencies
+    /// Map, in any layout that `mapper map inspect` understands with apparent efficiencies
     pub map: PathBuf,
     /// New file; its extension gives the format unless `--to` does
     #[arg(long, value_name = "FILE")]
@@ -23,9 +23,8 @@ pub struct Correct {
     /// Format of `--out`
     #[arg(long, value_name = "FORMAT", requires = "out")]
     pub to: Option<String>,
-    /// Reference state of the file's corrected quantities, if the file does not give it: SAE, Garrett, BorgWarner or "T, P"
-    #[arg(long, value_name = "STATE")]
-    pub reference: Option<String>,
+    #[command(flatten)]
+    pub reading: MapReading,
     /// Heat to the gas at the reference state in W, instead of what the map shows
     #[arg(long, value_name = "W")]
     pub heat: Option<f64>,
@@ -42,7 +41,7 @@ impl Correct {
         let registry = registry::registry();
         let format =
             self.out.as_ref().map(|path| registry.format_of(path, self.to.as_deref())).transpose()?;
-        let map = registry.read_map(&self.map, reference(self.reference.as_deref())?)?;
+        let map = registry.read_map(&self.map, &self.reading.description()?)?;
         let (map, correction) = correct_for_heat(map, self.heat)
             .map_err(|error| Failure::new(Code::BadInput, format!("{}: {error}", self.map.display())))?;
         if let Some((path, format)) = self.out.as_ref().zip(format) {

@@ -32,7 +32,7 @@ pub(super) struct Grid {
 }
 
 /// Maximum number of rows, as of points.
-const ROW_LIMIT: usize = crate::POINT_LIMIT;
+const ROW_LIMIT: usize = crate::lines::POINT_LIMIT;
 /// Maximum number of cells of a row: Excel's own limit.
 const CELL_LIMIT: usize = 16_384;
 
@@ -40,7 +40,7 @@ const CELL_LIMIT: usize = 16_384;
 ///
 /// # Errors
 /// [`ImportError::NotText`] if it has control characters, as other files have.
-pub(crate) fn text_of(bytes: &[u8]) -> Result<String, ImportError> {
+pub fn text_of(bytes: &[u8]) -> Result<String, ImportError> {
     let text = match bytes {
         [0xff, 0xfe, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] if rest.len() % 2 == 0 => utf16(rest, u16::from_be_bytes),
@@ -74,14 +74,20 @@ impl Grid {
                 .count()
         };
         let separators = ['\t', ';', ',', ' '];
-        let mut best = (0, ' ');
-        for separator in separators {
-            let rows = count(separator);
-            if rows > best.0 {
-                best = (rows, separator);
-            }
-        }
-        let (_, separator) = best;
+        let best = |count: &dyn Fn(char) -> usize| {
+            let counts = separators.into_iter().map(|separator| (count(separator), separator));
+            // The first of equal ones.
+            counts.rev().max_by_key(|(rows, _)| *rows).filter(|(rows, _)| *rows > 0)
+        };
+        // A column of text leaves no row of numbers alone; between blanks it could be anything.
+        let with_text = |separator: char| {
+            let is_point = |line: &str| {
+                separator != ' '
+                    && some_numbers(&split(uncommented(line).0, separator), separator != ',') >= 3
+            };
+            lines().filter(|(_, line)| is_point(line)).count()
+        };
+        let separator = best(&count).or_else(|| best(&with_text)).map_or(' ', |(_, separator)| separator);
         let mut rows = Vec::new();
         let mut decimal = [0, 0];
         for (at, line) in lines() {
@@ -108,41 +114,51 @@ impl Grid {
         })
     }
 
-    /// The cells of the first sheet with a table of numbers.
+    /// The cells of the first visible sheet with a table of numbers, or of the named one.
     ///
     /// # Errors
     /// [`ImportError::Workbook`] if it is not a workbook, unpacks to more than a map needs, or has no such sheet.
-    pub(super) fn of_workbook(bytes: &[u8]) -> Result<Grid, ImportError> {
+    pub(super) fn of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid, ImportError> {
         let failed = |error: &dyn std::fmt::Display| ImportError::Workbook { problem: error.to_string() };
         check_size(bytes)?;
         let mut book: calamine::Xlsx<_> =
             calamine::Reader::new(Cursor::new(bytes)).map_err(|error: calamine::XlsxError| failed(&error))?;
-        let names = calamine::Reader::sheet_names(&book);
-        for name in &names {
-            let range = calamine::Reader::worksheet_range(&mut book, name).map_err(|error| failed(&error))?;
-            let first = range.start().map_or(0, |(row, _)| row as usize);
-            let rows: Vec<GridRow> = range
-                .rows()
-                .take(2 * ROW_LIMIT)
-                .enumerate()
-                .map(|(index, row)| GridRow {
-                    at: first + index + 1,
-                    cells: row
-                        .iter()
-                        .take(CELL_LIMIT)
-                        .map(|cell| cell.to_string().trim().to_owned())
-                        .collect(),
-                    is_comment: false,
-                })
-                .filter(|row| row.cells.iter().any(|cell| cell.contains(char::is_alphanumeric)))
-                .collect();
-            if rows.iter().filter(|row| numbers(&row.cells, true) >= 3).count() >= 2 {
+        let sheets = calamine::Reader::sheets_metadata(&book).to_vec();
+        let list: Vec<&str> = sheets.iter().map(|sheet| sheet.name.as_str()).collect();
+        let list = list.join(", ");
+        // A hidden sheet counts only if it is named: people hide what they do not want to be used.
+        let is_read = |known: &calamine::Sheet| match sheet {
+            Some(name) => known.name == name,
+            None => known.visible == calamine::SheetVisible::Visible,
+        };
+        for known in sheets.iter().filter(|known| is_read(known)) {
+            let range = calamine::Reader::worksheet_range(&mut book, &known.name);
+            let rows = rows_of_sheet(&range.map_err(|error| failed(&error))?);
+            if rows.iter().filter(|row| some_numbers(&row.cells, true) >= 3).count() >= 2 {
                 return Ok(Grid { rows, decimal_comma: false, by_blanks: false });
             }
         }
-        Err(ImportError::Workbook {
-            problem: format!("no sheet holds rows of three numbers and more; sheets: {}", names.join(", ")),
-        })
+        let hidden: Vec<&str> = sheets
+            .iter()
+            .filter(|known| known.visible != calamine::SheetVisible::Visible)
+            .map(|known| known.name.as_str())
+            .collect();
+        let which = sheet.map_or("no visible sheet".to_owned(), |name| format!("no sheet `{name}`"));
+        let mut problem = format!("{which} holds rows of three numbers and more; sheets: {list}");
+        if !hidden.is_empty() {
+            problem += &format!("; hidden: {} (name one by `--with sheet=...`)", hidden.join(", "));
+        }
+        Err(ImportError::Workbook { problem })
+    }
+
+    /// The cells as CSV.
+    pub(super) fn csv(&self) -> String {
+        let cell = |cell: &String| {
+            let plain = cell.replace(['"', '\n', '\r'], " ");
+            if plain.contains(',') { format!("\"{plain}\"") } else { plain }
+        };
+        let line = |row: &GridRow| row.cells.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
+        self.rows.iter().map(line).collect()
     }
 
     /// The number in a cell: with a percent sign as a fraction, with a blank behind its sign. `None` for an empty one and for text.
@@ -159,6 +175,21 @@ impl Grid {
         };
         value.or_else(|| comma_number(text)).map(|value| factor * value)
     }
+}
+
+/// The rows of a sheet that are not blank.
+fn rows_of_sheet(range: &calamine::Range<calamine::Data>) -> Vec<GridRow> {
+    let first = range.start().map_or(0, |(row, _)| row as usize);
+    let cells = |row: &[calamine::Data]| {
+        row.iter().take(CELL_LIMIT).map(|cell| cell.to_string().trim().to_owned()).collect::<Vec<String>>()
+    };
+    range
+        .rows()
+        .take(2 * ROW_LIMIT)
+        .enumerate()
+        .map(|(index, row)| GridRow { at: first + index + 1, cells: cells(row), is_comment: false })
+        .filter(|row| row.cells.iter().any(|cell| cell.contains(char::is_alphanumeric)))
+        .collect()
 }
 
 /// Largest size of everything in a workbook, bytes: 100 000 points with 20 columns of 30 bytes.
@@ -187,7 +218,10 @@ fn check_size(bytes: &[u8]) -> Result<(), ImportError> {
 /// Content and comment of a line.
 fn uncommented(line: &str) -> (&str, &str) {
     let line = line.trim();
-    if let Some(comment) = ["!", "%", "//", "#"].iter().find_map(|mark| line.strip_prefix(mark)) {
+    // A row of units may begin with that of an efficiency.
+    let is_unit = line.strip_prefix('%').is_some_and(|rest| rest.starts_with([',', ';', '\t']));
+    let marks = ["!", "%", "//", "#"];
+    if let Some(comment) = marks.iter().find_map(|mark| line.strip_prefix(mark)).filter(|_| !is_unit) {
         return ("", comment.trim_start_matches(['#', '!', '%', '/']).trim());
     }
     line.split_once('#').unwrap_or((line, ""))
@@ -221,6 +255,12 @@ fn split(line: &str, separator: char) -> Vec<String> {
     }
     let comma: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
     if comma.iter().filter(|word| comma_number(word).is_some()).count() >= 2 { comma } else { cells }
+}
+
+/// How many cells are numbers, among others.
+fn some_numbers(cells: &[String], decimal_comma: bool) -> usize {
+    let is_number = |cell: &&String| numbers(std::slice::from_ref(*cell), decimal_comma) == 1;
+    cells.iter().filter(is_number).count()
 }
 
 /// How many cells are numbers; 0 if one of them is text.

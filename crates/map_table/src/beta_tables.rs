@@ -1,9 +1,12 @@
 //! Reads tables over speed and an auxiliary coordinate (beta, R line) from the scripts and files of simulation programs: arrays of MATLAB and
 //! Python, nested tables of NPSS.
 
+use crate::beta_design::{between, design_of, flow_unit, scales_flow};
+use crate::design::{MapDesign, scale_to_design};
+use crate::efficiency_comment::efficiency_in_comment;
 use crate::lines::{Row, map_of_rows, room_for_one_more};
-use crate::{heading, reference, table};
-use mapper_core::{CompressorMap, ImportError, ImportedMap, ReferenceState};
+use crate::reference::in_comment;
+use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
 
 /// Numbers of the quantities, speed by speed.
 #[derive(Debug, Default)]
@@ -17,11 +20,10 @@ struct BetaTables {
 }
 
 /// Maximum number of numbers in a file.
-const NUMBER_LIMIT: usize = 4 * crate::POINT_LIMIT;
+const NUMBER_LIMIT: usize = 4 * crate::lines::POINT_LIMIT;
 
 /// The map of a script with arrays: `name = [1 2; 3 4]` or `name = np.array([[1, 2], [3, 4]])`.
-pub(crate) fn read_arrays(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
-    let text = table::text_of(bytes)?;
+pub(crate) fn read_arrays(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
     let code: String = text
         .lines()
         .map(|line| line.split(['%', '#']).next().unwrap_or_default())
@@ -41,12 +43,11 @@ pub(crate) fn read_arrays(bytes: &[u8], given: Option<ReferenceState>) -> Result
             *place = bracketed(value, ('[', ']'), line_of(&code, at))?;
         }
     }
-    tables.map(&text, given)
+    tables.map(text, &code, given)
 }
 
 /// The map of nested tables: `NcorrMap = 0.5 { RlineMap = {1, 2} WcMap = {0.1, 0.2} }`.
-pub(crate) fn read_nested(bytes: &[u8], given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
-    let text = table::text_of(bytes)?;
+pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
     let code: String =
         text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
     let mut tables = BetaTables::default();
@@ -98,7 +99,31 @@ pub(crate) fn read_nested(bytes: &[u8], given: Option<ReferenceState>) -> Result
     if by_beta {
         tables.turn();
     }
-    tables.map(&text, given)
+    tables.map(text, &code, given)
+}
+
+/// The map of text tables of Modelica: `double name(rows, columns)`, the first row the auxiliary coordinate behind one unused number, the
+/// first column the speeds.
+pub(crate) fn read_modelica(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let code: String =
+        text.lines().map(|line| line.split('#').next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
+    let mut tables = BetaTables::default();
+    let starts: Vec<usize> = code.match_indices("double ").map(|(at, _)| at).collect();
+    for (index, start) in starts.iter().enumerate() {
+        let part = &code[*start..starts.get(index + 1).copied().unwrap_or(code.len())];
+        let Some((head, body)) = part.split_once(')') else { continue };
+        let Some((name, size)) = head.trim_start_matches("double ").split_once('(') else { continue };
+        let columns = size.split(',').nth(1).and_then(|columns| columns.trim().parse::<usize>().ok());
+        let Some(columns) = columns.filter(|columns| *columns > 1) else { continue };
+        let numbers = bracketed(body, ('[', ']'), line_of(&code, *start))?;
+        let rows: Vec<&[f64]> = numbers.chunks(columns).collect();
+        let Some(place) = tables.place(name.trim()) else { continue };
+        let (beta, lines) = rows.split_first().map_or((&[][..], &[][..]), |(first, rest)| (*first, rest));
+        *place = lines.iter().flat_map(|line| line.iter().skip(1)).copied().collect();
+        tables.beta = beta.iter().skip(1).copied().collect();
+        tables.speeds = lines.iter().filter_map(|line| line.first()).copied().collect();
+    }
+    tables.map(text, &code, given)
 }
 
 /// Line of a place in a text, from 1.
@@ -149,7 +174,9 @@ impl BetaTables {
             | "corrected_speed_rpm"
             | "x_c_map_ncvec" => Some(&mut self.speeds),
             "rlinevec" | "rlinemap" | "rline" | "beta" => Some(&mut self.beta),
-            "wcarray" | "wcmap" | "wc" | "wc_map" | "corrected_flow_kg_s" | "mc" => Some(&mut self.flow),
+            "wcarray" | "wcmap" | "wc" | "wc_map" | "corrected_flow_kg_s" | "flow_corrected_kg_s" | "mc" => {
+                Some(&mut self.flow)
+            }
             "prarray" | "prmap" | "pr" | "pr_map" | "pressure_ratio" => Some(&mut self.pressure_ratio),
             "effarray" | "effmap" | "eff" | "eff_map" | "isentropic_efficiency" | "eta" => {
                 Some(&mut self.efficiency)
@@ -167,7 +194,39 @@ impl BetaTables {
         }
     }
 
-    fn map(&self, text: &str, given: Option<ReferenceState>) -> Result<ImportedMap, ImportError> {
+    fn map(&self, text: &str, code: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+        let mut rows = self.rows()?;
+        let mut remarks = Vec::new();
+        let unit_kg_s = flow_unit(code, given)?;
+        for row in &mut rows {
+            row.flow_corrected_kg_s *= unit_kg_s.unwrap_or(1.0);
+        }
+        let mut design: MapDesign = design_of(code);
+        let at_design = |values: &[f64]| between(&self.speeds, &self.beta, values, design);
+        design.values =
+            match [&self.flow, &self.pressure_ratio, &self.efficiency].map(|values| at_design(values)) {
+                [Some(flow), Some(ratio), Some(eta)] => Some([unit_kg_s.unwrap_or(1.0) * flow, ratio, eta]),
+                _ => None,
+            };
+        let is_relative = scale_to_design(&mut rows, design, given.design, &mut remarks)?;
+        // Files of `mapper` have kg/s.
+        let machine = text.lines().find_map(|line| line.split_once("compressor map of "));
+        if unit_kg_s.is_none() && !scales_flow(given.design) && machine.is_none() {
+            if is_relative {
+                return Err(ImportError::FlowUnit);
+            }
+            remarks.push(ImportRemark::FlowUnitAssumed);
+        }
+        rows.iter().try_for_each(Row::check)?;
+        let found = text.lines().find_map(in_comment);
+        let machine = machine.map(|(_, name)| name.trim().chars().take(200).collect());
+        let efficiency = text.lines().find_map(efficiency_in_comment);
+        let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given.reference)?;
+        Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns: Vec::new(), remarks })
+    }
+
+    /// The points of the tables, as written.
+    fn rows(&self) -> Result<Vec<Row>, ImportError> {
         let missing = [
             (&self.speeds, "speed"),
             (&self.flow, "corrected flow"),
@@ -190,34 +249,20 @@ impl BetaTables {
                 efficiencies: self.efficiency.len(),
             });
         }
-        let fastest = self.speeds.iter().copied().fold(0.0, f64::max);
-        // Programs scale maps by a design point: no shaft turns at 10 rpm.
-        if fastest < 10.0 {
-            return Err(ImportError::RelativeSpeed { fastest });
-        }
         let mut rows = Vec::with_capacity(lines * columns);
         for (line, speed_corrected_rpm) in self.speeds.iter().enumerate() {
             for place in line * columns..(line + 1) * columns {
                 room_for_one_more(rows.len(), place + 1)?;
                 let value = |values: &[f64]| values.get(place).copied().unwrap_or(f64::NAN);
-                let row = Row {
+                rows.push(Row {
                     at: place + 1,
                     speed_corrected_rpm: *speed_corrected_rpm,
                     flow_corrected_kg_s: value(&self.flow),
                     pressure_ratio: value(&self.pressure_ratio),
                     eta: Some(value(&self.efficiency)),
-                };
-                row.check()?;
-                rows.push(row);
+                });
             }
         }
-        let found = text.lines().find_map(reference::in_comment);
-        let machine = text
-            .lines()
-            .find_map(|line| line.split_once("compressor map of "))
-            .map(|(_, name)| name.trim().chars().take(200).collect());
-        let efficiency = text.lines().find_map(heading::efficiency_in_comment);
-        let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given)?;
-        Ok(CompressorMap { efficiency, ..map }.into())
+        Ok(rows)
     }
 }

@@ -47,7 +47,7 @@ fn quantity(text: &str, units: Units) -> Option<f64> {
 }
 
 /// The reference state in a comment after the word "reference" and a colon.
-pub(crate) fn in_comment(comment: &str) -> Option<ReferenceState> {
+pub fn in_comment(comment: &str) -> Option<ReferenceState> {
     let lower = comment.to_ascii_lowercase();
     let at = lower.find("reference")?;
     let (_, behind) = comment.get(at..)?.split_once(':')?;
@@ -55,7 +55,10 @@ pub(crate) fn in_comment(comment: &str) -> Option<ReferenceState> {
 }
 
 /// The reference state of the corrected quantities, from the file and the user.
-pub(crate) fn settle(
+///
+/// # Errors
+/// [`ImportError::NoReference`] and [`ImportError::ReferenceConflict`].
+pub fn settle(
     found: Option<ReferenceState>,
     given: Option<ReferenceState>,
 ) -> Result<ReferenceState, ImportError> {

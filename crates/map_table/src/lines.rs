@@ -16,17 +16,23 @@ const SAME_LINE_RATIO: f64 = 0.015;
 
 /// The four numbers of a row, common to all maps.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Row {
+pub struct Row {
     /// Line of the file, from 1.
     pub at: usize,
+    /// Corrected speed, rpm.
     pub speed_corrected_rpm: f64,
+    /// Corrected flow, kg/s.
     pub flow_corrected_kg_s: f64,
+    /// Total pressure ratio.
     pub pressure_ratio: f64,
+    /// Isentropic efficiency, fraction.
     pub eta: Option<f64>,
 }
 
 impl Row {
-    pub(crate) fn check(&self) -> Result<(), ImportError> {
+    /// # Errors
+    /// [`ImportError`] with the value that no map has.
+    pub fn check(&self) -> Result<(), ImportError> {
         let positive = "a number above 0";
         for (quantity, value, good, needed) in [
             (
@@ -71,7 +77,7 @@ impl Row {
     }
 
     /// A point with only the numbers of its row. Physical values are those at the reference state.
-    pub(crate) fn point(&self, reference: ReferenceState, step: usize) -> IdentifiedPoint {
+    pub fn point(&self, reference: ReferenceState, step: usize) -> IdentifiedPoint {
         IdentifiedPoint {
             step,
             kind: StepKind::Point,
@@ -105,7 +111,10 @@ impl Row {
 }
 
 /// A map of rows with only four numbers.
-pub(crate) fn map_of_rows(
+///
+/// # Errors
+/// [`ImportError`] without reference state or points, and for speeds of no turbocharger.
+pub fn map_of_rows(
     machine: String,
     rows: &[Row],
     found: Option<ReferenceState>,
@@ -144,7 +153,7 @@ pub(crate) fn map_of_rows(
 }
 
 /// A line of points by rising flow.
-pub(crate) fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
+pub fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
     let speeds = || points.iter().map(|point| point.identified.speed_corrected_rpm);
     let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
     points.sort_by(|a, b| {
@@ -175,7 +184,10 @@ fn on_line(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
 }
 
 /// Refuses a file with too many rows.
-pub(crate) fn room_for_one_more(count: usize, at: usize) -> Result<(), ImportError> {
+///
+/// # Errors
+/// [`ImportError::TooMany`].
+pub fn room_for_one_more(count: usize, at: usize) -> Result<(), ImportError> {
     if count >= POINT_LIMIT {
         return Err(ImportError::TooMany { line: at, limit: POINT_LIMIT });
     }

@@ -1,0 +1,205 @@
+//! A quantity of a turbine map as a polynomial over vane position, speed and one coordinate of the expansion, by linear least squares.
+
+use mapper_numerics::statistics::student_quantile;
+use nalgebra::{DMatrix, DVector};
+
+/// Vane position, speed, coordinate of the expansion.
+pub(crate) type Place = [f64; 3];
+/// Exponents of the three coordinates.
+pub(crate) type Term = [i32; 3];
+
+/// A value to fit, and the line to which it belongs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Observation {
+    pub place: Place,
+    pub value: f64,
+    pub line: usize,
+}
+
+/// A fitted polynomial.
+#[derive(Debug, Clone)]
+pub(crate) struct Surface {
+    terms: Vec<Term>,
+    coefficients: DVector<f64>,
+    /// Inverse of the normal matrix.
+    inverse: DMatrix<f64>,
+    centre: Place,
+    half_range: Place,
+    /// Standard deviation of a value about the surface: of the residuals, or of lines that the fit does not know if these are further off.
+    pub sigma: f64,
+    /// Half of a 95 % interval over its standard error.
+    quantile: f64,
+    /// Root mean square of the error at lines that the fit does not know.
+    pub left_out_rms: f64,
+}
+
+/// Points of a fit for each of its terms, at least: with fewer the residuals say little about the error.
+const POINTS_PER_TERM: usize = 2;
+
+impl Surface {
+    /// Fits the first terms of `candidates`; their number is that with the least error at left-out lines. `None` without enough points.
+    pub fn fit(observations: &[Observation], candidates: &[Term]) -> Option<Surface> {
+        let (centre, half_range) = ranges(observations)?;
+        // A power that the places do not determine is left out: two vane positions have no curvature.
+        let usable: Vec<Term> = candidates
+            .iter()
+            .filter(|term| (0..3).all(|axis| (term[axis] as usize) < distinct(observations, axis)))
+            .copied()
+            .collect();
+        let most = usable.len().min(observations.len() / POINTS_PER_TERM);
+        let fitted = (1..=most).filter_map(|count| {
+            let terms = usable.get(..count)?.to_vec();
+            Surface::of_terms(observations, terms, centre, half_range)
+        });
+        fitted.min_by(|a, b| a.left_out_rms.total_cmp(&b.left_out_rms))
+    }
+
+    fn of_terms(
+        observations: &[Observation],
+        terms: Vec<Term>,
+        centre: Place,
+        half_range: Place,
+    ) -> Option<Surface> {
+        let lines = 1 + observations.iter().map(|observation| observation.line).max()?;
+        let mut surface = Surface {
+            coefficients: DVector::zeros(terms.len()),
+            inverse: DMatrix::zeros(terms.len(), terms.len()),
+            terms,
+            centre,
+            half_range,
+            sigma: f64::NAN,
+            quantile: f64::NAN,
+            left_out_rms: f64::INFINITY,
+        };
+        let mut squares = Vec::new();
+        let inner = inner_lines(observations, lines);
+        for line in inner {
+            let (left_out, kept): (Vec<Observation>, Vec<Observation>) =
+                observations.iter().partition(|observation| observation.line == line);
+            // Few lines leave nothing to fit: their points are then left out one by one below.
+            if surface.solve(&kept).is_some() {
+                squares.extend(left_out.iter().map(|o| (o.value - surface.value(o.place)).powi(2)));
+            }
+        }
+        surface.solve(observations)?;
+        if squares.is_empty() {
+            // Residual of a point that the fit does not know: its residual over 1 minus its leverage.
+            let without = |o: &Observation| {
+                ((o.value - surface.value(o.place)) / (1.0 - surface.leverage(o.place))).powi(2)
+            };
+            squares = observations.iter().map(without).collect();
+        }
+        let freedom =
+            observations.len().checked_sub(surface.terms.len()).filter(|freedom| *freedom > 0)? as f64;
+        let residuals: f64 = observations.iter().map(|o| (o.value - surface.value(o.place)).powi(2)).sum();
+        surface.left_out_rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        surface.sigma = (residuals / freedom).sqrt().max(surface.left_out_rms);
+        surface.quantile = student_quantile(0.975, freedom)?;
+        surface.left_out_rms.is_finite().then_some(surface)
+    }
+
+    /// The coefficients for some of the values; `None` if they do not determine them.
+    fn solve(&mut self, observations: &[Observation]) -> Option<()> {
+        if observations.len() < self.terms.len() {
+            return None;
+        }
+        let rows: Vec<DVector<f64>> = observations.iter().map(|o| self.row(o.place)).collect();
+        let mut normal = DMatrix::zeros(self.terms.len(), self.terms.len());
+        let mut right = DVector::zeros(self.terms.len());
+        for (row, observation) in rows.iter().zip(observations) {
+            normal += row * row.transpose();
+            right += row * observation.value;
+        }
+        let condition = normal.clone().symmetric_eigenvalues();
+        // Coordinates are scaled to -1 to 1, so that the eigenvalues of a determined fit are within some decades.
+        if condition.min() < SMALLEST_EIGENVALUE_RATIO * condition.max() {
+            return None;
+        }
+        let factor = normal.cholesky()?;
+        self.inverse = factor.inverse();
+        self.coefficients = factor.solve(&right);
+        Some(())
+    }
+
+    fn row(&self, place: Place) -> DVector<f64> {
+        let scaled: Vec<f64> =
+            (0..3).map(|axis| (place[axis] - self.centre[axis]) / self.half_range[axis]).collect();
+        let term = |term: &Term| scaled.iter().zip(term).map(|(value, power)| value.powi(*power)).product();
+        DVector::from_iterator(self.terms.len(), self.terms.iter().map(term))
+    }
+
+    /// The value at a place.
+    pub fn value(&self, place: Place) -> f64 {
+        self.row(place).dot(&self.coefficients)
+    }
+
+    fn leverage(&self, place: Place) -> f64 {
+        let row = self.row(place);
+        (row.transpose() * &self.inverse * &row)[(0, 0)].min(1.0 - 1e-9)
+    }
+
+    /// Standard error of a measured value at a place: of the surface and of the scatter about it.
+    pub fn standard_error(&self, place: Place) -> f64 {
+        self.sigma * (1.0 + self.leverage(place)).sqrt()
+    }
+
+    /// Half of the 95 % interval of a measured value at a place.
+    pub fn half_width(&self, place: Place) -> f64 {
+        self.quantile * self.standard_error(place)
+    }
+}
+
+/// Eigenvalues of a determined fit are closer together: with 1e-10 coefficients keep five of their fifteen digits.
+const SMALLEST_EIGENVALUE_RATIO: f64 = 1e-10;
+
+fn ranges(observations: &[Observation]) -> Option<(Place, Place)> {
+    let mut centre = [0.0; 3];
+    let mut half_range = [1.0; 3];
+    for axis in 0..3 {
+        let values = || observations.iter().map(|observation| observation.place[axis]);
+        let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        if low > high {
+            return None;
+        }
+        centre[axis] = 0.5 * (low + high);
+        if high > low {
+            half_range[axis] = 0.5 * (high - low);
+        }
+    }
+    Some((centre, half_range))
+}
+
+/// The lines that have slower and faster ones: the error of a line that the fit has to reach by extrapolation is another. All if they
+/// are few.
+fn inner_lines(observations: &[Observation], lines: usize) -> Vec<usize> {
+    let speeds = || observations.iter().map(|observation| observation.place[1]);
+    let (low, high) = speeds().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+    let is_outermost = |line: &usize| {
+        let mut own = observations.iter().filter(|observation| observation.line == *line);
+        own.any(|observation| {
+            observation.place[1] <= low * (1.0 + SAME_SPEED)
+                || observation.place[1] >= high * (1.0 - SAME_SPEED)
+        })
+    };
+    let inner: Vec<usize> = (0..lines).filter(|line| !is_outermost(line)).collect();
+    if inner.len() < 2 { (0..lines).collect() } else { inner }
+}
+
+/// Speeds of a line differ by up to 1.5 %.
+const SAME_SPEED: f64 = 0.015;
+
+/// Number of places along an axis that are more than 2 % of the largest apart: a held speed is one place.
+fn distinct(observations: &[Observation], axis: usize) -> usize {
+    let mut values: Vec<f64> = observations.iter().map(|observation| observation.place[axis]).collect();
+    values.sort_by(f64::total_cmp);
+    let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let mut count = 0;
+    let mut last = f64::NEG_INFINITY;
+    for value in values {
+        if value > last + 0.02 * largest || count == 0 {
+            count += 1;
+            last = value;
+        }
+    }
+    count
+}

@@ -53,6 +53,7 @@ mod terminal_text;
 mod thermal_model;
 mod timing;
 mod turbine_map;
+mod uncertainty_budget;
 mod verdict_forecast;
 mod visit_order;
 mod window_rule;
@@ -115,6 +116,7 @@ pub use timing::{Dwell, Timing};
 pub use turbine_map::{
     FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportedTurbine, TurbineMap, TurbineMapPoint,
 };
+pub use uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
 pub use verdict_forecast::{Advice, CampaignChange, VerdictForecast};
 pub use visit_order::VisitOrder;
 pub use window_rule::WindowRule;

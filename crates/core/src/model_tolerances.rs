@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One-sigma tolerances of the nominal model, ratios to the nominal value: a deviation within them is not an effect.
+/// One-sigma tolerances of the nominal model, ratios to the nominal value, and of the rig's conditions: a deviation within them is not an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ModelTolerances {
@@ -24,6 +24,16 @@ pub struct ModelTolerances {
     pub external_convection_ratio: f64,
     /// Conductance to the oil.
     pub oil_conductance_ratio: f64,
+    /// Compressor inlet pressure, Pa.
+    pub inlet_pressure_pa: f64,
+    /// Compressor inlet temperature, K.
+    pub inlet_temperature_k: f64,
+    /// Turbine inlet temperature, K.
+    pub turbine_inlet_temperature_k: f64,
+    /// Oil inlet temperature, K.
+    pub oil_temperature_k: f64,
+    /// Temperature around the housings, K.
+    pub ambient_temperature_k: f64,
     /// Declared lag of P3 behind its command, s: a value, not a tolerance.
     pub actuator_lag_s: f64,
 }
@@ -41,6 +51,11 @@ impl Default for ModelTolerances {
             convection_ratio: 0.03,
             external_convection_ratio: 0.10,
             oil_conductance_ratio: 0.05,
+            inlet_pressure_pa: 200.0,
+            inlet_temperature_k: 2.0,
+            turbine_inlet_temperature_k: 10.0,
+            oil_temperature_k: 5.0,
+            ambient_temperature_k: 5.0,
             actuator_lag_s: 0.3,
         }
     }

@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         direction: argument(3, 1.0),
         inlet,
         humidity_kg_kg: 0.0,
+        ..Machine::default()
     };
     let mut settings = JointSettings::default();
     if argument(9, 1.0) == 0.0 {

@@ -9,7 +9,7 @@ use crate::flow_drift::{FlowDrift, flow_drift};
 use crate::samples::Samples;
 use crate::window;
 use crate::{IdentifyConfig, commands, width};
-use mapper_core::{EstimateUncertainty, Recording, Window};
+use mapper_core::{BudgetRow, EstimateUncertainty, Recording, Window};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 
@@ -39,6 +39,8 @@ pub(crate) struct Estimate {
     pub(crate) intervals: Option<[(f64, f64); 2]>,
     /// Effect of the points' common errors on eta and h: see [`CommonErrors`](mapper_core::CommonErrors).
     pub(crate) common: [Vec<f64>; 2],
+    /// Sources of the uncertainty of eta and h; empty if the method does not separate them.
+    pub(crate) budgets: [Vec<BudgetRow>; 2],
     pub(crate) window: Option<Window>,
     pub(crate) residual_rms_k: Option<f64>,
     pub(crate) dt2_k: Option<f64>,

@@ -10,10 +10,10 @@ use crate::nominal_rig::NominalRig;
 use crate::objections::objection::Objection;
 use crate::objections::objections;
 use crate::two_parameter::TwoParameter;
-use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, dynamic, faults, joint, steady};
+use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, budgets, dynamic, faults, joint, steady};
 use mapper_core::{
-    Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, Method, Recording,
-    StepMarker, ThermalModel, WindowRule, confidence_interval_95,
+    Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, Method, PointBudgets,
+    Recording, StepMarker, ThermalModel, WindowRule, confidence_interval_95,
 };
 use mapper_inference::hypotheses::{Likelihood, Priors};
 
@@ -57,6 +57,8 @@ pub struct Identified {
     /// One standard error of the size of each possible fault, in the fault's unit; infinite if the recording does not determine it. A fault of
     /// six standard errors is found in 95 of 100 recordings.
     pub tells: Vec<(Suspect, f64)>,
+    /// Uncertainty budgets of the points, in order.
+    pub budgets: Vec<PointBudgets>,
 }
 
 /// Like [`identify_each`], with the shared parameters of the points (joint method alone).
@@ -125,7 +127,7 @@ pub fn identify_beside(
         joint::estimate(recording, &known, (alone, own_findings), config, condemned, findings)
     };
     let (mut thermal, mut two_parameter, mut fitted) = (None, Vec::new(), None);
-    let estimates: Vec<Estimate> = match config.method {
+    let mut estimates: Vec<Estimate> = match config.method {
         Method::Joint => {
             let joint = together(&mut findings, alone, own_findings);
             (thermal, two_parameter, fitted) = (joint.thermal, joint.two_parameter, joint.fitted);
@@ -154,6 +156,12 @@ pub fn identify_beside(
         balances = likelihood(Some(fitted));
         faults = balances.as_ref().map(find).unwrap_or_default();
     }
+    if let (Some(fitted), Some(balances), true) = (&fitted, &balances, nominal.is_some() && faults.is_empty())
+    {
+        let readings = faults::all_readings(recording, &ends).unwrap_or_default();
+        // Without a density of the balances nothing is known of faults.
+        let _ = faults::possible::widen(&mut estimates, fitted, &readings, balances, config);
+    }
     objections.extend(faults::objection(&faults, ends.len()));
     if let Some(remark) = faults::remark(&faults) {
         findings.iter_mut().for_each(|findings| findings.remark(code::OFF_THE_NOMINAL_MAP, remark.clone()));
@@ -164,16 +172,35 @@ pub fn identify_beside(
             findings[*position].doubt_first(objection.code, objection.message.clone());
         }
     }
-    let points = recording
+    let (points, budgets) = points_with_budgets(recording, states, &estimates, findings, config);
+    let standard_errors = balances.map(|(likelihood, priors)| faults::standard_errors(&likelihood, &priors));
+    let tells = standard_errors.unwrap_or_default();
+    Ok(Identified { points, thermal, two_parameter, faults, tells, budgets })
+}
+
+/// The points, and the budgets of those that there are.
+fn points_with_budgets(
+    recording: &Recording,
+    states: Vec<Result<EndState, StepError>>,
+    estimates: &[Estimate],
+    findings: Vec<Findings>,
+    config: &IdentifyConfig,
+) -> (Vec<Result<IdentifiedPoint, StepError>>, Vec<PointBudgets>) {
+    let points: Vec<Result<IdentifiedPoint, StepError>> = recording
         .steps
         .iter()
         .zip(states)
         .zip(estimates)
         .zip(findings)
-        .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, &estimate, findings, config)))
+        .map(|(((step, state), estimate), findings)| Ok(point(step, &state?, estimate, findings, config)))
         .collect();
-    let standard_errors = balances.map(|(likelihood, priors)| faults::standard_errors(&likelihood, &priors));
-    Ok(Identified { points, thermal, two_parameter, faults, tells: standard_errors.unwrap_or_default() })
+    let of_steps = points.iter().zip(estimates).zip(&recording.steps);
+    let budgets = of_steps
+        .filter_map(|((point, estimate), step)| {
+            Some(budgets::of_point(point.as_ref().ok()?, estimate, (recording, step), config))
+        })
+        .collect();
+    (points, budgets)
 }
 
 /// The steps that contribute to the shared parameters: steps with a failed check would bias the others. Samples of a temporarily frozen
@@ -324,6 +351,9 @@ fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig)
         h_changes_w_m2k,
         // Corrected flow is proportional to the root of T1 and to 1/P1.
         flow_corrected_standard_error_ratio: flow.hypot(p1).hypot(0.5 * relative(Channel::T1, state.t1_k)),
-        pressure_ratio_standard_error: state.pressure_ratio * p1.hypot(p2),
+        // An error of the barometer moves both pressures.
+        pressure_ratio_standard_error: state.pressure_ratio
+            * p1.hypot(p2)
+                .hypot(config.barometer_sigma_pa / state.p1_pa * (1.0 - state.pressure_ratio.recip())),
     }
 }

@@ -1,10 +1,11 @@
 //! Predictions of the declared map for a measured point: the speed at its flow and pressure ratio, and the efficiency there.
 
 use crate::faults::readings::Readings;
-use mapper_core::ModelTolerances;
+use mapper_core::{Channel, ModelTolerances};
 use mapper_numerics::polyline::NearestOnPolyline;
 use mapper_numerics::root::bisect;
 use mapper_physics::model::Model;
+use std::collections::BTreeMap;
 
 /// The declared rig of a campaign with its tolerances.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +14,8 @@ pub struct NominalRig<'a> {
     pub model: &'a Model,
     /// One-sigma tolerances.
     pub tolerances: &'a ModelTolerances,
+    /// Declared conditions of the rig by channel, SI; empty if they are not compared.
+    pub conditions: &'a BTreeMap<Channel, f64>,
 }
 
 /// Range about the measured speed in which the map's speed is searched.

@@ -1,7 +1,9 @@
 //! All integration tests of `mapper-identify`: one program, since each further one would be compiled and linked by itself.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
+mod budgets;
 mod common;
+mod conditions;
 mod coverage;
 mod declared_probe;
 mod expected;

@@ -7,13 +7,14 @@
 #![allow(clippy::print_stdout, reason = "the table is what a person looks at who changes a balance")]
 
 use crate::lab::{Machine as LabMachine, campaign, measured};
-use mapper_core::{Method, ModelTolerances, Recording, Verdict};
+use mapper_core::{Channel, Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_beside};
 use mapper_observe::sensor_fault::CATALOGUE;
 use mapper_physics::model::Model;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
 
 /// Size of the faults in standard errors of the recording.
 const SIGMAS: f64 = 6.0;
@@ -53,7 +54,7 @@ fn drawn(seed: u64) -> Drawn {
 
 fn found(drawn: &Drawn, recording: &Recording) -> Identified {
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
-    let nominal = NominalRig { model: &model, tolerances: &tolerances };
+    let nominal = NominalRig { model: &model, tolerances: &tolerances, conditions: &BTreeMap::new() };
     identify_beside(recording, &drawn.config, Some(nominal).filter(|_| drawn.is_declared)).unwrap()
 }
 
@@ -62,11 +63,13 @@ fn with(recording: &Recording, suspect: &Suspect, size: f64) -> Recording {
     let Suspect::Sensor(fault) = suspect else { panic!("a machine is not doctored") };
     let (start_s, end_s) = (recording.steps[0].start_s, recording.steps[recording.steps.len() - 1].end_s);
     let mut doctored = recording.clone();
+    let housing = &recording.series[&Channel::Tc];
     for channel in fault.channels {
         let series = doctored.series.get_mut(channel).unwrap();
         for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
             let share = (t_s - start_s) / (end_s - start_s);
-            *value += size * fault.error_per_unit(*channel, *value, share);
+            let housing_k = housing.interpolate(*t_s).unwrap();
+            *value += size * fault.error_per_unit(*channel, *value, housing_k, share);
         }
     }
     doctored
@@ -98,7 +101,7 @@ fn another_valve_is_named_and_leaves_the_points_as_they_are() {
     let drawn = drawn(9002);
     let (mut model, tolerances) = (Model::nominal(), ModelTolerances::default());
     let good = |model: &Model| {
-        let nominal = NominalRig { model, tolerances: &tolerances };
+        let nominal = NominalRig { model, tolerances: &tolerances, conditions: &BTreeMap::new() };
         let found = identify_beside(&drawn.recording, &drawn.config, Some(nominal)).unwrap();
         let good = found.points.iter().flatten().filter(|point| point.verdict == Verdict::Good).count();
         (good, found.faults)

@@ -102,7 +102,7 @@ fn score(recording: &Recording, fault_free: &FaultFree, method: Method) -> Score
     let config = config(method, fault_free);
     // As in a campaign that declares tolerances.
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
-    let nominal = NominalRig { model: &model, tolerances: &tolerances };
+    let nominal = NominalRig { model: &model, tolerances: &tolerances, conditions: &BTreeMap::new() };
     let Ok(Identified { points, .. }) = identify_beside(recording, &config, Some(nominal)) else {
         return score;
     };
@@ -226,7 +226,7 @@ const OBJECTIONS: [&str; 9] = [
 #[test]
 fn fault_free_recordings_get_no_objections() {
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
-    let nominal = NominalRig { model: &model, tolerances: &tolerances };
+    let nominal = NominalRig { model: &model, tolerances: &tolerances, conditions: &BTreeMap::new() };
     let other = Machine { alpha: 0.1, probe_m: 2e-3, ..Machine::default() };
     for (machine, nominal) in [(Machine::default(), Some(nominal)), (other, None)] {
         let clean = campaign(&grid(), 100.0, machine);

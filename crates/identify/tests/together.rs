@@ -9,6 +9,7 @@ use mapper_physics::model::Model;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
+use std::collections::BTreeMap;
 
 fn found(clean: &Campaign, seed: u64, method: Method) -> Vec<IdentifiedPoint> {
     found_beside(clean, seed, method, None)
@@ -129,7 +130,7 @@ fn one_bad_region_does_not_condemn_the_rest() {
 fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
     let clean = campaign(&eighteen(), 120.0, Machine::default());
     let (model, tolerances) = (Model::nominal(), ModelTolerances::default());
-    let nominal = NominalRig { model: &model, tolerances: &tolerances };
+    let nominal = NominalRig { model: &model, tolerances: &tolerances, conditions: &BTreeMap::new() };
     let doubted = |recording: &Campaign, seed: u64| {
         let points = found_beside(recording, seed, Method::Joint, Some(nominal));
         let named = |point: &IdentifiedPoint| {

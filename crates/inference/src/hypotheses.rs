@@ -137,7 +137,7 @@ impl Likelihood {
     }
 
     /// What is known of the other parameters where the first ones are as declared: they are integrated out.
-    fn given(&self, always: &[f64]) -> Option<Likelihood> {
+    pub(crate) fn given(&self, always: &[f64]) -> Option<Likelihood> {
         if always.is_empty() {
             return Some(self.clone());
         }
@@ -152,6 +152,11 @@ impl Likelihood {
             precision: rest - shared.tr_mul(&factor.solve(&shared)),
             pull: self.pull.rows(first, count - first) - shared.tr_mul(&factor.solve(&pull)),
         })
+    }
+
+    /// Precision and pull of one parameter.
+    pub(crate) fn of_parameter(&self, index: usize) -> (f64, f64) {
+        (self.precision[(index, index)], self.pull[index])
     }
 
     /// The scaled posterior precision `1 + D H D` of some parameters, factored, and their scaled pull.

@@ -11,3 +11,4 @@ pub mod hypotheses;
 pub mod interval;
 pub mod mixture;
 pub mod search;
+pub mod singles;

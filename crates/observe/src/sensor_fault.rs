@@ -14,6 +14,8 @@ pub enum FaultKind {
     /// Zero at the start of the run, the full size at its end, and proportional to the time between: unit of the channel, but a ratio to the
     /// reading for flow and speed.
     Drift,
+    /// A share of the way from the reading to the housing's temperature: the probe's stem conducts heat. Ratio.
+    TowardsHousing,
 }
 
 /// A fault of one or several sensors.
@@ -34,15 +36,17 @@ pub const CALIBRATED_AT_K: f64 = 293.15;
 const TEMPERATURE_K: f64 = 3.0;
 const PRESSURE_PA: f64 = 3e3;
 const RATIO: f64 = 0.05;
+/// Stems of probes that are too short for their pipe conduct some per cent to a tenth of the difference.
+const STEM_RATIO: f64 = 0.1;
 
 const fn fault(channels: &'static [Channel], kind: FaultKind, sigma: f64) -> SensorFault {
     SensorFault { channels, kind, sigma }
 }
 
 /// All faults considered.
-pub const CATALOGUE: [SensorFault; 25] = {
+pub const CATALOGUE: [SensorFault; 27] = {
     use Channel::{CompressorFlow, P1, P2, ShaftSpeed, T1, T2, Tc};
-    use FaultKind::{Drift, Gain, Offset};
+    use FaultKind::{Drift, Gain, Offset, TowardsHousing};
     [
         fault(&[T1], Offset, TEMPERATURE_K),
         fault(&[T2], Offset, TEMPERATURE_K),
@@ -50,6 +54,8 @@ pub const CATALOGUE: [SensorFault; 25] = {
         fault(&[T1, T2, Tc], Offset, TEMPERATURE_K),
         fault(&[T2], Gain, RATIO),
         fault(&[Tc], Gain, RATIO),
+        fault(&[T1, T2, Tc], Gain, RATIO),
+        fault(&[T2], TowardsHousing, STEM_RATIO),
         fault(&[T1], Drift, TEMPERATURE_K),
         fault(&[T2], Drift, TEMPERATURE_K),
         fault(&[Tc], Drift, TEMPERATURE_K),
@@ -92,20 +98,25 @@ pub fn drifts() -> impl Iterator<Item = SensorFault> {
 }
 
 impl SensorFault {
-    /// Error of a channel's reading by a fault of size 1. `run_ratio`: time since the start of the run over its length.
-    pub fn error_per_unit(&self, channel: Channel, reading: f64, run_ratio: f64) -> f64 {
+    /// Error of a channel's reading by a fault of size 1. `housing_k`: Tc; `run_ratio`: time since the start of the run over its length.
+    pub fn error_per_unit(&self, channel: Channel, reading: f64, housing_k: f64, run_ratio: f64) -> f64 {
         if !self.channels.contains(&channel) {
             return 0.0;
         }
         let relative = matches!(channel, Channel::CompressorFlow | Channel::ShaftSpeed);
         match self.kind {
             FaultKind::Offset => 1.0,
-            FaultKind::Gain if is_temperature(channel) => reading - CALIBRATED_AT_K,
-            FaultKind::Gain => reading,
+            FaultKind::Gain => gain_error(channel, reading),
             FaultKind::Drift if relative => run_ratio * reading,
             FaultKind::Drift => run_ratio,
+            FaultKind::TowardsHousing => housing_k - reading,
         }
     }
+}
+
+/// Error of a reading by a gain error of 1.
+pub fn gain_error(channel: Channel, reading: f64) -> f64 {
+    if is_temperature(channel) { reading - CALIBRATED_AT_K } else { reading }
 }
 
 fn is_temperature(channel: Channel) -> bool {

@@ -43,10 +43,50 @@ pub struct ChannelMap {
 /// The reference of gauge pressures.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AmbientPressure {
-    /// A known value, Pa.
-    Constant(f64),
+    /// A known value.
+    Constant(Barometer),
     /// A column of the log.
     Source(ChannelSource),
+}
+
+/// A constant ambient pressure with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Barometer {
+    /// Pa.
+    pub pressure_pa: f64,
+    /// One standard deviation, Pa.
+    pub sigma_pa: f64,
+}
+
+/// Word for an ambient pressure that nobody knows.
+pub(crate) const UNKNOWN_WORD: &str = "unknown";
+/// Pressure of the standard atmosphere at sea level, Pa.
+const STANDARD_PA: f64 = 101_325.0;
+/// Uncertainty of a barometer's reading, Pa: the weather changes it by some hectopascal while a test runs.
+const READ_PA: f64 = 100.0;
+/// Uncertainty of the pressure at a known altitude, Pa: the weather of the middle latitudes.
+const WEATHER_PA: f64 = 1e3;
+/// Uncertainty of the pressure at an unknown place, Pa: weather, and altitudes of up to some 500 m.
+const UNKNOWN_PA: f64 = 3e3;
+
+impl Barometer {
+    /// The reading of a barometer.
+    pub fn read(pressure_pa: f64) -> Self {
+        Barometer { pressure_pa, sigma_pa: READ_PA }
+    }
+
+    /// The standard atmosphere (ISO 2533) at an altitude below 11 km.
+    pub fn at_altitude(altitude_m: f64) -> Self {
+        // Temperature at sea level, its gradient, and gravity over the gas constant and the gradient.
+        let (sea_level_k, gradient_k_m, exponent) = (288.15, 6.5e-3, 5.255_88);
+        let ratio = (1.0 - gradient_k_m * altitude_m / sea_level_k).max(0.0);
+        Barometer { pressure_pa: STANDARD_PA * ratio.powf(exponent), sigma_pa: WEATHER_PA }
+    }
+
+    /// Nothing is known.
+    pub fn unknown() -> Self {
+        Barometer { pressure_pa: STANDARD_PA, sigma_pa: UNKNOWN_PA }
+    }
 }
 
 /// One field of one topic.
@@ -114,6 +154,13 @@ impl ChannelMap {
         let measured = CHANNELS.iter().filter(|row| row.group != Group::Command);
         let elements = measured.flat_map(several).collect();
         ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
+    }
+
+    /// Whether a channel's pressure is read over the ambient pressure.
+    pub fn is_gauge(&self, channel: Channel) -> bool {
+        let elements = self.elements.iter().filter(|(element, _)| element.channel == channel);
+        let own = self.channels.get(&channel).into_iter();
+        own.chain(elements.map(|(_, source)| source)).any(|source| source.gauge)
     }
 
     /// Whether this is [`ChannelMap::native`]: missing channels are then expected.

@@ -3,6 +3,7 @@
 //! Quantities are plain strings or numbers here: recordings of other programs spell units in more ways than campaigns
 //! may, and a ratio may be written without a unit. [`crate::channel_map_yaml`] parses them.
 
+use crate::channel_map::UNKNOWN_WORD;
 use mapper_core::{CHANNELS, MAX_ELEMENTS, NAMED_REFERENCES};
 use mapper_logs::OPTION_KEYS;
 use mapper_yaml::Schema;
@@ -65,11 +66,21 @@ fn ambient_pressure() -> Value {
             "unit": text("Unit of the column; as the log says if none is given.", "kPa"),
         }),
     );
-    let value = quantity("What the barometer read.", "101.3 kPa");
+    let uncertainty = || {
+        quantity(
+            "One standard deviation; 100 Pa for a reading and 1 kPa for an altitude if none is given.",
+            "50 Pa",
+        )
+    };
+    let value = || quantity("What the barometer read.", "99.2 kPa");
+    let read = closed(&["value"], json!({"value": value(), "uncertainty": uncertainty()}));
+    let altitude = quantity("Altitude of the stand above the sea.", "300 m");
+    let place = closed(&["altitude"], json!({"altitude": altitude, "uncertainty": uncertainty()}));
+    let unknown = json!({"type": "string", "enum": [UNKNOWN_WORD]});
     json!({
-        "description": "What gauge pressures are added to: a value, or the column of a log.",
-        "examples": ["101.3 kPa"],
-        "anyOf": [value, source],
+        "description": "What gauge pressures are added to: the reading of a barometer, the altitude of the stand, the column of a log, or `unknown`, which counts as 101.3 kPa with an uncertainty of 3 kPa.",
+        "examples": ["99.2 kPa"],
+        "anyOf": [value(), unknown, source, read, place],
     })
 }
 

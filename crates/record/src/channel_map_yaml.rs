@@ -1,8 +1,9 @@
 //! Channel maps in YAML with units.
 
+use crate::channel_map::UNKNOWN_WORD;
 use crate::channel_map_schema::SCHEMA;
 use crate::format::TRUTH_PREFIX;
-use crate::{AmbientPressure, ChannelMap, ChannelSource, MachineConstants, WindowLimits};
+use crate::{AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits};
 use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantSensors, ReferenceState};
 use mapper_logs::units::{difference, kind_of, parse_quantity, remedy, unit};
 use mapper_logs::{LogOptions, OPTION_KEYS, OptionError};
@@ -122,7 +123,8 @@ impl<'a> Reader<'a> {
         let gauge = channels.values().chain(elements.values()).any(|source| source.gauge);
         if gauge && !self.has("ambient_pressure") {
             let message = "a gauge pressure is mapped, and nothing says what it is added to".to_owned();
-            let remedy = "write `ambient_pressure: 101.3 kPa`, or the column that holds it: `ambient_pressure: {field: P_amb, unit: kPa}`";
+            let remedy = "write what the barometer read, e.g. `ambient_pressure: 99.2 kPa`, the altitude of the stand: `ambient_pressure: {altitude: 300 m}`, \
+                 or the column that holds it: `ambient_pressure: {field: P_amb, unit: kPa}`; `ambient_pressure: unknown` widens the intervals";
             self.note(FindingKind::MissingKey, &steps!["channels"], message, remedy);
         }
         ChannelMap {
@@ -145,8 +147,14 @@ impl<'a> Reader<'a> {
     fn ambient_pressure(&mut self) -> Option<AmbientPressure> {
         let here = steps!["ambient_pressure"];
         let node = self.root.get(&here)?;
+        if node.text() == Some(UNKNOWN_WORD) {
+            return Some(AmbientPressure::Constant(Barometer::unknown()));
+        }
         if node.entries().is_empty() {
-            return self.positive(&here, Kind::Pressure).map(AmbientPressure::Constant);
+            return self.positive(&here, Kind::Pressure).map(Barometer::read).map(AmbientPressure::Constant);
+        }
+        if let Some(barometer) = self.barometer() {
+            return Some(AmbientPressure::Constant(barometer));
         }
         let text = |key: &str| {
             self.root.get(&steps!["ambient_pressure", key]).and_then(Node::text).map(str::to_owned)
@@ -156,6 +164,18 @@ impl<'a> Reader<'a> {
             self.note_unit(&steps!["ambient_pressure", "unit"], Kind::Pressure, &error);
         }
         Some(AmbientPressure::Source(ChannelSource { topic, field, unit: written, gauge: false }))
+    }
+
+    /// A value or an altitude, with its uncertainty.
+    fn barometer(&mut self) -> Option<Barometer> {
+        let of = |key: &str| steps!["ambient_pressure", key];
+        let found = match self.root.get(&of("value")) {
+            Some(_) => Barometer::read(self.positive(&of("value"), Kind::Pressure)?),
+            None => Barometer::at_altitude(self.quantity(&of("altitude"), Kind::Length)?),
+        };
+        let stated = self.root.get(&of("uncertainty")).is_some();
+        let sigma_pa = self.not_negative(&of("uncertainty"), difference(Kind::Pressure));
+        Some(if stated { Barometer { sigma_pa, ..found } } else { found })
     }
 
     fn log(&mut self) -> LogOptions {

@@ -43,7 +43,9 @@ mod truth;
 mod warning;
 mod writer;
 
-pub use channel_map::{AmbientPressure, ChannelMap, ChannelSource, MachineConstants, WindowLimits};
+pub use channel_map::{
+    AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits,
+};
 pub use channel_map_yaml::ChannelMapError;
 pub use chunk::ChunkError;
 pub use error::{BadBatch, RecordError};

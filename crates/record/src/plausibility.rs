@@ -84,9 +84,11 @@ pub(crate) fn check_ambient(
     let (least, most) = AMBIENT_PA;
     let allowed = format!("it lies between {:.0} and {:.0} kPa", least / 1e3, most / 1e3);
     match (ambient, column.and_then(range)) {
-        (AmbientPressure::Constant(value_pa), _) if !(least..=most).contains(value_pa) => {
-            let message =
-                format!("the ambient pressure is {} kPa, which is impossible", short(value_pa / 1e3));
+        (AmbientPressure::Constant(barometer), _) if !(least..=most).contains(&barometer.pressure_pa) => {
+            let message = format!(
+                "the ambient pressure is {} kPa, which is impossible",
+                short(barometer.pressure_pa / 1e3)
+            );
             let remedy = format!("{allowed}: write what the barometer read");
             complaints.add(FindingKind::Implausible, &steps!["ambient_pressure"], message, remedy);
         }

@@ -265,7 +265,7 @@ fn gather(
 ) -> Gathered {
     let mut gathered = Gathered { series: BTreeMap::new(), elements: BTreeMap::new() };
     let ambient_pa = |t_s: f64| match (&map.ambient_pressure, ambient) {
-        (Some(AmbientPressure::Constant(value_pa)), _) => Some(*value_pa),
+        (Some(AmbientPressure::Constant(barometer)), _) => Some(barometer.pressure_pa),
         (_, Some(series)) => series.interpolate(t_s),
         _ => None,
     };
@@ -305,7 +305,7 @@ fn complete(
             plausibility::check_ambient(pressure, column, unit, &mut complaints);
         }
         let ambient_pa = match (&map.ambient_pressure, column) {
-            (Some(AmbientPressure::Constant(value_pa)), _) => Some(*value_pa),
+            (Some(AmbientPressure::Constant(barometer)), _) => Some(barometer.pressure_pa),
             (_, Some(series)) => mapper_numerics::statistics::median(&series.values),
             _ => None,
         };

@@ -6,6 +6,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod assumed_text;
+mod budget_table;
 mod campaign_page;
 mod comparison_text;
 mod conditions;
@@ -66,6 +67,7 @@ mod wrapped;
 mod zero_text;
 
 pub use assumed_text::{assumed_sentence, assumed_text, first_campaign_text};
+pub use budget_table::{BUDGET_COLUMNS, budget_rows};
 pub use campaign_page::campaign_page;
 pub use comparison_text::{comparison_json, comparison_text};
 pub use conditions::{CONDITION_HEADS, condition_rows};

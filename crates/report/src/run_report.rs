@@ -1,6 +1,7 @@
 //! The test report of a run, as Markdown.
 
 use crate::assumed_text::assumed_sentence;
+use crate::budget_table::budget_section;
 use crate::conditions::{CONDITION_HEADS, condition_rows};
 use crate::disagreement::disagreement_text;
 use crate::display::Display;
@@ -20,8 +21,8 @@ use mapper_assemble::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
-    Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, Recording,
-    ReferenceState, terminal_text,
+    Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, PointBudgets,
+    Recording, ReferenceState, terminal_text,
 };
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
@@ -73,6 +74,8 @@ pub struct RunReport<'a> {
     pub zero: &'a ZeroOutcome,
     /// Result for channels with several sensors.
     pub sensors: &'a [FusedChannel],
+    /// Uncertainty budgets of the points.
+    pub budgets: &'a [PointBudgets],
     /// Deviations of the points from the simulator's truth; `None` on a real rig.
     pub score: Option<&'a ScoreSummary>,
     /// Result of the search for surge; `None` if there was none.
@@ -181,6 +184,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         let _ = writeln!(text, "{}", score_text(score));
     }
     points_section(&mut text, &units, report);
+    text.push_str(&budget_section(report.budgets));
     if let Some(SurgeReport { marks, remarks, surges }) = surge {
         let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &units));
     }

@@ -1,13 +1,15 @@
 //! Converts a recording into identified points, with their truth if known. All commands use this module.
 
-use crate::declared::{identification_of, identification_with};
+use crate::declared::{declared_conditions, identification_of, identification_with};
 use crate::fusing::fused;
 use crate::recorded::{Recorded, all_differ, same_machine};
 use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_assemble::{RepeatedJump, repeated_jumps};
 use mapper_campaign::{Campaign, nominal_model};
-use mapper_core::{IdentifiedPoint, Method, Recording, StepMarker, StepOrigin, ThermalModel, joined};
+use mapper_core::{
+    IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, ThermalModel, joined,
+};
 use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_beside,
     isothermal_zero, method_for,
@@ -43,6 +45,8 @@ pub struct Identified {
     pub two_parameter: Vec<TwoParameter>,
     /// Faults of sensors or machine that are needed to explain the recording.
     pub faults: Vec<FoundFault>,
+    /// Uncertainty budgets of the points, in order.
+    pub budgets: Vec<PointBudgets>,
     /// Result of sensor fusion.
     pub sensors: Vec<FusedChannel>,
     /// Result of the zero.
@@ -77,6 +81,7 @@ impl Identified {
             "thermal": self.thermal,
             "two_parameter": self.two_parameter,
             "faults": self.faults,
+            "budgets": self.budgets,
             "zero": self.zero,
             "score": self.score,
             "recording_warnings": warnings,
@@ -176,7 +181,12 @@ impl Session<'_> {
         let declared = campaign.filter(|campaign| campaign.tolerances_declared);
         let model = declared.map(nominal_model).transpose()?;
         let nominal = declared.zip(model.as_ref());
-        let nominal = nominal.map(|(campaign, model)| NominalRig { model, tolerances: &campaign.tolerances });
+        let conditions = campaign.map(declared_conditions).unwrap_or_default();
+        let nominal = nominal.map(|(campaign, model)| NominalRig {
+            model,
+            tolerances: &campaign.tolerances,
+            conditions: &conditions,
+        });
         let found = identify_beside(&recording, &config, nominal)?;
         let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
         for point in &points {
@@ -194,6 +204,7 @@ impl Session<'_> {
             thermal: found.thermal,
             two_parameter: found.two_parameter,
             faults: found.faults,
+            budgets: found.budgets,
             sensors,
             zero,
             score,

@@ -9,13 +9,17 @@ use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
-use mapper_core::{CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ThermalModel};
+use mapper_core::{
+    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, PointBudgets, ThermalModel,
+};
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
 use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::{Display, ReportSource, RunReport, SurgeReport, gap_part, instant, run_report};
+use mapper_report::{
+    BUDGET_COLUMNS, Display, ReportSource, RunReport, SurgeReport, budget_rows, gap_part, instant, run_report,
+};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -263,6 +267,7 @@ impl Session<'_> {
             "thermal": identified.thermal,
             "two_parameter": identified.two_parameter,
             "faults": identified.faults,
+            "budgets": identified.budgets,
             "zero": identified.zero,
         });
         if !identified.sensors.is_empty() {
@@ -272,6 +277,9 @@ impl Session<'_> {
             points_file["surge"] = json!(surge);
         }
         write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
+        if !identified.budgets.is_empty() {
+            write_new(&directory.join(run_directory::BUDGET), &budget_csv(&identified.budgets)?)?;
+        }
         let repeats = identified.repeats();
         let program = program_and_commit(self.registry.commit);
         let has_picture = map.contains_key("svg");
@@ -311,6 +319,18 @@ impl Session<'_> {
     }
 }
 
+/// The budgets as a table of rows.
+fn budget_csv(budgets: &[PointBudgets]) -> Result<Vec<u8>, SessionError> {
+    let failed =
+        |error: csv::Error| SessionError::file("write", Path::new(run_directory::BUDGET))(error.into());
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(BUDGET_COLUMNS).map_err(failed)?;
+    for row in budget_rows(budgets) {
+        writer.write_record(row).map_err(failed)?;
+    }
+    writer.into_inner().map_err(|error| failed(error.into_error().into()))
+}
+
 /// Name of a recording in comparisons: its run directory, or its file.
 fn name_of(path: &Path) -> String {
     let named = match path.file_name() {
@@ -343,6 +363,7 @@ fn run_report_of<'a>(
         map,
         recording: &identified.recording,
         used: &identified.config.declared,
+        budgets: &identified.budgets,
         zero: &identified.zero,
         sources: &origin.sources,
         outcome: &origin.outcome,

@@ -17,6 +17,8 @@ pub const CAMPAIGN: &str = "campaign.yaml";
 pub const SEQUENCE: &str = "sequence.rhai";
 /// Identified points.
 pub const POINTS: &str = "points.json";
+/// Uncertainty budgets of the points.
+pub const BUDGET: &str = "budget.csv";
 /// The journal of safely recorded steps.
 pub const JOURNAL: &str = "journal.jsonl";
 /// The test report.
@@ -27,7 +29,7 @@ pub const PAGE: &str = "report.html";
 
 /// Whether a file of this name is a result: points, map, report, page, or executed steps of a script.
 pub(crate) fn is_result(name: &str) -> bool {
-    [POINTS, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")
+    [POINTS, BUDGET, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")
 }
 
 /// Creates `<parent>/<campaign>-<time>`, with suffix `-2`, `-3`, ... if it already exists.

@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct SensorDeclaration {
     /// Noise, offset left after calibration, gain; those of the combined reading if there are several sensors.
     pub declared: DeclaredUncertainty,
+    /// Whether a gain is declared, be it 0.
+    pub gain_is_declared: bool,
     /// Inner diameter of the pipe at a static tap, m; `None` if the total value is measured.
     pub static_tap_pipe_diameter_m: Option<f64>,
     /// Diameter of the probe's tip, m; 0 is a probe without inertia. For several sensors, that of the single probe with the same

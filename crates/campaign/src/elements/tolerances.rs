@@ -1,7 +1,7 @@
 //! `tolerances:`
 
 use crate::si::si;
-use crate::units::{Duration, Fraction, Quantity};
+use crate::units::{Duration, Fraction, PressureDifference, Quantity, TemperatureDifference};
 use mapper_core::ModelTolerances;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
@@ -46,6 +46,26 @@ pub(crate) struct TolerancesElement {
     #[serde(rename = "oil_conductance", deserialize_with = "si::<Fraction, _>")]
     #[schemars(with = "Quantity<Fraction>", extend("x-min" = "0 %", "x-max" = "50 %"), example = &"5 %")]
     oil_conductance_ratio: f64,
+    /// Inlet pressure about that of `boundary`; 200 Pa if none is given.
+    #[serde(rename = "inlet_pressure", deserialize_with = "si::<PressureDifference, _>")]
+    #[schemars(with = "Quantity<PressureDifference>", extend("x-min" = "0 Pa"), example = &"200 Pa")]
+    inlet_pressure_pa: f64,
+    /// Inlet temperature about that of `boundary`; 2 K if none is given.
+    #[serde(rename = "inlet_temperature", deserialize_with = "si::<TemperatureDifference, _>")]
+    #[schemars(with = "Quantity<TemperatureDifference>", extend("x-min" = "0 K"), example = &"2 K")]
+    inlet_temperature_k: f64,
+    /// Turbine inlet temperature about that of `boundary`; 10 K if none is given.
+    #[serde(rename = "turbine_inlet_temperature", deserialize_with = "si::<TemperatureDifference, _>")]
+    #[schemars(with = "Quantity<TemperatureDifference>", extend("x-min" = "0 K"), example = &"10 K")]
+    turbine_inlet_temperature_k: f64,
+    /// Oil temperature about that of `boundary`; 5 K if none is given.
+    #[serde(rename = "oil_temperature", deserialize_with = "si::<TemperatureDifference, _>")]
+    #[schemars(with = "Quantity<TemperatureDifference>", extend("x-min" = "0 K"), example = &"5 K")]
+    oil_temperature_k: f64,
+    /// Ambient temperature about that of `boundary`; 5 K if none is given.
+    #[serde(rename = "ambient_temperature", deserialize_with = "si::<TemperatureDifference, _>")]
+    #[schemars(with = "Quantity<TemperatureDifference>", extend("x-min" = "0 K"), example = &"5 K")]
+    ambient_temperature_k: f64,
     /// Declared lag of the turbine inlet pressure behind its command; 0.3 s if none is given.
     #[serde(rename = "actuator_lag", deserialize_with = "si::<Duration, _>")]
     #[schemars(with = "Quantity<Duration>", extend("x-min" = "0 s", "x-max" = "60 s"), example = &"0.3 s")]
@@ -90,7 +110,7 @@ mod tests {
             let text = named.strip_suffix(" if none is given.").unwrap();
             let kind = Kind::from_key(property["x-quantity"].as_str().unwrap()).unwrap();
             let value = parse(kind, text).unwrap();
-            let fields = [format!("{key}_ratio"), format!("{key}_s")];
+            let fields = ["ratio", "s", "pa", "k"].map(|unit| format!("{key}_{unit}"));
             let held = fields.iter().find_map(|field| default[field].as_f64()).unwrap();
             assert!((held - value).abs() < 1e-12, "{key}: {held} is not {text}");
         }

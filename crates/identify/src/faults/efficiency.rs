@@ -9,7 +9,8 @@ use crate::faults::readings::{PerChannel, Readings};
 use crate::faults::rows::{Machine, Rows, common, own};
 use crate::faults::smooth::{At, Smooth};
 use crate::nominal_rig::NominalRig;
-use mapper_core::ReferenceState;
+use mapper_core::{Channel, ReferenceState};
+use mapper_observe::sensor_fault::FaultKind;
 use mapper_physics::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
 use nalgebra::{DMatrix, DVector};
 
@@ -24,6 +25,19 @@ pub(crate) struct FittedEfficiencies {
     pub(crate) covariance: DMatrix<f64>,
     /// Sensitivity of each one to a constant error of each channel in all steps, per unit of the channel; `None` if no error of the channel is
     /// declared, because the fit then does not compute it.
+    pub(crate) by_reading: Vec<[Option<f64>; 7]>,
+    /// The same of ln h.
+    pub(crate) heat: FittedHeat,
+}
+
+/// Heat-transfer coefficients as fitted.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FittedHeat {
+    /// ln of h, W/(m2 K).
+    pub(crate) ln_h: Vec<f64>,
+    /// Their covariance, without the declared errors of the sensors.
+    pub(crate) covariance: DMatrix<f64>,
+    /// Sensitivity of each one to a constant error of each channel in all steps.
     pub(crate) by_reading: Vec<[Option<f64>; 7]>,
 }
 
@@ -133,7 +147,32 @@ pub(crate) fn rows(
     let by_reading = by_reading.collect();
     let readings =
         known.iter().map(|(row, readings, _)| as_gains_count(readings, fitted.eta[*row])).collect();
-    Some(Rows { residual, covariance, readings, by_reading, by_machine })
+    // It changes the slope of T2 over Tc, which convection absorbs, and nothing at equal temperatures.
+    let by_fault = vec![(Channel::T2, FaultKind::TowardsHousing, vec![0.0; count])];
+    Some(Rows { residual, covariance, readings, by_reading, by_machine, by_fault })
+}
+
+/// The efficiencies themselves, with the effects of errors on them.
+pub(crate) fn measured(fitted: &FittedEfficiencies, readings: &[Option<Readings>]) -> Rows {
+    let known: Vec<(usize, Readings)> = fitted
+        .positions
+        .iter()
+        .enumerate()
+        .filter_map(|(row, position)| Some((row, (*readings.get(*position)?)?)))
+        .collect();
+    let by_reading = |(row, readings): &(usize, Readings)| {
+        let apparent = readings.derivatives(apparent);
+        std::array::from_fn(|channel| fitted.by_reading[*row][channel].unwrap_or(apparent[channel]))
+    };
+    let count = known.len();
+    Rows {
+        residual: known.iter().map(|(row, _)| fitted.eta[*row]).collect(),
+        covariance: DMatrix::zeros(count, count),
+        by_reading: known.iter().map(by_reading).collect(),
+        readings: known.iter().map(|(row, readings)| as_gains_count(readings, fitted.eta[*row])).collect(),
+        by_machine: Vec::new(),
+        by_fault: vec![(Channel::T2, FaultKind::TowardsHousing, vec![0.0; count])],
+    }
 }
 
 /// Efficiency of a compressor without heat transfer.
@@ -147,7 +186,7 @@ fn isentropic_rise_k(readings: &Readings) -> f64 {
 }
 
 /// Temperature after compression without heat transfer, K.
-fn compressed(readings: &Readings, eta: f64) -> f64 {
+pub(crate) fn compressed(readings: &Readings, eta: f64) -> f64 {
     let rise = isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k(), readings.air);
     compressed_k(readings.t1_k(), rise, eta, readings.air)
 }

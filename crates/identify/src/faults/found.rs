@@ -41,11 +41,16 @@ impl Suspect {
 
     /// Factor and display unit of its size.
     fn scale(&self) -> (f64, &'static str) {
-        let Suspect::Sensor(SensorFault { channels, kind, .. }) = self else { return (100.0, "%") };
+        let Suspect::Sensor(SensorFault { channels, kind, .. }) = self else {
+            return match self {
+                Suspect::Machine(Machine::Condition(Channel::P1)) => (1e-3, "kPa"),
+                Suspect::Machine(Machine::Condition(_)) => (1.0, "K"),
+                _ => (100.0, "%"),
+            };
+        };
         match (kind, channels) {
-            (FaultKind::Gain, _) | (FaultKind::Drift, [Channel::CompressorFlow | Channel::ShaftSpeed]) => {
-                (100.0, "%")
-            }
+            (FaultKind::Gain | FaultKind::TowardsHousing, _)
+            | (FaultKind::Drift, [Channel::CompressorFlow | Channel::ShaftSpeed]) => (100.0, "%"),
             (_, [Channel::P1 | Channel::P2, ..]) => (1e-3, "kPa"),
             (_, [Channel::CompressorFlow]) => (1e3, "g/s"),
             (_, [Channel::ShaftSpeed]) => (1e-3, "krpm"),
@@ -98,10 +103,14 @@ impl fmt::Display for Suspect {
                     FaultKind::Offset => "offset",
                     FaultKind::Gain => "gain error",
                     FaultKind::Drift => "drift",
+                    FaultKind::TowardsHousing => "heat conduction to the housing at",
                 };
-                write!(f, "{kind} of {}", together(fault.channels))
+                match fault.kind {
+                    FaultKind::TowardsHousing => write!(f, "{kind} {}", together(fault.channels)),
+                    _ => write!(f, "{kind} of {}", together(fault.channels)),
+                }
             }
-            Suspect::Machine(machine) => f.write_str(machine_name(*machine)),
+            Suspect::Machine(machine) => f.write_str(&machine_name(*machine)),
         }
     }
 }
@@ -122,6 +131,9 @@ impl fmt::Display for FoundFault {
                     FaultKind::Drift => {
                         write!(f, "{channels} {} by {size} over the run", verb("drifts", "drift"))
                     }
+                    FaultKind::TowardsHousing => {
+                        write!(f, "{channels} reads {size} of the way to the housing temperature")
+                    }
                 }?;
             }
             Suspect::Machine(machine) => {
@@ -138,12 +150,15 @@ impl fmt::Display for FoundFault {
     }
 }
 
-fn machine_name(machine: Machine) -> &'static str {
-    match machine {
+fn machine_name(machine: Machine) -> String {
+    let name = match machine {
         Machine::FlowCapacity => "flow of the declared map",
         Machine::Efficiency => "efficiency of the declared map",
         Machine::ValveArea => "area of the declared valve",
-    }
+        Machine::Convection => "convection of the declared machine",
+        Machine::Condition(channel) => return format!("{} ({channel})", channel.info().description),
+    };
+    name.to_owned()
 }
 
 fn together(channels: &[Channel]) -> String {

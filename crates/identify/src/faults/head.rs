@@ -80,6 +80,7 @@ fn declared(
         readings,
         by_reading,
         by_machine: vec![(Machine::FlowCapacity, by_flow)],
+        by_fault: Vec::new(),
     })
 }
 
@@ -99,5 +100,5 @@ fn any(readings: &[Readings], noise: &PerChannel, reference: ReferenceState) -> 
         (own(direct.into_iter()) + &prior).cholesky()?.solve(&DVector::from_column_slice(&residual));
     let by_reading = by_reading(&|readings| ANY_CURVE.value(&places.at(readings), &at, &weights));
     let covariance = own(errors(&by_reading, noise, ANY_ROUGHNESS).into_iter()) + prior;
-    Some(Rows { residual, covariance, readings, by_reading, by_machine: Vec::new() })
+    Some(Rows { residual, covariance, readings, by_reading, by_machine: Vec::new(), by_fault: Vec::new() })
 }

@@ -4,11 +4,14 @@
 //! stores the heat from the gas, and efficiency is a smooth function of the map position. The hypotheses are the catalogue of sensor faults
 //! ([`mapper_observe::sensor_fault`]) and a machine of another scale. [`mapper_inference::hypotheses`] finds the most probable set of them.
 
+mod conditions;
+mod convection;
 pub(crate) mod efficiency;
 pub(crate) mod found;
 mod head;
 mod housing;
 mod places;
+pub(crate) mod possible;
 pub(crate) mod readings;
 pub(crate) mod rows;
 mod smooth;
@@ -31,10 +34,15 @@ use mapper_observe::sensor_fault::CATALOGUE;
 const EXPECTED_FAULTS: f64 = 0.1;
 /// Deviation of a machine from its declaration, ratio, one standard deviation: another machine of the same series.
 const OTHER_MACHINE_RATIO: f64 = 0.05;
+/// The same of convection: correlations of heat transfer in pipes scatter by that much (Incropera, ch. 8.5).
+const OTHER_CONVECTION_RATIO: f64 = 0.2;
+/// The same of the conditions: weather and altitude, a cell that is hot, another test.
+const OTHER_PRESSURE_PA: f64 = 3e3;
+const OTHER_TEMPERATURE_K: f64 = 10.0;
 /// Relative probability above which an alternative is named: one in twenty.
 const ALTERNATIVE: f64 = 0.05;
 /// Relative probability below which an alternative is excluded, if points stay good because of that: one in a thousand.
-const EXCLUDED: f64 = 1e-3;
+pub(crate) const EXCLUDED: f64 = 1e-3;
 
 /// Maximum number of steps, evenly spread: the cost grows with the cube, and these take a second.
 const MAX_STEPS: usize = 500;
@@ -77,7 +85,11 @@ pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> 
 /// Whether a number of a point depends on it: none depends on the valve, and an apparent efficiency does not depend on the housing.
 fn touches_points(suspect: Suspect, method: Method) -> bool {
     let housing = method == Method::Steady && suspect.channels() == [Channel::Tc];
-    !(housing || suspect == Suspect::Machine(Machine::ValveArea))
+    let measured = |machine| match machine {
+        Machine::ValveArea | Machine::Condition(_) => true,
+        Machine::FlowCapacity | Machine::Efficiency | Machine::Convection => false,
+    };
+    !(housing || matches!(suspect, Suspect::Machine(machine) if measured(machine)))
 }
 
 /// Warnings for all points if there are faults that affect them.
@@ -86,7 +98,8 @@ pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection
     let sensors = faults.iter().any(|fault| matches!(fault.suspect, Suspect::Sensor(_)));
     let code = if sensors { code::CONTRADICTED_CHANNEL } else { code::OFF_THE_NOMINAL_MAP };
     let message = format!(
-        "{}: compare the channels at standstill (`zero`), and repair the sensor or declare its uncertainty",
+        "{}: compare the channels at standstill (`zero`) and with the barometer, and repair the sensor, declare its uncertainty or correct the \
+         declared conditions (`boundary`)",
         described(faults)
     );
     Some(Objection::new(code, message, (0..steps).collect()))
@@ -100,7 +113,10 @@ pub(crate) fn remark(faults: &[FoundFault]) -> Option<String> {
 
 fn described(faults: &[FoundFault]) -> String {
     let sizes: Vec<String> = faults.iter().map(ToString::to_string).collect();
-    format!("valve, head, heat of the housing and efficiencies do not agree unless {}", sizes.join(", and "))
+    format!(
+        "conditions, valve, head, heat of the housing and efficiencies do not agree unless {}",
+        sizes.join(", and ")
+    )
 }
 
 /// Standard error of each suspect's size from the balances, in its unit.
@@ -110,11 +126,22 @@ pub(crate) fn standard_errors(likelihood: &Likelihood, priors: &Priors) -> Vec<(
 }
 
 /// The hypothesis at this position: the catalogue, then the machine.
-fn suspect(index: usize) -> Suspect {
+pub(crate) fn suspect(index: usize) -> Suspect {
     match CATALOGUE.get(index) {
         Some(fault) => Suspect::Sensor(*fault),
         None => Suspect::Machine(MACHINE[index - CATALOGUE.len()]),
     }
+}
+
+/// The readings of all steps, by position; at most [`MAX_STEPS`] of them.
+pub(crate) fn all_readings(recording: &Recording, ends: &[Option<Ends>]) -> Option<Vec<Option<Readings>>> {
+    let (first_s, last_s) = span_s(recording)?;
+    let every = ends.len().div_ceil(MAX_STEPS).max(1);
+    let of = |(position, end): (usize, &Option<Ends>)| {
+        let used = end.as_ref().filter(|_| position.is_multiple_of(every))?;
+        Some(Readings::of(used, first_s, last_s))
+    };
+    Some(ends.iter().enumerate().map(of).collect())
 }
 
 fn balances(
@@ -124,34 +151,41 @@ fn balances(
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
 ) -> Option<Vec<Rows>> {
-    let (first_s, last_s) = span_s(recording)?;
-    let every = ends.len().div_ceil(MAX_STEPS).max(1);
-    let used = ends.iter().enumerate().map(|(position, end)| end.as_ref().filter(|_| position % every == 0));
-    let used: Vec<Option<&Ends>> = used.collect();
-    let all: Vec<Option<Readings>> =
-        used.iter().map(|end| end.map(|end| Readings::of(end, first_s, last_s))).collect();
+    let all = all_readings(recording, ends)?;
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
+    let used = ends.iter().zip(&all).filter_map(|(end, readings)| Some((end.as_ref()?, (*readings)?)));
     let opened: Vec<(f64, Readings)> =
-        used.iter().flatten().map(|end| end.valve_opening_ratio).zip(readings.iter().copied()).collect();
+        used.map(|(end, readings)| (end.valve_opening_ratio, readings)).collect();
     let noise = readings::noise(config, recording);
     let reference = config.reference;
     let mut balances: Vec<Rows> = Vec::new();
     balances.extend(valve::rows(&opened, &noise, nominal));
     balances.extend(head::rows(&readings, &noise, reference, nominal));
-    balances.extend(housing::rows(recording, config, &used.iter().map(Option::is_some).collect::<Vec<_>>()));
+    balances.extend(housing::rows(recording, config, &all.iter().map(Option::is_some).collect::<Vec<_>>()));
     balances.extend(fitted.and_then(|fitted| efficiency::rows(fitted, &all, reference, nominal)));
+    if let Some(nominal) = nominal {
+        balances.extend(fitted.and_then(|fitted| convection::rows(fitted, &all, config, nominal)));
+        balances.extend(conditions::rows(recording, &all, config, nominal));
+    }
     Some(balances)
 }
 
 fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
     let declared = |channel: &Channel| config.declared.get(channel).copied().unwrap_or_default();
-    let meter = nominal.map_or(0.0, |nominal| nominal.tolerances.flow_meter_gain_ratio);
-    let gain = |channel: &Channel| {
-        let more = if *channel == Channel::CompressorFlow { meter } else { 0.0 };
-        declared(channel).gain_sigma_ratio.hypot(more)
+    let gain = |channel: &Channel| match (declared(channel).gain_sigma_ratio, nominal) {
+        (0.0, Some(nominal)) if *channel == Channel::CompressorFlow => {
+            nominal.tolerances.flow_meter_gain_ratio
+        }
+        (declared, _) => declared,
     };
     let offsets = CHANNELS.iter().map(|channel| declared(channel).offset_sigma);
-    let machine = MACHINE.iter().map(|_| OTHER_MACHINE_RATIO);
+    let machine = MACHINE.iter().map(|machine| match machine {
+        Machine::Convection => OTHER_CONVECTION_RATIO,
+        Machine::Condition(Channel::P1) => OTHER_PRESSURE_PA,
+        Machine::Condition(_) => OTHER_TEMPERATURE_K,
+        _ => OTHER_MACHINE_RATIO,
+    });
     let sigmas: Vec<f64> = CATALOGUE.iter().map(|fault| fault.sigma).chain(machine).collect();
-    Priors::even(offsets.chain(CHANNELS.iter().map(gain)).collect(), &sigmas, EXPECTED_FAULTS)
+    let always = offsets.chain(CHANNELS.iter().map(gain)).chain([config.barometer_sigma_pa]).collect();
+    Priors::even(always, &sigmas, EXPECTED_FAULTS)
 }

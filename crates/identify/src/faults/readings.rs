@@ -17,6 +17,9 @@ pub(crate) const CHANNELS: [Channel; 7] = [
     Channel::ShaftSpeed,
 ];
 
+/// Position of the housing temperature in [`CHANNELS`].
+pub(crate) const TC: usize = 2;
+
 /// One number for each of [`CHANNELS`].
 pub(crate) type PerChannel = [f64; CHANNELS.len()];
 

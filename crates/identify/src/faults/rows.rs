@@ -1,8 +1,9 @@
 //! The rows of one balance, and the columns of all parameters that affect them.
 
-use crate::faults::readings::{CHANNELS, PerChannel, Readings};
+use crate::faults::readings::{CHANNELS, PerChannel, Readings, TC};
+use mapper_core::Channel;
 use mapper_inference::hypotheses::Balance;
-use mapper_observe::sensor_fault::SensorFault;
+use mapper_observe::sensor_fault::{FaultKind, SensorFault, gain_error};
 use nalgebra::{DMatrix, DVector};
 
 /// A balance of the recording.
@@ -18,6 +19,8 @@ pub(crate) struct Rows {
     pub(crate) by_reading: Vec<PerChannel>,
     /// Effect of a machine of another scale on each residual; empty if no machine is declared.
     pub(crate) by_machine: Vec<(Machine, Vec<f64>)>,
+    /// Effects of faults of size 1 on each residual that differ from those of a constant error of the same size.
+    pub(crate) by_fault: Vec<(Channel, FaultKind, Vec<f64>)>,
 }
 
 /// Machine properties that may differ from the declaration.
@@ -29,12 +32,45 @@ pub enum Machine {
     Efficiency,
     /// Area of the back-pressure valve.
     ValveArea,
+    /// Heat transfer between gas and housing, all over.
+    Convection,
+    /// A condition of the rig, in the channel's unit.
+    Condition(Channel),
 }
 
 /// All of them, in the order of the parameters.
-pub(crate) const MACHINE: [Machine; 3] = [Machine::FlowCapacity, Machine::Efficiency, Machine::ValveArea];
+pub(crate) const MACHINE: [Machine; 9] = [
+    Machine::FlowCapacity,
+    Machine::Efficiency,
+    Machine::ValveArea,
+    Machine::Convection,
+    Machine::Condition(Channel::P1),
+    Machine::Condition(Channel::T1),
+    Machine::Condition(Channel::T3),
+    Machine::Condition(Channel::TOil),
+    Machine::Condition(Channel::TAmb),
+];
 
 impl Rows {
+    /// Effect of a fault of size 1 on each row.
+    pub(crate) fn by_fault(&self, fault: &SensorFault) -> DVector<f64> {
+        let own = |channel: Channel| {
+            self.by_fault.iter().find(|(of, kind, _)| *of == channel && *kind == fault.kind)
+        };
+        let general = self.column(|channel, readings| {
+            if own(CHANNELS[channel]).is_some() {
+                return 0.0;
+            }
+            let housing_k = readings.values[TC];
+            fault.error_per_unit(CHANNELS[channel], readings.values[channel], housing_k, readings.run_ratio)
+        });
+        fault
+            .channels
+            .iter()
+            .filter_map(|channel| own(*channel))
+            .fold(general, |sum, (_, _, effect)| sum + DVector::from_column_slice(effect))
+    }
+
     /// Effect of a reading error on each row. `error`: of a channel's reading.
     fn column(&self, error: impl Fn(usize, &Readings) -> f64) -> DVector<f64> {
         let rows = self.readings.iter().zip(&self.by_reading);
@@ -49,18 +85,17 @@ impl Rows {
         )
     }
 
-    /// The balance with one column for each parameter: declared offsets and gains of [`CHANNELS`], these faults, [`MACHINE`].
+    /// The balance with one column for each parameter: declared offsets and gains of [`CHANNELS`], the barometer, these faults, [`MACHINE`].
     pub(crate) fn balance(&self, faults: &[SensorFault]) -> Balance {
         let offsets =
             (0..CHANNELS.len()).map(|channel| self.column(|other, _| f64::from(u8::from(other == channel))));
         let gains = (0..CHANNELS.len()).map(|channel| {
-            self.column(|other, readings| if other == channel { readings.values[channel] } else { 0.0 })
+            let error = |readings: &Readings| gain_error(CHANNELS[channel], readings.values[channel]);
+            self.column(|other, readings| if other == channel { error(readings) } else { 0.0 })
         });
-        let faults = faults.iter().map(|fault| {
-            self.column(|channel, readings| {
-                fault.error_per_unit(CHANNELS[channel], readings.values[channel], readings.run_ratio)
-            })
-        });
+        let pressure = |channel: usize| matches!(CHANNELS[channel], Channel::P1 | Channel::P2);
+        let barometer = self.column(|channel, _| f64::from(u8::from(pressure(channel))));
+        let faults = faults.iter().map(|fault| self.by_fault(fault));
         let machine = MACHINE.iter().map(|machine| {
             let own = self.by_machine.iter().find(|(own, _)| own == machine);
             own.map_or_else(
@@ -68,7 +103,8 @@ impl Rows {
                 |(_, column)| DVector::from_column_slice(column),
             )
         });
-        let columns: Vec<DVector<f64>> = offsets.chain(gains).chain(faults).chain(machine).collect();
+        let columns: Vec<DVector<f64>> =
+            offsets.chain(gains).chain([barometer]).chain(faults).chain(machine).collect();
         Balance {
             residual: DVector::from_column_slice(&self.residual),
             covariance: self.covariance.clone(),

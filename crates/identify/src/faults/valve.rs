@@ -68,7 +68,14 @@ pub(crate) fn rows(
         }
     };
     let residual = readings.iter().zip(expected).map(|(readings, expected)| ln_area(readings) - expected);
-    Some(Rows { residual: residual.collect(), covariance, readings, by_reading, by_machine })
+    Some(Rows {
+        residual: residual.collect(),
+        covariance,
+        readings,
+        by_reading,
+        by_machine,
+        by_fault: Vec::new(),
+    })
 }
 
 /// ln of the valve's area, including the discharge coefficient, m2.

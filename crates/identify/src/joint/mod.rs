@@ -4,6 +4,7 @@
 //! wheel, the probe's lag, the effect of a hotter wall, the sensors' offsets, and how efficiency varies over the map. See
 //! `docs/explanation/identification.md` for the reasons, assumptions and limits.
 
+pub(crate) mod budget;
 pub(crate) mod common_part;
 pub(crate) mod expected;
 pub(crate) mod inlet;
@@ -134,7 +135,11 @@ pub(crate) fn estimate(
             problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
         let residual =
             member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, found)| measured - found);
+        let [eta_rows, ln_h_rows] = smoothed.budgets[i].clone();
+        let eta_rows = eta_rows.into_iter().map(|row| budget::in_unit(row, 1.0, "1")).collect();
+        let h_rows = ln_h_rows.into_iter().map(|row| budget::in_unit(row, h_w_m2k, "W/(m2 K)")).collect();
         estimates[step.position] = Estimate {
+            budgets: [eta_rows, h_rows],
             eta: Some((eta, Some(eta_error))),
             h_w_m2k: Some((h_w_m2k, Some(h_error))),
             intervals: Some([

@@ -1,12 +1,13 @@
 //! Predicts the T2 reading of a step's rows for given parameters, with its derivatives.
 
 use crate::joint::parameters::{
-    ALPHA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_COEFFICIENT, LN_DEVIATION,
-    LN_DIRECTION, LOCAL, LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
+    ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_COEFFICIENT,
+    LN_DEVIATION, LN_DIRECTION, LOCAL, LocalVector, OFFSETS, PROBE_MM2, SHARED, SLOPE, SURFACE, SharedVector,
 };
 use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
 use crate::probe::{self, Lag, follow};
+use mapper_observe::sensor_fault::CALIBRATED_AT_K;
 use mapper_physics::air::{self, Air};
 use mapper_physics::compression::{
     CompressionInputs, actual_rise_k, compress, compressed_k, isentropic_rise_ratio,
@@ -190,12 +191,13 @@ impl Setting {
     fn gas(&self, row: &Row, terms: &[f64; TERM_COUNT], shared: &SharedVector, local: &LocalVector) -> Gas {
         let offset = |index: usize| shared[OFFSETS + index];
         let t1_k = row.t1_k - offset(0);
-        let pressure_ratio = (row.p2_pa - offset(4)) / (row.p1_pa - offset(3));
+        let [p1_pa, p2_pa] = pressures_pa(row, shared);
+        let pressure_ratio = p2_pa / p1_pa;
         let air = Air { humidity_kg_kg: self.air.humidity_kg_kg + shared[HUMIDITY], ..self.air };
         let slope = if self.shaped { local[SLOPE] * dot(terms, surface_of(shared)) } else { 0.0 };
         Gas {
             t1_k,
-            tc_k: row.tc_k - offset(2),
+            tc_k: row.tc_k - offset(2) - shared[GAINS + 1] * (row.tc_k - CALIBRATED_AT_K),
             flow_kg_s: row.flow_kg_s / (1.0 + shared[FLOW_GAIN]),
             rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k, air),
             air,
@@ -330,22 +332,31 @@ impl Setting {
             }
             if active[OFFSETS] {
                 let (step, t1_k) = (gas.t1_k * STEP_RATIO, gas.t1_k * (1.0 + STEP_RATIO));
-                let pressure_ratio = (row.p2_pa - shared[OFFSETS + 4]) / (row.p1_pa - shared[OFFSETS + 3]);
+                let [p1_pa, p2_pa] = pressures_pa(row, shared);
                 let moved =
-                    Gas { t1_k, rise_ratio: isentropic_rise_ratio(pressure_ratio, t1_k, gas.air), ..gas };
+                    Gas { t1_k, rise_ratio: isentropic_rise_ratio(p2_pa / p1_pa, t1_k, gas.air), ..gas };
                 let convection = self.h(&moved, shared, deviation);
                 put(OFFSETS, -(self.t2_k(&moved, convection, alpha, ln_direction) - t2_k) / step);
             }
             put(OFFSETS + 1, 1.0);
-            if active[OFFSETS + 2] {
+            put(GAINS, t2_k - CALIBRATED_AT_K);
+            if active[OFFSETS + 2] || active[GAINS + 1] {
                 let step = gas.tc_k * STEP_RATIO;
-                put(OFFSETS + 2, -full(Gas { tc_k: gas.tc_k + step, ..gas }, step));
+                let by_reading = -full(Gas { tc_k: gas.tc_k + step, ..gas }, step);
+                put(OFFSETS + 2, by_reading);
+                put(GAINS + 1, by_reading * (row.tc_k - CALIBRATED_AT_K));
             }
-            if active[OFFSETS + 3] || active[OFFSETS + 4] {
+            if [OFFSETS + 3, OFFSETS + 4, GAINS + 2, GAINS + 3, BAROMETER].iter().any(|index| active[*index])
+            {
                 let by_rise = full(Gas { rise_ratio: gas.rise_ratio + STEP_RATIO, ..gas }, STEP_RATIO);
                 let by_ln_ratio = by_rise * rise_ratio_by_ln_pressure(gas.rise_ratio, gas.t1_k, gas.air);
-                put(OFFSETS + 3, by_ln_ratio / (row.p1_pa - shared[OFFSETS + 3]));
-                put(OFFSETS + 4, -by_ln_ratio / (row.p2_pa - shared[OFFSETS + 4]));
+                let [p1_pa, p2_pa] = pressures_pa(row, shared);
+                let (by_p1, by_p2) = (by_ln_ratio / p1_pa, -by_ln_ratio / p2_pa);
+                put(OFFSETS + 3, by_p1);
+                put(OFFSETS + 4, by_p2);
+                put(GAINS + 2, by_p1 * row.p1_pa);
+                put(GAINS + 3, by_p2 * row.p2_pa);
+                put(BAROMETER, by_p1 + by_p2);
             }
             if active[FLOW_GAIN] {
                 let step = gas.flow_kg_s * STEP_RATIO;
@@ -353,9 +364,9 @@ impl Setting {
                 put(FLOW_GAIN, -by_flow * gas.flow_kg_s / (1.0 + shared[FLOW_GAIN]));
             }
             if active[HUMIDITY] {
-                let pressure_ratio = (row.p2_pa - shared[OFFSETS + 4]) / (row.p1_pa - shared[OFFSETS + 3]);
+                let [p1_pa, p2_pa] = pressures_pa(row, shared);
                 let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + STEP_RATIO, ..gas.air };
-                let rise_ratio = isentropic_rise_ratio(pressure_ratio, gas.t1_k, air);
+                let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, gas.t1_k, air);
                 put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, STEP_RATIO));
             }
         }
@@ -390,7 +401,7 @@ impl Setting {
         let first_k = local[FIRST_READING];
         let readings = follow(&lags, first_k, &gas_k);
         for (index, column) in columns.iter_mut().enumerate() {
-            let own_offset = index == OFFSETS + 1;
+            let own_offset = index == OFFSETS + 1 || index == GAINS;
             if !column.is_empty() && !own_offset && index != PROBE_MM2 && index != SHARED + FIRST_READING {
                 // The first reading is a separate parameter.
                 *column = follow(&lags, 0.0, column);
@@ -407,6 +418,14 @@ impl Setting {
         }
         Prediction { t2_k: readings.iter().map(|reading| reading + offset_k).collect(), columns }
     }
+}
+
+/// P1 and P2 without their errors, Pa.
+fn pressures_pa(row: &Row, shared: &SharedVector) -> [f64; 2] {
+    let corrected = |reading_pa: f64, offset: usize, gain: usize| {
+        reading_pa - shared[OFFSETS + offset] - shared[GAINS + gain] * reading_pa - shared[BAROMETER]
+    };
+    [corrected(row.p1_pa, 3, 2), corrected(row.p2_pa, 4, 3)]
 }
 
 /// The surface coefficients among the shared parameters.

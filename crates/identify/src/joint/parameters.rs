@@ -20,8 +20,14 @@ pub(crate) const OFFSET_CHANNELS: [Channel; 5] =
     [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
 /// Index of the flow meter's gain error, ratio.
 pub(crate) const FLOW_GAIN: usize = OFFSETS + OFFSET_CHANNELS.len();
+/// Index of the first gain error, ratio, in the order of [`GAIN_CHANNELS`].
+pub(crate) const GAINS: usize = FLOW_GAIN + 1;
+/// Channels with a gain error in addition to the flow meter. That of T1 is an offset: its reading hardly changes.
+pub(crate) const GAIN_CHANNELS: [Channel; 4] = [Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
+/// Index of the error that P1 and P2 share, Pa: the barometer of gauge transducers.
+pub(crate) const BAROMETER: usize = GAINS + GAIN_CHANNELS.len();
 /// Index of the humidity's error, kg/kg.
-pub(crate) const HUMIDITY: usize = FLOW_GAIN + 1;
+pub(crate) const HUMIDITY: usize = BAROMETER + 1;
 /// Index of the degree to which h before the wheel follows the inlet's own law: 0 is h after the wheel, 1 is that law, with a power law
 /// between. Never fitted: a recording carries almost no information about it next to alpha_A.
 pub(crate) const INLET: usize = HUMIDITY + 1;
@@ -89,8 +95,10 @@ pub(crate) fn symbol(index: usize) -> String {
         PROBE_MM2 => "probe diameter".to_owned(),
         LN_DIRECTION => "direction factor".to_owned(),
         FLOW_GAIN => "gain of m_c".to_owned(),
+        BAROMETER => "barometer".to_owned(),
         HUMIDITY => "humidity".to_owned(),
         INLET => "h before the wheel".to_owned(),
+        GAINS..BAROMETER => format!("gain of {}", GAIN_CHANNELS[index - GAINS]),
         _ => match OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)) {
             Some(channel) => format!("offset of {channel}"),
             None if index >= BENDS => format!("bend {}", index - BENDS),

@@ -6,16 +6,17 @@
 //! Learning, 2006, ch. 2 and 5). Its amplitude and lengths are averaged with their posterior weights. On a strongly curved map the offsets
 //! keep their declared spread; on a flat one they lose about half of it. All quantities correlated with the efficiencies are corrected too.
 
-use crate::faults::efficiency::FittedEfficiencies;
+use crate::faults::efficiency::{FittedEfficiencies, FittedHeat};
 use crate::faults::readings::CHANNELS;
+use crate::joint::budget::{self, Pull, Stated};
 use crate::joint::common_part::common_part;
-use crate::joint::parameters::{FLOW_GAIN, OFFSET_CHANNELS, OFFSETS, SURFACE};
+use crate::joint::parameters::{FLOW_GAIN, LOCAL, OFFSET_CHANNELS, OFFSETS, SURFACE};
 use crate::joint::quantity::{Quantity, is_offset, of_shared, quantities};
 use crate::joint::refinements::{Gain, Refinements};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::{SLOW_LOSS, SurfaceScale};
-use mapper_core::{Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
+use mapper_core::{BudgetRow, Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::median;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -66,6 +67,8 @@ pub(crate) struct Smoothed {
     pub(crate) shared: Vec<(f64, f64)>,
     /// Shift of the offsets, in declared standard deviations.
     pub(crate) strain: f64,
+    /// Sources of the uncertainty of each point's efficiency and of its ln h.
+    pub(crate) budgets: Vec<[Vec<BudgetRow>; 2]>,
 }
 
 impl Smoothed {
@@ -110,7 +113,9 @@ pub(crate) fn smoothed(
             solve(&etas, &coordinates, problem)
         }
     };
-    judged(covariance, refined, &etas, &ln_hs, &solved)
+    let mut smoothed = judged(covariance, refined, &etas, &ln_hs, &solved);
+    smoothed.budgets = budgets((covariance, refined), &smoothed, (&etas, &ln_hs), &solved, steps);
+    smoothed
 }
 
 /// The efficiencies from the steps alone, and the effect of reading errors on them: an error that the smoothness prior has removed no longer
@@ -118,10 +123,35 @@ pub(crate) fn smoothed(
 pub(crate) fn as_measured(problem: &Problem<'_>, steps: &[StepRows]) -> Option<FittedEfficiencies> {
     let problem = &problem.without_a_surface()?;
     let covariance = &problem.covariance()?;
-    let (etas, _) = quantities(problem, covariance, steps);
+    let (etas, ln_hs) = quantities(problem, covariance, steps);
     let kept: Vec<usize> = (0..etas.len()).filter(|i| problem.members[*i].shares).collect();
+    let (of_etas, by_reading) = without_readings(covariance, &etas, &kept, steps);
+    let (of_ln_hs, ln_h_by_reading) = without_readings(covariance, &ln_hs, &kept, steps);
+    let ln_h = |i: &usize| {
+        problem.setting.h_at_end(&steps[*i].end, &problem.shared, &problem.members[*i].local).0.ln()
+    };
+    Some(FittedEfficiencies {
+        positions: kept.iter().map(|i| steps[*i].position).collect(),
+        eta: kept.iter().map(|i| etas[*i].value).collect(),
+        covariance: of_etas,
+        by_reading,
+        heat: FittedHeat {
+            ln_h: kept.iter().map(ln_h).collect(),
+            covariance: of_ln_hs,
+            by_reading: ln_h_by_reading,
+        },
+    })
+}
+
+/// Covariance of a quantity over the kept steps without the declared errors of the readings, and its sensitivities to them.
+fn without_readings(
+    covariance: &Covariance,
+    quantities: &[Quantity],
+    kept: &[usize],
+    steps: &[StepRows],
+) -> (DMatrix<f64>, Vec<[Option<f64>; 7]>) {
     // If the error is known, the efficiency rises by the amount that the error had lowered it.
-    let answer = |i: usize, row: usize| etas[i].by_shared[row] / covariance.shared[(row, row)];
+    let answer = |i: usize, row: usize| quantities[i].by_shared[row] / covariance.shared[(row, row)];
     let carried: Vec<usize> =
         (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row])).collect();
     let by_readings = |i: usize, j: usize| {
@@ -137,15 +167,16 @@ pub(crate) fn as_measured(problem: &Problem<'_>, steps: &[StepRows]) -> Option<F
             Some(if channel == Channel::CompressorFlow { per_unit / flow_kg_s } else { per_unit })
         })
     };
-    Some(FittedEfficiencies {
-        positions: kept.iter().map(|i| steps[*i].position).collect(),
-        eta: kept.iter().map(|i| etas[*i].value).collect(),
-        covariance: DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-            let (i, j) = (kept[i], kept[j]);
-            0.5 * (etas[i].by_eta[j] + etas[j].by_eta[i]) - by_readings(i, j)
-        }),
-        by_reading: kept.iter().map(|i| by_reading(*i)).collect(),
-    })
+    let matrix = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
+        let (one, other) = (&quantities[kept[i]], &quantities[kept[j]]);
+        let all = if i == j {
+            one.variance
+        } else {
+            0.5 * (one.answer.dot(&other.by_shared) + other.answer.dot(&one.by_shared))
+        };
+        all - by_readings(kept[i], kept[j])
+    });
+    (matrix, kept.iter().map(|i| by_reading(*i)).collect())
 }
 
 /// The channel whose error a shared parameter describes.
@@ -228,7 +259,29 @@ fn judged(
         }
         changes
     });
-    Smoothed { eta, ln_h, common, shared, strain }
+    Smoothed { eta, ln_h, common, shared, strain, budgets: Vec::new() }
+}
+
+/// The budgets of all points, in the units of the quantities.
+fn budgets(
+    (covariance, refined): (&Covariance, Option<(&Refinements, &Gain)>),
+    smoothed: &Smoothed,
+    (etas, ln_hs): (&[Quantity], &[Quantity]),
+    solved: &[Solved],
+    steps: &[StepRows],
+) -> Vec<[Vec<BudgetRow>; 2]> {
+    let steps: Vec<(usize, &StepRows)> = steps.iter().enumerate().collect();
+    parallel::map(&steps, |(i, step)| {
+        let of = |quantities: &[Quantity], judged: &[Judged]| {
+            let quantity = &quantities[*i];
+            let pulls: Vec<Pull> =
+                solved.iter().map(|one| (one.weight, one.factors.solve(&quantity.by_smooth))).collect();
+            let degrees_of_freedom = step.rows.len().saturating_sub(LOCAL).max(1) as f64;
+            let stated = Stated { error: judged[*i].error, added: judged[*i].added, degrees_of_freedom };
+            budget::rows(covariance, refined, (quantity, etas, *i), &pulls, &stated)
+        };
+        [of(etas, &smoothed.eta), of(ln_hs, &smoothed.ln_h)]
+    })
 }
 
 /// Covariance of a quantity over all steps after the correction by the best choice, and the part of its diagonal that is each step's own.

@@ -8,9 +8,9 @@ use crate::joint::inlet;
 use crate::joint::input_noise_spline::Explained;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ALPHA, ALPHA_SIGMA, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, HUMIDITY, INLET, LN_COEFFICIENT,
-    LN_DEVIATION, LN_DIRECTION, LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2,
-    PROBE_SIGMA_MM2, Prior, SHARED, SLOPE, SURFACE,
+    ALPHA, ALPHA_SIGMA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS,
+    HUMIDITY, INLET, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS,
+    OFFSETS, PROBE_MM2, PROBE_SIGMA_MM2, Prior, SHARED, SLOPE, SURFACE,
 };
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, NO_SURFACE_SIGMA, Problem};
@@ -177,6 +177,13 @@ pub(crate) fn problem<'a>(
             config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
         priors[FLOW_GAIN] = Prior { mean: 0.0, sigma };
         active[FLOW_GAIN] = sigma > 0.0;
+        for (i, channel) in GAIN_CHANNELS.iter().enumerate() {
+            let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.gain_sigma_ratio);
+            priors[GAINS + i] = Prior { mean: 0.0, sigma };
+            active[GAINS + i] = sigma > 0.0;
+        }
+        priors[BAROMETER] = Prior { mean: 0.0, sigma: config.barometer_sigma_pa };
+        active[BAROMETER] = config.barometer_sigma_pa > 0.0;
         priors[HUMIDITY] = Prior { mean: 0.0, sigma: config.humidity_sigma_kg_kg };
         active[HUMIDITY] = config.humidity_sigma_kg_kg > 0.0;
     }

@@ -38,6 +38,8 @@ pub struct Machine {
     pub inlet: InletConvection,
     /// Water per dry air, kg/kg.
     pub humidity_kg_kg: f64,
+    /// Efficiency, flow, convection and valve area over those of the nominal machine.
+    pub scales: [f64; 4],
 }
 
 impl Default for Machine {
@@ -48,6 +50,7 @@ impl Default for Machine {
             direction: 1.0,
             inlet: InletConvection::Shared,
             humidity_kg_kg: 0.0,
+            scales: [1.0; 4],
         }
     }
 }
@@ -59,6 +62,11 @@ impl Machine {
         model.params.compressor.inlet_convection = self.inlet;
         model.params.compressor.humidity_kg_kg = self.humidity_kg_kg;
         model.params.t2_probe_diameter_m = self.probe_m;
+        let [efficiency, flow, convection, valve] = self.scales;
+        model.params.compressor.efficiency_scale_ratio = efficiency;
+        model.params.compressor.flow_scale_ratio = flow;
+        model.params.compressor.nusselt_coefficient *= convection;
+        model.params.outlet.valve_area_m2 *= valve;
         model
     }
 }

@@ -42,8 +42,9 @@ pub fn channel_map_text(
         }
         Some(Ambient::Assumed) => {
             text.push_str(
-                "\n# What gauge pressures are added to. The log does not hold it: write what the barometer read.\n\
-                 ambient_pressure: 101.3 kPa\n",
+                "\n# What gauge pressures are added to. The log does not hold it: write what the barometer read, e.g. 99.2 kPa, or\n\
+                 # {altitude: 300 m}. `unknown` is 101.3 kPa with an uncertainty of 3 kPa.\n\
+                 ambient_pressure: unknown\n",
             );
         }
     }

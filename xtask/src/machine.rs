@@ -61,11 +61,6 @@ pub fn has_nextest() -> bool {
     step::succeeds(&workspace::cargo(), &["nextest", "--version"])
 }
 
-/// Whether licences and sources of dependencies can be checked.
-pub fn has_deny() -> bool {
-    step::succeeds(&workspace::cargo(), &["deny", "--version"])
-}
-
 /// Slurm, all of it on this machine.
 const SLURM: Tool = Tool {
     name: "slurm",

@@ -1,5 +1,5 @@
-//! What may be in the tree of dependencies, by licence: the list of deny.toml, held here where cargo-deny is not installed. And what is not in the
-//! program itself.
+//! What may be in the tree of dependencies, by licence: the list of deny.toml, checked here without cargo-deny and without a network. And what is
+//! not in the program itself.
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, PackageId};
 use std::collections::BTreeSet;

@@ -442,9 +442,6 @@ fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
     for misdeed in ["boolean", "future", "uncertain"] {
         let stand = Stand::with(&["--misdeed", misdeed]);
         stand.trust();
-        let mut rig = stand.armed();
-        rig.set(&setpoints(150e3)).unwrap();
-        let mut t_s = 0.0;
         let expected = if misdeed == "uncertain" { Quality::Uncertain } else { Quality::Bad };
         let (noted, marked) = (std::cell::Cell::new(false), std::cell::Cell::new(false));
         let seen = |batch: &SampleBatch| {
@@ -455,8 +452,23 @@ fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
             noted.set(noted.get() || !batch.events.is_empty());
             noted.get() && marked.get()
         };
-        until(&mut rig, &mut t_s, seen);
-        rig.make_safe().unwrap();
-        rig.disarm().unwrap();
+        assert!(
+            (0..CONNECTIONS).any(|_| over_a_connection(&stand, &seen)),
+            "{misdeed}: neither marked nor noted"
+        );
     }
+}
+
+/// On a busy machine, a connection may break at the driver's deadline of 0.8 s, which is not what the test is about: maximum number of new ones.
+const CONNECTIONS: usize = 5;
+
+/// Polls every half second until `seen`; `false` if the connection broke or nothing was seen in ten seconds of the rig's time.
+fn over_a_connection(stand: &Stand, seen: impl Fn(&SampleBatch) -> bool) -> bool {
+    let mut rig = stand.driver(PASSWORD);
+    if rig.arm().and_then(|()| rig.set(&setpoints(150e3))).is_err() {
+        return false;
+    }
+    let found = (1..=20).map_while(|half_s| rig.poll(0.5 * f64::from(half_s)).ok()).any(|batch| seen(&batch));
+    let _ = rig.make_safe().and_then(|()| rig.disarm());
+    found
 }

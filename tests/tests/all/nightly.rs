@@ -94,7 +94,7 @@ fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
     let link = drawn.split("<a href=\"").nth(1).unwrap().split('"').next().unwrap();
     assert!(drawn.contains("; eta_mean: ") && link.starts_with("history.nights/"), "{link}");
     let report = std::fs::read_to_string(folder.join(link)).unwrap();
-    assert!(report.contains("The first night") && report.contains("nightly_a"), "{report}");
+    assert!(report.contains("nightly_a"), "{report}");
 }
 
 /// 0.2 points of 70 %: truth moves as well, so that no error against it shows anything.

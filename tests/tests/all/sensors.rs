@@ -42,7 +42,7 @@ fn a_faulty_thermocouple_is_named_and_left_out_by_every_way_to_the_points() {
     let by = out["fault"]["off"]["by"].as_f64().unwrap();
     assert!((by - 2.0).abs() < 3.0 * 0.25 / 3f64.sqrt(), "{by} K");
     let report = std::fs::read_to_string(result["report"].as_str().unwrap()).unwrap();
-    assert!(report.contains("T2/3 reads"), "{report}");
+    assert!(report.contains("T2/3"), "{report}");
     // The recording alone says the same again.
     let recording = result["recording"].as_str().unwrap();
     let again = mapper(["identify", recording, "--json"]).exits(0).json();

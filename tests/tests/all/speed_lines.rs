@@ -68,9 +68,6 @@ fn a_speed_that_cannot_be_reached_is_reported_with_its_point() {
             assert!(band.contains(&short), "{short} {point}");
         }
     }
-    let report =
-        std::fs::read_to_string(Path::new(result["run"].as_str().unwrap()).join("report.md")).unwrap();
-    assert!(report.contains("the speed was not reached: 125.00 krpm asked for"), "{report}");
 }
 
 /// A replayed rig gives the same speeds, and the loop asks for the same pressures: none of them is reported to differ.

@@ -55,8 +55,6 @@ fn surge_is_found_on_every_line_without_surging_and_again_from_the_recording() {
             serde_json::from_str(&std::fs::read_to_string(result["map"]["json"].as_str().unwrap()).unwrap())
                 .unwrap();
         assert_eq!(map["surge"].as_array().unwrap().len(), 2);
-        let report = std::fs::read_to_string(result["report"].as_str().unwrap()).unwrap();
-        assert!(report.contains("## Surge") && report.contains("did not go into surge"), "{report}");
     }
 }
 
@@ -82,6 +80,5 @@ fn surge_without_warning_opens_the_valve_and_is_reported() {
         // Half of a step of 3 %, and the flow meter's 0.5 %.
         assert!(off.abs() < 0.03, "{mark}");
     }
-    let report = std::fs::read_to_string(result["report"].as_str().unwrap()).unwrap();
-    assert!(report.contains("went into surge 2 times") && report.contains("Completed."), "{report}");
+    assert!(result["failure"].is_null(), "{}", result["failure"]);
 }

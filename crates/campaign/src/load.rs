@@ -241,6 +241,8 @@ fn finish(
         }
     };
     campaign.machine.assumed = machine_sizes::assumed(root, &campaign.machine.params);
+    let wheel = steps!["machine", "geometry", "compressor", "wheel_diameter"];
+    campaign.machine.wheel_is_declared = root.get(&wheel).is_some();
     for concern in prospects::concerns(&campaign, &point_paths).into_iter().filter(|concern| concern.grave) {
         note(source, root, notes, FindingKind::Implausible, concern);
     }

@@ -14,6 +14,10 @@ pub enum Fault {
     Nan(Channel),
     /// A sensor reads this value.
     Reads(Channel, f64),
+    /// A sensor's readings are multiplied by this factor.
+    Scaled(Channel, f64),
+    /// A sensor's readings are shifted by this amount, unit of the channel.
+    Shifted(Channel, f64),
     /// A channel is missing.
     Absent(Channel),
     /// The rig reports a sensor's readings as bad.
@@ -109,6 +113,8 @@ impl<B: Backend> Misbehaving<B> {
         let (Fault::Frozen(channel)
         | Fault::Nan(channel)
         | Fault::Reads(channel, _)
+        | Fault::Scaled(channel, _)
+        | Fault::Shifted(channel, _)
         | Fault::Absent(channel)
         | Fault::Bad(channel)
         | Fault::Old(channel)
@@ -135,7 +141,13 @@ impl<B: Backend> Misbehaving<B> {
                 let Some(column) = batch.columns.iter_mut().find(|column| column.channel == *channel) else {
                     return;
                 };
+                match fault {
+                    Fault::Scaled(_, factor) => column.values.iter_mut().for_each(|value| *value *= factor),
+                    Fault::Shifted(_, by) => column.values.iter_mut().for_each(|value| *value += by),
+                    _ => {}
+                }
                 let value = match fault {
+                    Fault::Scaled(..) | Fault::Shifted(..) => return,
                     Fault::Nan(_) => f64::NAN,
                     Fault::Reads(_, value) => *value,
                     Fault::Frozen(_) => match self.frozen.iter().find(|(frozen, _)| frozen == channel) {

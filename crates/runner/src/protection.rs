@@ -1,6 +1,7 @@
-//! Protection of a run in addition to its guards: safe shutdown, speed band, polling rate.
+//! Protection of a run in addition to its guards: safe shutdown, speed band, plausible readings, polling rate.
 
 use crate::operator::Operator;
+use crate::plausibility_watch::ReadingBounds;
 use mapper_core::{SafeTrajectory, SetpointRanges, SpeedBand};
 use std::sync::atomic::AtomicBool;
 
@@ -15,6 +16,8 @@ pub struct Protection<'a> {
     pub accepts: Option<SetpointRanges>,
     /// Allowed deviation of a step's speed; `None`: not checked.
     pub speed: Option<SpeedBand>,
+    /// Machine and sensors, against which every sample is judged; `None`: not judged.
+    pub readings: Option<ReadingBounds>,
     /// Set from outside to stop at the end of the step.
     pub stop_after_step: &'a AtomicBool,
     /// Polls the rig sample by sample. A simulated rig is otherwise polled so only while a guard is alert.
@@ -32,6 +35,7 @@ impl Default for Protection<'_> {
             p3_min_pa: 0.0,
             accepts: None,
             speed: None,
+            readings: None,
             stop_after_step: &NEVER,
             each_sample: false,
             operator: None,

@@ -4,6 +4,7 @@ use crate::guard::{Bench, Commanded, Guard, Trip};
 use crate::merge::append;
 use crate::observer::{ObserverError, RunObserver};
 use crate::operator::Operator;
+use crate::plausibility_watch::PlausibilityWatch;
 use crate::protection::Protection;
 use crate::reached::Reached;
 use crate::run_error::RunError;
@@ -88,6 +89,7 @@ pub(crate) struct Run<'a, 'p> {
     pub(crate) commanded: Commanded,
     sample_s: f64,
     reached: Reached,
+    plausibility: Option<PlausibilityWatch>,
     skipped: u32,
     /// The step that a guard has cut short, until its end is reported.
     pub(crate) open: Option<StepMarker>,
@@ -121,6 +123,7 @@ impl Runner<'_> {
             commanded: Commanded::default(),
             sample_s: if sample_s > 0.0 { sample_s.min(POLL_INTERVAL_S) } else { POLL_INTERVAL_S },
             reached: Reached::default(),
+            plausibility: protection.readings.map(PlausibilityWatch::new),
             skipped: 0,
             open: None,
             stop_sent: false,
@@ -440,10 +443,16 @@ impl Run<'_, '_> {
         loop {
             let alert = self.protection.each_sample || Bench::new(&mut self.with.guards).is_alert();
             let next_s = if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s };
-            self.with.clock.wait_until(next_s);
-            let batch = self.with.backend.poll(next_s)?;
+            if !self.waited_until(next_s) {
+                return Ok((whole.unwrap_or_default(), Vec::new()));
+            }
+            let mut batch = self.with.backend.poll(next_s)?;
             self.now_s = next_s;
-            let trips = Bench::new(&mut self.with.guards).look(&batch, next_s, &self.commanded);
+            // Guards see the readings before impossible ones are marked: a mark must not hide a value above its limit.
+            let mut trips = Bench::new(&mut self.with.guards).look(&batch, next_s, &self.commanded);
+            let judged =
+                self.plausibility.as_mut().and_then(|watch| watch.judge(&mut batch, &self.commanded));
+            trips.extend(judged);
             match &mut whole {
                 None => whole = Some(batch),
                 Some(whole) => append(whole, batch),

@@ -1,9 +1,8 @@
 //! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
 use crate::guard::{Commanded, Guard, Trip};
-use mapper_core::{
-    Channel, Dimension, Quality, Reaction, SampleBatch, SignalGuard, measurable, plausible, readable,
-};
+use crate::plausibility_watch::can_be;
+use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
 use std::collections::VecDeque;
 
 /// A continuing violation trips again after this time, s.
@@ -150,15 +149,6 @@ impl SignalWatch {
     }
 }
 
-/// Whether a sensor can read this value now. An impossible value counts as no reading and is not compared with limits.
-/// Shaft speed and flow start from zero while the rig already runs.
-fn can_be(channel: Channel, value: f64, running: bool) -> bool {
-    let from_rest = matches!(channel.info().dimension, Dimension::RotationalSpeed | Dimension::MassFlow);
-    value.is_finite()
-        && measurable(channel.info().dimension).contains(&value)
-        && (!running || from_rest || plausible(channel).running.contains(&value))
-}
-
 impl Guard for SignalWatch {
     fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip> {
         let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
@@ -208,7 +198,7 @@ impl Guard for SignalWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{ChannelColumn, GuardName, LargestChange, Provenance};
+    use mapper_core::{Channel, ChannelColumn, GuardName, LargestChange, Provenance};
 
     fn spec() -> SignalGuard {
         SignalGuard {

@@ -7,7 +7,7 @@ mod faults;
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
 use mapper_core::{
     Backend, BackendError, Channel, Event, EventKind, GuardName, MadeFrom, OperatingPoint, PacedClock, Plan,
-    PlanFigures, PlanStep, Predicted, Reaction, RigDescription, SampleBatch, Setpoints, SignalGuard,
+    PlanFigures, PlanStep, Predicted, Quality, Reaction, RigDescription, SampleBatch, Setpoints, SignalGuard,
     StepKind, StepMarker, UnpacedClock, Wall,
 };
 use mapper_physics::model::Model;
@@ -16,6 +16,8 @@ use mapper_runner::{
     Guard, ObserverError, Operator, PlanSteps, Protection, RunEnd, RunError, RunObserver, Runner,
     SignalWatch, StepSource, StepSourceError,
 };
+use std::collections::BTreeSet;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Two steps of 20 s after 10 s of warm-up and before 5 s of cool-down.
@@ -72,6 +74,8 @@ struct Notebook {
     starts: Vec<StepMarker>,
     ends: Vec<StepMarker>,
     abandoned: Vec<StepMarker>,
+    /// Channels with bad readings.
+    bad: BTreeSet<Channel>,
     /// Raised once this run time is reached.
     stop_at_s: Option<(f64, &'static AtomicBool)>,
     /// Writing fails from this run time on.
@@ -85,6 +89,8 @@ impl RunObserver for Notebook {
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        let bad = batch.provenance.iter().filter(|from| from.quality.contains(&Quality::Bad));
+        self.bad.extend(bad.map(|from| from.channel));
         let Some(speeds) = batch.column(Channel::ShaftSpeed) else { return Ok(()) };
         self.samples.extend(batch.t_s.iter().copied().zip(speeds.iter().copied()));
         let now_s = self.samples.last().map_or(0.0, |sample| sample.0);
@@ -276,6 +282,79 @@ fn the_operator_stops_while_a_step_is_being_made() {
     .unwrap();
     assert_eq!(end, RunEnd::Interrupted { t_s: 0.5 });
     assert!(rig.made_safe && rig.disarmed);
+}
+
+/// A wall clock that advances only during waits, and a stop that comes at one of its times.
+struct StopsAt<'a> {
+    now_s: Mutex<f64>,
+    stop_s: f64,
+    stop: &'a AtomicBool,
+}
+
+impl Wall for &StopsAt<'_> {
+    fn now_s(&self) -> f64 {
+        *self.now_s.lock().unwrap()
+    }
+    fn wait_s(&self, duration_s: f64) {
+        let mut now_s = self.now_s.lock().unwrap();
+        *now_s += duration_s;
+        self.stop.store(*now_s >= self.stop_s, Ordering::Relaxed);
+    }
+}
+
+/// The lab, with the time at which it was made safe.
+struct SafeAt<'a> {
+    lab: VirtualLab,
+    wall: &'a StopsAt<'a>,
+    safe_s: Option<f64>,
+}
+
+impl Backend for SafeAt<'_> {
+    fn describe(&self) -> RigDescription {
+        self.lab.describe()
+    }
+    fn arm(&mut self) -> Result<(), BackendError> {
+        self.lab.arm()
+    }
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        self.lab.set(setpoints)
+    }
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        self.lab.poll(until_s)
+    }
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        self.safe_s = self.safe_s.or(Some(self.wall.now_s()));
+        self.lab.make_safe()
+    }
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.lab.disarm()
+    }
+}
+
+/// In warm-up and steps of a rig in real time, the safe command follows a stop within 20 ms, not at the next sample of 10 Hz.
+#[test]
+fn a_stop_does_not_wait_for_the_next_sample() {
+    for stop_s in [3.013, 17.508, 33.3333, 49.9871] {
+        let stop = AtomicBool::new(false);
+        let wall = StopsAt { now_s: Mutex::new(0.0), stop_s, stop: &stop };
+        let lab = VirtualLab::new(LabSettings::ideal(Model::nominal(), BoundaryConditions::default()));
+        let mut rig = SafeAt { lab, wall: &wall, safe_s: None };
+        let (plan, mut notebook) = (plan(), Notebook::default());
+        let end = Runner {
+            steps: &mut PlanSteps::new(&plan),
+            backend: &mut rig,
+            clock: &mut PacedClock::new(&wall, 1.0),
+            guards: Vec::new(),
+            observer: &mut notebook,
+            speed: None,
+            stop: &stop,
+        }
+        .run_under(&Protection { each_sample: true, ..Protection::default() })
+        .unwrap();
+        assert!(matches!(end, RunEnd::Interrupted { .. }), "{stop_s}: {end:?}");
+        let late_s = rig.safe_s.unwrap() - stop_s;
+        assert!((0.0..0.02).contains(&late_s), "{stop_s} s: {late_s} s late");
+    }
 }
 
 /// On a real-time rig, guards receive every sample meanwhile: the shaft stays above their limit long enough after the step.

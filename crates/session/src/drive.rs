@@ -6,9 +6,10 @@ use mapper_core::{Backend, Channel, Clock, PlanStep, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::speed_response::speed_response;
+use mapper_physics::thermocouple;
 use mapper_runner::{
-    Operator, Protection, ReadChannel, RunEnd, RunError, RunObserver, Runner, Soaked, SpeedControl,
-    SpeedControlLimits, StepSource,
+    Operator, Protection, ReadChannel, ReadingBounds, RunEnd, RunError, RunObserver, Runner, Soaked,
+    SpeedControl, SpeedControlLimits, StepSource,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -81,6 +82,7 @@ pub fn drive_paced(
         p3_min_pa: campaign.limits.p3_min_pa,
         accepts: rig.accepts,
         speed: campaign.guard_set().speed.filter(|_| rig.controls),
+        readings: rig.controls.then(|| reading_bounds(campaign)),
         stop_after_step: pace.stop_after_step,
         each_sample: pace.each_sample || !rig.simulated_time,
         operator: pace.operator,
@@ -99,6 +101,29 @@ pub fn drive_paced(
 
 /// Allowed positive error of the P3 reading, in declared standard deviations.
 const READS_TOO_HIGH_SIGMAS: f64 = 4.0;
+
+/// Flow in the outlet pipe with the shortest and the longest lag of the T2 probe: the speed of sound (347 m/s) at 400 kPa, and a
+/// fiftieth of it at 100 kPa, both at 300 K.
+const SONIC_KG_M2S: f64 = 4.65 * 347.0;
+const SLOW_KG_M2S: f64 = 1.16 * 347.0 / 50.0;
+const PROBE_K: f64 = 300.0;
+
+/// Bounds of the readings from the declared machine and sensors. A wheel that the campaign does not give excludes no reading.
+fn reading_bounds(campaign: &Campaign) -> ReadingBounds {
+    let (machine, compressor) = (&campaign.machine, &campaign.machine.params.compressor);
+    let area_m2 = 0.25 * std::f64::consts::PI * compressor.outlet_diameter_m.powi(2);
+    let tip_m = machine.params.t2_probe_diameter_m;
+    let lag_s = |flux_kg_m2s: f64| {
+        let flow_kg_s = flux_kg_m2s * area_m2;
+        thermocouple::time_constant_s(tip_m, compressor.outlet_diameter_m, flow_kg_s, PROBE_K)
+    };
+    let noise_k = |channel| campaign.sensors.get(&channel).map_or(0.0, |sensor| sensor.declared.noise_sigma);
+    ReadingBounds {
+        wheel_diameter_m: machine.wheel_is_declared.then_some(compressor.wheel_diameter_m),
+        t2_lag_s: (lag_s(SONIC_KG_M2S), lag_s(SLOW_KG_M2S)),
+        noise_k: [Channel::T2, Channel::Tc, Channel::Tt].map(noise_k),
+    }
+}
 
 /// The speed loop that the campaign asks for.
 fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedControl<'a>> {

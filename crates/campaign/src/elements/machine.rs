@@ -31,6 +31,9 @@ pub struct Machine {
     /// Sizes that the file does not give. Not part of the canonical JSON: `params` has their values.
     #[serde(skip)]
     pub assumed: Vec<AssumedSize>,
+    /// Whether the file gives the diameter of the compressor wheel. Not part of the canonical JSON either.
+    #[serde(skip)]
+    pub wheel_is_declared: bool,
 }
 
 /// Source of the nominal compressor map.
@@ -159,7 +162,8 @@ impl MachineFile {
         };
         let mut params = self.geometry.unwrap_or_default().machine();
         params.t2_probe_diameter_m = probe_diameter_m;
-        Ok(Machine { name: self.name, serial_number: self.serial_number, params, map, assumed: Vec::new() })
+        let (name, serial_number) = (self.name, self.serial_number);
+        Ok(Machine { name, serial_number, params, map, assumed: Vec::new(), wheel_is_declared: false })
     }
 }
 

@@ -53,7 +53,7 @@ pub(crate) const OVER_THE_PROTOCOL: &[(f64, Fault, Ends)] = &[
     (FAULT_S, Fault::Trips { says_so: false }, Ends::Trips("no longer drives it", 130.0)),
     // These faults start before the jump.
     (60.0, Fault::Ignores, Ends::Trips("asked for", 130.0)),
-    (40.0, Fault::Frozen(T2), Ends::Trips("frozen", 91.5)),
+    (40.0, Fault::Frozen(P2), Ends::Trips("frozen", 91.5)),
     // The host detects these before any guard.
     (FAULT_S, Fault::Mute(1.5), Ends::Lost("are missing")),
     (FAULT_S, Fault::Doubled, Ends::Lost("was expected")),

@@ -1,0 +1,128 @@
+//! Sound readings of jumps, surge and rest are good; jumps that no sensor of that lag can make are bad, for as long as they last.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use mapper_core::{Channel, ChannelColumn, Quality, Reaction, SampleBatch};
+use mapper_runner::{Commanded, PlausibilityWatch, ReadingBounds, Trip};
+
+const INTERVAL_S: f64 = 0.1;
+const RUNNING: Commanded = Commanded { running: true, step_since_s: None, aim: None, jumped_s: None };
+
+/// A steady point: pressure ratio 1.8, efficiency 70 %.
+const STEADY: [(Channel, f64); 8] = [
+    (Channel::ShaftSpeed, 110e3),
+    (Channel::CompressorFlow, 0.08),
+    (Channel::P1, 100e3),
+    (Channel::T1, 298.0),
+    (Channel::P2, 180e3),
+    (Channel::T2, 376.0),
+    (Channel::Tc, 360.0),
+    (Channel::P3, 175e3),
+];
+
+fn watch(t2_lag_s: f64) -> PlausibilityWatch {
+    PlausibilityWatch::new(ReadingBounds {
+        wheel_diameter_m: Some(0.052),
+        t2_lag_s: (t2_lag_s, 2.0 * t2_lag_s),
+        noise_k: [0.1, 0.1, 0.3],
+    })
+}
+
+/// Judges the steady point with some channels changed at each time; returns the times of the bad readings of a channel, and the trip.
+fn judged(
+    watch: &mut PlausibilityWatch,
+    seconds: f64,
+    of: Channel,
+    changed: impl Fn(f64) -> Vec<(Channel, f64)>,
+) -> (Vec<f64>, Option<Trip>) {
+    let (mut bad_s, mut trip) = (Vec::new(), None);
+    for sample in 0..(seconds / INTERVAL_S).round() as u32 {
+        let t_s = INTERVAL_S * f64::from(sample);
+        let changed = changed(t_s);
+        let value = |(channel, usual)| {
+            let found = changed.iter().find(|(other, _)| *other == channel);
+            found.map_or(usual, |(_, value)| *value)
+        };
+        let mut batch = SampleBatch {
+            t_s: vec![t_s],
+            columns: STEADY.map(|row| ChannelColumn { channel: row.0, values: vec![value(row)] }).to_vec(),
+            ..SampleBatch::default()
+        };
+        trip = trip.or(watch.judge(&mut batch, &RUNNING));
+        if batch.provenance_of(of).is_some_and(|from| from.quality[0] == Quality::Bad) {
+            bad_s.push(t_s);
+        }
+    }
+    (bad_s, trip)
+}
+
+#[test]
+fn a_jump_that_the_probe_cannot_make_is_bad_until_it_is_back() {
+    let at = |t2_k: f64| vec![(Channel::T2, t2_k)];
+    // A probe of 2 s behind a gas that jumps by 100 K.
+    let follows = |t_s: f64| at(376.0 + 100.0 * (1.0 - (-(t_s - 5.0).max(0.0) / 2.0).exp()));
+    assert_eq!(judged(&mut watch(2.0), 20.0, Channel::T2, follows), (vec![], None));
+    // Interference of two samples is bad by itself, and nothing else is.
+    let spike = |t_s: f64| at(if (4.95..5.15).contains(&t_s) { 480.0 } else { 376.0 });
+    let (bad_s, trip) = judged(&mut watch(2.0), 20.0, Channel::T2, spike);
+    assert_eq!((bad_s.len(), trip), (2, None));
+    // A shift that stays is bad for as long as it stays, although a gas may be as hot, and ends the run.
+    let shift = |t_s: f64| at(if t_s < 4.95 { 376.0 } else { 440.0 });
+    let (bad_s, trip) = judged(&mut watch(2.0), 20.0, Channel::T2, shift);
+    assert_eq!(bad_s.len(), 150);
+    let trip = trip.unwrap();
+    assert!(trip.reaction == Reaction::Safe && (6.9..7.2).contains(&trip.t_s), "{trip:?}");
+    // A probe without inertia may jump.
+    assert_eq!(judged(&mut watch(0.0), 20.0, Channel::T2, shift), (vec![], None));
+    // The housing has a lag without any declaration.
+    let housing = |t_s: f64| vec![(Channel::Tc, if t_s < 4.95 { 360.0 } else { 400.0 })];
+    assert!(judged(&mut watch(0.0), 20.0, Channel::Tc, housing).1.is_some());
+}
+
+#[test]
+fn surge_jumps_and_rest_are_sound() {
+    // Deep surge: flow reverses in each cycle of half a second, pressure swings by a fifth.
+    let surge = |t_s: f64| {
+        let swing = (2.0 * std::f64::consts::PI * 2.1 * t_s).sin();
+        vec![
+            (Channel::CompressorFlow, 0.02 + 0.08 * swing),
+            (Channel::P2, 170e3 + 34e3 * swing),
+            (Channel::T2, 385.0 + 15.0 * swing),
+        ]
+    };
+    assert_eq!(judged(&mut watch(0.0), 30.0, Channel::CompressorFlow, surge), (vec![], None));
+    // From rest: no pressure ratio, and a flow meter that shows a little less than nothing.
+    let rest = |t_s: f64| {
+        let drives = t_s / 30.0;
+        vec![
+            (Channel::ShaftSpeed, 50e3 * drives),
+            (Channel::CompressorFlow, 0.03 * drives - 2e-4),
+            (Channel::P2, 100e3 * (1.0 + 0.16 * drives * drives)),
+            (Channel::T2, 297.5 + 18.0 * drives * drives),
+            (Channel::Tc, 296.0),
+        ]
+    };
+    assert_eq!(judged(&mut watch(0.5), 30.0, Channel::CompressorFlow, rest), (vec![], None));
+    // The shaft drops from 110 to 50 krpm within a second; the probe, of 4 s, stays hot.
+    let drop = |t_s: f64| {
+        let left = (-(t_s - 5.0).max(0.0) / 0.4).exp();
+        let probe = (-(t_s - 5.0).max(0.0) / 4.0).exp();
+        vec![
+            (Channel::ShaftSpeed, 50e3 + 60e3 * left),
+            (Channel::P2, 115e3 + 65e3 * left),
+            (Channel::T2, 313.0 + 63.0 * probe),
+        ]
+    };
+    assert_eq!(judged(&mut watch(4.0), 30.0, Channel::T2, drop), (vec![], None));
+    // And back: the probe lags behind the pressure.
+    let rise = |t_s: f64| {
+        let left = (-(t_s - 5.0).max(0.0) / 0.4).exp();
+        let probe = (-(t_s - 5.0).max(0.0) / 4.0).exp();
+        vec![
+            (Channel::ShaftSpeed, 110e3 - 60e3 * left),
+            (Channel::P2, 180e3 - 65e3 * left),
+            (Channel::T2, 376.0 - 63.0 * probe),
+            (Channel::Tc, 330.0),
+        ]
+    };
+    assert_eq!(judged(&mut watch(4.0), 30.0, Channel::T2, rise), (vec![], None));
+}

@@ -130,6 +130,19 @@ pub enum FleetError {
         /// The directory.
         directory: PathBuf,
     },
+    /// Tasks of an earlier submission are still in the queue.
+    #[error(
+        "{} is in the queue already: job {job} has {tasks} tasks that wait or run; wait until they end, or cancel the job, and then \
+         use `mapper fleet retry`", .directory.display()
+    )]
+    InTheQueue {
+        /// The directory.
+        directory: PathBuf,
+        /// The job.
+        job: String,
+        /// Its tasks.
+        tasks: usize,
+    },
     /// The queue rejected the submission.
     #[error("the queue did not take {}: {answer}; its template is {template}", .script.display())]
     Queue {

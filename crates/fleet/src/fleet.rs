@@ -75,9 +75,9 @@ impl Fleet {
         self.directory.join(BEGUN).join(hash.to_string())
     }
 
-    /// State of an item's part; `None` without a part.
+    /// State of an item's part, damage of its body included; `None` without a part.
     pub(crate) fn head(&self, item: &Listed) -> Option<Result<Part, PartRefusal>> {
-        Part::read_head(&self.part(&item.hash), self.expected(item))
+        Some(self.whole(item)?.map(|(part, _)| part))
     }
 
     /// An item's part with its body; `None` without a part.

@@ -112,23 +112,14 @@ impl Part {
         Ok(part)
     }
 
-    /// The header line of a part file, and whether the file has the stated length; `None` without a file.
-    pub(crate) fn read_head(path: &Path, expected: Expected<'_>) -> Option<Result<Part, PartRefusal>> {
-        match std::fs::symlink_metadata(path) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
-            Err(error) => return Some(Err(PartRefusal::Unread(error.to_string()))),
-            // A pipe would hang, a link may lead anywhere.
-            Ok(found) if !found.is_file() => return Some(Err(PartRefusal::NotAPart)),
-            Ok(_) => {}
-        }
-        Some(open(path, expected).map(|(part, ..)| part))
-    }
-
-    /// A part with its body; `None` without a file.
+    /// A part with its body, whose checksum is checked; `None` without a file.
     pub(crate) fn read(path: &Path, expected: Expected<'_>) -> Option<Result<(Part, String), PartRefusal>> {
-        match Self::read_head(path, expected)? {
+        match std::fs::symlink_metadata(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+            Err(error) => Some(Err(PartRefusal::Unread(error.to_string()))),
+            // A pipe would hang, a link may lead anywhere.
+            Ok(found) if !found.is_file() => Some(Err(PartRefusal::NotAPart)),
             Ok(_) => Some(read_body(path, expected)),
-            Err(refusal) => Some(Err(refusal)),
         }
     }
 }

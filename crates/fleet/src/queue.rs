@@ -47,8 +47,17 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
-/// Runs the submission; returns the IDs that it prints as `word ID`, by word.
-pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<String, String>, FleetError> {
+/// The queue's answer to a submission.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Submitted {
+    /// ID of the array job.
+    pub work: String,
+    /// ID of the merge job; or, if the queue refused it after it had accepted the array, its answer.
+    pub merge: Result<Option<String>, String>,
+}
+
+/// Runs the submission. It prints `work ID` and `merge ID`; other lines, e.g. the site's greeting, are ignored.
+pub(crate) fn submitted(script: &Path, template: &Template) -> Result<Submitted, FleetError> {
     let failed = |message: String| FleetError::Queue {
         script: PathBuf::from(script),
         answer: message,
@@ -59,18 +68,20 @@ pub(crate) fn submitted(script: &Path, template: &Template) -> Result<BTreeMap<S
         .stdin(Stdio::null())
         .output()
         .map_err(|error| failed(format!("failed to start sh: {error}")))?;
-    if !output.status.success() {
-        let message = String::from_utf8_lossy(&output.stderr);
-        return Err(failed(message.trim().to_owned()));
-    }
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    let answer = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     let words = printed.lines().filter_map(|line| line.trim().split_once(' '));
-    let ids: BTreeMap<String, String> =
-        words.map(|(word, id)| (word.to_owned(), id.trim().to_owned())).collect();
-    if ids.contains_key("work") {
-        Ok(ids)
-    } else {
-        Err(failed(format!("it printed no `work ID` but {printed:?}")))
+    let mut ids: BTreeMap<String, String> = words
+        .map(|(word, id)| (word.to_owned(), id.trim().to_owned()))
+        .filter(|(_, id)| !id.is_empty() && !id.contains(char::is_whitespace))
+        .collect();
+    let merge = ids.remove("merge");
+    match (ids.remove("work"), output.status.success()) {
+        (Some(work), true) => Ok(Submitted { work, merge: Ok(merge) }),
+        // The tasks are in the queue, and must not be submitted a second time.
+        (Some(work), false) => Ok(Submitted { work, merge: Err(answer) }),
+        (None, false) => Err(failed(answer)),
+        (None, true) => Err(failed(format!("it printed no `work ID` but {printed:?}"))),
     }
 }
 

@@ -71,7 +71,7 @@ impl Status {
 const MAX_STRANGERS: usize = 1000;
 
 impl Fleet {
-    /// The progress. Only the header lines of parts are read.
+    /// The progress. Every part is read whole: a damaged one does not count as done.
     pub fn status(&self) -> Status {
         let mut status = Status { items: self.study.items.len(), ..Status::default() };
         for item in &self.study.items {

@@ -2,7 +2,7 @@
 
 use crate::fleet::LOGS;
 use crate::place::{Durability, Machine, make_directory, read_at_most, write_whole};
-use crate::queue::{Template, quoted, submitted};
+use crate::queue::{Template, quoted, running, submitted};
 use crate::{Cost, Fleet, FleetError, Shard, Status};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -66,6 +66,9 @@ pub struct Submission {
     pub work: String,
     /// ID of the merge job that follows it.
     pub merge: Option<String>,
+    /// The queue's answer if it accepted the array and refused the merge job; the study is then merged by hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub merge_refused: Option<String>,
 }
 
 /// Safety factor on the estimated duration of a task.
@@ -87,6 +90,7 @@ impl Fleet {
         if cost.left == 0 {
             return Err(self.nothing_left());
         }
+        self.not_in_the_queue()?;
         let status = self.status();
         let limits = &options.limits;
         let refused = |why: String| Err(FleetError::DoesNotFit { why });
@@ -138,6 +142,7 @@ impl Fleet {
             program: options.program.clone(),
             work: String::new(),
             merge: None,
+            merge_refused: None,
         };
         self.hand_over(submission, "", machine)
     }
@@ -148,6 +153,7 @@ impl Fleet {
     /// [`FleetError::NotSubmitted`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
     pub fn retry(&self, machine: &Machine<'_>) -> Result<Submission, FleetError> {
         let before = self.submission()?;
+        self.not_in_the_queue()?;
         let status = self.status();
         let mut numbers: Vec<u64> = status
             .failed
@@ -175,6 +181,22 @@ impl Fleet {
         }
         let bytes = read_at_most(&path, 1 << 20)?;
         serde_json::from_slice(&bytes).map_err(FleetError::content(&path, "a submission"))
+    }
+
+    /// Refuses a submission while the queue still has tasks of the last one: each item would be done twice. A queue that cannot be asked
+    /// counts as empty.
+    fn not_in_the_queue(&self) -> Result<(), FleetError> {
+        let Ok(before) = self.submission() else { return Ok(()) };
+        let template = Template { name: before.template, text: before.template_text };
+        let tasks: usize = running(&template, &before.work).unwrap_or_default().into_values().sum();
+        match tasks {
+            0 => Ok(()),
+            tasks => Err(FleetError::InTheQueue {
+                directory: self.directory().to_owned(),
+                job: before.work,
+                tasks,
+            }),
+        }
     }
 
     fn nothing_left(&self) -> FleetError {
@@ -235,9 +257,12 @@ impl Fleet {
         }
         let script = write("submit.sh", &(text + &submission.template_text))?;
         let template = Template { name: submission.template.clone(), text: submission.template_text.clone() };
-        let mut ids = submitted(&script, &template)?;
-        submission.work = ids.remove("work").unwrap_or_default();
-        submission.merge = ids.remove("merge");
+        let answer = submitted(&script, &template)?;
+        submission.work = answer.work;
+        (submission.merge, submission.merge_refused) = match answer.merge {
+            Ok(merge) => (merge, None),
+            Err(why) => (None, Some(why)),
+        };
         let path = directory.join(SUBMITTED);
         let bytes =
             serde_json::to_vec_pretty(&submission).map_err(FleetError::content(&path, "a submission"))?;

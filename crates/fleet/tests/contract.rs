@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_fleet::{
-    At, Draft, Drafts, Engine, Fleet, FleetError, Kind, Machine, Made, Merged, Output, Results, Shard,
-    StudyFile, Which, WorkError, Worked, kind_of, open_study,
+    At, Draft, Drafts, Engine, Fleet, FleetError, Kind, Limits, Machine, Made, Merged, Output, Results,
+    Shard, StudyFile, SubmitOptions, Template, Which, WorkError, Worked, kind_of, open_study,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -227,6 +227,9 @@ fn hostile_parts_are_named_and_left_out() {
         std::fs::remove_file(part(&fleet, 8)).unwrap();
         std::os::unix::fs::symlink("/dev/zero", part(&fleet, 8)).unwrap();
     }
+    // The progress counts none of them as done.
+    let status = fleet.status();
+    assert_eq!((status.done, status.refused.len()), (2, 10));
     let merged = fleet.merge(&kind, true, &machine("merger")).unwrap();
     let why: BTreeMap<&str, &str> =
         merged.status.refused.iter().map(|item| (item.name.as_str(), item.why.as_deref().unwrap())).collect();
@@ -250,6 +253,66 @@ fn hostile_parts_are_named_and_left_out() {
     work(&fleet, &kind, Which::All, false).unwrap();
     assert!(merge(&fleet).result.is_some());
     assert_eq!(result(&fleet), squares(0..12));
+}
+
+/// Slurm's commands as functions of the shell: each job gets the next ID.
+const SBATCH: &str = r#"
+sbatch() {
+    cat > /dev/null
+    echo "Welcome to the cluster, work hard"
+    for option in "$@"; do
+        case $option in
+        --dependency=*) [ ! -e REFUSES ] || { echo "sbatch: error: no dependencies today" >&2; return 1; } ;;
+        esac
+    done
+    echo job >> JOBS
+    echo "$(wc -l < JOBS);cluster"
+}
+"#;
+
+#[test]
+#[cfg(unix)]
+fn a_queue_is_asked_once_and_its_answers_are_understood() {
+    let folder = tempfile::tempdir().unwrap();
+    let fleet = made(folder.path(), 12, PROGRAM).unwrap().fleet;
+    let kind = Squares::default();
+    let place = |name: &str| folder.path().join(name).display().to_string();
+    let text = SBATCH.replace("JOBS", &place("jobs")).replace("REFUSES", &place("refuses"));
+    let slurm = Template::slurm().text.lines().skip(2).collect::<Vec<_>>().join("\n");
+    let template = Template {
+        name: "slurm".to_owned(),
+        text: format!("#states: cat {}\n{text}\n{slurm}\n", place("states")),
+    };
+    let options = SubmitOptions {
+        template,
+        program: "mapper".into(),
+        partition: String::new(),
+        cpus: 1,
+        task_min: 15.0,
+        limits: Limits { time_min: None, tasks: 10, at_once: None, hours: None, memory_mb: None },
+    };
+    let machine = machine("login");
+    let cost = fleet.tried(&kind, 3, &engine(1), &machine).unwrap().cost;
+    // A greeting before the ID, and the cluster's name behind it.
+    let sent = fleet.submit(&options, &cost, &machine).unwrap();
+    assert_eq!((sent.work.as_str(), sent.merge.as_deref()), ("1", Some("2")));
+    // While its tasks wait or run, nothing is submitted a second time.
+    std::fs::write(place("states"), "PENDING\nRUNNING\n").unwrap();
+    for again in [fleet.submit(&options, &cost, &machine), fleet.retry(&machine)] {
+        assert!(matches!(again, Err(FleetError::InTheQueue { tasks: 2, .. })), "{again:?}");
+    }
+    // An array whose merge the queue refuses is in the queue, and is known.
+    std::fs::write(place("states"), "").unwrap();
+    std::fs::write(place("refuses"), "").unwrap();
+    let sent = fleet.submit(&options, &cost, &machine).unwrap();
+    assert_eq!((sent.work.as_str(), sent.merge.as_deref()), ("3", None));
+    assert!(sent.merge_refused.is_some());
+    assert_eq!(fleet.submission().unwrap(), sent);
+    // A queue that prints no ID has taken nothing.
+    let mute = Template { text: "sbatch() { echo busy; }\n".to_owned() + &slurm, ..options.template.clone() };
+    let refused = fleet.submit(&SubmitOptions { template: mute, ..options.clone() }, &cost, &machine);
+    assert!(matches!(refused, Err(FleetError::Queue { .. })), "{refused:?}");
+    assert_eq!(fleet.submission().unwrap(), sent);
 }
 
 #[test]

@@ -105,8 +105,14 @@ pub fn cost_text(cost: &Cost) -> String {
 
 /// Job numbers, tasks, limits.
 pub fn submission_text(submission: &Submission) -> String {
-    let merge =
-        submission.merge.as_ref().map_or_else(String::new, |id| format!(", merge behind it: job {id}"));
+    let merge = match (&submission.merge, &submission.merge_refused) {
+        (Some(id), _) => format!(", merge behind it: job {id}"),
+        (None, Some(why)) => format!(
+            "\nthe queue refused the merge job: {}\nrun `mapper fleet merge` when the tasks have ended",
+            why.lines().next_back().unwrap_or("no reason given")
+        ),
+        (None, None) => String::new(),
+    };
     format!(
         "tasks {} of {}: job {}{merge}\n{} cores, {} min and {} MB a task at most\n",
         submission.array,

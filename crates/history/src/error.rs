@@ -27,6 +27,12 @@ pub enum HistoryError {
         /// What was found.
         reason: String,
     },
+    /// The file, or its directory, cannot be written.
+    #[error("the history {} cannot be written; name another one with `--db`", .path.display())]
+    ReadOnly {
+        /// The file.
+        path: PathBuf,
+    },
     /// SQLite's own word.
     #[error("the history {} cannot be used: {source}", .path.display())]
     Sqlite {

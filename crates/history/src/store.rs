@@ -85,8 +85,18 @@ impl History {
                 .map_err(|source| HistoryError::Directory { path: parent.to_owned(), source })?;
         }
         let mut history = Self::connect(path, OpenFlags::default())?;
-        history.prepare()?;
-        Ok(history)
+        // Found out before a night of runs, not when they are to be stored.
+        let writable = history.prepare().and_then(|()| {
+            let begun = history.connection.transaction_with_behavior(TransactionBehavior::Immediate);
+            let path = path.to_owned();
+            begun.and_then(Transaction::rollback).map_err(|source| HistoryError::Sqlite { path, source })
+        });
+        match writable {
+            Err(HistoryError::Sqlite { path, source }) if is_read_only(&source) => {
+                Err(HistoryError::ReadOnly { path })
+            }
+            writable => writable.map(|()| history),
+        }
     }
 
     /// Opens a history that is there, to read it.
@@ -100,6 +110,24 @@ impl History {
         // Reading a WAL database may have to make its side files, so that read-only would fail after a crash.
         let mut history =
             Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+        match history.prepare() {
+            Err(HistoryError::Sqlite { source, .. }) if is_read_only(&source) => Self::open_read_only(path),
+            prepared => prepared.map(|()| history),
+        }
+    }
+
+    /// Opens a history in a place where nothing can be written. A night that a killed process was writing is not seen.
+    ///
+    /// # Errors
+    /// As [`History::open_existing`].
+    pub fn open_read_only(path: &Path) -> Result<History, HistoryError> {
+        let flags =
+            OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        // Percent signs, question marks and hash marks have a meaning in a URI.
+        let named = whole.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
+        let history = Self::connect(Path::new(&format!("file:{named}?immutable=1")), flags)?;
+        let mut history = History { path: path.to_owned(), ..history };
         history.prepare()?;
         Ok(history)
     }
@@ -123,7 +151,11 @@ impl History {
         let foreign = |reason: String| HistoryError::Foreign { path: path.clone(), reason };
         // Another process may be switching at this very moment, which SQLite reports as busy at once; the mode stays
         // with the file, so that it is enough if one of the two succeeds.
-        let switched = self.connection.pragma_update(None, "journal_mode", "WAL");
+        let reads_only = self.connection.is_readonly("main").map_err(fail)?;
+        let switched = match reads_only {
+            true => Ok(()),
+            false => self.connection.pragma_update(None, "journal_mode", "WAL"),
+        };
         if let Err(error) = switched
             && error.sqlite_error_code() != Some(rusqlite::ErrorCode::DatabaseBusy)
         {
@@ -162,17 +194,23 @@ impl History {
     }
 
     /// Compares a night with the band of the last `nights` nights and appends it, in one transaction. A night that has
-    /// moved, or is accepted as a new beginning, is marked so.
+    /// moved, or is accepted as a new beginning, is marked so. Nights are told apart by the time they began: of two in one millisecond, the
+    /// second gets the next free one.
     ///
     /// # Errors
     /// [`HistoryError::Sqlite`]; the history is then as it was.
-    pub fn append(&mut self, night: &Night, nights: usize) -> Result<Comparison, HistoryError> {
+    pub fn append(&mut self, night: &mut Night, nights: usize) -> Result<Comparison, HistoryError> {
         let path = self.path.clone();
         self.try_append(night, nights).map_err(|source| HistoryError::Sqlite { path, source })
     }
 
-    fn try_append(&mut self, night: &Night, nights: usize) -> rusqlite::Result<Comparison> {
+    fn try_append(&mut self, night: &mut Night, nights: usize) -> rusqlite::Result<Comparison> {
         let transaction = self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        let mut taken = transaction.prepare("SELECT 1 FROM night WHERE started_ms = ?1")?;
+        while taken.exists([night.started_ms])? {
+            night.started_ms += 1;
+        }
+        drop(taken);
         let earlier = earlier(&transaction, &night.name, nights)?;
         let comparison = compare(night, &earlier);
         let moved = !comparison.is_quiet() && !night.accepted;
@@ -368,6 +406,13 @@ fn earlier(
         earlier.entry(run.key.clone()).or_default().push(run);
     }
     Ok(earlier)
+}
+
+/// Whether SQLite could not write: to the file, to its directory, or at all.
+fn is_read_only(error: &rusqlite::Error) -> bool {
+    use rusqlite::ErrorCode;
+    let code = error.sqlite_error_code();
+    matches!(code, Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied))
 }
 
 /// NULL for what is not a number.

@@ -57,7 +57,7 @@ fn night(number: i64, truth: f64, method: f64) -> Night {
 }
 
 fn append(path: &Path, night: &Night) -> Comparison {
-    History::open(path).unwrap().append(night, NIGHTS).unwrap()
+    History::open(path).unwrap().append(&mut night.clone(), NIGHTS).unwrap()
 }
 
 fn scratch() -> (tempfile::TempDir, std::path::PathBuf) {
@@ -212,6 +212,42 @@ fn a_history_killed_in_mid_write_is_as_it_was() {
     assert_eq!(runs.len(), 4);
     assert_eq!(integrity(&killed), "ok");
     assert!(append(&killed, &night(1, 0.0, 0.0)).is_quiet());
+}
+
+/// A report is stored under the time of its night: the second of two that begin in one millisecond gets the next one.
+#[test]
+fn nights_of_one_millisecond_are_told_apart() {
+    let (_scratch, path) = scratch();
+    let mut history = History::open(&path).unwrap();
+    let mut nights = [night(0, 0.0, 0.0), night(0, 0.0, 0.0), night(0, 0.0, 0.0)];
+    nights.iter_mut().for_each(|night| drop(history.append(night, NIGHTS).unwrap()));
+    let [first, second, third] = nights.map(|night| night.started_ms);
+    assert_eq!((second, third), (first + 1, first + 2));
+    let stored: std::collections::BTreeSet<i64> =
+        history.runs(&Filter::default()).unwrap().iter().map(|run| run.night.started_ms).collect();
+    assert_eq!(stored, [first, second, third].into());
+}
+
+/// In a directory without write permission, SQLite can make no side files.
+#[test]
+#[cfg(unix)]
+fn a_history_that_cannot_be_written_is_read_and_refuses_a_night_beforehand() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let (_scratch, path) = scratch();
+    append(&path, &night(0, 0.0, 0.0));
+    assert_eq!(History::open_read_only(&path).unwrap().runs(&Filter::default()).unwrap().len(), 4);
+    let mode = |path: &Path, mode| {
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+    };
+    mode(&path, 0o444);
+    mode(path.parent().unwrap(), 0o555);
+    // Permissions do not bind root.
+    let bound = std::fs::OpenOptions::new().write(true).open(&path).is_err();
+    let read = History::open_existing(&path).and_then(|history| history.runs(&Filter::default()));
+    let written = History::open(&path).map(drop);
+    mode(path.parent().unwrap(), 0o755);
+    assert_eq!(read.unwrap().len(), 4);
+    assert!(!bound || matches!(written, Err(HistoryError::ReadOnly { .. })), "{written:?}");
 }
 
 #[test]

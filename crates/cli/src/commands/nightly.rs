@@ -62,7 +62,7 @@ impl Nightly {
             }
             _ => error.into(),
         })?;
-        let night = Night {
+        let mut night = Night {
             name: nightly.name.clone(),
             started_ms: started.as_millisecond(),
             duration_s: jiff::Timestamp::now().duration_since(started).as_secs_f64(),
@@ -70,7 +70,7 @@ impl Nightly {
             accepted: self.accept,
             runs,
         };
-        let comparison = history.append(&night, nightly.nights).map_err(SessionError::from)?;
+        let comparison = history.append(&mut night, nightly.nights).map_err(SessionError::from)?;
         keep_night_report(&path, &night, &comparison)?;
         if self.json {
             output::print_json(&json!({

@@ -655,6 +655,23 @@ fn malformed_text_has_a_place() {
     assert_eq!(mistakes(&"a".repeat(2 << 20)).list[0].kind, Kind::TooLarge);
 }
 
+/// 141 speeds at 141 openings are a month on the rig, and more pairs than a planner compares: refused with both.
+#[test]
+fn a_grid_without_end_is_refused_with_an_estimate() {
+    let list = |first: f64, step: f64, unit: &str| {
+        let values: Vec<String> =
+            (0..141).map(|i| format!("{:.4}{unit}", first + step * f64::from(i))).collect();
+        format!("[{}]", values.join(", "))
+    };
+    let text = RIGHT
+        .replace("[90 krpm, 110 krpm]", &list(50.0, 0.5, " krpm"))
+        .replace("[0.7, 1.0]", &list(0.5, 0.01, ""));
+    let findings = mistakes(&text);
+    let found = findings.list.iter().find(|finding| finding.kind == Kind::TooLarge).unwrap();
+    // 19 881 points of 120 s.
+    assert!(found.message.contains("19881") && found.message.contains("27.6 days"), "{findings}");
+}
+
 #[test]
 fn all_mistakes_come_in_one_go_and_in_the_order_of_the_text() {
     let text = RIGHT

@@ -12,8 +12,9 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::HashSet;
 
-/// Maximum number of points a grid may have: four weeks of two-minute steps.
-const POINT_LIMIT: usize = 20_000;
+/// Maximum number of points a grid may have: three days of two-minute steps. The planner holds several numbers for every pair of points: 32 MB
+/// each for 2000 points (11 s of processor time), gigabytes each for 20 000.
+const POINT_LIMIT: usize = 2_000;
 /// Forms of a grid.
 const FORMS: &str = "write `speeds` and `openings`, or `points`, a list of `{speed: 50 krpm, opening: 0.5}`, or `lines`, \
                      a list of `{speed_corrected: 50 krpm, points: 6}`";
@@ -29,10 +30,10 @@ pub(crate) struct GridFile {
     #[schemars(length(min = 1, max = 1000), extend("examples" = [[0.5, 1.0, 2.5]]))]
     openings: Option<Vec<Opening>>,
     /// Points of `speeds` x `openings` to leave out.
-    #[schemars(length(min = 1, max = 20000))]
+    #[schemars(length(min = 1, max = 2000))]
     skip: Option<Vec<PointFile>>,
     /// The points one by one.
-    #[schemars(length(min = 1, max = 20000))]
+    #[schemars(length(min = 1, max = 2000))]
     points: Option<Vec<PointFile>>,
     /// Speed lines by their corrected speeds, each with points from choke to surge; the openings are found on the nominal machine.
     #[schemars(length(min = 1, max = 200))]
@@ -239,8 +240,14 @@ fn product(check: &mut Check<'_>) {
     let count = speeds.len().saturating_mul(openings.len());
     let here = steps!["grid"];
     if count > POINT_LIMIT {
-        let message = format!("the grid has {count} points");
-        check.note(FindingKind::TooLarge, &here, message, &format!("a grid may have at most {POINT_LIMIT}"));
+        let dwell = check.quantity(Kind::Duration, &steps!["timing", "dwell"]);
+        let days = dwell.map(|(dwell_s, _)| count as f64 * dwell_s / 86_400.0);
+        let lasts = days.map_or_else(String::new, |days| format!(", which take {days:.1} days on the rig"));
+        let pairs = (count as f64 / POINT_LIMIT as f64).powi(2);
+        let message =
+            format!("the grid has {count} points{lasts}, and {pairs:.0} times as many pairs as are planned");
+        let remedy = format!("a grid may have at most {POINT_LIMIT}; divide it into several campaigns");
+        check.note(FindingKind::TooLarge, &here, message, &remedy);
         return;
     }
     let mut skipped = HashSet::new();

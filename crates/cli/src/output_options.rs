@@ -2,7 +2,7 @@
 
 use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
-use mapper_terminal::{ColourChoice, Progress, ProgressManner, is_coloured};
+use mapper_terminal::{ColourChoice, Progress, ProgressManner, is_coloured, understands_escapes};
 use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::sync::OnceLock;
@@ -87,12 +87,17 @@ pub fn replaces() -> bool {
 
 /// Colours of standard output.
 pub fn paint() -> Paint {
-    if coloured(std::io::stdout().is_terminal()) { Paint::Coloured } else { Paint::Plain }
+    if coloured(shows_escapes(&std::io::stdout())) { Paint::Coloured } else { Paint::Plain }
 }
 
 /// Whether standard error is coloured.
 pub fn warns_in_colour() -> bool {
-    coloured(std::io::stderr().is_terminal())
+    coloured(shows_escapes(&std::io::stderr()))
+}
+
+/// Whether this is a terminal that moves its cursor and shows colours.
+fn shows_escapes(stream: &impl IsTerminal) -> bool {
+    stream.is_terminal() && understands_escapes(std::env::var_os("TERM").as_deref())
 }
 
 fn coloured(terminal: bool) -> bool {
@@ -101,7 +106,7 @@ fn coloured(terminal: bool) -> bool {
 
 /// The display of progress.
 pub fn progress() -> Progress {
-    let usual = match (std::io::stderr().is_terminal(), json()) {
+    let usual = match (shows_escapes(&std::io::stderr()), json()) {
         (true, _) => ProgressManner::Bar,
         (false, true) => ProgressManner::Quiet,
         (false, false) => ProgressManner::Lines,

@@ -12,6 +12,11 @@ pub enum ColourChoice {
     Never,
 }
 
+/// Whether a terminal understands escape sequences, by the environment variable `TERM`: `dumb` is a printer, or an editor's shell.
+pub fn understands_escapes(term: Option<&std::ffi::OsStr>) -> bool {
+    term.is_none_or(|term| term != "dumb")
+}
+
 /// Whether the output is coloured. `no_color`: the environment variable of that name.
 pub fn is_coloured(choice: ColourChoice, to_terminal: bool, no_color: Option<&std::ffi::OsStr>) -> bool {
     match choice {
@@ -24,6 +29,13 @@ pub fn is_coloured(choice: ColourChoice, to_terminal: bool, no_color: Option<&st
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_dumb_terminal_gets_no_escapes() {
+        assert!(!understands_escapes(Some(std::ffi::OsStr::new("dumb"))));
+        assert!(understands_escapes(Some(std::ffi::OsStr::new("xterm-256color"))));
+        assert!(understands_escapes(None));
+    }
 
     #[test]
     fn what_was_asked_for_outranks_the_environment_and_an_empty_no_color_is_none() {

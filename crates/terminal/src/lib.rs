@@ -10,6 +10,6 @@ mod colour;
 mod progress;
 mod results_text;
 
-pub use colour::{ColourChoice, is_coloured};
+pub use colour::{ColourChoice, is_coloured, understands_escapes};
 pub use progress::{Progress, ProgressManner};
 pub use results_text::{Shown, identified_text, results_text};

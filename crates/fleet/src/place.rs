@@ -57,11 +57,8 @@ pub(crate) fn write_whole(
 /// Reads a regular file of at most so many bytes. A pipe or a device is not opened: it could hang.
 pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, FleetError> {
     let read = || -> std::io::Result<Vec<u8>> {
-        if !std::fs::metadata(path)?.is_file() {
-            return Err(std::io::Error::new(ErrorKind::InvalidInput, "it is not a plain file"));
-        }
         let mut bytes = Vec::new();
-        File::open(path)?.take(limit_bytes + 1).read_to_end(&mut bytes)?;
+        mapper_yaml::open_file(path)?.take(limit_bytes + 1).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > limit_bytes {
             let larger = format!("it is larger than the {limit_bytes} bytes that are read");
             return Err(std::io::Error::new(ErrorKind::FileTooLarge, larger));

@@ -1,7 +1,6 @@
 //! A log as a file or as bytes in memory.
 
 use crate::LogError;
-use std::fs::File;
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,7 +45,18 @@ impl LogFile {
     pub fn open(&self) -> Result<Box<dyn ReadSeek>, LogError> {
         match &self.bytes {
             Some(bytes) => Ok(Box::new(Cursor::new(bytes.clone()))),
-            None => Ok(Box::new(File::open(&self.path).map_err(|error| self.error(error))?)),
+            None => Ok(Box::new(mapper_yaml::open_file(&self.path).map_err(|error| self.error(error))?)),
+        }
+    }
+
+    /// Its size, bytes.
+    ///
+    /// # Errors
+    /// [`LogError::Read`] if the file cannot be found.
+    pub fn size_bytes(&self) -> Result<u64, LogError> {
+        match &self.bytes {
+            Some(bytes) => Ok(bytes.len() as u64),
+            None => Ok(std::fs::metadata(&self.path).map_err(|error| self.error(error))?.len()),
         }
     }
 

@@ -10,6 +10,7 @@ mod error;
 mod file;
 mod format;
 mod layout;
+pub mod limits;
 mod options;
 pub mod plausible;
 pub mod proposal;

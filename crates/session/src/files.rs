@@ -2,7 +2,7 @@
 
 use crate::SessionError;
 use serde::Serialize;
-use std::io::{ErrorKind, Read, Write};
+use std::io::Write;
 use std::path::Path;
 use tempfile::NamedTempFile;
 
@@ -71,20 +71,8 @@ pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
 /// # Errors
 /// [`SessionError::File`] if it cannot be read or is too large.
 pub(crate) fn read_at_most(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, SessionError> {
-    let failed = SessionError::file("read", path);
-    let mut bytes = Vec::new();
-    let file = match std::fs::File::open(path) {
-        Ok(file) => file,
-        Err(error) => return Err(failed(error)),
-    };
-    match file.take(limit_bytes + 1).read_to_end(&mut bytes) {
-        Err(error) => Err(failed(error)),
-        Ok(_) if bytes.len() as u64 > limit_bytes => {
-            let larger = format!("it is larger than the {limit_bytes} bytes that are read");
-            Err(failed(std::io::Error::new(ErrorKind::FileTooLarge, larger)))
-        }
-        Ok(_) => Ok(bytes),
-    }
+    let limit_bytes = usize::try_from(limit_bytes).unwrap_or(usize::MAX);
+    mapper_yaml::read_limited(path, limit_bytes).map_err(SessionError::file("read", path))
 }
 
 #[cfg(test)]

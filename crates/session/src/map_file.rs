@@ -70,7 +70,7 @@ impl Registry {
         let mut bytes = Vec::new();
         // One byte above the limit shows that the file is too large.
         let limit = MAP_FILE_SIZE_LIMIT as u64 + 1;
-        std::fs::File::open(path)
+        mapper_yaml::open_file(path)
             .and_then(|file| file.take(limit).read_to_end(&mut bytes))
             .map_err(SessionError::file("read", path))?;
         let bytes = unpacked(&bytes)

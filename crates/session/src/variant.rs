@@ -4,6 +4,7 @@ use mapper_campaign::Campaign;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Column of the serial number.
@@ -86,7 +87,8 @@ impl Variant {
         if bytes > SIZE_LIMIT {
             return Err(VariantError::TooLarge { path: path.to_owned(), bytes });
         }
-        let text = std::fs::read_to_string(path).map_err(unread)?;
+        let mut text = String::new();
+        mapper_yaml::open_file(path).and_then(|mut file| file.read_to_string(&mut text)).map_err(unread)?;
         Self::from_text(&text, path)
     }
 

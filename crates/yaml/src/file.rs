@@ -3,8 +3,28 @@
 use crate::finding::FindingKind;
 use crate::findings::Findings;
 use crate::source::{Document, Source};
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+
+/// Opens a plain file. A pipe or a device is not opened: reading it may hang or never end.
+///
+/// # Errors
+/// What the system says; [`io::ErrorKind::InvalidInput`] with the remedy for anything but a file.
+pub fn open_file(path: &Path) -> io::Result<File> {
+    let found = std::fs::metadata(path)?;
+    let refused = |why: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+    match found {
+        found if found.is_file() => File::open(path),
+        found if found.is_dir() => refused("it is a directory; name a file in it"),
+        _ => refused("it is a pipe or a device, not a file; write its content to a file first"),
+    }
+}
+
+/// Whether this is a descriptor that the caller has opened: `/dev/stdin`, or a shell's `<(command)`.
+fn is_descriptor(path: &Path) -> bool {
+    ["/dev/stdin", "/dev/fd", "/proc/self/fd"].iter().any(|place| path.starts_with(place))
+}
 
 /// Reads a file without ever holding much more than `limit_bytes`, whatever the file claims to be.
 ///
@@ -12,7 +32,7 @@ use std::path::Path;
 /// What the system says; [`io::ErrorKind::FileTooLarge`] for a file beyond the limit.
 pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path)?;
+    let file = if is_descriptor(path) { File::open(path)? } else { open_file(path)? };
     file.take(limit_bytes as u64 + 1).read_to_end(&mut bytes)?;
     if bytes.len() > limit_bytes {
         return Err(io::Error::new(

@@ -26,7 +26,7 @@ mod suggestion;
 mod tree;
 pub mod units;
 
-pub use file::{open, read_limited};
+pub use file::{open, open_file, read_limited};
 pub use finding::{Finding, FindingKind};
 pub use findings::Findings;
 pub use notes::Notes;

@@ -14,6 +14,7 @@ mod counter;
 mod encoding;
 mod instant;
 mod long_table;
+mod mdf_source;
 mod number;
 mod parts;
 #[cfg(feature = "parquet")]

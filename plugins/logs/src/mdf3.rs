@@ -1,11 +1,9 @@
 //! MDF, version 3: the `.dat` files of older measuring systems, as INCA writes them.
 
-use falcon_mdf::io::memory::MemorySource;
-use falcon_mdf::io::reader::BufferedSource;
+use crate::mdf_source::MdfSource;
 use falcon_mdf::mdf3::Mdf3File;
 use mapper_logs::{Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -21,7 +19,8 @@ const SAMPLE_LIMIT: u32 = 20_000_000;
 /// The identification block of a version before 4: its text is `3.30` and the like.
 fn recognises(head: &[u8]) -> bool {
     let version = head.get(8..16).and_then(|text| std::str::from_utf8(text).ok());
-    let major = version.and_then(|text| text.trim_matches(['\0', ' ']).split('.').next()?.parse::<u32>().ok());
+    let major =
+        version.and_then(|text| text.trim_matches(['\0', ' ']).split('.').next()?.parse::<u32>().ok());
     head.starts_with(b"MDF     ") && major.is_some_and(|major| major < 4)
 }
 
@@ -43,11 +42,7 @@ struct Mdf3 {
 fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
     options.only(&["missing"]).map_err(|why| path.content(NAME, why))?;
-    let file = match path.bytes() {
-        Some(bytes) => Mdf3File::from_source(Arc::new(MemorySource::new(bytes.to_vec()))),
-        None => BufferedSource::open(path.path()).and_then(|source| Mdf3File::from_source(Arc::new(source))),
-    };
-    let file = file.map_err(failed)?;
+    let file = Mdf3File::from_source(MdfSource::open(path, NAME)?).map_err(failed)?;
     if file.channel_count() > CHANNEL_LIMIT {
         let message = format!("it has {} channels; at most {CHANNEL_LIMIT} are read", file.channel_count());
         return Err(path.content(NAME, message));
@@ -78,11 +73,17 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             });
             masters.push((data, number, clock));
             let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
-            for (index, channel) in channel_group.channels.iter().enumerate().filter(|(index, _)| *index != clock) {
+            for (index, channel) in
+                channel_group.channels.iter().enumerate().filter(|(index, _)| *index != clock)
+            {
                 let count = seen.entry(&channel.name).or_default();
                 *count += 1;
                 layout.columns.push(Column {
-                    name: if *count > 1 { format!("{} ({count})", channel.name) } else { channel.name.clone() },
+                    name: if *count > 1 {
+                        format!("{} ({count})", channel.name)
+                    } else {
+                        channel.name.clone()
+                    },
                     header: channel.name.clone(),
                     unit: Some(channel.unit.trim().to_owned()).filter(|unit| !unit.is_empty()),
                     description: channel.description.chars().take(200).collect(),
@@ -98,11 +99,22 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     if channels.is_empty() {
         return Err(path.content(NAME, "no group has a time channel and another one with samples"));
     }
-    layout.findings.push(format!("version {} of MDF, written by `{}`", file.version().trim(), file.program().trim()));
+    layout.findings.push(format!(
+        "version {} of MDF, written by `{}`",
+        file.version().trim(),
+        file.program().trim()
+    ));
     if without_clock > 0 {
         layout.findings.push(format!("{without_clock} channels without a time channel are left out"));
     }
-    Ok(Box::new(Mdf3 { path: path.clone(), file, layout, masters, channels, missing: options.missing.clone() }))
+    Ok(Box::new(Mdf3 {
+        path: path.clone(),
+        file,
+        layout,
+        masters,
+        channels,
+        missing: options.missing.clone(),
+    }))
 }
 
 impl Log for Mdf3 {
@@ -116,9 +128,15 @@ impl Log for Mdf3 {
             values.map(|values| values.to_f64()).map_err(|error| self.path.content(NAME, error.to_string()))
         };
         for (group, master) in self.masters.iter().enumerate() {
-            let of_group = |column: &&usize| self.layout.columns.get(**column).is_some_and(|column| column.group == group);
-            let places: Vec<Place> =
-                wanted.iter().filter(of_group).filter_map(|column| self.channels.get(*column)).copied().collect();
+            let of_group = |column: &&usize| {
+                self.layout.columns.get(**column).is_some_and(|column| column.group == group)
+            };
+            let places: Vec<Place> = wanted
+                .iter()
+                .filter(of_group)
+                .filter_map(|column| self.channels.get(*column))
+                .copied()
+                .collect();
             if places.is_empty() {
                 continue;
             }

@@ -1,10 +1,10 @@
 //! ASAM MDF, version 4: the format of measuring systems on engine test beds.
 
-use falcon_mdf::io::reader::BufferedSource;
-use falcon_mdf::{Channel, ChannelGroup, Mf4File, OpenOptions, Signal};
+use crate::mdf_source::MdfSource;
+use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
+use mapper_logs::limits::{BLOCK_BYTES, unpacked_max};
 use mapper_logs::{Column, Group, Kind, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -17,8 +17,8 @@ const CHUNK: usize = 4096;
 /// Maximum number of channels in a file.
 const CHANNEL_LIMIT: usize = 10_000;
 
-/// Maximum unpacked size of a compressed block, bytes: writers make blocks of 4 MiB, as in the standard.
-const BLOCK_LIMIT: u64 = 256 << 20;
+/// Size of a decoded value, bytes.
+const VALUE_BYTES: u64 = 8;
 
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"MDF     ") || head.starts_with(b"UnFinMF ")
@@ -39,34 +39,57 @@ struct Mdf4 {
 fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     let failed = |error: falcon_mdf::error::Mf4Error| path.content(NAME, error.to_string());
     options.only(&["time", "time_unit", "missing"]).map_err(|why| path.content(NAME, why))?;
-    let limits = OpenOptions { max_decompressed: BLOCK_LIMIT, ..OpenOptions::default() };
-    let file = match path.bytes() {
-        Some(bytes) => Mf4File::from_bytes_with_options(bytes.to_vec(), limits),
-        None => BufferedSource::open(path.path())
-            .and_then(|source| Mf4File::from_source_with_options(Arc::new(source), limits)),
-    };
-    let file = file.map_err(failed)?;
+    let limits = OpenOptions { max_decompressed: BLOCK_BYTES + 1, ..OpenOptions::default() };
+    let file = Mf4File::from_source_with_options(MdfSource::open(path, NAME)?, limits).map_err(failed)?;
     if file.channel_count() > CHANNEL_LIMIT {
-        return Err(path.content(NAME, format!("it has {} channels; at most {CHANNEL_LIMIT} are read", file.channel_count())));
+        return Err(path.content(
+            NAME,
+            format!("it has {} channels; at most {CHANNEL_LIMIT} are read", file.channel_count()),
+        ));
     }
-    let mut log = Mdf4 { path: path.clone(), layout: Layout::default(), masters: Vec::new(), channels: Vec::new(), missing: options.missing.clone(), file };
+    let mut log = Mdf4 {
+        path: path.clone(),
+        layout: Layout::default(),
+        masters: Vec::new(),
+        channels: Vec::new(),
+        missing: options.missing.clone(),
+        file,
+    };
+    // A list of blocks may name the same packed block again and again.
+    let samples_max = unpacked_max(path.size_bytes()?) / VALUE_BYTES;
     let (mut left_out, mut without_clock) = (0usize, 0usize);
     for (index, group) in log.file.data_groups().iter().flat_map(|data| &data.channel_groups).enumerate() {
         let named = |channel: &&Channel| options.time.contains(&channel.name);
-        let clock = group.channels.iter().find(named).or_else(|| {
-            group.master_channel().filter(|master| master.is_time_channel())
-        });
+        let clock = group
+            .channels
+            .iter()
+            .find(named)
+            .or_else(|| group.master_channel().filter(|master| master.is_time_channel()));
         let readable = |channel: &&Channel| {
-            channel.unreadable().is_none() && channel.is_numeric() && !channel.is_array() && !channel.is_master()
+            // Without its conversion, a channel has no value.
+            let converts = !matches!(channel.conversion, Conversion::Unsupported { .. });
+            converts
+                && channel.unreadable().is_none()
+                && channel.is_numeric()
+                && !channel.is_array()
+                && !channel.is_master()
         };
         let Some(clock) = clock else {
             without_clock += group.channels.len();
             continue;
         };
-        let columns: Vec<Channel> = group.channels.iter().filter(readable).filter(|c| c.name != clock.name).cloned().collect();
+        let columns: Vec<Channel> =
+            group.channels.iter().filter(readable).filter(|c| c.name != clock.name).cloned().collect();
         left_out += group.channels.len().saturating_sub(columns.len() + 1);
         if columns.is_empty() || group.sample_count == 0 {
             continue;
+        }
+        if group.sample_count > samples_max {
+            let message = format!(
+                "a group states {} samples; a file of this size may have {samples_max}",
+                group.sample_count
+            );
+            return Err(path.content(NAME, message));
         }
         let number = log.layout.groups.len();
         log.layout.groups.push(Group { name: name_of(group, index), clock: clock_words(clock) });
@@ -90,18 +113,27 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         findings.push(format!("{left_out} channels are left out: texts, arrays, or not readable"));
     }
     if without_clock > 0 {
-        findings.push(format!("{without_clock} channels are left out: their groups have no clock; name one with `time`"));
+        findings.push(format!(
+            "{without_clock} channels are left out: their groups have no clock; name one with `time`"
+        ));
     }
     log.layout.start_time_ns = u64::try_from(log.file.start_time().timestamp_ns).ok().filter(|ns| *ns > 0);
     if log.layout.groups.is_empty() {
-        return Err(path.content(NAME, "it holds no group of numbers with a clock; name the clock's channel with `time`"));
+        return Err(path.content(
+            NAME,
+            "it holds no group of numbers with a clock; name the clock's channel with `time`",
+        ));
     }
     Ok(Box::new(log))
 }
 
 fn name_of(group: &ChannelGroup, index: usize) -> String {
     let source = group.source.as_ref().map(|source| source.name.clone());
-    [Some(group.acquisition_name.clone()), source].into_iter().flatten().find(|name| !name.trim().is_empty()).unwrap_or_else(|| format!("group {}", index + 1))
+    [Some(group.acquisition_name.clone()), source]
+        .into_iter()
+        .flatten()
+        .find(|name| !name.trim().is_empty())
+        .unwrap_or_else(|| format!("group {}", index + 1))
 }
 
 /// The unit of a clock in seconds; `None` if its unit is unknown. The standard prescribes seconds.
@@ -132,7 +164,9 @@ fn distinct_names(layout: &mut Layout) {
     }
     for index in 1..layout.groups.len() {
         let (before, rest) = layout.groups.split_at_mut(index);
-        if let Some(group) = rest.first_mut().filter(|group| before.iter().any(|other| other.name == group.name)) {
+        if let Some(group) =
+            rest.first_mut().filter(|group| before.iter().any(|other| other.name == group.name))
+        {
             group.name = format!("{} ({})", group.name, index + 1);
         }
     }
@@ -147,14 +181,21 @@ impl Log for Mdf4 {
         let failed = |error: falcon_mdf::error::Mf4Error| self.path.content(NAME, error.to_string());
         for (group, (master, unit_s)) in self.masters.iter().enumerate() {
             let mut channels: Vec<&Channel> = vec![master];
-            let of_group = |column: &&usize| self.layout.columns.get(**column).is_some_and(|column| column.group == group);
+            let of_group = |column: &&usize| {
+                self.layout.columns.get(**column).is_some_and(|column| column.group == group)
+            };
             channels.extend(wanted.iter().filter(of_group).filter_map(|column| self.channels.get(*column)));
             if channels.len() == 1 {
                 continue;
             }
             let mut values: Vec<f64> = Vec::new();
             for chunk in self.file.signals_chunks(&channels, CHUNK).map_err(failed)? {
-                let columns: Vec<Vec<f64>> = chunk.map_err(failed)?.iter().map(valid_values).collect::<Result<_, _>>().map_err(failed)?;
+                let columns: Vec<Vec<f64>> = chunk
+                    .map_err(failed)?
+                    .iter()
+                    .map(valid_values)
+                    .collect::<Result<_, _>>()
+                    .map_err(failed)?;
                 let Some((times_s, columns)) = columns.split_first() else { continue };
                 for (row, t_s) in times_s.iter().enumerate() {
                     values.clear();

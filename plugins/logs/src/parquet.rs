@@ -2,6 +2,7 @@
 
 use crate::record_batches::{Batches, open_log};
 use arrow_schema::Schema;
+use mapper_logs::limits::unpacked_max;
 use mapper_logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::errors::ParquetError;
@@ -15,6 +16,9 @@ const NAME: &str = "Parquet";
 /// Rows decoded at once.
 const BATCH_ROWS: usize = 8192;
 
+/// Unpacked size of a value, bytes.
+const VALUE_BYTES: u64 = 8;
+
 fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"PAR1")
 }
@@ -24,10 +28,18 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
 }
 
 fn batches(file: &LogFile) -> Result<(Schema, Batches), LogError> {
+    let most = unpacked_max(file.size_bytes()?);
     let failed = |error: ParquetError| file.content(NAME, error.to_string());
     macro_rules! reader_of {
         ($source:expr) => {{
             let builder = ParquetRecordBatchReaderBuilder::try_new($source).map_err(failed)?;
+            let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or(u64::MAX);
+            if rows.saturating_mul(VALUE_BYTES) > most {
+                return Err(file.content(
+                    NAME,
+                    format!("it states {rows} rows; a file of this size may have {}", most / VALUE_BYTES),
+                ));
+            }
             let schema = builder.schema().as_ref().clone();
             let reader = builder.with_batch_size(BATCH_ROWS).build().map_err(failed)?;
             (schema, Box::new(reader) as Batches)

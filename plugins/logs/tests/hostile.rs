@@ -37,10 +37,39 @@ fn mdf4() -> Vec<u8> {
     let group = writer.add_group(&times).unwrap();
     group.add_channel("n_TC", "rpm", &times).unwrap();
     group.add_channel("T2", "degC", &times).unwrap();
-    let folder = std::env::temp_dir().join(format!("mapper-hostile-{}.mf4", std::process::id()));
-    writer.write_to_file(&folder).unwrap();
-    let bytes = std::fs::read(&folder).unwrap();
-    std::fs::remove_file(folder).unwrap();
+    let mut bytes = Vec::new();
+    writer.write(&mut bytes).unwrap();
+    bytes
+}
+
+/// An integer of an MDF file.
+fn number(bytes: &[u8], at: usize) -> usize {
+    usize::try_from(u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())).unwrap()
+}
+
+/// Gives a channel of an MDF file a conversion by this formula: blocks `CC` and `TX` at the end, and the link to them.
+fn with_formula(mut bytes: Vec<u8>, name: &str, formula: &str) -> Vec<u8> {
+    let block = |kind: &[u8], links: &[usize], data: &[u8]| {
+        let mut block = [kind, &[0; 4]].concat();
+        block.extend(u64::try_from(24 + 8 * links.len() + data.len()).unwrap().to_le_bytes());
+        block.extend(u64::try_from(links.len()).unwrap().to_le_bytes());
+        links.iter().for_each(|link| block.extend(u64::try_from(*link).unwrap().to_le_bytes()));
+        [block, data.to_vec()].concat()
+    };
+    let channel = (0..bytes.len() - 48)
+        .filter(|at| bytes[*at..].starts_with(b"##CN"))
+        .find(|at| bytes[number(&bytes, at + 24 + 16) + 24..].starts_with(name.as_bytes()))
+        .unwrap();
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    let text = bytes.len();
+    bytes.extend(block(b"##TX", &[], &[formula.as_bytes(), &[0; 8]].concat()));
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    let conversion = bytes.len();
+    // Kind 3, one reference, no values, no range.
+    let data = [&[3, 0, 0, 0, 1, 0, 0, 0][..], &[0; 16]].concat();
+    bytes.extend(block(b"##CC", &[0, 0, 0, 0, text], &data));
+    bytes[channel + 24 + 32..channel + 24 + 40]
+        .copy_from_slice(&u64::try_from(conversion).unwrap().to_le_bytes());
     bytes
 }
 
@@ -141,6 +170,80 @@ fn every_truncation_ends() {
 fn refusal(bytes: &[u8]) -> String {
     let file = LogFile::of_bytes(Path::new("log"), bytes);
     LOG_FORMATS.open(&file, &LogOptions::default()).err().expect("refused").to_string()
+}
+
+/// A conversion rule that calls its reader at each level: the process would end without a stack. The channel is left out, the others are read.
+#[test]
+fn a_formula_of_a_hundred_thousand_levels_costs_its_channel_alone() {
+    let plain = mdf4();
+    let deep = |open: &str, close: &str| format!("{}X{}", open.repeat(100_000), close.repeat(100_000));
+    for formula in [deep("(", ")"), deep("-", ""), deep("abs(", ")"), deep("X+", ""), deep("2^", "")] {
+        let bytes = with_formula(plain.clone(), "T2", &formula);
+        let file = LogFile::of_bytes(Path::new("log"), &bytes);
+        let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+        let names: Vec<String> = log.layout().columns.iter().map(|column| column.name.clone()).collect();
+        assert_eq!(names, ["n_TC"]);
+        assert_eq!(survey(log.as_mut()).unwrap().columns[0].count, 50);
+    }
+}
+
+/// A formula of a sensor is applied: the deep ones above are what fails, not the conversion of the test.
+#[test]
+fn a_usual_formula_is_applied() {
+    let bytes = with_formula(mdf4(), "T2", "((2*X+1)*X)^2");
+    let file = LogFile::of_bytes(Path::new("log"), &bytes);
+    let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+    let found = survey(log.as_mut()).unwrap();
+    // 4.9 s are the last sample.
+    assert!(
+        (found.columns[1].max - ((2.0 * 4.9 + 1.0) * 4.9f64).powi(2)).abs() < 1e-9,
+        "{:?}",
+        found.columns
+    );
+}
+
+/// Few bytes that state an unpacked block of a gigabyte, or unpack to a workbook of gigabytes.
+#[test]
+fn bombs_are_refused_before_they_unpack() {
+    let mut writer = falcon_mdf::Mf4Writer::new();
+    writer.set_compression(true);
+    let times: Vec<f64> = (0..5000).map(|row| f64::from(row) / 10.0).collect();
+    writer.add_group(&times).unwrap().add_channel("T2", "K", &times).unwrap();
+    let mut packed = Vec::new();
+    writer.write(&mut packed).unwrap();
+    let block = (0..packed.len()).find(|at| packed[*at..].starts_with(b"##DZ")).unwrap();
+    let read = |bytes: &[u8]| -> Result<(), mapper_logs::LogError> {
+        let file = LogFile::of_bytes(Path::new("log"), bytes);
+        survey(LOG_FORMATS.open(&file, &LogOptions::default())?.1.as_mut()).map(drop)
+    };
+    read(&packed).unwrap();
+    let mut bomb = packed.clone();
+    bomb[block + 32..block + 40].copy_from_slice(&(1u64 << 30).to_le_bytes());
+    assert!(read(&bomb).unwrap_err().to_string().contains("1024 MiB"));
+    // Zeros that unpack to 1.1 GiB: one MiB of them, packed a thousandfold.
+    let mut bytes = std::io::Cursor::new(xlsx());
+    let mut archive = zip::ZipWriter::new_append(&mut bytes).unwrap();
+    for part in 0..9 {
+        archive.start_file(format!("xl/media/{part}.bin"), zip::write::SimpleFileOptions::default()).unwrap();
+        (0..127).for_each(|_| archive.write_all(&[0; 1 << 20]).unwrap());
+    }
+    archive.finish().unwrap();
+    let bytes = bytes.into_inner();
+    assert!(bytes.len() < 2 << 20, "{}", bytes.len());
+    assert!(read(&bytes).unwrap_err().to_string().contains("1024 MiB"));
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pipe_in_the_place_of_a_log_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("log.csv");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    for path in [pipe.as_path(), Path::new("/dev/zero"), folder.path()] {
+        let error = LOG_FORMATS.open(&LogFile::of_path(path), &LogOptions::default()).err().unwrap();
+        assert!(matches!(error, mapper_logs::LogError::Read { .. }), "{error}");
+    }
 }
 
 #[test]

@@ -52,7 +52,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // The page of a run, for a browser.
     ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "numerics", "observe", "record", "report"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "map-table", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet", "fmu"]),
+    ("mapper-session",   &["core", "chart", "map-table", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet", "fmu", "yaml"]),
     // What fleets work on: one file a kind, above the application and the blind cases.
     ("mapper-studies",   &["blind", "campaign", "chart", "core", "fleet", "history", "record", "session"]),
     // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.

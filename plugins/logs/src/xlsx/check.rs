@@ -1,6 +1,7 @@
 //! Checks the unpacked size of a workbook, since the library unpacks it without limits.
 
 use super::NAME;
+use mapper_logs::limits::unpacked_max;
 use mapper_logs::{LogError, LogFile};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -13,9 +14,6 @@ const PART_LIMIT: u64 = 128 << 20;
 
 /// Maximum unpacked size of the part with cell formats, bytes: each format copies its strings.
 const STYLES_LIMIT: u64 = 8 << 20;
-
-/// Maximum unpacked size of all parts together, bytes: a sheet of a million rows with 40 columns.
-const WHOLE_LIMIT: u64 = 4 << 30;
 
 /// Maximum number of parts.
 const PART_COUNT_LIMIT: usize = 10_000;
@@ -54,7 +52,7 @@ impl Kind {
 
     fn limit(self) -> u64 {
         match self {
-            Kind::Sheet => WHOLE_LIMIT,
+            Kind::Sheet => u64::MAX,
             Kind::Styles => STYLES_LIMIT,
             Kind::SharedStrings | Kind::Other => PART_LIMIT,
         }
@@ -72,22 +70,33 @@ pub(super) fn check(file: &LogFile) -> Result<(), LogError> {
     if archive.has_overlapping_files().map_err(wrong)? {
         return Err(refused("its parts overlap: the same bytes are unpacked several times".to_owned()));
     }
-    let mut left = WHOLE_LIMIT;
+    let whole = unpacked_max(file.size_bytes()?);
+    let mut left = whole;
     for index in 0..archive.len() {
         let part = archive.by_index(index).map_err(wrong)?;
         let name = part.name().map_err(wrong)?.into_owned();
-        let read = check_part(part, Kind::of(&name), left).map_err(|why| refused(format!("{name} {why}")))?;
-        left -= read;
+        let kind = Kind::of(&name);
+        let read = check_part(part, kind, left).map_err(|why| refused(format!("{name} {why}")))?;
+        if read > kind.limit() {
+            return Err(refused(format!("{name} unpacks to more than {} MiB", kind.limit() >> 20)));
+        }
+        left = left.checked_sub(read).ok_or_else(|| {
+            refused(format!(
+                "its parts unpack to more than the {} MiB that a file of this size may have",
+                whole >> 20
+            ))
+        })?;
     }
     Ok(())
 }
 
-/// The unpacked size of a part in bytes, or its error.
+/// The unpacked size of a part in bytes, one more than its limit if it is larger; or its error.
 fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
     let limit = kind.limit().min(left);
     let read = Rc::new(Cell::new(0));
     let piece = Rc::new(Cell::new(0));
-    let mut counted = Counted { inner: part.take(limit + 1), read: read.clone(), piece: piece.clone() };
+    let mut counted =
+        Counted { inner: part.take(limit.saturating_add(1)), read: read.clone(), piece: piece.clone() };
     if kind == Kind::Other {
         io::copy(&mut counted, &mut io::sink()).map_err(|error| error.to_string())?;
     } else {
@@ -98,9 +107,6 @@ fn check_part(part: impl Read, kind: Kind, left: u64) -> Result<u64, String> {
         if read.get() <= limit {
             found?;
         }
-    }
-    if read.get() > limit {
-        return Err(format!("unpacks to more than {} MiB, or all parts together to more than {} MiB", kind.limit() >> 20, WHOLE_LIMIT >> 20));
     }
     Ok(read.get())
 }

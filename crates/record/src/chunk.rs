@@ -19,7 +19,7 @@ pub enum ChunkError {
         limit: u64,
     },
     /// Another compression.
-    #[error("it is compressed with `{compression}`, and only zstd can be read")]
+    #[error("it is compressed with `{compression}`, and only lz4 and zstd can be read")]
     Compression {
         /// Its compression.
         compression: String,
@@ -27,7 +27,7 @@ pub enum ChunkError {
     /// The compressed data are damaged.
     #[error("it does not decompress ({reason})")]
     Decompress {
-        /// The error of zstd.
+        /// The error of the library.
         reason: String,
     },
     /// Its unpacked size differs from the stated one.
@@ -71,6 +71,13 @@ impl Unpacker {
         self.content.clear();
         match compression {
             b"" => self.content.extend_from_slice(data),
+            b"lz4" => {
+                let most = claimed.saturating_add(1);
+                let mut frames = lz4_flex::frame::FrameDecoder::new(data).take(most);
+                frames
+                    .read_to_end(&mut self.content)
+                    .map_err(|error| ChunkError::Decompress { reason: error.to_string() })?;
+            }
             b"zstd" => self
                 .decompress(data, claimed)
                 .map_err(|error| ChunkError::Decompress { reason: error.to_string() })?,

@@ -1,6 +1,6 @@
 //! Why a recording could not be written or read.
 
-use crate::{FormatVersion, UnitError};
+use crate::{FormatVersion, ReadWarning, UnitError};
 use mapper_core::Channel;
 use mapper_logs::LogError;
 use mapper_logs::units::{kind_of, remedy};
@@ -85,6 +85,14 @@ pub enum RecordError {
         path: PathBuf,
         /// Its format.
         found: FormatVersion,
+    },
+    /// Nothing of it can be read, because its chunks cannot.
+    #[error("failed to read `{}`: {warning}, and nothing else in it is a measurement", path.display())]
+    NothingReadable {
+        /// The file.
+        path: PathBuf,
+        /// The first chunk that was left out.
+        warning: ReadWarning,
     },
     /// There are topics, but none of the mapped measurements.
     #[error("failed to read `{}`: it contains none of the expected measurements; its topics are {}; give a channel map that names its topics and fields", path.display(), list(topics))]

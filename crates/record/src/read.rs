@@ -2,6 +2,7 @@
 
 use crate::clock_steps::{repair_set_back, repair_set_forward};
 use crate::complaints::Complaints;
+use crate::continuity::repair_gaps;
 use crate::definitions::{Reads, source_of};
 use crate::log_read::{is_mcap, log_of_path, read_log};
 use crate::measured_valve::{hold, turns_share};
@@ -17,12 +18,11 @@ use crate::{
     AmbientPressure, ChannelMap, ChannelSource, FormatVersion, ReadWarning, RecordError, plausibility,
 };
 use mapper_core::{
-    Channel, Element, Group, Quality, ReadingOrigin, Recording, RedundantSensors, Series, StepMarker,
+    Channel, Element, Event, Group, Quality, ReadingOrigin, Recording, RedundantSensors, Series, StepMarker,
 };
 use mapper_logs::{LogError, LogFile, Unit};
 use mapper_yaml::{FindingKind, steps};
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 
@@ -71,8 +71,17 @@ pub fn read_recording(
 /// # Errors
 /// As [`read_recording`].
 pub fn read_steps(path: &Path, options: &ReadOptions) -> Result<Vec<StepMarker>, RecordError> {
+    Ok(read_marks(path, options)?.0)
+}
+
+/// Reads only the steps and the events of a recording of this program.
+///
+/// # Errors
+/// As [`read_recording`].
+pub fn read_marks(path: &Path, options: &ReadOptions) -> Result<(Vec<StepMarker>, Vec<Event>), RecordError> {
     let map = ChannelMap { channels: BTreeMap::new(), elements: BTreeMap::new(), ..ChannelMap::native() };
-    Ok(read(path, &map, options, &|| open(path))?.recording.steps)
+    let recording = read(path, &map, options, &|| open(path))?.recording;
+    Ok((recording.steps, recording.events))
 }
 
 /// Reads a recording from memory; `name` stands for the file in messages. Otherwise as [`read_recording`].
@@ -94,7 +103,7 @@ pub fn read_recording_from(
 }
 
 pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
-    Ok(Box::new(BufReader::with_capacity(1 << 16, File::open(path)?)))
+    Ok(Box::new(BufReader::with_capacity(1 << 16, mapper_yaml::open_file(path)?)))
 }
 
 fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Result<ReadReport, RecordError> {
@@ -106,8 +115,9 @@ fn read_as_log(file: &LogFile, map: &ChannelMap, options: &ReadOptions) -> Resul
             Err(error) => error.into(),
         });
     }
-    let log = read_log(file, map, options)?;
+    let mut log = read_log(file, map, options)?;
     let mut warnings = log.warnings;
+    repair_gaps(&mut log.builders, &mut log.ambient, &mut warnings);
     if log.averaged {
         warnings.push(ReadWarning::Averaged);
     }
@@ -142,6 +152,10 @@ fn read(
     let measured = builders.keys().any(|reads| reads.channel().info().group != Group::Command);
     let has_rig_topics = sink.topic_names.iter().any(|topic| !is_own(topic));
     if !measured && sink.format.is_none() && has_rig_topics {
+        let damaged = |warning: &ReadWarning| matches!(warning, ReadWarning::DamagedChunk { .. });
+        if let Some(warning) = scanned.warnings.into_iter().find(damaged) {
+            return Err(RecordError::NothingReadable { path: path.to_owned(), warning });
+        }
         let topics = sink.topic_names.into_iter().collect();
         return Err(RecordError::NothingMapped { path: path.to_owned(), topics });
     }
@@ -190,6 +204,9 @@ fn report(
     repair_set_back(&mut builders, &mut sink.steps, &mut sink.events, &mut warnings);
     if let Some(start_time_ns) = sink.start_time_ns {
         repair_set_forward(&mut builders, &mut sink.steps, start_time_ns, &mut warnings);
+    }
+    if sink.steps.is_empty() {
+        repair_gaps(&mut builders, None, &mut warnings);
     }
     let strays: Vec<(u64, u64)> = builders.values_mut().filter_map(SeriesBuilder::drop_strays).collect();
     let first_sample_ns = builders.values().filter_map(SeriesBuilder::first_time_ns).min();

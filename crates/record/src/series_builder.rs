@@ -26,6 +26,9 @@ pub(crate) struct Break {
     pub(crate) interval_ns: Option<u64>,
 }
 
+/// Samples before and after a gap.
+pub(crate) type Sides = (Vec<(f64, f64)>, Vec<(f64, f64)>);
+
 /// Collects the samples of one channel.
 #[derive(Debug, Default)]
 pub(crate) struct SeriesBuilder {
@@ -112,6 +115,38 @@ impl SeriesBuilder {
         for time_ns in self.times_ns.iter_mut().skip(before + 1) {
             *time_ns = time_ns.saturating_sub(by_ns);
         }
+    }
+
+    /// Whether no sample is earlier than the one before it.
+    pub(crate) fn is_in_order(&self) -> bool {
+        self.times_ns.is_sorted()
+    }
+
+    /// Times between neighbours, s, where they advance.
+    pub(crate) fn intervals_s(&self) -> Vec<f64> {
+        let steps = self.times_ns.windows(2).filter_map(|pair| pair[1].checked_sub(pair[0]));
+        steps.filter(|step| *step > 0).map(|step| step as f64 / 1e9).collect()
+    }
+
+    /// Neighbours that are more than this apart, ns.
+    pub(crate) fn gaps(&self, limit_s: f64) -> impl Iterator<Item = (u64, u64)> {
+        let far = move |pair: &&[u64]| pair[1].saturating_sub(pair[0]) as f64 > limit_s * 1e9;
+        self.times_ns.windows(2).filter(far).map(|pair| (pair[0], pair[1]))
+    }
+
+    /// The samples next to a gap: times before and after its edges, s, and values. `None` if the channel has no such gap.
+    pub(crate) fn sides(&self, from_ns: u64, to_ns: u64, count: usize) -> Option<Sides> {
+        let half_ns = from_ns + to_ns.saturating_sub(from_ns) / 2;
+        let next = self.times_ns.windows(2).position(|pair| pair[0] < half_ns && half_ns <= pair[1])? + 1;
+        let (edge_ns, start_ns) = (*self.times_ns.get(next - 1)?, *self.times_ns.get(next)?);
+        let seconds = |time_ns: u64, from_ns: u64| (time_ns as i128 - from_ns as i128) as f64 / 1e9;
+        let of = |range: std::ops::Range<usize>, edge_ns: u64| -> Vec<(f64, f64)> {
+            range
+                .filter_map(|at| Some((seconds(*self.times_ns.get(at)?, edge_ns), *self.values.get(at)?)))
+                .collect()
+        };
+        let end = self.times_ns.len().min(next + count);
+        Some((of(next.saturating_sub(count)..next, edge_ns), of(next..end, start_ns)))
     }
 
     pub(crate) fn is_empty(&self) -> bool {

@@ -69,6 +69,47 @@ fn a_clock_that_is_set_back_loses_no_reading() {
     }
 }
 
+/// Without step markers, only the readings show it: they go on as if no time had passed. Over a pause they have moved, and at rest they show
+/// nothing.
+#[test]
+fn a_clock_that_is_set_forward_in_an_imported_log_is_found_by_its_readings() {
+    for by_s in [7, 3600] {
+        let times: Vec<u64> =
+            (0..600).map(|row| (10_000 + if row < 300 { 0 } else { by_s }) * S + row * S / 10).collect();
+        let (series, warnings) = read(&times);
+        assert_eq!(set_by(&warnings), [by_s as f64]);
+        for channel in [Channel::T2, Channel::T3] {
+            let t_s = &series[&channel].t_s;
+            assert!(
+                t_s.iter().enumerate().all(|(row, t_s)| (t_s - row as f64 / 10.0).abs() < 1e-5),
+                "{channel}"
+            );
+        }
+    }
+    // A table: a temperature that rises with time, by noise of a tenth of a kelvin, and one at rest.
+    let noise = |row: u32| 0.1 * (f64::from(row * 7919 % 101) / 50.0 - 1.0);
+    for (what, rate_k_s, passes, set) in [
+        ("set", 0.5, false, vec![600.0]),
+        ("paused", 0.5, true, vec![]),
+        ("at rest, set", 0.0, false, vec![]),
+        ("at rest, paused", 0.0, true, vec![]),
+    ] {
+        let mut text = String::from("t [s];T2 [K];T3 [K]\n");
+        for row in 0..400 {
+            let gap_s = if row < 200 { 0.0 } else { 600.0 };
+            let run_s = 0.1 * f64::from(row);
+            let t2_k = 330.0 + noise(row) + rate_k_s * (run_s + if passes { gap_s } else { 0.0 });
+            text.push_str(&format!("{:.1};{t2_k:.3};{:.3}\n", run_s + gap_s, 800.0 + noise(row + 31)));
+        }
+        let map = "channels:\n  T2: {field: T2, unit: K}\n  T3: {field: T3, unit: K}\nconstants: {T_amb: 25 degC}\n";
+        let map = ChannelMap::from_yaml(map, Path::new("map.yaml")).unwrap();
+        let options = ReadOptions { logs: mapper_log_formats::LOG_FORMATS, ..ReadOptions::default() };
+        let report = read_recording_from(text.as_bytes(), Path::new("log.csv"), &map, &options).unwrap();
+        let found: Vec<f64> = set_by(&report.warnings).iter().map(|by_s| by_s.round()).collect();
+        assert_eq!(found, set, "{what}: {:?}", report.warnings);
+    }
+}
+
 #[test]
 fn late_messages_are_no_set_clock() {
     let even: Vec<u64> = (0..4000).map(|row| 10_000 * S + row * S / 10).collect();

@@ -167,6 +167,47 @@ fn foreign(topic: &str, rows: &[(u64, &str)], metadata: &[(&str, &str)]) -> Vec<
     file.into_inner()
 }
 
+/// The chunks of an uncompressed file with `pack` applied to their content.
+fn packed(bytes: &[u8], compression: &str, pack: impl Fn(&[u8]) -> Vec<u8>) -> Vec<u8> {
+    let mut file = bytes[..8].to_vec();
+    for (at, opcode, length) in records(bytes) {
+        let body = &bytes[at + 9..at + 9 + length];
+        // Chunk: start, end, size, checksum, no compression, content.
+        let body = match opcode {
+            6 => {
+                let content = pack(&body[8 + 8 + 8 + 4 + 4 + 8..]);
+                let name = [&(compression.len() as u32).to_le_bytes(), compression.as_bytes()].concat();
+                [&body[..28], &name, &(content.len() as u64).to_le_bytes(), &content].concat()
+            }
+            _ => body.to_vec(),
+        };
+        file.push(opcode);
+        file.extend((body.len() as u64).to_le_bytes());
+        file.extend(body);
+    }
+    [&file, &bytes[bytes.len() - 8..]].concat()
+}
+
+#[test]
+fn lz4_is_read_and_another_compression_is_named() {
+    let rows = [(1_000_000_000, r#"{"tt2": 300.0}"#), (2_000_000_000, r#"{"tt2": 301.0}"#)];
+    let plain = foreign("/daq", &rows, &[]);
+    let lz4 = packed(&plain, "lz4", |content| {
+        let mut frames = lz4_flex::frame::FrameEncoder::new(Vec::new());
+        std::io::Write::write_all(&mut frames, content).unwrap();
+        frames.finish().unwrap()
+    });
+    let series = |bytes: &[u8]| {
+        read_foreign(bytes, &map(", unit: K")).unwrap().recording.series[&Channel::T2].values.clone()
+    };
+    assert_eq!(series(&lz4), [300.0, 301.0]);
+    assert_eq!(series(&lz4), series(&plain));
+    let other = packed(&plain, "brotli", <[u8]>::to_vec);
+    let error = read_foreign(&other, &map(", unit: K")).unwrap_err();
+    assert!(matches!(error, RecordError::NothingReadable { .. }), "{error}");
+    assert!(error.to_string().contains("brotli"), "{error}");
+}
+
 fn map(unit: &str) -> ChannelMap {
     let text = format!("channels:\n  T2: {{topic: /daq, field: tt2{unit}}}\nconstants: {{T_amb: 25 degC}}\n");
     ChannelMap::from_yaml(&text, Path::new("map.yaml")).unwrap()

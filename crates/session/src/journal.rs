@@ -176,7 +176,7 @@ pub(crate) const COMPLETED: &str = "Completed.";
 /// The system's error.
 pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(READ_MAX).read_to_end(&mut bytes)?;
+    mapper_yaml::open_file(path)?.take(READ_MAX).read_to_end(&mut bytes)?;
     let mut parts: Vec<JournalPart> = Vec::new();
     for line in bytes.split(|byte| *byte == b'\n') {
         match (serde_json::from_slice::<Entry>(line), parts.last_mut()) {
@@ -254,6 +254,32 @@ mod tests {
             let more = read_journal(&path).unwrap();
             assert_eq!(more.last().unwrap().recording, "c");
             assert_eq!(more.len(), parts.len() + 1);
+        }
+    }
+
+    /// A journal that names a soak: the recording decides whether there was one.
+    #[test]
+    fn a_soak_counts_only_if_the_recording_holds_it() {
+        use mapper_core::{Event, EventKind};
+        for (recorded, soaked) in [(EventKind::SoakStarted, false), (EventKind::SoakEnded, true)] {
+            let directory = tempfile::tempdir().unwrap();
+            let mut journal = Journal::open(&directory.path().join("journal.jsonl"), false).unwrap();
+            journal.write(&part("recording.mcap")).unwrap();
+            journal.write(&Entry::Soaked).unwrap();
+            let header = mapper_record::RecordingHeader {
+                library: "mapper".to_owned(),
+                profile: String::new(),
+                start_time_ns: 0,
+                metadata: std::collections::BTreeMap::new(),
+                plan_json: None,
+                campaign_yaml: None,
+            };
+            let path = directory.path().join("recording.mcap");
+            let mut writer = mapper_record::RecordingWriter::create(&path, &header).unwrap();
+            writer.write_event(&Event { t_s: 1.0, kind: recorded, message: String::new() }).unwrap();
+            writer.finish().unwrap();
+            let broken_off = crate::BrokenOff::read(directory.path()).unwrap();
+            assert_eq!(broken_off.soaked(), soaked, "{recorded:?}");
         }
     }
 

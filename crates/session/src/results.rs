@@ -61,6 +61,9 @@ pub struct Results {
     pub surge: Option<SoughtSurge>,
     /// Other remarks.
     pub remarks: Vec<String>,
+    /// Why a file of the results could not be written, and how to write it later; `None`: all were written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unwritten: Option<String>,
     /// The map itself; `None` if there is none.
     #[serde(skip)]
     pub compressor_map: Option<CompressorMap>,
@@ -174,7 +177,13 @@ impl Session<'_> {
             tested_at: instant(started_ns),
             sources: Vec::new(),
         };
-        self.written(&origin, identified, (recording, further), remarks, directory)
+        let (results, written) =
+            self.written(&origin, identified, (recording, further), remarks, directory)?;
+        let unwritten = written.err().map(|error| {
+            let run = directory.display();
+            format!("{error}; make room, then write the results with `mapper run --resume {run}`, which does not use the rig")
+        });
+        Ok(Results { unwritten, ..results })
     }
 
     /// Identifies recordings and writes the same results as a run, points, map and report, to `directory`. Creates it if missing. Existing
@@ -203,7 +212,8 @@ impl Session<'_> {
         let identified = self.identify(recorded, map, method)?;
         let origin = Provenance { outcome: identified_by(identified.config.method), ..origin };
         std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
-        self.written(&origin, identified, (first, further), remarks, directory)
+        let (results, written) = self.written(&origin, identified, (first, further), remarks, directory)?;
+        written.map(|()| results)
     }
 
     /// The page of the run with recordings `shown`, with other runs' maps for comparison and its gap diagnosis, if any. Writes no file.
@@ -243,7 +253,7 @@ impl Session<'_> {
         page_of(&identified, &report, &others, gap)
     }
 
-    /// Writes the files of an identification.
+    /// Writes the files of an identification. A file that cannot be written costs the later ones, and not the results themselves.
     fn written(
         &self,
         origin: &Provenance,
@@ -251,12 +261,13 @@ impl Session<'_> {
         (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
         mut remarks: Vec<String>,
         directory: &Path,
-    ) -> Result<Results, SessionError> {
+    ) -> Result<(Results, Result<(), SessionError>), SessionError> {
         remarks.extend(identified.remarks.iter().cloned());
         let compressor_map = compressor_map(&origin.machine, &identified, &mut remarks);
+        let mut files = ResultFiles { directory, failed: Ok(()) };
         let map = match &compressor_map {
             Some(map) => {
-                export(self.registry, &origin.formats(), map, &origin.map_units(), directory, &mut remarks)?
+                export(self.registry, &origin.formats(), map, &origin.map_units(), &mut files, &mut remarks)?
             }
             None => BTreeMap::new(),
         };
@@ -276,9 +287,9 @@ impl Session<'_> {
         if let Some(surge) = &identified.surge {
             points_file["surge"] = json!(surge);
         }
-        write_new(&directory.join(run_directory::POINTS), json_text(&points_file)?.as_bytes())?;
+        files.write(run_directory::POINTS, json_text(&points_file)?.as_bytes());
         if !identified.budgets.is_empty() {
-            write_new(&directory.join(run_directory::BUDGET), &budget_csv(&identified.budgets)?)?;
+            files.write(run_directory::BUDGET, &budget_csv(&identified.budgets)?);
         }
         let repeats = identified.repeats();
         let program = program_and_commit(self.registry.commit);
@@ -292,13 +303,10 @@ impl Session<'_> {
             &repeats,
             has_picture,
         );
-        let report = directory.join(run_directory::REPORT);
-        write_new(&report, run_report(&shown).as_bytes())?;
-        let page = directory.join(run_directory::PAGE);
-        let page_text = page_of(&identified, &shown, &[], None)?;
-        write_new(&page, page_text.as_bytes())?;
+        let report = files.write(run_directory::REPORT, run_report(&shown).as_bytes());
+        let page = files.write(run_directory::PAGE, page_of(&identified, &shown, &[], None)?.as_bytes());
         let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
-        Ok(Results {
+        let results = Results {
             run: directory.to_owned(),
             recording: recording_file,
             further_recordings,
@@ -314,8 +322,28 @@ impl Session<'_> {
             zero,
             surge,
             remarks,
+            unwritten: None,
             compressor_map,
-        })
+        };
+        Ok((results, files.failed))
+    }
+}
+
+/// The files of an identification in their directory.
+struct ResultFiles<'a> {
+    directory: &'a Path,
+    /// Why the first file that could not be written could not; none is written after it.
+    failed: Result<(), SessionError>,
+}
+
+impl ResultFiles<'_> {
+    /// Writes a file, and returns its path.
+    fn write(&mut self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.directory.join(name);
+        if self.failed.is_ok() {
+            self.failed = write_new(&path, bytes);
+        }
+        path
     }
 }
 
@@ -456,10 +484,10 @@ fn export(
     formats: &[String],
     map: &CompressorMap,
     units: &MapUnits,
-    directory: &Path,
+    files: &mut ResultFiles<'_>,
     remarks: &mut Vec<String>,
 ) -> Result<BTreeMap<String, PathBuf>, SessionError> {
-    let mut files = BTreeMap::new();
+    let mut paths = BTreeMap::new();
     for name in formats {
         let format = registry.written_format(name)?;
         let bytes = match format.write_in(map, units) {
@@ -471,9 +499,8 @@ fn export(
             }
             Err(error) => return Err(error.into()),
         };
-        let path = directory.join(format!("map.{}", format.extension));
-        write_new(&path, &bytes)?;
-        files.insert(name.to_owned(), path);
+        let path = files.write(&format!("map.{}", format.extension), &bytes);
+        paths.insert(name.to_owned(), path);
     }
-    Ok(files)
+    Ok(paths)
 }

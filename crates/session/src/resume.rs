@@ -3,8 +3,8 @@
 use crate::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::{Plan, PlanStep, StepKind, StepMarker};
-use mapper_record::{ReadOptions, read_steps};
+use mapper_core::{EventKind, Plan, PlanStep, StepKind, StepMarker};
+use mapper_record::{ReadOptions, read_marks, read_steps};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
@@ -38,10 +38,11 @@ impl BrokenOff {
         if parts.is_empty() {
             return Err(why("its journal holds no run".to_owned()));
         }
-        for part in parts.iter_mut().filter(|part| !part.saved.is_empty()) {
-            // The recording decides: a step that the journal names and the recording does not hold to its end is run again.
-            let steps =
-                read_steps(&directory.join(&part.recording), &ReadOptions::default()).unwrap_or_default();
+        for part in parts.iter_mut().filter(|part| part.soaked || !part.saved.is_empty()) {
+            // The recording decides: a step, or a soak, that the journal names and the recording does not hold to its end is run again.
+            let (steps, events) =
+                read_marks(&directory.join(&part.recording), &ReadOptions::default()).unwrap_or_default();
+            part.soaked = events.iter().any(|event| event.kind == EventKind::SoakEnded);
             let whole = steps.iter().filter(|step| step.end_s > step.start_s).map(|step| step.index);
             let whole: BTreeSet<usize> = whole.collect();
             part.saved.retain(|index| whole.contains(index));
@@ -102,8 +103,11 @@ impl BrokenOff {
                 return why(format!("{} changed since", differences.join(" and ")));
             }
         }
-        if self.directory.join(run_directory::POINTS).exists() && self.is_whole(campaign, plan) {
-            return why("all of its steps are there, and so is its map".to_owned());
+        // The page is written last: without it the disk was full, or the program was killed.
+        let results = [run_directory::POINTS, run_directory::REPORT, run_directory::PAGE];
+        let written = results.iter().all(|name| self.directory.join(name).exists());
+        if written && self.is_whole(campaign, plan) {
+            return why("all of its steps are there, and so are its results".to_owned());
         }
         Ok(())
     }

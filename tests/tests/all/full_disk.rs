@@ -6,10 +6,10 @@ use mapper_tests::{
 };
 use std::process::Command;
 
-/// Mounts 2 MB on $1, runs the rest there, and keeps what was written in $2.
+/// Mounts $SIZE (2 MB if none is given) on $1, runs the rest there, and keeps what was written in $2.
 const SCRIPT: &str = r#"
 disk="$1"; kept="$2"; shift 2
-mount -t tmpfs -o size=2m tmpfs "$disk" || exit 99
+mount -t tmpfs -o size="${SIZE:-2m}" tmpfs "$disk" || exit 99
 "$@"; code=$?
 cp -r "$disk"/. "$kept" || exit 98
 exit $code
@@ -45,6 +45,46 @@ fn a_full_disk_is_reported_and_what_was_flushed_can_be_read() {
     let points = result["points"].as_array().unwrap();
     assert!(points.len() >= 2, "{} points", points.len());
     assert!(points[1]["eta"].is_f64(), "{}", points[1]);
+}
+
+/// A disk that is full only when the page is written: the table is shown, the run is whole, and the command in the message finishes it.
+#[test]
+#[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
+fn a_disk_that_is_full_at_the_page_costs_the_page_alone() {
+    let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
+    let campaign = CampaignFile::shipped_with(&replacements);
+    let runs = campaign.runs();
+    mapper(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), runs.as_os_str()]).exits(0);
+    // tmpfs gives out pages of 4 KiB; a directory, and the file that is written aside, take some more.
+    let pages = |bytes: u64| bytes.div_ceil(4096) * 4096;
+    let (mut all, mut page) = (0, 0);
+    for entry in std::fs::read_dir(only_run(&runs)).unwrap().flatten() {
+        let bytes = pages(entry.metadata().unwrap().len());
+        all += bytes;
+        page += if entry.file_name() == "report.html" { bytes } else { 0 };
+    }
+    let (disk, kept) = (campaign.directory().join("disk"), campaign.directory().join("kept"));
+    std::fs::create_dir(&disk).unwrap();
+    std::fs::create_dir(&kept).unwrap();
+    let run = mapper_command(["run".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), disk.as_os_str()]);
+    let output = Command::new("unshare")
+        .args(["--mount", "sh", "-c", SCRIPT, "sh"])
+        .args([&disk, &kept])
+        .arg(run.get_program())
+        .args(run.get_args())
+        .env("SIZE", (all - page / 2).to_string())
+        .current_dir(mapper_tests::repository())
+        .output()
+        .unwrap();
+    let finished = Finished::from(output).exits(1);
+    assert!(finished.stdout.contains("krpm"), "no table: {}", finished.stdout);
+    assert!(finished.stderr.contains("--resume"), "{}", finished.stderr);
+    let run = only_run(&kept);
+    assert!(!run.join("report.html").exists(), "half a page under its name");
+    mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(0);
+    assert!(run.join("report.html").exists());
+    // Once more there is nothing to do.
+    mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(4);
 }
 
 /// Mounts 16 kB on $1, runs the rest, and copies what was written there to $2.

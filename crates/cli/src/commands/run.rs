@@ -154,8 +154,12 @@ impl Run {
         let unusable = results.as_ref().is_ok_and(|results| {
             results.points.iter().all(|scored| scored.point.verdict == Verdict::Unusable)
         });
+        let unwritten = results.as_ref().ok().and_then(|results| results.unwritten.clone());
         let kept = "the rig is safe and the recording is kept";
         let failure = match end {
+            Ended::Completed if unwritten.is_some() => {
+                Some(Failure::new(Code::Failure, unwritten.unwrap_or_default()))
+            }
             Ended::Completed if unusable => Some(Failure::new(
                 Code::BadRecording,
                 "no point is usable: the reasons stand above and in the report",

@@ -163,7 +163,8 @@ where
     }
 
     /// Takes exactly one step, to `end_s` (> `t_s`), without control of its error: on a frozen grid of steps, runs with
-    /// slightly different parameters differ smoothly, which a step-size control would spoil.
+    /// slightly different parameters differ smoothly, which a step-size control would spoil. Also returns the estimate of its error, in
+    /// tolerances.
     ///
     /// # Errors
     /// [`IntegrationError::StepTooSmall`] if the system cannot be stepped at all (rates that are not numbers).
@@ -171,7 +172,7 @@ where
         &mut self,
         system: &mut impl OdeSystem<N>,
         end_s: f64,
-    ) -> Result<Step<N>, IntegrationError> {
+    ) -> Result<(Step<N>, f64), IntegrationError> {
         let (t0_s, y0) = (self.t_s, self.y);
         let f0 = system.rates(t0_s, &y0);
         let jacobian = self.jacobian(system, t0_s, &y0, &f0);
@@ -182,10 +183,11 @@ where
         if !stages.y1.iter().all(|value| value.is_finite()) {
             return Err(failed);
         }
+        let error = self.error_norm(&y0, &stages);
         self.steps += 1;
         self.t_s = end_s;
         self.y = stages.y1;
-        Ok(Step { t0_s, t1_s: end_s, y0, y1: stages.y1, dense: stages.dense })
+        Ok((Step { t0_s, t1_s: end_s, y0, y1: stages.y1, dense: stages.dense }, error))
     }
 
     fn scale(&self, i: usize, a: f64, b: f64) -> f64 {

@@ -54,8 +54,9 @@ impl SmoothedInputs {
     ) -> SmoothedInputs {
         let command = LaggedCommand::of_recording(recording, p3, valve);
         let along: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
+        let jumps_s: Vec<f64> = recording.steps.iter().map(|step| step.start_s).collect();
         let smoothed = |channel: Channel, values: &[f64]| {
-            smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour)
+            smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour, &jumps_s)
         };
         let p3_rest = table.column(Channel::P3).and_then(|values| {
             let rest: Vec<f64> = values.iter().zip(&along).map(|(p3, a)| p3 - a).collect();
@@ -72,7 +73,7 @@ impl SmoothedInputs {
             p3_rest: p3_rest.unwrap_or_else(|| Course::constant(0.0)),
             drivers: others.chain([Channel::TAmb]).filter_map(driver).collect(),
             nominal: declared.nominal,
-            jumps_s: recording.steps.iter().map(|step| step.start_s).collect(),
+            jumps_s,
             command,
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! The model is an integrated random walk with white and first-order noise. Its intensity is chosen by likelihood, and the smoothed time
 //! history comes from the Kalman smoother (Rauch, Tung and Striebel 1965). If nothing wanders, the result is a straight line over the whole
-//! recording, which averages all of it.
+//! recording, which averages all of it. If something does, its slope may also change at given times, where commands change: a temperature that
+//! follows its command with a lag has a kink there, which must not be rounded.
 
 use mapper_core::NoiseColour;
 use mapper_numerics::coloured_noise::{memory, variance_of_mean};
@@ -18,6 +19,8 @@ pub struct Course {
     start_s: f64,
     value: Vec<f64>,
     slope_s: Vec<f64>,
+    /// Whether the slope changes before each value, halfway from the one before it; empty if it changes nowhere.
+    kinks: Vec<bool>,
     /// Typical standard deviation of the time history, in the quantity's unit.
     pub sigma: f64,
     /// Correlation time of its error, s.
@@ -27,7 +30,14 @@ pub struct Course {
 impl Course {
     /// A constant value.
     pub fn constant(value: f64) -> Course {
-        Course { start_s: 0.0, value: vec![value], slope_s: vec![0.0], sigma: 0.0, correlation_s: 1.0 }
+        Course {
+            start_s: 0.0,
+            value: vec![value],
+            slope_s: vec![0.0],
+            kinks: Vec::new(),
+            sigma: 0.0,
+            correlation_s: 1.0,
+        }
     }
 
     /// Value at `t_s`; constant beyond both ends.
@@ -42,9 +52,14 @@ impl Course {
         }
         let i = place as usize;
         let x = place - i as f64;
-        // Cubic with the slopes of the smoother.
         let (a, b) = (self.value[i], self.value[i + 1]);
         let (da, db) = (BIN_S * self.slope_s[i], BIN_S * self.slope_s[i + 1]);
+        if self.kinks.get(i + 1) == Some(&true) {
+            // Both sides go on to the kink.
+            let halfway = 0.5 * (a + 0.5 * da + b - 0.5 * db);
+            return if x < 0.5 { a + 2.0 * x * (halfway - a) } else { b + 2.0 * (1.0 - x) * (halfway - b) };
+        }
+        // Cubic with the slopes of the smoother.
         let rise = b - a;
         a + x * (da + x * (3.0 * rise - 2.0 * da - db + x * (da + db - 2.0 * rise)))
     }
@@ -56,17 +71,39 @@ struct Bin {
     samples: f64,
 }
 
-/// The time history through `values` at `t_s` (rising; NaN counts as missing) with the noise `noise_sigma` of one sample. `None` without any
-/// value.
-pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour) -> Option<Course> {
+/// Standard deviations of a change of slope that are tried, noise of a sample a second.
+const KINKS_PER_S: [f64; 4] = [0.01, 0.1, 1.0, 10.0];
+/// Gain of the log likelihood from which changes of slope are assumed: that of one more parameter at three standard deviations.
+const KINKED: f64 = 4.5;
+/// Exponents of the intensity over the variance, in steps of half a decade.
+const EXPONENTS: std::ops::RangeInclusive<i32> = -26..=4;
+
+/// The time history through `values` at `t_s` (rising; NaN counts as missing) with the noise `noise_sigma` of one sample. Its slope may change
+/// at `kinks_s`. `None` without any value.
+pub fn smooth(
+    t_s: &[f64],
+    values: &[f64],
+    noise_sigma: f64,
+    colour: NoiseColour,
+    kinks_s: &[f64],
+) -> Option<Course> {
     let bins = bins(t_s, values);
     let first = bins.iter().find_map(|bin| bin.mean)?;
     let start_s = t_s[0] + 0.5 * BIN_S;
     let noise_sigma = noise_sigma.max(1e-12);
     let c2 = colour.first_order_share_ratio.powi(2);
     let tau_s = colour.time_constant_s.max(1e-3);
+    let mut kinks = vec![false; bins.len()];
+    for kink_s in kinks_s {
+        // Between the bins whose common edge is the nearest.
+        let edge = ((kink_s - t_s[0]) / BIN_S).round();
+        if let Some(kink) = (edge >= 1.0).then(|| kinks.get_mut(edge as usize)).flatten() {
+            *kink = true;
+        }
+    }
     let filter = Filter {
         bins: &bins,
+        kinks: &kinks,
         first,
         noise_sigma,
         white_variance: (1.0 - c2) * noise_sigma * noise_sigma,
@@ -74,22 +111,40 @@ pub fn smooth(t_s: &[f64], values: &[f64], noise_sigma: f64, colour: NoiseColour
         coloured_decay: memory(BIN_S, tau_s),
     };
     // Ratio of intensity to variance, 1/s^3: from a straight line over hours to a time history that follows each bin.
-    let mut best = (f64::NEG_INFINITY, 0.0);
-    for exponent in -26..=4 {
-        let intensity = noise_sigma * noise_sigma * 10f64.powf(0.5 * f64::from(exponent));
-        let likelihood = filter.run(intensity, None);
-        if likelihood > best.0 {
-            best = (likelihood, intensity);
+    let intensity = |exponent: i32| noise_sigma * noise_sigma * 10f64.powf(0.5 * f64::from(exponent));
+    let likeliest = |kink_variance: f64, exponents: std::ops::RangeInclusive<i32>| {
+        let mut best = (f64::NEG_INFINITY, *exponents.start());
+        for exponent in exponents {
+            let likelihood = filter.run(intensity(exponent), kink_variance, None);
+            if likelihood > best.0 {
+                best = (likelihood, exponent);
+            }
+        }
+        best
+    };
+    let (likelihood, smooth) = likeliest(0.0, EXPONENTS);
+    let mut best = (likelihood + KINKED, smooth, 0.0);
+    // What wanders without kinks is a constant with them at most.
+    if smooth > *EXPONENTS.start() && kinks.contains(&true) {
+        for kink_per_s in KINKS_PER_S {
+            let variance = (kink_per_s * noise_sigma).powi(2);
+            let (likelihood, exponent) = likeliest(variance, *EXPONENTS.start()..=smooth);
+            if likelihood > best.0 {
+                best = (likelihood, exponent, variance);
+            }
         }
     }
+    let (_, exponent, kink_variance) = best;
+    let best_intensity = intensity(exponent);
     let mut tracks = Vec::with_capacity(bins.len());
-    filter.run(best.1, Some(&mut tracks));
+    filter.run(best_intensity, kink_variance, Some(&mut tracks));
     let (value, slope_s, variance) = filter.back(&tracks);
+    let kinks = if kink_variance > 0.0 { kinks.clone() } else { Vec::new() };
     // Density of the noise at low frequency; the smoother's window is the fourth root of its ratio to the intensity.
     let density = filter.white_variance * 0.1 + 2.0 * tau_s * c2 * noise_sigma * noise_sigma;
-    let correlation_s = (density / best.1).powf(0.25).clamp(2.0, 1e4) * std::f64::consts::SQRT_2;
+    let correlation_s = (density / best_intensity).powf(0.25).clamp(2.0, 1e4) * std::f64::consts::SQRT_2;
     let sigma = median(&variance).unwrap_or(0.0).max(0.0).sqrt();
-    Some(Course { start_s, value, slope_s, sigma, correlation_s })
+    Some(Course { start_s, value, slope_s, kinks, sigma, correlation_s })
 }
 
 fn bins(t_s: &[f64], values: &[f64]) -> Vec<Bin> {
@@ -110,6 +165,8 @@ fn bins(t_s: &[f64], values: &[f64]) -> Vec<Bin> {
 
 struct Filter<'a> {
     bins: &'a [Bin],
+    /// Whether the slope may change at the start of each bin.
+    kinks: &'a [bool],
     first: f64,
     noise_sigma: f64,
     white_variance: f64,
@@ -126,7 +183,7 @@ impl Filter<'_> {
     }
 
     /// Log likelihood, up to a constant independent of the intensity.
-    fn run(&self, intensity: f64, mut tracks: Option<&mut Vec<Track>>) -> f64 {
+    fn run(&self, intensity: f64, kink_variance: f64, mut tracks: Option<&mut Vec<Track>>) -> f64 {
         let transition = self.transition();
         let (d, q) = (BIN_S, intensity);
         let coloured = self.coloured_variance * (1.0 - self.coloured_decay * self.coloured_decay);
@@ -141,13 +198,16 @@ impl Filter<'_> {
             0.0,
             coloured,
         );
+        // Halfway from one bin's middle to the next.
+        let kink = Vector3::new(0.5 * d, 1.0, 0.0);
+        let at_kink = drive + kink * kink.transpose() * kink_variance;
         let see = RowVector3::new(1.0, 0.0, 1.0);
         let wide = 1e3 * self.noise_sigma;
         let mut mean = Vector3::new(self.first, 0.0, 0.0);
         let mut covariance =
             Matrix3::from_diagonal(&Vector3::new(wide * wide, wide * wide * 1e-4, self.coloured_variance));
         let mut likelihood = 0.0;
-        for bin in self.bins {
+        for (place, bin) in self.bins.iter().enumerate() {
             let (before, before_covariance) = (mean, covariance);
             if let Some(seen) = bin.mean {
                 let variance =
@@ -163,7 +223,8 @@ impl Filter<'_> {
                 tracks.push((before, before_covariance, mean, covariance));
             }
             mean = transition * mean;
-            covariance = transition * covariance * transition.transpose() + drive;
+            let driven = if self.kinks.get(place + 1) == Some(&true) { at_kink } else { drive };
+            covariance = transition * covariance * transition.transpose() + driven;
         }
         likelihood
     }
@@ -220,7 +281,7 @@ mod tests {
     #[test]
     fn a_constant_is_found_within_the_error_of_its_mean_and_a_wave_within_its_own_statement() {
         let (t_s, values) = noisy(|_| 5.0, 1);
-        let course = smooth(&t_s, &values, 0.1, NoiseColour::default()).unwrap();
+        let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
         // Noise of a mean over 1200 s: sqrt((2 * 2 * 0.36 + 0.1 * 0.64)/1200) * 0.1 = 0.0035; a line doubles it at its
         // ends. Four of these.
         for t in [0.0, 300.0, 600.0, 1190.0] {
@@ -228,7 +289,7 @@ mod tests {
         }
         let wave = |t: f64| 2.0 * (t / 7.0).sin();
         let (t_s, values) = noisy(wave, 2);
-        let course = smooth(&t_s, &values, 0.1, NoiseColour::default()).unwrap();
+        let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
         let n = 1150;
         let mean_square =
             (0..n).map(|i| (course.at(20.0 + f64::from(i)) - wave(20.0 + f64::from(i))).powi(2)).sum::<f64>()
@@ -244,10 +305,34 @@ mod tests {
         for value in &mut values[4_000..5_000] {
             *value = f64::NAN;
         }
-        let course = smooth(&t_s, &values, 0.1, NoiseColour::default()).unwrap();
+        let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), &[]).unwrap();
         // Ten times the error of a straight line through all of it.
         assert!((course.at(450.0) - 4.5).abs() < 0.1, "{}", course.at(450.0));
-        assert!(smooth(&t_s, &vec![f64::NAN; t_s.len()], 0.1, NoiseColour::default()).is_none());
-        assert!(smooth(&[], &[], 0.1, NoiseColour::default()).is_none());
+        assert!(smooth(&t_s, &vec![f64::NAN; t_s.len()], 0.1, NoiseColour::default(), &[]).is_none());
+        assert!(smooth(&[], &[], 0.1, NoiseColour::default(), &[]).is_none());
+    }
+
+    /// A temperature that follows its command with 20 s, in steps of 50 K every two minutes: what a lag rounds least is its first second.
+    #[test]
+    fn a_kink_is_not_rounded() {
+        let kinks_s: Vec<f64> = (1..10).map(|step| 120.0 * f64::from(step)).collect();
+        let lagged = |t: f64| {
+            let step = (t / 120.0).floor();
+            let up = if step as u32 % 2 == 1 { 1.0 } else { -1.0 };
+            if step < 1.0 { 0.0 } else { 25.0 + 25.0 * up * (1.0 - 2.0 * (-(t - 120.0 * step) / 20.0).exp()) }
+        };
+        let (t_s, values) = noisy(lagged, 4);
+        // Within two seconds of each kink but the first, which is half as high.
+        let near: Vec<f64> = kinks_s[1..]
+            .iter()
+            .flat_map(|kink_s| (-4..=4).map(move |i| kink_s + 0.5 * f64::from(i)))
+            .collect();
+        let off = |kinks_s: &[f64]| {
+            let course = smooth(&t_s, &values, 0.1, NoiseColour::default(), kinks_s).unwrap();
+            (near.iter().map(|t| (course.at(*t) - lagged(*t)).powi(2)).sum::<f64>() / near.len() as f64)
+                .sqrt()
+        };
+        let (rounded, kinked) = (off(&[]), off(&kinks_s));
+        assert!(kinked < 0.5 * rounded && kinked < 0.15, "{kinked} K, {rounded} K without");
     }
 }

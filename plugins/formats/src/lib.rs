@@ -36,6 +36,7 @@ formats! {
     surge,
     modelica,
     simscape,
+    mat,
     npss,
     pycycle,
     svg,

@@ -241,7 +241,7 @@ fn odd_maps_give_a_picture() {
 #[test]
 fn every_text_says_its_reference_state() {
     let map = support::fitted();
-    for entry in FORMATS.written().filter(|entry| !["json", "svg", "png"].contains(&entry.name)) {
+    for entry in FORMATS.written().filter(|entry| !["json", "svg", "png", "mat"].contains(&entry.name)) {
         let text = export(entry.name, &map);
         assert!(text.contains("298 K, 100000 Pa"), "{}", entry.name);
     }

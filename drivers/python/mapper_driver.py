@@ -395,6 +395,11 @@ def serve_at(path, name, version, open_rig, news):
         listener = listen_at(path)
     except OSError as error:
         sys.exit(f"{path}: {error}")
+    serve_hosts(listener, path, name, version, open_rig, news)
+
+
+def serve_hosts(listener, path, name, version, open_rig, news):
+    """Serves the hosts that connect to this listener, until TERMINATE is in `news`."""
     busy = threading.Lock()
 
     def open_the_door():
@@ -420,6 +425,8 @@ def serve_at(path, name, version, open_rig, news):
                 came = TERMINATE if asked_to_end else None
                 busy.release()
     finally:
+        hang_up(listener)  # ends the thread that waits for hosts
+        listener.close()
         if os.path.lexists(path):
             os.unlink(path)
 

@@ -2,12 +2,36 @@
 
 use crate::frame::log_formats;
 use mapper_backends::BACKENDS;
+use mapper_core::{Backend, BackendError};
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
+use mapper_host::{Driver, PATIENCE, Places};
 use mapper_physics::effect::Effect;
 use mapper_session::{Registry, SessionError};
-use std::path::Path;
+use serde_json::Value;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+thread_local! {
+    /// The rig in Python that the work of this thread runs: its name in the campaign, and its socket.
+    static RIG: RefCell<Option<(String, PathBuf)>> = const { RefCell::new(None) };
+}
+
+/// The registry for a run in this thread on a rig in Python, of this name and at this socket.
+pub fn registry_with_rig(rig: (String, PathBuf)) -> Registry {
+    RIG.set(Some(rig));
+    Registry { driver: Some(rig_in_python), ..registry() }
+}
+
+/// Connects to the rig of this thread, and finds no other driver.
+fn rig_in_python(name: &str, settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
+    let rig = RIG.with_borrow(Clone::clone).filter(|(own, _)| own == name);
+    Ok(Box::new(match rig {
+        Some((_, socket)) => Driver::at_socket(&socket, name, settings, PATIENCE)?,
+        None => Driver::find(&Places::default(), name, settings, "", "")?,
+    }))
+}
 
 /// Every plug-in of the package. It starts no drivers: a rig in real time is run by the command, which handles all signals.
 pub fn registry() -> Registry {

@@ -4,7 +4,7 @@ use crate::attended::{Attended, Shared, attend};
 use crate::campaign::{Campaign, Inner};
 use crate::error::Fault;
 use crate::map::Map;
-use crate::registry::registry;
+use crate::registry::{registry, registry_with_rig};
 use mapper_session::{Ended, RunOutcome, RunRequest, Session, SessionError, SessionEvent};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -60,9 +60,9 @@ impl Outcome {
     }
 }
 
-/// Runs the campaign in a new directory in `parent`. Ctrl-C stops it at the next sample, and is raised again when the rig is safe.
+/// Runs the campaign in a new directory in `parent`. `socket`: where its backend listens, if that is a rig in Python. Ctrl-C stops it at the next sample, and is raised again when the rig is safe.
 #[pyfunction(name = "run")]
-#[pyo3(signature = (campaign, parent, started_name, started_ns, on_event=None))]
+#[pyo3(signature = (campaign, parent, started_name, started_ns, on_event=None, socket=None))]
 pub fn run_campaign(
     py: Python<'_>,
     campaign: &Campaign,
@@ -70,6 +70,7 @@ pub fn run_campaign(
     started_name: String,
     started_ns: u64,
     on_event: Option<Py<PyAny>>,
+    socket: Option<PathBuf>,
 ) -> PyResult<Outcome> {
     let (inner, shared) = (campaign.inner.clone(), Shared::default());
     let of_worker = shared.clone();
@@ -80,7 +81,7 @@ pub fn run_campaign(
             started_ns,
             ..RunRequest::new(&inner.campaign, &inner.text, &parent)
         };
-        run(&inner, request, &on_event, &of_worker)
+        run(&inner, request, &on_event, &of_worker, socket)
     })?;
     match attended {
         Attended::Ended(result, None) => Ok(result?),
@@ -94,8 +95,10 @@ fn run(
     request: RunRequest<'_>,
     on_event: &(dyn Fn(&SessionEvent) + Sync),
     shared: &Shared,
+    socket: Option<PathBuf>,
 ) -> Result<Outcome, Fault> {
-    let registry = registry();
+    let backend = inner.campaign.backend.name.clone();
+    let registry = socket.map_or_else(registry, |socket| registry_with_rig((backend, socket)));
     let session = Session { on_event, stop: &shared.stop, ..Session::new(&registry) };
     let prepared = session.prepare(request).map_err(|error| inner.fault(error))?;
     let rig = prepared.rig();

@@ -13,8 +13,10 @@ Examples
 >>> result.map.to("simscape", "map.m")
 """
 
+from mapper._backend import Backend
 from mapper._campaign import Campaign, Plan
 from mapper._diagnosis import Diagnosis, diagnose
+from mapper._effect import Effect, Parameter
 from mapper._map import Map, map_formats, reduce
 from mapper._mapper import CampaignError, IdentificationError, MapperError, RecordingError
 from mapper._recording import Recording
@@ -22,12 +24,15 @@ from mapper._result import Result, identify
 from mapper._run import Run
 
 __all__ = [
+    "Backend",
     "Campaign",
     "CampaignError",
     "Diagnosis",
+    "Effect",
     "IdentificationError",
     "Map",
     "MapperError",
+    "Parameter",
     "Plan",
     "Recording",
     "RecordingError",

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from mapper import _mapper, _plots, _tables
+from mapper._backend import Backend, listening
 from mapper._progress import Progress, observer
 from mapper._run import Run
 
@@ -157,6 +158,7 @@ class Campaign:
         self,
         out: str | os.PathLike[str] | None = None,
         *,
+        backend: Backend | Callable[[dict[str, Any]], Backend] | None = None,
         progress: bool | Callable[[dict[str, Any]], object] = False,
     ) -> Run:
         """Plan, run on the simulated rig, record, identify, and write the results to a new directory.
@@ -167,6 +169,9 @@ class Campaign:
         ----------
         out
             Parent of the run's directory; the campaign's ``outputs.directory`` by default.
+        backend
+            Simulated rig in Python, or a function (a class, for example) that makes it from the settings below ``backend.NAME`` in the
+            campaign. NAME is any name that no backend of ``mapper`` has.
         progress
             True shows a bar (needs tqdm). A function is called with each event.
 
@@ -175,13 +180,13 @@ class Campaign:
         CampaignError
             There is no plan, or the backend's settings are wrong.
         MapperError
-            The rig failed, or it is a rig in real time: use the command ``mapper run`` for it.
+            The rig failed, or it is a rig in real time: use the command ``mapper run`` for it. An exception of a rig in Python is its cause.
         """
         parent = Path(self._inner.output_directory if out is None else out)
         now = datetime.now(timezone.utc)
         started_name, started_ns = now.strftime("%Y%m%dT%H%M%SZ"), int(now.timestamp() * 1e9)
-        with Progress.of(progress) as shown:
-            return Run(_mapper.run(self._inner, parent, started_name, started_ns, observer(shown)))
+        with Progress.of(progress) as shown, listening(self._inner.backend, backend) as socket:
+            return Run(_mapper.run(self._inner, parent, started_name, started_ns, observer(shown), socket))
 
     def __repr__(self) -> str:
         """Return a line on the campaign."""

@@ -6,12 +6,14 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
 
 from mapper import _mapper, _tables
 from mapper._campaign import Campaign
+from mapper._effect import Effect
 from mapper._progress import Progress, observer
 from mapper._recording import Recording
 from mapper._run import Run
@@ -73,7 +75,7 @@ def diagnose(
     recording: Recording | Run,
     campaign: Campaign,
     *,
-    effects: Sequence[str | os.PathLike[str]] = (),
+    effects: Sequence[Effect | str | os.PathLike[str]] = (),
     healthy: Recording | Run | None = None,
     progress: bool | Callable[[dict[str, Any]], object] = False,
 ) -> Diagnosis:
@@ -88,7 +90,7 @@ def diagnose(
     campaign
         Campaign with machine, declared uncertainties and tolerances.
     effects
-        Suspected effects written in rhai, as files.
+        Suspected effects: files written in rhai, or :class:`mapper.Effect`.
     healthy
         Reference recording of the same rig and steps: the diagnosis then covers only changes since then.
     progress
@@ -101,8 +103,8 @@ def diagnose(
     """
     inner = _recorded(recording)
     reference = None if healthy is None else _recorded(healthy)
-    files = [Path(effect) for effect in effects]
-    with Progress.of(progress) as shown:
+    with Progress.of(progress) as shown, TemporaryDirectory(prefix="mapper-") as scripts:
+        files = [effect.write(Path(scripts)) if isinstance(effect, Effect) else Path(effect) for effect in effects]
         found = _mapper.diagnose(inner, campaign._inner, files, reference, observer(shown))
     return Diagnosis(json.loads(found))
 

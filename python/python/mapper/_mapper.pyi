@@ -73,7 +73,12 @@ def write_template(
     name: str, directory: Path, rig: str, wheel_diameter_m: float, map: Path | None = None, reference: str = "SAE"
 ) -> str: ...
 def run(
-    campaign: Campaign, parent: Path, started_name: str, started_ns: int, on_event: _OnEvent | None = None
+    campaign: Campaign,
+    parent: Path,
+    started_name: str,
+    started_ns: int,
+    on_event: _OnEvent | None = None,
+    socket: Path | None = None,
 ) -> Outcome: ...
 def identify(
     recordings: list[Recording], campaign: Campaign | None = None, method: str | None = None

@@ -92,6 +92,9 @@ class Recording:
         RecordingError
             A column is missing, or a unit is wrong; line and caret refer to the channel map as indented JSON.
         """
+        # Attributes would be copied with every column.
+        frame = frame.copy(deep=False)
+        frame.attrs = {}
         t_s, start_time_ns = _clock(frame, time)
         columns: dict[str, npt.NDArray[np.float64]] = {}
         sources = {}

@@ -52,14 +52,12 @@ def table(rows: Sequence[Mapping[str, Any]], index: str | None = None, first: Se
     frame = frame[[*front, *(name for name in frame.columns if name not in front)]]
     if index is not None and index in frame:
         frame = frame.set_index(index)
-    # A column without any value has no type of its own: unknown numbers are NaN.
-    for name in frame.columns:
-        if unit_of(str(name)) is not None and frame[name].isna().all():
-            frame[name] = float("nan")
-        elif frame[name].isna().all():
-            # An object that is absent in all rows.
-            frame = frame.drop(columns=name)
-    units = {str(name): unit_of(str(name)) for name in frame.columns if is_numeric_dtype(frame[name])}
+    # A column without any value has no type of its own: unknown numbers are NaN, and an object that is absent in all rows has no column.
+    empty = [str(name) for name in frame.columns[frame.isna().all()]]
+    unknown = [name for name in empty if unit_of(name) is not None]
+    frame = frame.drop(columns=[name for name in empty if name not in unknown])
+    frame[unknown] = float("nan")
+    units = {str(name): unit_of(str(name)) for name, kind in frame.dtypes.items() if is_numeric_dtype(kind)}
     frame.attrs["units"] = {name: unit for name, unit in units.items() if unit is not None}
     return frame
 

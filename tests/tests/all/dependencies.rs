@@ -60,7 +60,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-live",      &["core", "campaign", "page", "record", "report", "session"]),
     // The program names the plug-ins; nothing sees the program.
     ("mapper-cli",       &["core", "physics", "campaign", "conformance", "host", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats", "fleet", "studies"]),
-    ("mapper-python",    &["core", "physics", "campaign", "record", "assemble", "logs", "log-formats", "session", "backends", "effects", "formats"]),
+    ("mapper-python",    &["core", "physics", "campaign", "record", "assemble", "logs", "log-formats", "session", "host", "backends", "effects", "formats"]),
     // Drivers are programs of their own: what they share, and whatever each needs for its rig.
     ("mapper-driver",    &["core", "protocol"]),
     ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),

@@ -1,0 +1,1 @@
+../../../drivers/python/mapper_driver.py

@@ -3,8 +3,8 @@
 //! Works on the tree and skips what is missing or unreadable, so that one mistake does not hide another.
 
 use crate::units::{self, Kind};
-use mapper_yaml::{FindingKind, Notes, Source};
-use mapper_yaml::{Node, Step, path_text};
+use mapper_yaml::{FindingKind, Notes, Step, Tree};
+use serde_json::Value;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -18,21 +18,20 @@ pub(crate) fn beside(origin: &Path, file: &str) -> PathBuf {
 
 /// A file as far as it could be read, and its list of mistakes.
 pub(crate) struct Check<'a> {
-    pub source: &'a Source,
-    pub root: &'a Node,
+    pub tree: &'a Tree,
     pub files: Files<'a>,
     pub notes: &'a mut Notes,
 }
 
 impl<'a> Check<'a> {
-    /// The node at a path.
-    pub fn get(&self, steps: &[Step]) -> Option<&'a Node> {
-        self.root.get(steps)
+    /// The value at a path.
+    pub fn get(&self, steps: &[Step]) -> Option<&'a Value> {
+        self.tree.get(steps)
     }
 
     /// The text of a scalar.
     pub fn text(&self, steps: &[Step]) -> Option<&'a str> {
-        self.root.get(steps)?.text()
+        self.tree.text(steps)
     }
 
     /// The value in the internal unit, and its text.
@@ -43,32 +42,29 @@ impl<'a> Check<'a> {
 
     /// A plain number.
     pub fn number(&self, steps: &[Step]) -> Option<f64> {
-        self.root.get(steps)?.number()
+        self.tree.get(steps)?.as_f64()
     }
 
     /// Number of entries of a list; 0 if it is not a list.
     pub fn count(&self, steps: &[Step]) -> usize {
-        self.root.get(steps).map_or(0, |node| node.items().len())
+        self.tree.items(steps).len()
     }
 
     /// The resolved path of a file named in the campaign, and its text.
     pub fn file(&self, name: &str) -> (PathBuf, io::Result<String>) {
-        let path = beside(&self.source.origin, name);
+        let path = beside(&self.tree.source().origin, name);
         let text = (self.files)(&path);
         (path, text)
     }
 
     /// A mistake at a value.
     pub fn note(&mut self, kind: FindingKind, steps: &[Step], message: String, remedy: &str) {
-        let place = self.root.place(steps);
-        let finding = self.source.finding(kind, path_text(steps), place, message, remedy.to_owned());
-        self.notes.push(finding);
+        self.notes.push(self.tree.finding(kind, steps, message, remedy));
     }
 
     /// A mistake at a key, if the key itself is wrong and not its value.
     pub fn note_key(&mut self, kind: FindingKind, parent: &[Step], key: &str, message: String, remedy: &str) {
-        let place = self.root.key_place(parent, key);
-        let path = format!("{}.{key}", path_text(parent));
-        self.notes.push(self.source.finding(kind, path, place, message, remedy.to_owned()));
+        let steps = [parent, &[Step::from(key)]].concat();
+        self.notes.push(self.tree.key_finding(kind, &steps, message, remedy));
     }
 }

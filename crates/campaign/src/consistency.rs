@@ -3,11 +3,11 @@
 
 use crate::checking::{Check, Files};
 use crate::elements;
-use mapper_yaml::{Node, Notes, Source};
+use mapper_yaml::{Notes, Tree};
 
 /// Checks everything that needs more than one value.
-pub(crate) fn check(source: &Source, root: &Node, files: Files<'_>, notes: &mut Notes) {
-    let mut check = Check { source, root, files, notes };
+pub(crate) fn check(tree: &Tree, files: Files<'_>, notes: &mut Notes) {
+    let mut check = Check { tree, files, notes };
     elements::readers::check(&mut check);
     elements::limits::check(&mut check);
     elements::guards::check(&mut check);

@@ -9,7 +9,7 @@ use crate::reach::{self, Unreachable};
 use crate::resolved;
 use crate::schema::SCHEMA;
 use mapper_map_table::file_text;
-use mapper_yaml::{Document, FindingKind, Findings, Node, Notes, ReadError, Source, Step, path_text, steps};
+use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -87,24 +87,21 @@ pub fn check_with(
         let remedy = "a campaign needs a few thousand; is this the right file?".to_owned();
         return Err(Findings::single(source, FindingKind::TooLarge, 0, message, remedy));
     }
-    let source = Source::new(&DOCUMENT, origin, text);
-    let mut notes = Notes::default();
-    if let Some(root) = mapper_yaml::read(&source, &mut notes) {
-        if let Some(concern) = other_file(&root) {
-            note(&source, &root, &mut notes, FindingKind::WrongValue, concern);
-            return Err(Findings::new(source, notes));
-        }
-        SCHEMA.check(&source, &root, &mut notes);
-        if !notes.is_full() {
-            consistency::check(&source, &root, files, &mut notes);
-        }
-        if notes.is_empty()
-            && let Some(campaign) = finish(&source, &root, files, unreachable, &mut notes)
-        {
-            return Ok(campaign);
-        }
+    let (tree, mut notes) = read(text, origin)?;
+    if let Some(concern) = other_file(&tree) {
+        note(&tree, &mut notes, FindingKind::WrongValue, concern);
+        return Err(tree.findings(notes));
     }
-    Err(Findings::new(source, notes))
+    SCHEMA.check(&tree, &mut notes);
+    if !notes.is_full() {
+        consistency::check(&tree, files, &mut notes);
+    }
+    let campaign = notes.is_empty().then(|| finish(&tree, files, unreachable, &mut notes)).flatten();
+    campaign.ok_or_else(|| tree.findings(notes))
+}
+
+fn read(text: &str, origin: &Path) -> Result<(Tree, Notes), Findings> {
+    mapper_yaml::read(Source::new(&DOCUMENT, origin, text))
 }
 
 /// Reports a mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
@@ -119,58 +116,50 @@ pub fn backend_mistake(
     message: &str,
     hidden: bool,
 ) -> Findings {
-    let mut source = Source::new(&DOCUMENT, origin, text);
-    let mut notes = Notes::default();
-    let root = mapper_yaml::read(&source, &mut notes);
     let keys = at.split('.').chain(setting.split('.'));
     let steps: Vec<Step> = keys.filter(|key| !key.is_empty()).map(Step::from).collect();
-    let span = root.map_or(0..0, |root| root.place(&steps));
-    if let (true, Some(value)) = (hidden, text.get(span.clone())) {
-        // The same length, so that all places stay valid.
-        let asterisks = value.bytes().map(|byte| if byte == b'\n' { '\n' } else { '*' }).collect::<String>();
-        source =
-            Source::new(&DOCUMENT, origin, &[&text[..span.start], &asterisks, &text[span.end..]].concat());
+    let (mut tree, mut notes) = match read(text, origin) {
+        Ok(read) => read,
+        Err(findings) => return findings,
+    };
+    if hidden {
+        tree.hide(&steps);
     }
-    let remedy = "the settings of each backend are listed in docs/tutorials/first_map.md".to_owned();
-    let kind = FindingKind::WrongValue;
-    notes.push(source.finding(kind, path_text(&steps), span, message.to_owned(), remedy));
-    Findings::new(source, notes)
+    let remedy = "the settings of each backend are listed in docs/tutorials/first_map.md";
+    notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
+    tree.findings(notes)
 }
 
 /// An unknown format of the map, at its place in the campaign's text. `known`: the supported names.
 pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -> Findings {
-    let source = Source::new(&DOCUMENT, origin, text);
-    let mut notes = Notes::default();
-    let list = steps!["outputs", "formats"];
-    let root = mapper_yaml::read(&source, &mut notes);
-    let written = root.as_ref().and_then(|root| root.get(&list)).map(|list| list.items()).unwrap_or_default();
-    let named = |node: &Node| node.text() == Some(format);
-    let mut steps = list.to_vec();
-    steps.extend(written.iter().position(named).map(Step::from));
-    let span = root.as_ref().map_or(0..0, |root| root.place(&steps));
+    let (tree, mut notes) = match read(text, origin) {
+        Ok(read) => read,
+        Err(findings) => return findings,
+    };
+    let mut steps = steps!["outputs", "formats"].to_vec();
+    let index = tree.items(&steps).iter().position(|written| written == format);
+    steps.extend(index.map(Step::from));
     let message = format!("`{format}` is not a format that a map can be written in");
     let remedy = format!("choose from {}", known.join(", "));
-    notes.push(source.finding(FindingKind::WrongValue, path_text(&steps), span, message, remedy));
-    Findings::new(source, notes)
+    notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
+    tree.findings(notes)
 }
 
 /// Unusual settings in a campaign without mistakes, each at its place in the text. `more`: findings of other crates.
 pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concern>) -> Findings {
-    let source = Source::new(&DOCUMENT, origin, text);
-    let mut notes = Notes::default();
-    if let Some(root) = mapper_yaml::read(&source, &mut notes) {
-        let paths = match campaign.lines.as_slice() {
-            [] => {
-                root.deserialise().map(|file: CampaignFile| file.grid.points(&[], 0.0).1).unwrap_or_default()
-            }
-            _ => resolved::places(campaign),
-        };
-        let own = prospects::concerns(campaign, &paths).into_iter().filter(|concern| !concern.grave);
-        for concern in own.chain(more) {
-            note(&source, &root, &mut notes, FindingKind::Unusual, concern);
-        }
+    let (tree, mut notes) = match read(text, origin) {
+        Ok(read) => read,
+        Err(findings) => return findings,
+    };
+    let paths = match campaign.lines.as_slice() {
+        [] => tree.deserialise().map(|file: CampaignFile| file.grid.points(&[], 0.0).1).unwrap_or_default(),
+        _ => resolved::places(campaign),
+    };
+    let own = prospects::concerns(campaign, &paths).into_iter().filter(|concern| !concern.grave);
+    for concern in own.chain(more) {
+        note(&tree, &mut notes, FindingKind::Unusual, concern);
     }
-    Findings::new(source, notes)
+    tree.findings(notes)
 }
 
 /// Files of other commands, by a key that only they have.
@@ -184,12 +173,11 @@ const OTHER_FILES: [(&str, &str, &str); 2] = [
 ];
 
 /// A file of another command: one mistake in place of one for each of its keys.
-fn other_file(root: &Node) -> Option<Concern> {
-    if root.get(&steps!["campaign"]).is_some() {
+fn other_file(tree: &Tree) -> Option<Concern> {
+    if tree.get(&steps!["campaign"]).is_some() {
         return None;
     }
-    let (key, message, remedy) =
-        OTHER_FILES.iter().find(|(key, ..)| root.get(&[Step::from(*key)]).is_some())?;
+    let (key, message, remedy) = OTHER_FILES.iter().find(|(key, ..)| tree.get(&steps![*key]).is_some())?;
     Some(Concern {
         grave: true,
         at: vec![Step::from(*key)],
@@ -198,53 +186,37 @@ fn other_file(root: &Node) -> Option<Concern> {
     })
 }
 
-fn note(source: &Source, root: &Node, notes: &mut Notes, kind: FindingKind, concern: Concern) {
+fn note(tree: &Tree, notes: &mut Notes, kind: FindingKind, concern: Concern) {
     let Concern { at, message, remedy, .. } = concern;
-    notes.push(source.finding(kind, path_text(&at), root.place(&at), message, remedy));
+    notes.push(tree.finding(kind, &at, message, remedy));
 }
 
 /// Deserialises a text without known mistakes. `None` with at least one finding.
 fn finish(
-    source: &Source,
-    root: &Node,
+    tree: &Tree,
     files: &dyn Fn(&Path) -> io::Result<String>,
     unreachable: &dyn Fn(&Campaign) -> Vec<Unreachable>,
     notes: &mut Notes,
 ) -> Option<Campaign> {
-    let file: CampaignFile = match root.deserialise() {
-        Ok(file) => file,
-        Err(ReadError { steps, source: error }) => {
-            let remedy = "put the value into quotes, or write it in a simpler form".to_owned();
-            let kind = FindingKind::WrongValue;
-            notes.push(source.finding(
-                kind,
-                path_text(&steps),
-                root.place(&steps),
-                error.to_string(),
-                remedy,
-            ));
-            return None;
-        }
-    };
-    let (mut campaign, mut point_paths) = match file.campaign(&source.origin, files) {
+    let file: CampaignFile = tree.deserialise().map_err(|finding| notes.push(finding)).ok()?;
+    let (mut campaign, mut point_paths) = match file.campaign(&tree.source().origin, files) {
         Ok(built) => built,
         Err(error) => {
             // Both were present a moment ago; the map is the default one.
             let map = steps!["machine", "map", "file"];
             let sequence = steps!["sequence"];
-            let steps: &[Step] = if root.get(&map).is_some() { &map } else { &sequence };
+            let steps: &[Step] = if tree.get(&map).is_some() { &map } else { &sequence };
             let message = format!("a file of the campaign can no longer be read: {error}");
-            let remedy = "write its path relative to the campaign file".to_owned();
-            let kind = FindingKind::MissingFile;
-            notes.push(source.finding(kind, path_text(steps), root.place(steps), message, remedy));
+            let remedy = "write its path relative to the campaign file";
+            notes.push(tree.finding(FindingKind::MissingFile, steps, message, remedy));
             return None;
         }
     };
-    campaign.machine.assumed = machine_sizes::assumed(root, &campaign.machine.params);
+    campaign.machine.assumed = machine_sizes::assumed(tree, &campaign.machine.params);
     let wheel = steps!["machine", "geometry", "compressor", "wheel_diameter"];
-    campaign.machine.wheel_is_declared = root.get(&wheel).is_some();
+    campaign.machine.wheel_is_declared = tree.get(&wheel).is_some();
     for concern in prospects::concerns(&campaign, &point_paths).into_iter().filter(|concern| concern.grave) {
-        note(source, root, notes, FindingKind::Implausible, concern);
+        note(tree, notes, FindingKind::Implausible, concern);
     }
     if notes.is_empty()
         && !campaign.lines.is_empty()
@@ -254,7 +226,7 @@ fn finish(
             Ok(()) => point_paths = resolved::places(&campaign),
             Err(concerns) => {
                 for concern in concerns {
-                    note(source, root, notes, FindingKind::Unreachable, concern);
+                    note(tree, notes, FindingKind::Unreachable, concern);
                 }
             }
         }
@@ -264,8 +236,7 @@ fn finish(
     }
     for Unreachable { point, reason, remedy } in unreachable(&campaign) {
         let steps = point_paths.get(point).map(Vec::as_slice).unwrap_or_default();
-        let kind = FindingKind::Unreachable;
-        notes.push(source.finding(kind, path_text(steps), root.place(steps), reason, remedy));
+        notes.push(tree.finding(FindingKind::Unreachable, steps, reason, remedy));
     }
     notes.is_empty().then_some(campaign)
 }

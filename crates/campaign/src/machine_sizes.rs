@@ -5,7 +5,7 @@
 //! al., Appendix A, whose wheel has 52 mm.
 
 use mapper_physics::params::Params;
-use mapper_yaml::{Node, Step};
+use mapper_yaml::{Step, Tree};
 use serde::Serialize;
 
 /// Factors by which lengths, areas and masses, and the inertia may differ from those of the reference machine, scaled to the wheel,
@@ -119,8 +119,8 @@ pub fn similar_sizes(wheel_diameter_m: f64) -> Vec<AssumedSize> {
 }
 
 /// The sizes that the file does not give.
-pub(crate) fn assumed(root: &Node, params: &Params) -> Vec<AssumedSize> {
-    let left_out = |size: &&Size| root.get(&size.steps()).is_none();
+pub(crate) fn assumed(tree: &Tree, params: &Params) -> Vec<AssumedSize> {
+    let left_out = |size: &&Size| tree.get(&size.steps()).is_none();
     SIZES.iter().filter(left_out).map(|size| size.assumed(params)).collect()
 }
 

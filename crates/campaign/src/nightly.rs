@@ -1,9 +1,7 @@
 //! The nightly campaign: campaigns with their methods and seeds, and the history.
 
 use crate::load::FILE_SIZE_LIMIT;
-use mapper_yaml::{
-    Document, FindingKind, Findings, Notes, ReadError, Schema, Source, Step, path_text, steps,
-};
+use mapper_yaml::{Document, FindingKind, Findings, Schema, Source, Step, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -130,30 +128,20 @@ pub fn load_nightly(path: &Path) -> Result<Nightly, NightlyError> {
 }
 
 fn check(text: &str, path: &Path) -> Result<Nightly, Findings> {
-    let source = Source::new(&DOCUMENT, path, text);
-    let mut notes = Notes::default();
-    if let Some(root) = mapper_yaml::read(&source, &mut notes) {
-        Schema::of::<NightlyFile>().check(&source, &root, &mut notes);
-        if notes.is_empty() {
-            let mistakes = match root.deserialise::<NightlyFile>() {
-                Ok(file) => match nightly(file, path.parent().unwrap_or(Path::new(""))) {
-                    Ok(nightly) => return Ok(nightly),
-                    Err(mistakes) => mistakes,
-                },
-                Err(ReadError { steps, source: error }) => vec![Mistake {
-                    steps,
-                    kind: FindingKind::WrongValue,
-                    message: error.to_string(),
-                    remedy: "write it in a simpler form",
-                }],
-            };
-            for Mistake { steps, kind, message, remedy } in mistakes {
-                let place = root.place(&steps);
-                notes.push(source.finding(kind, path_text(&steps), place, message, remedy.to_owned()));
+    let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, text))?;
+    Schema::of::<NightlyFile>().check(&tree, &mut notes);
+    if notes.is_empty() {
+        match tree.deserialise().map(|file| nightly(file, path.parent().unwrap_or(Path::new("")))) {
+            Ok(Ok(nightly)) => return Ok(nightly),
+            Ok(Err(mistakes)) => {
+                for Mistake { steps, kind, message, remedy } in mistakes {
+                    notes.push(tree.finding(kind, &steps, message, remedy));
+                }
             }
+            Err(finding) => notes.push(finding),
         }
     }
-    Err(Findings::new(source, notes))
+    Err(tree.findings(notes))
 }
 
 /// Checks beyond the schema.

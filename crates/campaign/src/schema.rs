@@ -18,7 +18,7 @@ pub(crate) static SCHEMA: LazyLock<Schema> = LazyLock::new(Schema::of::<Campaign
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_yaml::{Notes, Source};
+    use mapper_yaml::Source;
     use serde_json::Map;
     use std::path::Path;
 
@@ -82,7 +82,7 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/turbo_a.yaml");
         let text = std::fs::read_to_string(path).unwrap();
         let source = Source::new(&crate::load::DOCUMENT, Path::new(path), &text);
-        let mut value = mapper_yaml::read(&source, &mut Notes::default()).unwrap().to_json();
+        let mut value = mapper_yaml::read(source).unwrap().0.value().clone();
         assert!(validator.is_valid(&value), "{:?}", validator.validate(&value));
         for (key, text, right) in
             [("dwell", "120 kg", false), ("dwell", "2 min", true), ("dwel", "2 min", false)]

@@ -1,7 +1,7 @@
 //! Reads elements from a text, for their tests.
 
 use crate::load::DOCUMENT;
-use mapper_yaml::{Notes, Source};
+use mapper_yaml::Source;
 use serde::de::{DeserializeOwned, Error as _};
 use serde_json::{Error, Value};
 use std::path::Path;
@@ -13,7 +13,6 @@ pub(crate) fn any<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
 
 /// As [`any`], with a reader that is not a `Deserialize` of its own, such as a `serde` remote.
 pub(crate) fn any_with<T>(text: &str, read: impl FnOnce(Value) -> Result<T, Error>) -> Result<T, Error> {
-    let mut notes = Notes::default();
-    let root = mapper_yaml::read(&Source::new(&DOCUMENT, Path::new("test.yaml"), text), &mut notes);
-    read(root.ok_or_else(|| Error::custom("the text is not YAML"))?.to_json())
+    let tree = mapper_yaml::read(Source::new(&DOCUMENT, Path::new("test.yaml"), text));
+    read(tree.map_err(Error::custom)?.0.value().clone())
 }

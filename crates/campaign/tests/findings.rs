@@ -637,14 +637,50 @@ fn yaml_that_a_campaign_does_not_use() {
     assert_eq!(kinds, [Kind::Unsupported, Kind::Unsupported, Kind::Unsupported]);
 }
 
+/// YAML 1.2.2, sections 5.5 and 7.4.2: a tab separates as a space does, and a flow mapping may leave a value out.
+#[test]
+fn separating_tabs_and_empty_values_are_read() {
+    let (text, line) = with("timing: {dwell: 120 s}", "timing:\t{dwell:\t120 s}\t# a\tremark");
+    assert_eq!(run(&text).unwrap_or_else(|findings| panic!("{findings}")).timing.dwell, Dwell::Fixed(120.0));
+    let findings = mistakes(&text.replace("120 s", "120 K"));
+    assert_eq!((findings.list[0].line, findings.list[0].column), (line, 17), "{findings}");
+    assert!(run(&with("{virtual_lab: {}}", "{virtual_lab:}").0).is_ok());
+}
+
+/// Refused YAML does not hide other mistakes, and aliases expand to nothing.
+#[test]
+fn refused_yaml_leaves_the_other_mistakes() {
+    let text = RIGHT.replace("dwell: 120 s", "dwell: 120").replace("25 degC", "&t 25 degC");
+    let text = text
+        .replace("oil_temperature: 50 degC", "oil_temperature: *t")
+        .replace("{noise: 30 rpm}", "!x {noise: 30}");
+    let found: Vec<(Kind, usize)> =
+        mistakes(&text).list.iter().map(|found| (found.kind, found.line)).collect();
+    let refused = [4, 8, 10].map(|line| (Kind::Unsupported, line));
+    assert_eq!(found, [&refused[..], &[(Kind::Unit, 10), (Kind::Unit, 21)]].concat());
+    let bomb: String = (1..40).map(|n| format!("a{n}: &a{n} [*a{0}, *a{0}]\n", n - 1)).collect();
+    assert!(
+        mistakes(&format!("a0: &a0 [x]\n{bomb}")).list.iter().any(|found| found.kind == Kind::Unsupported)
+    );
+    // YAML 1.1 breaks the line here, where YAML 1.2 continues the comment.
+    let hidden = format!("a: b #\u{85}{}", "[".repeat(500_000));
+    assert_eq!(mistakes(&hidden).list[0].kind, Kind::Unsupported);
+}
+
 #[test]
 fn malformed_text_has_a_place() {
-    for (text, line) in
-        [("a: [1, 2\n", 2), ("a: b\n\tc: d\n", 2), ("a: 'x\n", 1), ("a: b: c\n", 1), ("{a: b}}\n", 1)]
-    {
+    for (text, line) in [
+        ("a: [1, 2\n", 2),
+        ("a: b\n\tc: d\n", 2),
+        ("a:\n  b: 1\n\tc: 2\n", 3),
+        ("a:\n  b: |\n    x\n\ty\n", 4),
+        ("a: 'x\n", 1),
+        ("a: b: c\n", 1),
+        ("{a: b}}\n", 1),
+    ] {
         let findings = mistakes(text);
         assert_eq!(findings.list[0].kind, Kind::Syntax, "{text:?} {findings}");
-        assert!(findings.list[0].line.abs_diff(line) <= 1, "{text:?} {findings}");
+        assert_eq!(findings.list[0].line, line, "{text:?} {findings}");
     }
     assert_eq!(mistakes("").list[0].message, "the file is empty");
     assert_eq!(mistakes("just text").list[0].kind, Kind::WrongType);

@@ -2,7 +2,7 @@
 //! our own files are.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_yaml::{Document, Notes, Source};
+use mapper_yaml::{Document, Source};
 use std::path::Path;
 
 #[test]
@@ -11,7 +11,7 @@ fn the_shipped_workflow_has_schedule_runner_and_steps() {
     let text = std::fs::read_to_string(path).unwrap();
     let document = &Document { name: "workflow", example: "examples/nightly/nightly.yml" };
     let source = Source::new(document, Path::new(path), &text);
-    let workflow = mapper_yaml::read(&source, &mut Notes::default()).unwrap().to_json();
+    let workflow = mapper_yaml::read(source).unwrap().0.value().clone();
     let job = &workflow["jobs"]["nightly"];
     assert!(workflow["on"]["schedule"][0]["cron"].is_string() && job["runs-on"].is_string(), "{workflow}");
     let steps = job["steps"].as_array().unwrap();

@@ -1,8 +1,6 @@
 //! A study file: name and kind are read here, everything else by the kind.
 
-use mapper_yaml::{
-    Document, FindingKind, Findings, Node, Notes, ReadError, Schema, Source, path_text, steps,
-};
+use mapper_yaml::{Document, FindingKind, Findings, Notes, Schema, Source, Tree, steps};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
@@ -32,8 +30,7 @@ pub enum StudyFileError {
 #[derive(Debug)]
 pub struct StudyFile {
     path: PathBuf,
-    source: Source,
-    root: Node,
+    tree: Tree,
     /// Its name.
     pub name: String,
     /// Its kind.
@@ -52,31 +49,25 @@ impl StudyFile {
     /// [`StudyFileError::Mistakes`] with all mistakes.
     pub fn read<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, StudyFileError> {
         let mut notes = Notes::default();
-        Schema::of::<T>().check(&self.source, &self.root, &mut notes);
+        Schema::of::<T>().check(&self.tree, &mut notes);
         if notes.is_empty() {
-            match self.root.deserialise::<T>() {
+            match self.tree.deserialise() {
                 Ok(file) => return Ok(file),
-                Err(ReadError { steps, source: error }) => notes.push(self.source.finding(
-                    FindingKind::WrongValue,
-                    path_text(&steps),
-                    self.root.place(&steps),
-                    error.to_string(),
-                    "write it in a simpler form".to_owned(),
-                )),
+                Err(finding) => notes.push(finding),
             }
         }
-        Err(StudyFileError::Mistakes(Box::new(Findings::new(self.source.clone(), notes))))
+        Err(self.mistakes(notes))
     }
 
     /// A mistake found by the kind, at a key of the file.
     pub fn mistake(&self, key: &str, message: String, remedy: &str) -> StudyFileError {
-        let steps = steps![key];
-        let place = self.root.place(&steps);
-        let (kind, remedy) = (FindingKind::WrongValue, remedy.to_owned());
-        let finding = self.source.finding(kind, path_text(&steps), place, message, remedy);
         let mut notes = Notes::default();
-        notes.push(finding);
-        StudyFileError::Mistakes(Box::new(Findings::new(self.source.clone(), notes)))
+        notes.push(self.tree.finding(FindingKind::WrongValue, &steps![key], message, remedy));
+        self.mistakes(notes)
+    }
+
+    fn mistakes(&self, notes: Notes) -> StudyFileError {
+        StudyFileError::Mistakes(Box::new(Findings::new(self.tree.source().clone(), notes)))
     }
 }
 
@@ -89,12 +80,10 @@ pub fn open_study(path: &Path) -> Result<StudyFile, StudyFileError> {
     let text = mapper_yaml::open(&DOCUMENT, path, LARGEST_BYTES)
         .map_err(|source| StudyFileError::Read { path: path.to_owned(), source })?
         .map_err(mistakes)?;
-    let source = Source::new(&DOCUMENT, path, &text);
-    let mut notes = Notes::default();
-    let Some(root) = mapper_yaml::read(&source, &mut notes).filter(|_| notes.is_empty()) else {
-        return Err(mistakes(Findings::new(source, notes)));
-    };
-    let word = |key: &str| root.get(&steps![key]).and_then(Node::text).map(str::to_owned);
-    let (name, kind) = (word("fleet").unwrap_or_default(), word("study").unwrap_or_default());
-    Ok(StudyFile { path: path.to_owned(), name, kind, source, root })
+    let (tree, notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, &text)).map_err(mistakes)?;
+    if !notes.is_empty() {
+        return Err(mistakes(tree.findings(notes)));
+    }
+    let word = |key: &str| tree.text(&steps![key]).unwrap_or_default().to_owned();
+    Ok(StudyFile { path: path.to_owned(), name: word("fleet"), kind: word("study"), tree })
 }

@@ -8,7 +8,7 @@ use mapper_core::{Channel, DeclaredUncertainty, Element, NoiseColour, RedundantS
 use mapper_logs::units::{difference, kind_of, parse_quantity, remedy, unit};
 use mapper_logs::{LogOptions, OPTION_KEYS, OptionError};
 use mapper_yaml::units::{Kind, UnitError};
-use mapper_yaml::{Content, Document, FindingKind, Findings, Node, Notes, Source, Step, path_text, steps};
+use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io;
@@ -55,24 +55,17 @@ impl ChannelMap {
     /// # Errors
     /// All mistakes of the text together.
     pub fn from_yaml(text: &str, origin: &Path) -> Result<ChannelMap, Findings> {
-        let source = Source::new(&DOCUMENT, origin, text);
-        let mut notes = Notes::default();
-        if let Some(root) = mapper_yaml::read(&source, &mut notes) {
-            SCHEMA.check(&source, &root, &mut notes);
-            let map = Reader { source: &source, root: &root, notes: &mut notes }.map();
-            if notes.is_empty() {
-                return Ok(map);
-            }
-        }
-        Err(Findings::new(source, notes))
+        let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, origin, text))?;
+        SCHEMA.check(&tree, &mut notes);
+        let map = Reader { tree: &tree, notes: &mut notes }.map();
+        if notes.is_empty() { Ok(map) } else { Err(tree.findings(notes)) }
     }
 }
 
 /// Converts the tree to values and collects mistakes. The check against the schema has already reported missing values and wrong
 /// types, so they are skipped here.
 struct Reader<'a> {
-    source: &'a Source,
-    root: &'a Node,
+    tree: &'a Tree,
     notes: &'a mut Notes,
 }
 
@@ -130,7 +123,7 @@ impl<'a> Reader<'a> {
         ChannelMap {
             ambient_pressure,
             log: self.log(),
-            text: Some((self.source.origin.clone(), self.source.text().to_owned())),
+            text: Some((self.tree.source().origin.clone(), self.tree.source().text().to_owned())),
             channels,
             elements,
             redundant,
@@ -146,19 +139,16 @@ impl<'a> Reader<'a> {
 
     fn ambient_pressure(&mut self) -> Option<AmbientPressure> {
         let here = steps!["ambient_pressure"];
-        let node = self.root.get(&here)?;
-        if node.text() == Some(UNKNOWN_WORD) {
+        if self.tree.text(&here) == Some(UNKNOWN_WORD) {
             return Some(AmbientPressure::Constant(Barometer::unknown()));
         }
-        if node.entries().is_empty() {
+        if !self.tree.get(&here)?.is_object() {
             return self.positive(&here, Kind::Pressure).map(Barometer::read).map(AmbientPressure::Constant);
         }
         if let Some(barometer) = self.barometer() {
             return Some(AmbientPressure::Constant(barometer));
         }
-        let text = |key: &str| {
-            self.root.get(&steps!["ambient_pressure", key]).and_then(Node::text).map(str::to_owned)
-        };
+        let text = |key: &str| self.tree.text(&steps!["ambient_pressure", key]).map(str::to_owned);
         let (topic, field, written) = (text("topic").unwrap_or_default(), text("field")?, text("unit"));
         if let Some(Err(error)) = written.as_deref().map(|name| unit(Kind::Pressure, name)) {
             self.note_unit(&steps!["ambient_pressure", "unit"], Kind::Pressure, &error);
@@ -169,29 +159,24 @@ impl<'a> Reader<'a> {
     /// A value or an altitude, with its uncertainty.
     fn barometer(&mut self) -> Option<Barometer> {
         let of = |key: &str| steps!["ambient_pressure", key];
-        let found = match self.root.get(&of("value")) {
+        let found = match self.tree.get(&of("value")) {
             Some(_) => Barometer::read(self.positive(&of("value"), Kind::Pressure)?),
             None => Barometer::at_altitude(self.quantity(&of("altitude"), Kind::Length)?),
         };
-        let stated = self.root.get(&of("uncertainty")).is_some();
+        let stated = self.tree.get(&of("uncertainty")).is_some();
         let sigma_pa = self.not_negative(&of("uncertainty"), difference(Kind::Pressure));
         Some(if stated { Barometer { sigma_pa, ..found } } else { found })
     }
 
     fn log(&mut self) -> LogOptions {
         let mut options = LogOptions::default();
-        for entry in self.root.get(&steps!["log"]).map(Node::entries).unwrap_or_default() {
-            let here = steps!["log", entry.key.as_str()];
-            let Some(node) = self.root.get(&here) else { continue };
-            let Some(text) =
-                node.text().map(str::to_owned).or_else(|| node.number().map(|number| number.to_string()))
-            else {
-                continue;
-            };
+        for key in self.tree.keys(&steps!["log"]) {
+            let here = steps!["log", key];
+            let Some(text) = self.text_or_number(&here) else { continue };
             // The check against the schema has already reported an unknown key.
-            if let Err(error @ OptionError::Value { .. }) = options.set(&entry.key, &text) {
+            if let Err(error @ OptionError::Value { .. }) = options.set(key, &text) {
                 let remedy =
-                    OPTION_KEYS.iter().find(|key| key.name == entry.key).map_or("", |key| key.description);
+                    OPTION_KEYS.iter().find(|known| known.name == key).map_or("", |known| known.description);
                 self.note(FindingKind::WrongValue, &here, error.to_string(), remedy);
             }
         }
@@ -200,8 +185,8 @@ impl<'a> Reader<'a> {
 
     fn topic_unit_and_gauge(&mut self, channel: Channel) -> (String, Option<String>, bool) {
         let of = |key: &str| steps!["channels", channel.symbol(), key];
-        let topic = self.root.get(&of("topic")).and_then(Node::text).unwrap_or_default().to_owned();
-        let written = self.root.get(&of("unit")).and_then(Node::text).map(str::to_owned);
+        let topic = self.tree.text(&of("topic")).unwrap_or_default().to_owned();
+        let written = self.tree.text(&of("unit")).map(str::to_owned);
         if topic.starts_with(TRUTH_PREFIX) {
             let message = "topics below /truth are for scoring and cannot be mapped".to_owned();
             let remedy = "name a topic that the rig itself would have recorded";
@@ -211,10 +196,7 @@ impl<'a> Reader<'a> {
         if let Some(Err(error)) = written.as_deref().map(|name| unit(kind, name)) {
             self.note_unit(&of("unit"), kind, &error);
         }
-        let gauge = matches!(
-            self.root.get(&of("gauge")).map(|node| &node.content),
-            Some(Content::Scalar(Value::Bool(true)))
-        );
+        let gauge = self.tree.get(&of("gauge")) == Some(&Value::Bool(true));
         if gauge && kind != Kind::Pressure {
             let message =
                 format!("{channel} is not a pressure, and only pressures are read over the ambient pressure");
@@ -225,11 +207,9 @@ impl<'a> Reader<'a> {
 
     /// The field of a channel, or the fields of its several sensors.
     fn fields(&self, channel: Channel) -> Vec<String> {
-        let Some(node) = self.root.get(&steps!["channels", channel.symbol(), "field"]) else {
-            return Vec::new();
-        };
-        let texts = node.items().iter().chain(node.text().is_some().then_some(node));
-        texts.filter_map(Node::text).map(str::to_owned).collect()
+        let here = steps!["channels", channel.symbol(), "field"];
+        let listed = self.tree.items(&here).iter().filter_map(Value::as_str);
+        listed.chain(self.tree.text(&here)).map(str::to_owned).collect()
     }
 
     fn machine(&mut self) -> MachineConstants {
@@ -246,8 +226,7 @@ impl<'a> Reader<'a> {
     }
 
     fn reference(&mut self) -> Option<ReferenceState> {
-        let node = self.root.get(&steps!["reference"])?;
-        if let Some(name) = node.text() {
+        if let Some(name) = self.tree.text(&steps!["reference"]) {
             return ReferenceState::named(name);
         }
         let t_ref_k = self.positive(&steps!["reference", "temperature"], Kind::Temperature)?;
@@ -314,20 +293,22 @@ impl<'a> Reader<'a> {
     }
 
     fn quantity(&mut self, steps: &[Step], kind: Kind) -> Option<f64> {
-        let node = self.root.get(steps)?;
-        let text =
-            node.text().map(str::to_owned).or_else(|| node.number().map(|number| number.to_string()))?;
+        let text = self.text_or_number(steps)?;
         parse_quantity(kind, &text).map_err(|error| self.note_unit(steps, kind, &error)).ok()
     }
 
     fn has(&self, key: &str) -> bool {
-        self.root.get(&steps![key]).is_some()
+        self.tree.get(&steps![key]).is_some()
+    }
+
+    fn text_or_number(&self, steps: &[Step]) -> Option<String> {
+        let value = self.tree.get(steps)?;
+        value.as_str().map(str::to_owned).or_else(|| value.as_f64().map(|number| number.to_string()))
     }
 
     /// The channels that have an entry below a key.
     fn channels_below(&self, key: &str) -> Vec<Channel> {
-        let entries = self.root.get(&steps![key]).map(Node::entries).unwrap_or_default();
-        entries.iter().filter_map(|entry| entry.key.parse().ok()).collect()
+        self.tree.keys(&steps![key]).filter_map(|symbol| symbol.parse().ok()).collect()
     }
 
     fn note_unit(&mut self, steps: &[Step], kind: Kind, error: &UnitError) {
@@ -335,7 +316,6 @@ impl<'a> Reader<'a> {
     }
 
     fn note(&mut self, kind: FindingKind, steps: &[Step], message: String, remedy: &str) {
-        let place = self.root.place(steps);
-        self.notes.push(self.source.finding(kind, path_text(steps), place, message, remedy.to_owned()));
+        self.notes.push(self.tree.finding(kind, steps, message, remedy));
     }
 }

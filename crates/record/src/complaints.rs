@@ -2,7 +2,7 @@
 
 use crate::channel_map_yaml::DOCUMENT;
 use crate::{ChannelMap, RecordError};
-use mapper_yaml::{FindingKind, Findings, Node, Notes, Source, Step, path_text};
+use mapper_yaml::{FindingKind, Source, Step};
 use std::path::Path;
 
 /// Collects mistakes, so that all are reported at once.
@@ -25,15 +25,17 @@ impl Complaints {
         if self.list.is_empty() {
             return Ok(());
         }
-        let nowhere = (Path::new("channel map").to_owned(), String::new());
+        let nowhere = (Path::new("channel map").to_owned(), "{}".to_owned());
         let (path, text) = map.text.as_ref().unwrap_or(&nowhere);
-        let source = Source::new(&DOCUMENT, path, text);
-        let root: Option<Node> = mapper_yaml::read(&source, &mut Notes::default());
-        let mut notes = Notes::default();
-        for (kind, steps, message, remedy) in self.list {
-            let place = root.as_ref().map_or(0..0, |root| root.place(&steps));
-            notes.push(source.finding(kind, path_text(&steps), place, message, remedy));
-        }
-        Err(RecordError::ChannelMap(Box::new(Findings::new(source, notes))))
+        let findings = match mapper_yaml::read(Source::new(&DOCUMENT, path, text)) {
+            Ok((tree, mut notes)) => {
+                for (kind, steps, message, remedy) in self.list {
+                    notes.push(tree.finding(kind, &steps, message, remedy));
+                }
+                tree.findings(notes)
+            }
+            Err(findings) => findings,
+        };
+        Err(RecordError::ChannelMap(Box::new(findings)))
     }
 }

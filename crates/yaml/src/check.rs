@@ -1,39 +1,32 @@
-//! The tree against the schema: every violation becomes a finding at its place.
+//! The values against the schema: every violation becomes a finding at its place.
+//!
+//! serde stops at the first mistake, and in untagged enums and at unknown keys it loses the place and the choices.
 
 use crate::complaint::{
     complain, example_of, example_sentence, keys_of, quoted, replacement, shortened, with_description,
     wrong_name,
 };
-use crate::finding::FindingKind;
+use crate::finding::{Finding, FindingKind};
 use crate::notes::Notes;
+use crate::path::{Step, path_text};
 use crate::quantity_check::{self, Complaint};
 use crate::rules::{Rule, Violation, violations};
 use crate::schema::Schema;
-use crate::source::Source;
 use crate::suggestion::{closest, guess};
-use crate::tree::{Entry, Node, Step, path_text};
+use crate::tree::Tree;
 use serde_json::{Map, Value};
 use std::collections::HashSet;
-use std::ops::Range;
 
 /// Unknown keys of one mapping that are reported; looking up the place of each takes time.
 const UNKNOWN_KEYS_LIMIT: usize = 200;
 
 impl Schema {
     /// Checks everything the schema says, quantities included, and notes what is wrong.
-    pub fn check(&self, source: &Source, root: &Node, notes: &mut Notes) {
-        if !self.unknown.is_empty() {
-            let message =
-                format!("the program's own schema has unknown keywords: {}", self.unknown.join(", "));
-            let remedy = "this is a fault of the program; please report it".to_owned();
-            notes.push(source.finding(FindingKind::Unsupported, String::new(), 0..0, message, remedy));
-            return;
-        }
-        let value = root.to_json();
-        // What the tree refused is null here, and would be complained about a second time.
+    pub fn check(&self, tree: &Tree, notes: &mut Notes) {
+        // A refused value would be complained about a second time.
         let refused = notes.list().iter().map(|finding| finding.span.start).collect();
-        let mut check = Check { source, root, notes, refused };
-        for violation in violations(&self.value, &value) {
+        let mut check = Check { tree, notes, refused };
+        for violation in violations(&self.value, tree.value()) {
             check.translate(&violation);
             if check.notes.is_full() {
                 break;
@@ -43,8 +36,7 @@ impl Schema {
 }
 
 struct Check<'a> {
-    source: &'a Source,
-    root: &'a Node,
+    tree: &'a Tree,
     notes: &'a mut Notes,
     refused: HashSet<usize>,
 }
@@ -53,7 +45,7 @@ impl Check<'_> {
     fn translate(&mut self, violation: &Violation<'_>) {
         let Violation { steps, schema, value, rule } = violation;
         match rule {
-            Rule::Quantity(complaint) => self.note(steps, complaint.clone()),
+            Rule::Quantity(complaint) => self.note(steps, complaint),
             // Type, range and kind all fail for one mistake.
             _ if quantity_check::check(schema, value).is_some() => {}
             Rule::UnknownKeys(keys) => self.unknown_keys(steps, keys, schema),
@@ -61,20 +53,17 @@ impl Check<'_> {
             Rule::NoForm(forms) => self.best_form(steps, forms, schema, value),
             rule => {
                 if let Some(complaint) = complain(rule, schema, value) {
-                    self.note(steps, complaint);
+                    self.note(steps, &complaint);
                 }
             }
         }
     }
 
-    fn note(&mut self, steps: &[Step], complaint: Complaint) {
-        let place = self.root.place(steps);
-        self.note_at(steps, place, complaint);
+    fn note(&mut self, steps: &[Step], Complaint { kind, message, remedy }: &Complaint) {
+        self.push(self.tree.finding(*kind, steps, message, remedy));
     }
 
-    fn note_at(&mut self, steps: &[Step], place: Range<usize>, complaint: Complaint) {
-        let Complaint { kind, message, remedy } = complaint;
-        let finding = self.source.finding(kind, path_text(steps), place, message, remedy);
+    fn push(&mut self, finding: Finding) {
         if !self.refused.contains(&finding.span.start) {
             self.notes.push(finding);
         }
@@ -83,41 +72,32 @@ impl Check<'_> {
     fn unknown_keys(&mut self, steps: &[Step], unexpected: &[&str], schema: &Map<String, Value>) {
         let known = keys_of(schema);
         let within = match path_text(steps) {
-            path if path.is_empty() => format!("in a {}", self.source.document.name),
+            path if path.is_empty() => format!("in a {}", self.tree.source().document.name),
             path => format!("in `{path}`"),
         };
         for key in unexpected.iter().take(UNKNOWN_KEYS_LIMIT) {
-            let mut full: Vec<Step> = steps.to_vec();
-            full.push(Step::from(*key));
-            let complaint = match replacement(schema, key) {
-                Some(remedy) => Complaint {
-                    kind: FindingKind::UnknownKey,
-                    message: format!("the key `{key}` is no longer known {within}"),
-                    remedy: remedy.to_owned(),
-                },
-                None => Complaint {
-                    kind: FindingKind::UnknownKey,
-                    message: format!("there is no key `{}` {within}", shortened(key)),
-                    remedy: format!("{}the keys are {}", guess(key, &known), known.join(", ")),
-                },
+            let (message, remedy) = match replacement(schema, key) {
+                Some(remedy) => (format!("the key `{key}` is no longer known {within}"), remedy.to_owned()),
+                None => (
+                    format!("there is no key `{}` {within}", shortened(key)),
+                    format!("{}the keys are {}", guess(key, &known), known.join(", ")),
+                ),
             };
-            let place = self.root.key_place(steps, key);
-            self.note_at(&full, place, complaint);
+            let full = [steps, &[Step::from(*key)]].concat();
+            self.push(self.tree.key_finding(FindingKind::UnknownKey, &full, message, remedy));
         }
     }
 
     fn missing_key(&mut self, steps: &[Step], key: &str, schema: &Map<String, Value>) {
         let known = keys_of(schema);
-        let there = self.root.get(steps).map(Node::entries).unwrap_or_default();
-        let mistyped =
-            |entry: &Entry| !known.contains(&entry.key.as_str()) && closest(&entry.key, &known) == Some(key);
+        let is_mistyped = |there: &str| !known.contains(&there) && closest(there, &known) == Some(key);
         // A mistyped key is one mistake, complained about as an unknown key.
-        if there.iter().take(UNKNOWN_KEYS_LIMIT).any(mistyped) {
+        if self.tree.keys(steps).take(UNKNOWN_KEYS_LIMIT).any(is_mistyped) {
             return;
         }
         let property = schema.get("properties").and_then(|properties| properties.get(key));
         let within = match path_text(steps) {
-            path if path.is_empty() => format!("the {}", self.source.document.name),
+            path if path.is_empty() => format!("the {}", self.tree.source().document.name),
             path => format!("`{path}`"),
         };
         let example = property.and_then(example_of).map_or(format!("{key}: ..."), |e| format!("{key}: {e}"));
@@ -126,7 +106,7 @@ impl Check<'_> {
             message: format!("{within} has no key `{key}`"),
             remedy: with_description(format!("write e.g. `{example}`"), property.and_then(Value::as_object)),
         };
-        self.note(steps, complaint);
+        self.note(steps, &complaint);
     }
 
     /// Of several forms a value may take, complains about the one that was meant: the one of the same type.
@@ -152,7 +132,7 @@ impl Check<'_> {
             .map(|lists| lists.concat());
         match (names, meant.as_slice()) {
             // The description of the whole says more than that of the list of names.
-            (Some(names), [_, ..]) => self.note(steps, wrong_name(&names, schema, value)),
+            (Some(names), [_, ..]) => self.note(steps, &wrong_name(&names, schema, value)),
             (_, [form]) => form.iter().for_each(|violation| self.translate(violation)),
             _ => {
                 let complaint = Complaint {
@@ -160,7 +140,7 @@ impl Check<'_> {
                     message: format!("{} is not one of the forms allowed here", quoted(value)),
                     remedy: with_description(example_sentence(schema), Some(schema)),
                 };
-                self.note(steps, complaint);
+                self.note(steps, &complaint);
             }
         }
     }

@@ -50,6 +50,11 @@ pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Val
             message: format!("{} has more than one meaning here", quoted(value)),
             remedy: with_description(example_sentence(schema), Some(schema)),
         },
+        Rule::UnknownKeyword(keyword) => Complaint {
+            kind: FindingKind::Unsupported,
+            message: format!("the program's own schema has the unknown keyword `{keyword}`"),
+            remedy: "this is a fault of the program; please report it".to_owned(),
+        },
         Rule::UnknownKeys(_) | Rule::MissingKey(_) | Rule::NoForm(_) | Rule::Quantity(_) => return None,
     })
 }

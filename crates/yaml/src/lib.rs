@@ -1,9 +1,9 @@
 //! YAML that people write: read with positions, checked against a schema, mistakes shown with line and caret, values
 //! written with units.
 //!
-//! The text becomes a tree that keeps positions ([`read`]); the tree is checked against a JSON schema
-//! ([`Schema::check`]), units and ranges included; the caller checks what no schema can say on the same tree; only a
-//! tree without [`Notes`] is deserialised ([`Node::deserialise`]). All mistakes of a text come in one go, as
+//! serde_yaml reads the values, saphyr-parser their places ([`read`]). The values are checked against a JSON schema
+//! ([`Schema::check`]), units and ranges included; the caller checks relations between values on the same [`Tree`]; only
+//! a text without [`Notes`] is deserialised ([`Tree::deserialise`]). All mistakes of a text are reported together, as
 //! [`Findings`]. This crate does not depend on the subject of the files.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
@@ -13,13 +13,12 @@ mod complaint;
 mod file;
 mod finding;
 mod findings;
-mod keywords;
 mod notes;
+mod path;
+mod places;
 mod quantity_check;
-mod reader;
 mod render;
 mod rules;
-mod scalar;
 mod schema;
 mod source;
 mod suggestion;
@@ -30,8 +29,8 @@ pub use file::{open, open_file, read_limited};
 pub use finding::{Finding, FindingKind};
 pub use findings::Findings;
 pub use notes::Notes;
-pub use reader::read;
+pub use path::{Step, path_text};
 pub use schema::{Schema, json_schema_of};
 pub use source::{Document, Source};
 pub use suggestion::closest;
-pub use tree::{Content, Entry, Node, ReadError, Step, path_text};
+pub use tree::{Tree, read};

@@ -1,6 +1,5 @@
 //! A JSON schema made from a type: given to editors, and what a file is checked against.
 
-use crate::keywords::unknown_keywords;
 use schemars::transform::{Transform, transform_subschemas};
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value};
@@ -9,8 +8,6 @@ use serde_json::{Map, Value};
 #[derive(Debug, Clone)]
 pub struct Schema {
     pub(crate) value: Value,
-    /// Keywords that the check does not know; it would pass over what they demand.
-    pub(crate) unknown: Vec<String>,
 }
 
 impl Schema {
@@ -21,7 +18,7 @@ impl Schema {
 
     /// A schema written out.
     pub fn new(value: Value) -> Self {
-        Schema { unknown: unknown_keywords(&value), value }
+        Schema { value }
     }
 }
 

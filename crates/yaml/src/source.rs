@@ -63,11 +63,11 @@ impl Source {
         remedy: String,
     ) -> Finding {
         let bytes = self.text.as_bytes();
-        let start = floor_char_boundary(&self.text, span.start);
+        let start = self.text.floor_char_boundary(span.start);
         let line = self.line_starts.partition_point(|line_start| *line_start <= start);
         let line_start = self.line_starts.get(line.saturating_sub(1)).copied().unwrap_or_default();
         let column = 1 + self.text.get(line_start..start).map_or(0, |before| before.chars().count());
-        let end = floor_char_boundary(&self.text, span.end).max(start);
+        let end = self.text.floor_char_boundary(span.end).max(start);
         let cut = bytes
             .get(start..end)
             .and_then(|inside| inside.iter().position(|b| matches!(b, b'\n' | b'\r')))
@@ -76,12 +76,4 @@ impl Source {
         let trimmed = self.text.get(start..cut).map_or(0, |inside| inside.trim_end().len());
         Finding { kind, path, line, column, message, remedy, span: start..start + trimmed }
     }
-}
-
-fn floor_char_boundary(text: &str, at: usize) -> usize {
-    let mut at = at.min(text.len());
-    while !text.is_char_boundary(at) {
-        at -= 1;
-    }
-    at
 }

@@ -86,11 +86,18 @@ const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
 ];
 
 /// Libraries that only some packages may use.
-const RESTRICTED: &[(&str, &[&str], &str)] = &[(
-    "saphyr-parser",
-    &["mapper-yaml"],
-    "YAML is read in one way, with positions, so that mistakes have places",
-)];
+const RESTRICTED: &[(&str, &[&str], &str)] = &[
+    (
+        "saphyr-parser",
+        &["mapper-yaml"],
+        "YAML is read in one way, with positions, so that mistakes have places",
+    ),
+    (
+        "serde_yaml",
+        &["mapper-yaml", "mapper-session"],
+        "mapper-yaml reads YAML, with places and limits; mapper-session only writes it",
+    ),
+];
 
 /// One edge: who uses whom, and whether in tests alone.
 #[derive(Clone, Copy)]

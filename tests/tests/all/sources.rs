@@ -23,7 +23,7 @@ const RULES: &[Rule] = &[
     },
     Rule {
         word: ("saphyr_", "parser"),
-        places: &["crates/yaml/src/reader.rs"],
+        places: &["crates/yaml/src/places.rs"],
         why: "YAML is read in one way, with positions, so that mistakes have places",
     },
 ];

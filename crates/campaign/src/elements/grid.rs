@@ -6,10 +6,10 @@ use crate::checking::Check;
 use crate::units::{Fraction, Kind, Quantity, Speed};
 use mapper_core::{Limits, OperatingPoint, ReferenceState};
 use mapper_physics::line_points::LineRequest;
-use mapper_yaml::FindingKind;
-use mapper_yaml::{Content, Step, steps};
+use mapper_yaml::{FindingKind, Step, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use serde_json::Value;
 use std::collections::HashSet;
 
 /// Maximum number of points a grid may have: three days of two-minute steps. The planner holds several numbers for every pair of points: 32 MB
@@ -116,11 +116,8 @@ fn rounded(rpm: f64, opening: f64) -> (i64, i64) {
 
 /// Checks that the grid has one of its forms, without duplicates and within the limits.
 pub(crate) fn check(check: &mut Check<'_>) {
-    let Some(grid) = check.get(&steps!["grid"]) else { return };
-    if grid.entries().is_empty() && !matches!(&grid.content, Content::Mapping(_)) {
-        return;
-    }
-    let has = |key: &str| grid.get(&steps![key]).is_some();
+    let Some(grid) = check.get(&steps!["grid"]).and_then(Value::as_object) else { return };
+    let has = |key: &str| grid.contains_key(key);
     let (speeds, openings, points, skip) = (has("speeds"), has("openings"), has("points"), has("skip"));
     let here = steps!["grid"];
     let other = ["speeds", "openings", "points", "skip"].into_iter().find(|key| has(key));

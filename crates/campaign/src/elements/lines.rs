@@ -8,6 +8,7 @@ use mapper_physics::line_points::{LineRequest, Spread};
 use mapper_yaml::{FindingKind, steps};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use serde_json::Value;
 use std::collections::HashSet;
 
 /// Surge margin of a line's last point if the file gives none.
@@ -81,7 +82,9 @@ pub(crate) fn check(check: &mut Check<'_>) {
                 let remedy = "give the number of its points, or their distance";
                 check.note_key(FindingKind::Conflict, &here, "spacing", message, remedy);
             }
-            (false, false) if check.get(&here).is_some_and(|line| !line.entries().is_empty()) => {
+            (false, false)
+                if check.get(&here).and_then(Value::as_object).is_some_and(|line| !line.is_empty()) =>
+            {
                 let message = "the line has neither `points` nor `spacing`".to_owned();
                 check.note(FindingKind::MissingKey, &here, message, FORM);
             }

@@ -46,26 +46,23 @@ pub(crate) fn readers(file: BTreeMap<String, ReaderFile>) -> Vec<ReaderChoice> {
 
 /// Checks that names are usable in messages, that channels exist, and that there are no duplicates.
 pub(crate) fn check(check: &mut Check<'_>) {
-    let names: Vec<String> = check
-        .get(&steps!["readers"])
-        .map(|readers| readers.entries().iter().map(|entry| entry.key.clone()).collect())
-        .unwrap_or_default();
+    let tree = check.tree;
     let mut taken: BTreeMap<String, String> = BTreeMap::new();
-    for name in names {
+    for name in tree.keys(&steps!["readers"]) {
         let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-".contains(&byte);
         if name.is_empty() || name.len() > 40 || !name.bytes().all(plain) {
             let message = format!("`{name}` cannot be the name of a reader");
             let remedy = "use letters, digits, `_` and `-`, at most 40";
-            check.note_key(FindingKind::WrongValue, &steps!["readers"], &name, message, remedy);
+            check.note_key(FindingKind::WrongValue, &steps!["readers"], name, message, remedy);
             continue;
         }
-        for index in 0..check.count(&steps!["readers", name.as_str(), "channels"]) {
-            let place = steps!["readers", name.as_str(), "channels", index];
+        for index in 0..check.count(&steps!["readers", name, "channels"]) {
+            let place = steps!["readers", name, "channels", index];
             let Some(symbol) = check.text(&place).map(str::to_owned) else { continue };
             if let Err(error) = symbol.parse::<Channel>() {
                 let remedy = "write the symbol of a measured quantity, e.g. `m_c`";
                 check.note(FindingKind::WrongValue, &place, error.to_string(), remedy);
-            } else if let Some(other) = taken.insert(symbol.clone(), name.clone()) {
+            } else if let Some(other) = taken.insert(symbol.clone(), name.to_owned()) {
                 let message = format!("{symbol} is taken from `{other}` already");
                 check.note(FindingKind::Conflict, &place, message, "take each channel from one reader");
             }

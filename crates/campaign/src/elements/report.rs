@@ -96,10 +96,10 @@ struct Date(
 
 /// Checks that days of calibration exist in the calendar. The schema checks their form.
 pub(crate) fn check(check: &mut Check<'_>) {
-    let Some(calibration) = check.get(&steps!["report", "calibration"]) else { return };
-    for entry in calibration.entries() {
-        let steps = steps!["report", "calibration", entry.key.as_str()];
-        if let Some(text) = entry.value.text()
+    let tree = check.tree;
+    for channel in tree.keys(&steps!["report", "calibration"]) {
+        let steps = steps!["report", "calibration", channel];
+        if let Some(text) = check.text(&steps)
             && let Some((year, month, day)) = date(text)
             && (1..=12).contains(&month)
             && (29..=31).contains(&day)

@@ -2,7 +2,7 @@
 
 use crate::checking::Check;
 use mapper_core::{Channel, DeclaredElement, DeclaredUncertainty, Element, MAX_ELEMENTS, RedundantSensors};
-use mapper_yaml::{FindingKind, Node, Step, steps};
+use mapper_yaml::{FindingKind, Step, steps};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -120,9 +120,7 @@ pub(crate) fn check_several(check: &mut Check<'_>, symbol: &str) {
     }
     // One place in the flow and one calibration bath have one value each.
     for key in ["common_offset", "tap", "pipe_diameter"] {
-        let text_of = |check: &Check<'_>, place: &[Step]| {
-            check.get(&at(place, key)).and_then(Node::text).map(str::to_owned)
-        };
+        let text_of = |check: &Check<'_>, place: &[Step]| check.text(&at(place, key)).map(str::to_owned);
         let first = places.iter().find_map(|place| text_of(check, place));
         let other = places
             .iter()

@@ -34,10 +34,13 @@ pub fn read(source: Source) -> Result<(Tree, Notes), Findings> {
     match document.map_or(Ok(Value::Null), Value::deserialize) {
         Ok(value) => Ok((Tree { source, readable, value, places }, notes)),
         Err(error) => {
-            let at = error.location().map_or(0, |location| source.byte_of_char(location.index()));
-            let message = format!("this is not YAML: {error}");
-            let remedy = SYNTAX_REMEDY.to_owned();
-            notes.push(source.finding(FindingKind::Syntax, String::new(), at..at, message, remedy));
+            // Refused YAML may be the reason.
+            if notes.is_empty() {
+                let at = error.location().map_or(0, |location| source.byte_of_char(location.index()));
+                let message = format!("this is not YAML: {error}");
+                let remedy = SYNTAX_REMEDY.to_owned();
+                notes.push(source.finding(FindingKind::Syntax, String::new(), at..at, message, remedy));
+            }
             Err(Findings::new(source, notes))
         }
     }

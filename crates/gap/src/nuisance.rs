@@ -14,6 +14,9 @@ pub const OUTPUTS: [Channel; 9] = {
     [n, m_c, p2, t2, tc, m_t, t4, tt, Channel::P3]
 };
 
+/// Start of the name of an offset; the channel follows.
+pub const OFFSET_PREFIX: &str = "offset of ";
+
 /// Kind of nuisance parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NuisanceKind {
@@ -37,7 +40,7 @@ impl std::fmt::Display for NuisanceKind {
     /// Name in files and messages.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            NuisanceKind::Offset(channel) => write!(f, "offset of {channel}"),
+            NuisanceKind::Offset(channel) => write!(f, "{OFFSET_PREFIX}{channel}"),
             NuisanceKind::CommonOffset(Dimension::Pressure) => f.write_str("common offset of the pressures"),
             NuisanceKind::CommonOffset(_) => f.write_str("common offset of the temperatures"),
             NuisanceKind::FlowMeterGain => f.write_str("flow_meter_gain"),

@@ -3,12 +3,12 @@
 use crate::coordinate::coordinates;
 use crate::diagnose::Diagnosed;
 use crate::fit::{Fit, effect_changes};
-use crate::nuisance::OUTPUTS;
+use crate::nuisance::{OFFSET_PREFIX, OUTPUTS};
 use crate::outlook::{Alike, imagined_steps};
 use crate::report::Verdict;
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, dot};
-use mapper_core::{StepMarker, half_width_95};
+use mapper_core::{Channel, StepMarker, half_width_95};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -33,6 +33,13 @@ pub struct FoundTolerance {
     pub value: f64,
     /// Prior standard deviation.
     pub sigma: f64,
+}
+
+impl FoundTolerance {
+    /// The channel whose offset it is; `None` for other tolerances.
+    pub fn offset_of(&self) -> Option<Channel> {
+        self.name.strip_prefix(OFFSET_PREFIX)?.parse().ok()
+    }
 }
 
 /// A machine as identified by a diagnosis.

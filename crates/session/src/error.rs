@@ -393,6 +393,9 @@ pub enum SessionError {
         /// The directory.
         parent: PathBuf,
     },
+    /// Data could not be written as YAML: a defect of the program.
+    #[error("failed to write YAML: {0}")]
+    Yaml(#[from] serde_yaml::Error),
     /// Data could not be written as JSON: a defect of the program.
     #[error("failed to write JSON: {0}")]
     Json(#[from] serde_json::Error),
@@ -490,6 +493,7 @@ impl SessionError {
             | E::File { .. }
             | E::Exists { .. }
             | E::TooManyRuns { .. }
+            | E::Yaml(_)
             | E::Json(_) => ErrorKind::Failure,
             E::Interrupted => ErrorKind::Interrupted,
         }

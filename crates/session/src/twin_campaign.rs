@@ -3,6 +3,7 @@
 use crate::SessionError;
 use mapper_gap::twin::{Found, TwinError};
 use mapper_physics::effect::{Effect, EffectParameter};
+use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -41,53 +42,41 @@ pub fn twin_campaign(
 }
 
 /// The backend block.
-fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, TwinError> {
-    let mut text = format!(
-        "# The machine as found in {}; its covariance is there.\nbackend:\n  virtual_lab:\n    start: settled\n",
-        twin.source.display()
-    );
-    // As in the diagnosis: P3 follows with its declared lag, the valve without lag.
-    text += &format!(
-        "    actuators:\n      turbine_inlet_pressure: {{lag: {} s, slew: 1000 bar/s}}\n      valve: {{lag: 0 s, slew: 1000 1/s}}\n",
-        twin.p3_lag_s
-    );
-    if !twin.found.effects.is_empty() {
-        text += "    effects:\n";
-    }
+fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, SessionError> {
+    let mut effects = Map::new();
     for effect in &twin.found.effects {
         let known = catalogue.iter().find(|known| known.info().id == effect.id.as_str());
         let known = known.ok_or_else(|| TwinError::Effect(effect.id.clone()))?;
         let value = |(parameter, value): (&EffectParameter, &f64)| match parameter.unit.as_ref() {
-            "1" | "kg/kg" => format!("{value}"),
-            unit => format!("\"{value} {unit}\""),
+            "1" | "kg/kg" => (parameter.name.to_string(), json!(value)),
+            unit => (parameter.name.to_string(), json!(format!("{value} {unit}"))),
         };
         let parameters = &known.info().parameters;
-        let values: Vec<String> = parameters.iter().zip(&effect.values).map(value).collect();
-        text += &match (parameters.as_slice(), values.as_slice()) {
-            ([_], [value]) => format!("      {}: {value}\n", effect.id),
-            _ => {
-                let named: Vec<String> =
-                    parameters.iter().zip(values).map(|(p, value)| format!("{}: {value}", p.name)).collect();
-                format!("      {}: {{{}}}\n", effect.id, named.join(", "))
-            }
-        };
+        let mut values: Map<String, Value> = parameters.iter().zip(&effect.values).map(value).collect();
+        let single = parameters.first().filter(|_| parameters.len() == 1);
+        let single = single.and_then(|parameter| values.remove(parameter.name.as_ref()));
+        effects.insert(effect.id.clone(), single.unwrap_or(Value::Object(values)));
     }
-    text += "    deviations:\n";
-    for tolerance in twin.found.tolerances.iter().filter(|t| DEVIATIONS.contains(&t.name.as_str())) {
-        text += &format!("      {}: {:.4} %\n", tolerance.name, 100.0 * tolerance.value);
-    }
-    let offsets: Vec<String> = twin
-        .found
-        .tolerances
-        .iter()
-        .filter_map(|t| {
-            let channel = t.name.strip_prefix("offset of ")?;
-            let unit = if channel.starts_with('P') { "Pa" } else { "K" };
-            Some(format!("{channel}: {:.4} {unit}", t.value))
-        })
-        .collect();
-    text += &format!("    offset_of: {{{}}}\n", offsets.join(", "));
-    Ok(text)
+    let tolerances = &twin.found.tolerances;
+    let deviations = tolerances.iter().filter(|t| DEVIATIONS.contains(&t.name.as_str()));
+    let deviations = deviations.map(|t| (t.name.clone(), json!(format!("{:.4} %", 100.0 * t.value))));
+    let offsets = tolerances.iter().filter_map(|t| {
+        let channel = t.offset_of()?;
+        Some((channel.to_string(), json!(format!("{:.4} {}", t.value, channel.unit()))))
+    });
+    let lab = json!({
+        "start": "settled",
+        // As in the diagnosis: P3 follows with its declared lag, the valve without lag.
+        "actuators": {
+            "turbine_inlet_pressure": {"lag": format!("{} s", twin.p3_lag_s), "slew": "1000 bar/s"},
+            "valve": {"lag": "0 s", "slew": "1000 1/s"},
+        },
+        "effects": effects,
+        "deviations": deviations.collect::<Map<_, _>>(),
+        "offset_of": offsets.collect::<Map<_, _>>(),
+    });
+    let block = serde_yaml::to_string(&json!({"backend": {"virtual_lab": lab}}))?;
+    Ok(format!("# The machine as found in {}; its covariance is there.\n{block}", twin.source.display()))
 }
 
 /// A campaign's text with its backend's block replaced.
@@ -124,6 +113,46 @@ fn with_backend(text: &str, block: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_gap::twin::{FoundEffect, FoundTolerance};
+
+    /// Every effect of the library, and tolerances of both kinds, arrive in the campaign as numbers or values with units.
+    #[test]
+    fn a_machine_becomes_the_settings_of_the_virtual_lab() {
+        let catalogue = mapper_effects::catalogue();
+        let effect = |effect: &Arc<dyn Effect>| {
+            let values = effect.info().parameters.iter().map(|parameter| parameter.high);
+            FoundEffect { id: effect.info().id.to_string(), values: values.collect() }
+        };
+        let tolerance =
+            |(name, value): (&str, f64)| FoundTolerance { name: name.to_owned(), value, sigma: 1.0 };
+        let found = Found {
+            effects: catalogue.iter().map(effect).collect(),
+            tolerances: [("valve_area", -0.02), ("offset of T1", 0.25), ("offset of P2", -40.0)]
+                .map(tolerance)
+                .into(),
+            covariance: Vec::new(),
+        };
+        let twin = Twin { found: &found, source: Path::new("first.json"), p3_lag_s: 0.4 };
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/grid18.yaml"));
+        let text = twin_campaign(&std::fs::read_to_string(path).unwrap(), &twin, &catalogue).unwrap();
+        let campaign = mapper_campaign::check(&text, path, &mapper_campaign::read_text).unwrap();
+        let lab = campaign.backend.settings;
+        assert_eq!(lab["deviations"], json!({"valve_area": "-2.0000 %"}));
+        assert_eq!(lab["offset_of"], json!({"T1": "0.2500 K", "P2": "-40.0000 Pa"}));
+        assert_eq!(lab["actuators"]["turbine_inlet_pressure"]["lag"], "0.4 s");
+        for effect in catalogue {
+            let written = &lab["effects"][effect.info().id.as_ref()];
+            for parameter in &effect.info().parameters {
+                let value = if effect.info().parameters.len() == 1 {
+                    written
+                } else {
+                    &written[parameter.name.as_ref()]
+                };
+                let number = value.as_f64().or_else(|| value.as_str()?.split(' ').next()?.parse().ok());
+                assert_eq!(number, Some(parameter.high), "{text}");
+            }
+        }
+    }
 
     #[test]
     fn only_the_block_of_the_backend_is_replaced() {

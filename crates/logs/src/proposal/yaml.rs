@@ -2,6 +2,7 @@
 
 use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
 use crate::Layout;
+use serde_json::Value;
 use std::fmt::Write;
 
 /// The text of a channel map: what is sure and what is likely as entries, what is not as comments. `options` are the keys and
@@ -15,7 +16,7 @@ pub fn channel_map_text(
     let mut text = format!(
         "# Channel map of {}, proposed by `mapper log inspect`. Lines that end in a remark had to be guessed:\n\
          # look at them. Lines that are comments are doubtful and count only without the `#`.\nchannels:\n",
-        name.replace(['\n', '\r'], " ")
+        remark(name)
     );
     let kept = |proposed: &&ProposedChannel| proposed.certainty > Certainty::Unsure;
     if !proposal.channels.iter().any(|proposed| kept(&proposed)) {
@@ -26,7 +27,7 @@ pub fn channel_map_text(
     for proposed in &proposal.channels {
         let mut line = format!("{}: {}", proposed.channel.symbol(), source(layout, proposed));
         if !proposed.remarks.is_empty() {
-            let remarks = proposed.remarks.join("; ").replace(['\n', '\r'], " ");
+            let remarks = remark(&proposed.remarks.join("; "));
             let _ = write!(line, "  # {remarks}");
         }
         let _ = writeln!(text, "  {}{line}", if kept(&proposed) { "" } else { "# " });
@@ -101,18 +102,19 @@ fn scalar(text: &str) -> String {
     if plain { text.to_owned() } else { quoted(text) }
 }
 
+/// In quotes as JSON has them, which YAML reads too. YAML reads fewer characters without an escape.
 fn quoted(text: &str) -> String {
-    let mut quoted = String::from("\"");
-    for letter in text.chars() {
-        match letter {
-            '"' | '\\' => quoted.extend(['\\', letter]),
-            '\t' => quoted.push_str("\\t"),
-            letter if letter.is_control() => {
-                let _ = write!(quoted, "\\x{:02x}", u32::from(letter).min(255));
-            }
-            letter => quoted.push(letter),
-        }
-    }
-    quoted.push('"');
-    quoted
+    let json = Value::from(text).to_string();
+    let escaped = |c| if is_plain(c) { c.to_string() } else { format!("\\u{:04x}", u32::from(c)) };
+    json.chars().map(escaped).collect()
+}
+
+/// A text for a comment.
+fn remark(text: &str) -> String {
+    text.chars().map(|c| if is_plain(c) { c } else { ' ' }).collect()
+}
+
+/// Whether every YAML reader takes a character as it is, and as part of its line.
+fn is_plain(c: char) -> bool {
+    !c.is_control() && !matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}')
 }

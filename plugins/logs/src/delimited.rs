@@ -5,7 +5,7 @@ use crate::encoding;
 use crate::long_table::{LongForm, LongRows};
 use crate::row_stream::{Dialect, RowStream};
 use crate::separator::{SEPARATORS, decimal, score};
-use crate::table_log::Table;
+use crate::table_log::{Origin, Table};
 use mapper_logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink};
 use std::io::Cursor;
 
@@ -69,12 +69,12 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     };
     let (found_decimal, seen) = decimal(&rows);
     let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
-    let mut table = Table::look(&rows, decimal, options).map_err(|message| file.content(NAME, message))?;
+    let mut table = Table::look(&rows, decimal, options, Origin::Rows).map_err(|message| file.content(NAME, message))?;
     let long = LongForm::find(&rows, &table, decimal);
     if let Some(form) = &long {
         // The header of the gathered table is in its first row, wherever that of the file is.
         let gathered = LogOptions { names_row: None, units_row: None, data_row: None, ..options.clone() };
-        table = Table::look(&form.wide(&rows), decimal, &gathered).map_err(|message| file.content(NAME, message))?;
+        table = Table::look(&form.wide(&rows), decimal, &gathered, Origin::Rows).map_err(|message| file.content(NAME, message))?;
         table.layout.findings.insert(0, form.words(&rows));
     }
     let dialect = Dialect { encoding, mark, separator, decimal };

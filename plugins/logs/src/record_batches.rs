@@ -3,7 +3,7 @@
 use crate::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::instant::{Instant, NS_PER_DAY};
 use crate::table_head::COLUMN_LIMIT;
-use crate::table_log::Table;
+use crate::table_log::{Origin, Table};
 use arrow_array::cast::AsArray;
 use arrow_array::temporal_conversions::MILLISECONDS;
 use arrow_array::types::{
@@ -51,9 +51,8 @@ pub(crate) fn open_log(
     }
     let chunks = BatchChunks { file, name, batches };
     let rows = ColumnRows::new(head(&schema), chunks).texts(HEAD_ROWS)?;
-    let mut table = Table::look(&rows, b'.', options).map_err(|why| file.content(name, why))?;
-    // Header rows have no meaning in a file of columns.
-    table.layout.findings.retain(|finding| !finding.starts_with("header: "));
+    let mut table =
+        Table::look(&rows, b'.', options, Origin::Columns).map_err(|why| file.content(name, why))?;
     let unread = schema.fields().iter().filter(|field| !is_read(field.data_type())).count();
     if unread > 0 {
         let findings = &mut table.layout.findings;

@@ -17,6 +17,8 @@ pub(crate) struct TableHead {
     pub(crate) data_row: usize,
     /// Unit behind each number of a column, where cells have one.
     pub(crate) cell_units: BTreeMap<usize, String>,
+    /// The rows of the head, in words.
+    pub(crate) head: String,
     pub(crate) findings: Vec<String>,
 }
 
@@ -130,8 +132,9 @@ pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> R
         columns.pop();
     }
     let found = Found { names_row, units_row, distant_units, group_row, header: &header, data_row, repeated };
+    let head = head_words(&found, &columns);
     let findings = findings(&found, &columns, cell_units.len());
-    Ok(TableHead { columns, data_row, cell_units, findings })
+    Ok(TableHead { columns, data_row, cell_units, head, findings })
 }
 
 /// The rows of a head.
@@ -147,19 +150,23 @@ struct Found<'a> {
     repeated: usize,
 }
 
-/// What was found, in words.
-fn findings(found: &Found<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<String> {
-    let mut findings = Vec::new();
+/// The rows of the head, in words.
+fn head_words(found: &Found<'_>, columns: &[HeadColumn]) -> String {
     let row_number = |row: Option<usize>| row.map_or("none".to_owned(), |row| (row + 1).to_string());
     let in_names = found.units_row.is_none() && columns.iter().any(|column| column.unit.is_some());
     let units = if in_names { "in the names".to_owned() } else { row_number(found.units_row) };
-    findings.push(format!(
+    format!(
         "header: names in row {}, units {}{}, data from row {} (names_row, units_row, data_row)",
         row_number(found.names_row),
         if found.units_row.is_some() { "in row " } else { "" },
         units,
         found.data_row + 1
-    ));
+    )
+}
+
+/// Everything else about the head, in words.
+fn findings(found: &Found<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<String> {
+    let mut findings = Vec::new();
     if let Some(row) = found.distant_units.filter(|_| columns.iter().any(|column| column.unit.is_some())) {
         findings.push(format!("units of columns without one are in row {}", row + 1));
     }

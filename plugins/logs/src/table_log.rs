@@ -56,13 +56,34 @@ pub(crate) struct Table {
     cell_units: BTreeMap<usize, String>,
 }
 
+/// Where a table comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// A text or a sheet: its head is in rows.
+    Rows,
+    /// A file of columns, which has no rows of a head.
+    Columns,
+    /// As `Columns`; the file gives the interval of the samples too.
+    Waveform,
+}
+
 impl Table {
     /// Analyses the first rows of a table.
-    pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<Table, String> {
-        let TableHead { columns, data_row, cell_units, mut findings } = look(rows, decimal, options)?;
+    pub(crate) fn look(
+        rows: &[Vec<String>],
+        decimal: u8,
+        options: &LogOptions,
+        origin: Origin,
+    ) -> Result<Table, String> {
+        let TableHead { columns, data_row, cell_units, head, mut findings } = look(rows, decimal, options)?;
+        if origin == Origin::Rows {
+            findings.insert(0, head);
+        }
         let sample = Sample { columns: &columns, rows: rows.get(data_row..).unwrap_or_default(), decimal };
         let mut clocks = choose(&sample, options)?;
-        findings.append(&mut clocks.findings);
+        if origin != Origin::Waveform {
+            findings.append(&mut clocks.findings);
+        }
         let mut layout = Layout {
             groups: clocks.groups.iter().map(|(group, _)| group.clone()).collect(),
             columns: Vec::new(),

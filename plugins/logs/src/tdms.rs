@@ -4,7 +4,7 @@ use crate::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::instant::Instant;
 use crate::parts::{Part, side_by_side};
 use crate::table_head::COLUMN_LIMIT;
-use crate::table_log::Table;
+use crate::table_log::{Origin, Table};
 use mapper_logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 use std::io::{Seek as _, SeekFrom};
 use tedium::{ChannelPath, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
@@ -214,14 +214,13 @@ fn look(
         options.time.clear();
     }
     let head = ColumnRows::new(head(channels), GroupChunks::new(file, source, channels, HEAD_ROWS)).texts(HEAD_ROWS)?;
-    let mut table = match Table::look(&head, b'.', &options) {
+    let origin = if waveform.is_some() { Origin::Waveform } else { Origin::Columns };
+    let mut table = match Table::look(&head, b'.', &options, origin) {
         Ok(table) => table,
         Err(problem) => return Ok(Err(problem)),
     };
-    let findings = &mut table.layout.findings;
-    // Header rows have no meaning in a file of columns.
-    findings.retain(|finding| !finding.starts_with("header: ") && (waveform.is_none() || !finding.starts_with("clock: ")));
     if let Some(waveform) = waveform {
+        let findings = &mut table.layout.findings;
         findings.push(format!("clock: a waveform with a value every {} s (time, rate)", waveform.interval_s));
         let start_ns = waveform.start.map(|start| start.ns() as f64 + 1e9 * waveform.start_offset_s);
         table.layout.start_time_ns = start_ns.filter(|ns| *ns > 0.0 && *ns < i64::MAX as f64).map(|ns| ns as u64);

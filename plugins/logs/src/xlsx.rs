@@ -8,7 +8,7 @@ use crate::parts::{Part, side_by_side};
 use crate::table_head::COLUMN_LIMIT;
 use crate::number::number_in;
 use crate::separator::decimal;
-use crate::table_log::Table;
+use crate::table_log::{Origin, Table};
 use crate::value::Value;
 use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
 use mapper_logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
@@ -83,7 +83,7 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         let (decimal, _) = decimal(&cells.iter().map(texts).collect::<Vec<Vec<String>>>());
         let head: Vec<Vec<String>> =
             cells.iter().map(|row| row.iter().map(|cell| cell.text(decimal)).collect()).collect();
-        match Table::look(&head, decimal, options) {
+        match Table::look(&head, decimal, options, Origin::Rows) {
             Ok(mut table) => {
                 note_empty_columns(&mut table, &head);
                 found.push((name, table, decimal));

@@ -239,12 +239,11 @@ fn alone(balance: Balance, formula: Expression, unit: &'static str, step: f64, w
         }
         None => words.to_owned(),
     };
-    // A level is a number; a term relative to the reference is a slope.
-    let level = matches!(&formula, Number(_)) && unit != "1";
-    let role = match unit {
-        _ if level => Role::Level,
-        "W/K" if words.contains("50 degC") => Role::Slope,
-        "W/K" | "m2" => Role::Exchange,
+    let role = match (&formula, unit) {
+        (Number(_), unit) if unit != "1" => Role::Level,
+        // Relative to the reference.
+        (Expression::Minus(from, _), "W/K") if matches!(**from, Number(_)) => Role::Slope,
+        (_, "W/K" | "m2") => Role::Exchange,
         _ => Role::Other,
     };
     // Heat flows from hot to cold.

@@ -16,8 +16,8 @@ pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {
 /// Recommended actions in order of importance, each a sentence.
 pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
     let mut things: Vec<String> = Vec::new();
-    if !report.outcome.starts_with("Completed") && !report.outcome.starts_with("Identified") {
-        things.push(report.outcome.to_owned());
+    if !report.origin.is_complete() {
+        things.push(report.origin.sentence());
     }
     if let Some(text) = disagreement_text(
         report.points,

@@ -7,6 +7,7 @@ use crate::disagreement::disagreement_text;
 use crate::display::Display;
 use crate::doubts::doubts;
 use crate::duration::duration;
+use crate::ending_text::PointsOrigin;
 use crate::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, instrument_rows};
 use crate::key_figures::key_figures;
 use crate::lines_of_points::verdict_sentence;
@@ -50,8 +51,8 @@ pub struct RunReport<'a> {
     pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
     /// The identified recordings; empty for a run, whose directory has its recording.
     pub sources: &'a [ReportSource],
-    /// How the run ended, in a sentence.
-    pub outcome: &'a str,
+    /// How the run ended, or how the points were made.
+    pub origin: PointsOrigin,
     /// Further remarks: on the recording, the method and the map.
     pub remarks: &'a [String],
     /// Reference state of corrected quantities.
@@ -118,7 +119,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         machine,
         campaign,
         sources,
-        outcome,
+        origin,
         remarks,
         events,
         points,
@@ -138,7 +139,8 @@ fn markdown_report(report: &RunReport<'_>) -> String {
     if let Some(disagreement) = disagreement_text(points, two_parameter, &units) {
         let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
     }
-    let _ = writeln!(text, "**{}** {outcome}\n", verdict_sentence(points.iter().map(|scored| &scored.point)));
+    let verdict = verdict_sentence(points.iter().map(|scored| &scored.point));
+    let _ = writeln!(text, "**{verdict}** {}\n", origin.sentence());
     if let Some(words) = key_figures(report.map, points, campaign, report.plan) {
         let _ = writeln!(text, "{words}\n");
     }

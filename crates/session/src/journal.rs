@@ -3,7 +3,7 @@
 
 use crate::SessionError;
 use mapper_campaign::Campaign;
-use mapper_core::{Plan, RigDescription};
+use mapper_core::{Plan, RigDescription, RunEnding};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -103,8 +103,8 @@ pub enum Entry {
     Soaked,
     /// A step is complete and recorded. Holds its index in the plan, stored as the step number.
     StepSaved(#[serde(with = "mapper_core::step_number")] usize),
-    /// The run has ended; holds the reason.
-    Ended(String),
+    /// The run has ended.
+    Ended(RunEnding),
 }
 
 /// A journal that is being written.
@@ -167,9 +167,6 @@ pub struct JournalPart {
     pub completed: bool,
 }
 
-/// The journal's end text for a run that made every step.
-pub(crate) const COMPLETED: &str = "Completed.";
-
 /// Reads the parts of a run. Unreadable lines are skipped: a step not known to be saved is run again.
 ///
 /// # Errors
@@ -193,7 +190,7 @@ pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
             (Ok(Entry::StepSaved(index)), Some(part)) => {
                 part.saved.insert(index);
             }
-            (Ok(Entry::Ended(how)), Some(part)) => part.completed = how == COMPLETED,
+            (Ok(Entry::Ended(how)), Some(part)) => part.completed = how == RunEnding::Completed,
             _ => {}
         }
     }

@@ -3,7 +3,7 @@
 use crate::SessionEvent;
 use crate::event::OnEvent;
 use crate::journal::{Entry, Journal};
-use mapper_core::{Event, EventKind, RigDescription, SampleBatch, StepMarker};
+use mapper_core::{Event, EventKind, RigDescription, RunEnding, SampleBatch, StepMarker};
 use mapper_record::{RecordError, RecordingWriter, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
 use std::fs::File;
@@ -49,9 +49,9 @@ impl Recorder {
     }
 
     /// Writes the end of the run into the journal.
-    fn journal_the_end(journal: Option<Journal>, pending: Vec<(Entry, Option<f64>)>, end: &str) {
+    fn journal_the_end(journal: Option<Journal>, pending: Vec<(Entry, Option<f64>)>, end: RunEnding) {
         let Some(mut journal) = journal else { return };
-        let entries = pending.into_iter().map(|(entry, _)| entry).chain([Entry::Ended(end.to_owned())]);
+        let entries = pending.into_iter().map(|(entry, _)| entry).chain([Entry::Ended(end)]);
         for entry in entries {
             // The recording is complete; a missing end entry costs at most one step.
             if journal.write(&entry).is_err() {
@@ -60,8 +60,8 @@ impl Recorder {
         }
     }
 
-    /// Closes the file. `end`: how the run ended, for the journal.
-    pub(crate) fn finish(self, end: &str) -> Result<(), RecordError> {
+    /// Closes the file, and writes how the run ended into the journal.
+    pub(crate) fn finish(self, end: RunEnding) -> Result<(), RecordError> {
         self.writer.finish()?;
         Recorder::journal_the_end(self.journal, self.pending, end);
         Ok(())

@@ -10,7 +10,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
 use mapper_core::{
-    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, PointBudgets, ThermalModel,
+    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, PointBudgets, RunEnding, ThermalModel,
 };
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
@@ -18,7 +18,7 @@ use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{
-    BUDGET_COLUMNS, Display, ReportSource, RunReport, SurgeReport, budget_rows, gap_part, instant, run_report,
+    BUDGET_COLUMNS, Display, PointsOrigin, ReportSource, RunReport, SurgeReport, budget_rows, gap_part, instant, run_report,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -73,8 +73,8 @@ pub struct Results {
 pub(crate) struct Provenance {
     campaign: Option<Campaign>,
     plan: Option<Plan>,
-    /// How the run ended, or how the points were made.
-    outcome: String,
+    /// How the run ended; `None` for points from recordings.
+    ending: Option<RunEnding>,
     machine: String,
     /// Test date for people.
     tested_at: Option<String>,
@@ -97,7 +97,7 @@ impl Provenance {
         let named = || file.unwrap_or_default().to_string_lossy().into_owned();
         let sources: Vec<ReportSource> = recorded.iter().map(source).collect();
         Provenance {
-            outcome: String::new(),
+            ending: None,
             machine: campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone()),
             // Simulated time has no date; the name of the run directory has one.
             tested_at: sources
@@ -146,7 +146,7 @@ impl Session<'_> {
         &self,
         campaign: &Campaign,
         plan: &Plan,
-        outcome: &str,
+        ending: RunEnding,
         started_ns: u64,
         directory: &Path,
         parts: &[RunPart],
@@ -172,7 +172,7 @@ impl Session<'_> {
         let origin = Provenance {
             campaign: Some(campaign.clone()),
             plan: Some(plan.clone()),
-            outcome: outcome.to_owned(),
+            ending: Some(ending),
             machine: campaign.machine.name.clone(),
             tested_at: instant(started_ns),
             sources: Vec::new(),
@@ -210,7 +210,6 @@ impl Session<'_> {
         let further: Vec<PathBuf> = files.collect();
         let origin = Provenance::of(&recorded);
         let identified = self.identify(recorded, map, method)?;
-        let origin = Provenance { outcome: identified_by(identified.config.method), ..origin };
         std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
         let (results, written) = self.written(&origin, identified, (first, further), remarks, directory)?;
         written.map(|()| results)
@@ -231,7 +230,6 @@ impl Session<'_> {
         let mut remarks: Vec<String> =
             shown.iter().flat_map(|one| remarks_of(one, shown.len() > 1)).collect();
         let identified = self.identify(shown, channels, None)?;
-        let origin = Provenance { outcome: identified_by(identified.config.method), ..origin };
         remarks.extend(identified.remarks.iter().cloned());
         let map = compressor_map(&origin.machine, &identified, &mut remarks);
         let reference = identified.config.reference;
@@ -368,10 +366,6 @@ fn name_of(path: &Path) -> String {
     named.unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn identified_by(method: Method) -> String {
-    format!("Identified by the method `{method}`.")
-}
-
 /// Contents of the report and the page.
 fn run_report_of<'a>(
     origin: &'a Provenance,
@@ -394,7 +388,10 @@ fn run_report_of<'a>(
         budgets: &identified.budgets,
         zero: &identified.zero,
         sources: &origin.sources,
-        outcome: &origin.outcome,
+        origin: origin
+            .ending
+            .clone()
+            .map_or(PointsOrigin::Recordings(identified.config.method), PointsOrigin::Run),
         remarks,
         reference: identified.config.reference,
         efficiency: identified.config.air.efficiency,

@@ -17,7 +17,7 @@ use crate::results::{Results, RunPart};
 use crate::resume::{BrokenOff, MissingSteps, depends_on_readings};
 use crate::rig_lease::RigLease;
 use crate::rig_state::RigStates;
-use crate::run_outcome::{Ended, doubt, sentence};
+use crate::run_outcome::{Ended, doubt};
 use crate::scripted_steps::ScriptedSteps;
 use crate::sources::Sources;
 use crate::stored_plan::stored_plan;
@@ -29,6 +29,7 @@ use mapper_campaign::campaign::MapSource;
 use mapper_core::{Clock, MadeFrom, Plan, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
 use mapper_record::{RecordingHeader, RecordingWriter};
+use mapper_report::ending_sentence;
 use mapper_runner::{Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -99,7 +100,7 @@ pub struct RunOutcome {
 impl RunOutcome {
     /// One sentence on how it ended.
     pub fn sentence(&self) -> String {
-        sentence(&self.end)
+        ending_sentence(&self.end.ending())
     }
 }
 
@@ -265,7 +266,7 @@ impl PreparedRun<'_> {
         let what = format!("identifying {} steps", self.plan.steps.len());
         session.send(SessionEvent::Progress { done_ratio: 0.0, what });
         let (campaign, started_ns) = (self.request.campaign, self.request.started_ns);
-        session.results(campaign, &executed?, &sentence(end), started_ns, directory, parts)
+        session.results(campaign, &executed?, end.ending(), started_ns, directory, parts)
     }
 
     /// Identifies a run that was interrupted after its last step. Only the map is missing, so the rig is not used.
@@ -399,7 +400,7 @@ impl PreparedRun<'_> {
         });
         let doubt = doubt(&end);
         let end = Ended::of(end, drifted);
-        let finished = recorder.finish(&sentence(&end)).map_err(SessionError::from);
+        let finished = recorder.finish(end.ending()).map_err(SessionError::from);
         (end, finished, doubt)
     }
 

@@ -1,7 +1,6 @@
 //! Outcome of a run.
 
-use crate::journal::COMPLETED;
-use mapper_core::Reaction;
+use mapper_core::{Reaction, RunEnding};
 use mapper_runner::{RunEnd, RunError};
 
 /// How a run ended.
@@ -41,6 +40,17 @@ impl Ended {
             (Err(error), _) => Ended::Failed(error),
         }
     }
+
+    /// The same as data for files.
+    pub fn ending(&self) -> RunEnding {
+        match self {
+            Ended::Completed => RunEnding::Completed,
+            Ended::Drifted { reason } => RunEnding::Drifted { reason: reason.clone() },
+            Ended::Interrupted { t_s } => RunEnding::Interrupted { t_s: *t_s },
+            Ended::Tripped { t_s, reason } => RunEnding::Tripped { t_s: *t_s, reason: reason.clone() },
+            Ended::Failed(error) => RunEnding::Failed { reason: error.to_string() },
+        }
+    }
 }
 
 /// Why the rig's state is unknown, or must be inspected before the next run.
@@ -50,19 +60,4 @@ pub(crate) fn doubt(end: &Result<RunEnd, RunError>) -> Option<String> {
         Err(error) if error.leaves_doubt() => Some(error.to_string()),
         _ => None,
     }
-}
-
-/// One sentence for the report on how a run ended.
-pub(crate) fn sentence(end: &Ended) -> String {
-    let what = match end {
-        Ended::Completed => return COMPLETED.to_owned(),
-        Ended::Drifted { reason } => format!("({reason})"),
-        Ended::Interrupted { t_s } => format!("by the operator at {t_s:.0} s"),
-        Ended::Tripped { t_s, reason } => format!("by a guard at {t_s:.1} s ({reason})"),
-        // A script's error shows its source line below the first line.
-        Ended::Failed(error) => {
-            format!("by a fault ({})", error.to_string().lines().next().unwrap_or_default())
-        }
-    };
-    format!("Stopped {what}: the map is not complete.")
 }

@@ -19,7 +19,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
         section #notes aria-labelledby="notes-head" {
             h2 #notes-head { "Notes" }
             h3 { "Outcome" }
-            p { (prose(report.outcome)) }
+            p { (prose(&report.origin.sentence())) }
             @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (prose(remark)) } } } }
             @if let Some(score) = report.score {
                 h3 { "Against the simulator's truth" }

@@ -12,10 +12,11 @@ use mapper_campaign::{Campaign, nominal_model};
 use mapper_fleet::Engine;
 use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::coordinates;
-use mapper_gap::diagnose::{Diagnosed, Question, diagnose, weight};
+use mapper_gap::diagnose::{Diagnosed, Question, diagnose};
 use mapper_gap::fit::Fit;
 use mapper_gap::report::Verdict;
 use mapper_gap::study::{Study, members};
+use mapper_gap::weigh::weight;
 use mapper_numerics::statistics::{NORMAL_975, quantile};
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;
@@ -182,7 +183,7 @@ fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Obs
 
 /// Error of each parameter in its own standard errors, in the coordinate in which it was searched.
 fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
-    let coordinates = coordinates(study, &fit.hypothesis);
+    let coordinates = coordinates(&study.effects, &fit.hypothesis);
     let mut place = 0;
     let mut errors = Vec::new();
     for (index, values) in &fit.hypothesis.effects {

@@ -8,6 +8,7 @@ use mapper_gap::selection::Selection;
 use mapper_gap::study::{Hypothesis, Study};
 use mapper_gap::whiten::Linearised;
 use mapper_numerics::parallel;
+use mapper_numerics::statistics::HINT_SIGMAS;
 use mapper_physics::effect::Effect;
 use std::sync::Arc;
 
@@ -37,7 +38,7 @@ impl Candidate {
         let values = self.coefficients();
         terms.iter().zip(values).enumerate().all(|(place, (term, value))| {
             let variance = covariance.get((first + place, first + place)).copied().unwrap_or(f64::INFINITY);
-            (sink && term.role == Role::Level) || (value / term.step).abs() > MIN_SIGMAS * variance.sqrt()
+            (sink && term.role == Role::Level) || (value / term.step).abs() > HINT_SIGMAS * variance.sqrt()
         })
     }
 
@@ -121,9 +122,6 @@ impl Bench {
         (choice.clone(), effect, start)
     }
 }
-
-/// Minimum significance of a coefficient, in standard errors.
-const MIN_SIGMAS: f64 = 2.0;
 
 /// Drops candidates with an insignificant coefficient, if others remain.
 pub fn keep_determined(library: &[Term], candidates: &mut Vec<Candidate>) {

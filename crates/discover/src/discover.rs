@@ -13,7 +13,7 @@ use crate::sentence::{LawDescription, tell};
 use mapper_gap::additions::additions;
 use mapper_gap::adequacy::adequacy;
 use mapper_gap::calibration::Calibration;
-use mapper_gap::diagnose::{Diagnosed, weight};
+use mapper_gap::diagnose::{Diagnosed, MIN_SHRINK};
 use mapper_gap::first_step::with_start_read;
 use mapper_gap::fit::{Effort, Fit, fit};
 use mapper_gap::how_far::channels_on;
@@ -21,6 +21,7 @@ use mapper_gap::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_o
 use mapper_gap::report::{Law, MissingForce, Place, Verdict};
 use mapper_gap::selection::Selection;
 use mapper_gap::study::{Study, members};
+use mapper_gap::weigh::{ALIKE, MAX_EQUIVALENT, weight};
 
 /// Results outside the effect library.
 #[derive(Debug, Default)]
@@ -37,14 +38,8 @@ pub struct Discovered {
 
 /// Number of leave-one-out folds of steps in which a law must recur.
 const FOLDS: usize = 6;
-/// Minimum share of the gap that a law must remove on held-out steps.
-const MIN_SHRINK: f64 = 0.5;
 /// Minimum share of the folds in which a law must recur.
 const MIN_STABILITY: f64 = 0.5;
-/// Maximum evidence difference of indistinguishable laws, in calibration temperatures.
-const NEAR: f64 = 3.0;
-/// Maximum number of equivalent laws named.
-const MAX_EQUIVALENT: usize = 3;
 /// Maximum number of reported source terms.
 const FORCES: usize = 3;
 
@@ -266,7 +261,7 @@ fn propose(
         .map(|addition| addition.gain)
         .fold(0.0, f64::max);
     let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit, one_more).features());
-    let near = |other: &&Candidate| best.score() - other.score() < NEAR * calibration.temperature;
+    let near = |other: &&Candidate| best.score() - other.score() < ALIKE * calibration.temperature;
     let weights: f64 = found
         .fitted
         .iter()

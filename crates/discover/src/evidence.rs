@@ -2,9 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Prior width of a coefficient, in its steps: the same as for effects.
-pub const PRIOR_STEPS: f64 = 10.0;
-
 /// Fit of some terms to the projected products: log evidence relative to none, and the coefficients in steps.
 #[derive(Debug, Clone)]
 pub struct LinearEvidence {

@@ -11,9 +11,8 @@ use crate::quantity::Quantity::{
 };
 use crate::term::{Role, Term};
 use mapper_core::Channel;
+use mapper_physics::housing::STEFAN_BOLTZMANN_W_M2K4;
 
-/// Stefan's and Boltzmann's constant, W/(m2 K4).
-const STEFAN_BOLTZMANN: f64 = 5.670374419e-8;
 /// Reference for a single temperature in a term, K: near the middle of all, so that level and slope of a law are distinguishable.
 pub const REFERENCE_K: f64 = 323.15;
 /// Speed scale: 100 krpm, rad/s.
@@ -47,7 +46,7 @@ pub fn library() -> Vec<Term> {
             ));
         }
         all.push(on(
-            times(STEFAN_BOLTZMANN, fourth_powers(Ambient, metal)),
+            times(STEFAN_BOLTZMANN_W_M2K4, fourth_powers(Ambient, metal)),
             "m2",
             0.05,
             "radiation over {} between {} and the cell",
@@ -78,7 +77,7 @@ pub fn library() -> Vec<Term> {
     all.push(between(
         Balance::CompressorHousing,
         Balance::TurbineHousing,
-        |sign| times(sign * STEFAN_BOLTZMANN, fourth_powers(Tt, Tc)),
+        |sign| times(sign * STEFAN_BOLTZMANN_W_M2K4, fourth_powers(Tt, Tc)),
         "m2",
         5e-3,
         "radiation over {} from the turbine housing to the compressor housing",

@@ -1,13 +1,14 @@
 //! Laws that begin during a recording.
 
 use crate::columns::{Base, Products};
-use crate::evidence::{PRIOR_STEPS, weigh};
+use crate::evidence::weigh;
 use crate::expression::{Expression, product};
 use crate::force::APART;
 use crate::select::Choice;
 use crate::term::{Role, Term};
 use crate::time_history::{Course, Shape};
 use mapper_core::step_number;
+use mapper_gap::normal::PRIOR_STEPS;
 use mapper_gap::whiten::rows_of_step;
 use nalgebra::DMatrix;
 

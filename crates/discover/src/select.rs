@@ -1,7 +1,8 @@
 //! Selects the few library terms that explain the recording, in closed form.
 
-use crate::evidence::{LinearEvidence, PRIOR_STEPS, weigh};
+use crate::evidence::{LinearEvidence, weigh};
 use crate::term::{Role, Term};
+use mapper_gap::normal::PRIOR_STEPS;
 use nalgebra::DMatrix;
 
 /// Some library terms, by index, with their fit to the recording.

@@ -2,8 +2,8 @@
 
 use crate::time_history::CourseKind;
 use mapper_core::{Channel, Dimension, with_unit};
-use mapper_observe::sensor_fault::drifts;
 use mapper_physics::bearing_friction::at_150_krpm;
+use mapper_physics::sensor_fault::drifts;
 use serde::{Serialize, Serializer};
 
 /// A possible cause of drift.

@@ -13,8 +13,9 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) const FINE_ONSETS: usize = 280;
 /// Evidence (twice the ln of a likelihood ratio) below which a difference is not significant.
 const AS_GOOD: f64 = 0.1;
-/// Rounds in which the onsets of several drifts are fitted in turn.
-const ROUNDS: usize = 2;
+/// Rounds in which the onsets of several drifts are fitted in turn, and in which the model is linearised about them: each one reduces the
+/// error to about a tenth.
+pub(crate) const ROUNDS: usize = 2;
 
 /// A cause with its best time history and size.
 #[derive(Debug, Clone)]

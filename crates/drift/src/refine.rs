@@ -6,7 +6,7 @@ use crate::cause::Cause;
 use crate::constant::Constant;
 use crate::decide::{Decision, decide};
 use crate::drive::{Drive, predict};
-use crate::fit::{FINE_ONSETS, Fit, Fits, fit};
+use crate::fit::{FINE_ONSETS, Fit, Fits, ROUNDS, fit};
 use crate::nuisance;
 use crate::planted::Planted;
 use crate::readings::Readings;
@@ -15,8 +15,6 @@ use crate::time_history::Course;
 use mapper_observe::declared::Declared;
 use nalgebra::DMatrix;
 
-/// Number of rounds: each one reduces the error to about a tenth.
-const ROUNDS: usize = 2;
 /// Readings, constants, decisions and fits about the detected drift.
 pub(crate) struct Refined {
     pub readings: Readings,

@@ -5,13 +5,12 @@ use crate::low_rank::LowRank;
 use crate::readings::Readings;
 use crate::request::Unsolvable;
 use mapper_numerics::statistics::median;
+use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::{DMatrix, DVector};
 
 /// Distance from the model, relative to the median segment, above which a segment is an outlier.
 const FAR_OUT: f64 = 5.0;
 const LEAVE_OUT_ROUNDS: usize = 4;
-/// Factor on the variance of excluded segments.
-const AS_GOOD_AS_NOTHING: f64 = 1e8;
 
 /// Excludes outlying segments even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop). Returns
 /// their number, the noise without them, and the residual of the best explanation.
@@ -42,7 +41,7 @@ pub(crate) fn leave_out(
         }
         for block in far {
             out[block] = true;
-            own[block] *= AS_GOOD_AS_NOTHING;
+            own[block] *= UNINFORMATIVE * UNINFORMATIVE;
         }
         noise = LowRank::new(own, columns)?;
         left = unexplained(&noise, difference, candidates);

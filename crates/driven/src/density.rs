@@ -6,9 +6,9 @@ use crate::{Declared, Readings, Values, predict};
 /// Correlation time of model and sensor errors, s: a probe's own time constant.
 pub(crate) const ALIKE_S: f64 = 2.0;
 /// Uncertainty of a measured housing temperature, K: one thermocouple represents a whole housing.
-const HOUSING_SIGMA_K: f64 = 3.0;
+pub(crate) const HOUSING_SIGMA_K: f64 = 3.0;
 /// Correlation time of the housing's error, s.
-const HOUSING_ALIKE_S: f64 = 60.0;
+pub(crate) const HOUSING_ALIKE_S: f64 = 60.0;
 
 /// Log posterior density of standard normal parameters, up to a constant; minus infinity if the model has no solution.
 pub(crate) fn log_density(

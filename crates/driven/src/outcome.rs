@@ -4,6 +4,7 @@ use crate::density::log_density;
 use crate::ensemble::draws;
 use crate::parameters::{COUNT, PARAMETERS, Parameter};
 use crate::{Declared, DrivenError, Predicted, Readings, Values, predict};
+use mapper_inference::interval::IDENTIFIED_RATIO;
 use mapper_numerics::statistics::{mean, quantile, rms};
 use mapper_physics::air::Air;
 use mapper_physics::compression::apparent_efficiency;
@@ -15,8 +16,6 @@ use serde::Serialize;
 
 /// Minimum number of rows: twice the parameters.
 const MIN_ROWS: usize = 2 * COUNT;
-/// A parameter counts as identified if its interval is narrower than this share of the prior's.
-pub(crate) const TOLD_RATIO: f64 = 0.7;
 
 /// Posterior of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -156,7 +155,7 @@ fn found(parameter: Parameter, place: usize, sample: &[Values]) -> FoundParamete
         standard[place] = z;
         Values::of_standard(&standard).0[place]
     };
-    let identified = high - low < TOLD_RATIO * (prior(1.96) - prior(-1.96));
+    let identified = high - low < IDENTIFIED_RATIO * (prior(1.96) - prior(-1.96));
     FoundParameter { parameter, value: at(0.5), low, high, identified }
 }
 

@@ -53,10 +53,10 @@ const fn log_normal(
 }
 
 /// Number of parameters.
-pub const COUNT: usize = 14;
+pub const COUNT: usize = PARAMETERS.len();
 
 /// All parameters, in the order of [`Values`].
-pub const PARAMETERS: [Parameter; COUNT] = [
+pub const PARAMETERS: [Parameter; 14] = [
     normal("eta", "", 0.70, 0.06, "isentropic efficiency, total to total, at middle speed and flow"),
     normal("eta_speed", "", 0.0, 0.08, "its change per unit of relative speed"),
     normal("eta_speed_2", "", -0.10, 0.12, "its curvature over relative speed"),

@@ -4,10 +4,10 @@ use crate::DrivenError;
 use crate::rows::{Rows, Wanted};
 use mapper_core::{Channel, Recording};
 
-/// Pressure ratio below which a compressor does hardly any work, so that its temperature rise does not show its efficiency.
-const WORKING_RATIO: f64 = 1.02;
-/// Minimum flow at which eqs. 1-3 are evaluated, kg/s (they divide by it).
-const SMALLEST_FLOW_KG_S: f64 = 1e-3;
+/// Pressure ratio below which a compressor or turbine does hardly any work, so that its temperatures do not show its efficiency.
+pub(crate) const WORKING_RATIO: f64 = 1.02;
+/// Minimum flow at which the gas path is evaluated, kg/s (its equations divide by it).
+pub(crate) const SMALLEST_FLOW_KG_S: f64 = 1e-3;
 /// Channels that the compressor side needs.
 pub(crate) const COMPRESSOR: Wanted<'_> = Wanted {
     drives: &[Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::P2, Channel::T1],

@@ -22,7 +22,7 @@ pub(crate) struct Wanted<'a> {
 }
 
 /// Complete rows, as columns of equal length. SI units.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Rows {
     /// Time, s, rising.
     pub(crate) t_s: Vec<f64>,
@@ -43,13 +43,7 @@ impl Rows {
     /// [`DrivenError::Channel`] if a driving channel or the first judged one is missing.
     pub(crate) fn read(recording: &Recording, wanted: Wanted<'_>) -> Result<Self, DrivenError> {
         let Some(first) = wanted.judged.first() else {
-            return Ok(Rows {
-                t_s: Vec::new(),
-                drives: Vec::new(),
-                rates: Vec::new(),
-                judged: Vec::new(),
-                lost: 0,
-            });
+            return Ok(Rows::default());
         };
         let judged = recording.require(*first)?;
         let mut series = Vec::with_capacity(wanted.drives.len());
@@ -60,13 +54,8 @@ impl Rows {
             judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
         let spacing_s = SPACING_S.max(span_s / MAX_ROWS as f64);
         let columns = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
-        let mut rows = Rows {
-            t_s: Vec::new(),
-            drives: columns(wanted.drives),
-            rates: Vec::new(),
-            judged: columns(wanted.judged),
-            lost: 0,
-        };
+        let mut rows =
+            Rows { drives: columns(wanted.drives), judged: columns(wanted.judged), ..Rows::default() };
         let mut row = Vec::with_capacity(series.len());
         for (t_s, value) in judged.t_s.iter().zip(&judged.values) {
             if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {

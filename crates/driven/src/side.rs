@@ -1,6 +1,7 @@
 //! Compressor side driven by its measured neighbours: eqs. 1-3, one housing node, and the probe.
 
 use crate::{Readings, Values};
+use mapper_numerics::statistics::mean;
 use mapper_physics::compression::{CompressionInputs, compress, compressed_k, isentropic_rise_ratio};
 use mapper_physics::housing::compressor_capacity_j_k;
 use mapper_physics::params::Params;
@@ -23,22 +24,26 @@ pub struct Declared {
 impl Declared {
     /// Reference at the geometric means of the rows.
     pub fn new(params: Params, rows: &Readings) -> Self {
-        let mean = |values: &mut dyn Iterator<Item = f64>| {
-            let (sum, count) =
-                values.fold((0.0, 0.0), |(sum, count), value: f64| (sum + value.ln(), count + 1.0));
-            if count > 0.0 { f64::exp(sum / count) } else { 1.0 }
-        };
         Declared {
             params,
-            middle_speed_rpm: mean(&mut rows.speed_rpm.iter().copied()),
-            middle_flow: mean(&mut (0..rows.len()).map(|i| flow_coefficient(rows, i))),
+            middle_speed_rpm: geometric_mean(rows.speed_rpm.iter().copied()),
+            middle_flow: geometric_mean((0..rows.len()).map(|i| flow_coefficient_of(rows, i))),
         }
     }
 }
 
+/// Geometric mean of positive values; 1 of none.
+pub(crate) fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
+    mean(values.map(f64::ln)).map_or(1.0, f64::exp)
+}
+
 /// Flow over speed at inlet density: the flow coefficient without wheel size and gas constant.
-fn flow_coefficient(rows: &Readings, i: usize) -> f64 {
-    rows.flow_kg_s[i] * rows.t1_k[i] / (rows.p1_pa[i] * rows.speed_rpm[i])
+pub(crate) fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f64 {
+    flow_kg_s * t1_k / (p1_pa * speed_rpm)
+}
+
+fn flow_coefficient_of(rows: &Readings, i: usize) -> f64 {
+    flow_coefficient(rows.speed_rpm[i], rows.flow_kg_s[i], rows.p1_pa[i], rows.t1_k[i])
 }
 
 /// Predicted sensor readings.
@@ -77,7 +82,7 @@ pub fn predict(rows: &Readings, declared: &Declared, values: &Values, count: usi
     for i in 0..count {
         let (t1_k, flow_kg_s) = (rows.t1_k[i], rows.flow_kg_s[i]);
         let speed = (rows.speed_rpm[i] / declared.middle_speed_rpm).ln();
-        let flow = (flow_coefficient(rows, i) / declared.middle_flow).ln();
+        let flow = (flow_coefficient_of(rows, i) / declared.middle_flow).ln();
         let efficiency =
             (eta + (eta_speed + eta_speed_2 * speed) * speed + (eta_flow + eta_flow_2 * flow) * flow)
                 .clamp(EFFICIENCY.0, EFFICIENCY.1);

@@ -4,12 +4,13 @@
 
 use crate::common::{self, Course, ELEMENT_LAG, declared, engine, healthy};
 use mapper_core::{Channel, Recording};
+use mapper_driven::DrivenError;
 use mapper_driven::why::{Ask, Diagnosis, Which, Word, diagnose};
-use mapper_driven::{DrivenError, why::compressor_sensors, why::turbine_sensors};
 use mapper_effects::catalogue;
 use mapper_gap::calibration::Calibration;
 use mapper_physics::effect::Rig;
 use mapper_physics::model::Model;
+use mapper_physics::sensor_fault::log_effects;
 
 fn diagnosis(recording: &Recording, side: Which, fit_until_s: f64) -> Diagnosis {
     let ask = Ask {
@@ -177,7 +178,7 @@ fn what_cannot_be_asked_is_reported() {
         let mut all: Vec<String> = found.asked.iter().map(|one| one.effect.clone()).collect();
         all.extend(found.not_asked.iter().map(|one| one.effect.clone()));
         all.sort();
-        let own = compressor_sensors().into_iter().map(|effect| effect.info().id.to_string());
+        let own = log_effects(true).into_iter().map(|effect| effect.info().id.to_string());
         let mut expected: Vec<String> = catalogue.iter().cloned().chain(own).collect();
         expected.sort();
         assert_eq!(all, expected);
@@ -226,7 +227,7 @@ fn slow_probes_of_the_turbine_side_are_named() {
         assert!(found.not_asked.iter().any(|one| one.effect == "turbine_flow_gain"), "{found:?}");
         assert!(found.not_asked.iter().any(|one| one.effect == "turbine_efficiency"));
     }
-    assert_eq!(turbine_sensors().len(), 6);
+    assert_eq!(log_effects(false).len(), 6);
 }
 
 /// The intervals of the turbine's own parameters, especially its efficiency, contain the truth.

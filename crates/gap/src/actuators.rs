@@ -21,6 +21,17 @@ pub struct Actuators {
 }
 
 impl Actuators {
+    /// By whether the campaign declares tolerances.
+    pub fn of(
+        table: &Table,
+        recording: &Recording,
+        declared: &Declared,
+        tolerances_declared: bool,
+    ) -> Actuators {
+        let read = if tolerances_declared { Actuators::declared } else { Actuators::undeclared };
+        read(table, recording, declared)
+    }
+
     /// For a campaign with declared tolerances: measured P3 drives the model and is compared with its declared lag; the valve follows at
     /// once.
     pub fn declared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
@@ -29,7 +40,7 @@ impl Actuators {
     }
 
     /// For a campaign without declarations: both responses are estimated from the recording.
-    pub fn undeclared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
+    fn undeclared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
         let (p3, timed) = timed_p3(table, recording, declared);
         let valve = measured_valve_response(table, &timed, declared.nominal.p1_pa);
         let valve = valve.unwrap_or(Response::lag(0.0));

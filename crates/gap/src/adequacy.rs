@@ -6,10 +6,8 @@ use crate::selection::Selection;
 use crate::study::Study;
 use crate::whiten::{Linearised, dot, rows_of_step};
 
-/// Time constants of the smooth basis after a jump, s; the basis also includes a step.
-const BASIS_S: [f64; 4] = [5.0, 20.0, 60.0, 200.0];
-/// Directions in each group.
-pub const DIRECTIONS: usize = BASIS_S.len() + 1;
+/// Time constants of the smooth basis after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
+const BASIS_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
 
 /// Smooth misfit that noise exceeds in one recording of a thousand, standard deviations. Scatter from step to step is counted relative to
 /// it, because scatter grows with the strength of an effect, even of a correct one.
@@ -52,15 +50,10 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
         .map(|(index, group)| {
             let here = &residual[group.rows.clone()];
             let mut directions: Vec<Vec<f64>> = Vec::new();
-            for basis in 0..DIRECTIONS.min(here.len()) {
-                let mut direction: Vec<f64> = group
-                    .blocks
-                    .iter()
-                    .map(|block| {
-                        let since_s = study.steps[group.step].blocks[*block].since_jump_s;
-                        basis.checked_sub(1).map_or(1.0, |b| (-since_s / BASIS_S[b]).exp())
-                    })
-                    .collect();
+            for decay_s in BASIS_S.iter().take(here.len()) {
+                let since_s = |block: &usize| study.steps[group.step].blocks[*block].since_jump_s;
+                let mut direction: Vec<f64> =
+                    group.blocks.iter().map(|block| (-since_s(block) / decay_s).exp()).collect();
                 linearised.whiten_group(index, &mut direction);
                 // Gram-Schmidt orthogonalisation.
                 for before in &directions {
@@ -82,7 +75,7 @@ pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64])
 /// Evaluates the residual of a fit on all steps. `one_more` is the largest gain of a further effect.
 pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64) -> Adequacy {
     let energies = smooth_energies(study, linearised, &fit.residual);
-    let expected: f64 = study.groups.iter().map(|group| DIRECTIONS.min(group.rows.len()) as f64).sum();
+    let expected: f64 = study.groups.iter().map(|group| BASIS_S.len().min(group.rows.len()) as f64).sum();
     let smooth_excess = energies.iter().sum::<f64>() - expected;
     let everywhere = Selection::all(study);
     let mut scatter_sigma: f64 = 0.0;

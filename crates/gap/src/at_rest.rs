@@ -9,12 +9,11 @@ use crate::fit::Fit;
 use crate::misfit::misfit;
 use crate::study::{Hypothesis, Study};
 use mapper_core::Channel;
+use mapper_inference::descent::FINE;
 use nalgebra::DMatrix;
 
 /// Prior of the common temperature of all sensors, 1 sigma, in units of each remaining uncertainty: effectively unknown.
 const COMMON_SIGMA: f64 = 1e4;
-/// Step for numerical slopes, as a share of a typical step; readings are linear in offsets.
-const SLOPE_STEP: f64 = 0.02;
 
 /// Misfit increase of each fit (column) after refitting to a soak, if another fit (row) were true, in squared sigmas.
 pub(crate) fn apart_at_rest(recorded: &Study, soak: &AtRest, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
@@ -68,20 +67,17 @@ fn changes(
     };
     let of_nuisance = |index: usize| {
         let mut moved = hypothesis.clone();
-        moved.nuisances[index] += SLOPE_STEP;
-        slope(&moved, SLOPE_STEP)
+        moved.nuisances[index] += FINE;
+        slope(&moved, FINE)
     };
     let values = parameters(hypothesis);
     let of_parameter = |(place, coordinate): (usize, &Coordinate)| {
-        let at = coordinate.of(values[place]);
-        // Step towards the side with room.
-        let ahead = coordinate.of(coordinate.value(at + SLOPE_STEP)) - at;
-        let step = if ahead.abs() > 0.5 * SLOPE_STEP { ahead } else { -SLOPE_STEP };
+        let (next, step) = coordinate.next_to(values[place], FINE);
         let mut moved = hypothesis.clone();
-        set_parameter(&mut moved, place, coordinate.value(at + step));
+        set_parameter(&mut moved, place, next);
         slope(&moved, step)
     };
-    let coordinates = coordinates(study, hypothesis);
+    let coordinates = coordinates(&study.effects, hypothesis);
     let effects = coordinates.iter().enumerate().map(of_parameter);
     (0..study.nuisances.len()).map(of_nuisance).chain(effects).collect()
 }

@@ -1,7 +1,8 @@
 //! Search coordinates of effect parameters.
 
-use crate::study::{Hypothesis, Study};
-use mapper_physics::effect::EffectParameter;
+use crate::study::Hypothesis;
+use mapper_physics::effect::{Effect, EffectParameter};
+use std::sync::Arc;
 
 /// Search coordinate of a parameter: its value in typical steps, or its logarithm if it spans decades.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +37,15 @@ impl Coordinate {
         (ends.0.min(ends.1), ends.0.max(ends.1))
     }
 
+    /// A value next to another one, on the side where there is room, and the coordinate's change.
+    pub fn next_to(&self, value: f64, distance: f64) -> (f64, f64) {
+        let at = self.of(value);
+        let fits = |x: &f64| (self.of(self.value(*x)) - x).abs() < 1e-9;
+        let away = [at + distance, at - distance].into_iter().find(fits).unwrap_or(at - distance);
+        let moved = self.value(away);
+        (moved, self.of(moved) - at)
+    }
+
     /// Value of a coordinate, within the parameter's range.
     pub fn value(&self, coordinate: f64) -> f64 {
         let value = if self.logarithmic { coordinate.exp() } else { coordinate * self.scale };
@@ -44,9 +54,8 @@ impl Coordinate {
 }
 
 /// Coordinates of all parameters of a hypothesis' effects, in order.
-pub fn coordinates(study: &Study, hypothesis: &Hypothesis) -> Vec<Coordinate> {
-    let parameters =
-        hypothesis.effects.iter().flat_map(|(index, _)| study.effects[*index].info().parameters.iter());
+pub fn coordinates(effects: &[Arc<dyn Effect>], hypothesis: &Hypothesis) -> Vec<Coordinate> {
+    let parameters = hypothesis.effects.iter().flat_map(|(index, _)| &effects[*index].info().parameters);
     parameters.map(Coordinate::new).collect()
 }
 

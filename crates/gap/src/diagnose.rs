@@ -21,8 +21,7 @@ use crate::selection::Selection;
 use crate::smallest_seen::smallest_seen;
 use crate::study::{Hypothesis, Prediction, Study, members};
 use crate::usable::usable;
-pub use crate::weigh::weight;
-use crate::weigh::{rivals, suspicions, weigh};
+use crate::weigh::{rivals, suspicions, weigh, weight};
 use crate::whiten::Linearised;
 use mapper_core::Recording;
 use mapper_observe::declared::Declared;
@@ -85,10 +84,8 @@ const HOPELESS: f64 = 60.0;
 /// Causes among which each fold chooses again, and how far behind the best in the logarithm of the evidence one may be.
 const CHOSEN_AGAIN: usize = 3;
 const CLOSE: f64 = 10.0;
-/// Steps that it takes to see with which of them a cause begins.
-const MIN_STEPS: usize = 6;
 /// Share of the null's misfit that a cause must remove to explain a gap in part, also on steps that its fit did not see.
-const MAX: f64 = 0.5;
+pub const MIN_SHRINK: f64 = 0.5;
 
 /// Diagnoses a recording.
 ///
@@ -110,11 +107,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     let recording = &with_command_times(recording);
     let table = Table::new(recording).ok_or(Problem::Empty)?;
     let mut warnings = usable(recording, &table, &declared)?;
-    let actuators = if tolerances_declared {
-        Actuators::declared(&table, recording, &declared)
-    } else {
-        Actuators::undeclared(&table, recording, &declared)
-    };
+    let actuators = Actuators::of(&table, recording, &declared, tolerances_declared);
     let (nominal, mut since) = (model.clone(), None);
     let mut study = Study::with_actuators(recording, table, declared, model, effects, actuators);
     if let Some(healthy) = healthy {
@@ -182,7 +175,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     progress(0.75, "what one more would do");
     let mut one_more = most_gain(&study, at_best, &everywhere, fits.first().unwrap_or(&null));
     let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
-    if calibration.outside(left.features()) > 0.5 && study.steps.len() >= MIN_STEPS {
+    if calibration.outside(left.features()) > 0.5 && folds.steps.len() > 1 {
         progress(0.8, "causes that begin");
         study.add_onsets();
         let at = Search {
@@ -226,8 +219,12 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         let n = null.residual.len() as f64;
         let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
         let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
-        let better = gap.shrink > MAX;
-        if removed > MAX && smooth > MAX && better { Verdict::PartlyExplained } else { Verdict::Unexplained }
+        let better = gap.shrink > MIN_SHRINK;
+        if removed > MIN_SHRINK && smooth > MIN_SHRINK && better {
+            Verdict::PartlyExplained
+        } else {
+            Verdict::Unexplained
+        }
     };
     let mut gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
     for fit in &found.fits {

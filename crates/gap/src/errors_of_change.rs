@@ -9,10 +9,9 @@
 use crate::nuisance::OUTPUTS;
 use crate::study::Study;
 use crate::whiten::Linearised;
+use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::DMatrix;
 
-/// Noise variance above this multiple of the declared one marks uninformative values near surge.
-const SAYS_NOTHING: f64 = 1e3;
 /// Values within this time after a jump are fully correlated, s.
 const AT_ONCE_S: f64 = 0.3;
 
@@ -25,7 +24,8 @@ pub(crate) fn errors_of_change(
     let mut of_output = [const { Vec::new() }; OUTPUTS.len()];
     for (place, group) in study.groups.iter().enumerate() {
         let variances = linearised.covariance(place).diagonal();
-        let most = SAYS_NOTHING * study.declared.noise_sigma(OUTPUTS[group.output]).powi(2);
+        // Near surge.
+        let most = UNINFORMATIVE * study.declared.noise_sigma(OUTPUTS[group.output]).powi(2);
         let kept = group.rows.clone().zip(variances.iter().copied()).filter(|(_, variance)| *variance < most);
         of_output[group.output].extend(kept);
     }

@@ -9,7 +9,7 @@ use crate::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
 use crate::selection::{Selection, dot_over};
 use crate::study::{Hypothesis, PredictError, Prediction, Study};
 use crate::whiten::Linearised;
-use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend};
+use mapper_inference::descent::{ENOUGH, End, Model, Normal, Reach, Until, descend, room_within};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -50,7 +50,7 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { iterations: 10, enough: 0.02, most_sigmas: MAX_SIGMAS }
+        Effort { iterations: 10, enough: ENOUGH, most_sigmas: MAX_SIGMAS }
     }
 }
 
@@ -65,7 +65,7 @@ pub fn fit(
     selection: &Selection,
     effort: Effort,
 ) -> Result<Fit, PredictError> {
-    let coordinates = coordinates(study, start);
+    let coordinates = coordinates(&study.effects, start);
     let at = coordinates.iter().zip(parameters(start)).map(|(coordinate, value)| coordinate.of(value));
     let unknowns = DVector::from_iterator(
         start.nuisances.len() + coordinates.len(),
@@ -156,8 +156,8 @@ impl Model for Fitted<'_> {
         let Point { hypothesis, prediction, residual } = point;
         let Fitted { study, linearised, coordinates, rows, .. } = self;
         // Near surge the cost has small steps: a slope taken over more of the way sees past them.
-        let distance = if reach == Reach::Fine { FINE } else { COARSE };
-        let columns = changes_near(study, linearised, hypothesis, prediction, coordinates, distance);
+        let mut columns = changes_near(study, hypothesis, prediction, coordinates, reach.distance());
+        columns.iter_mut().for_each(|column| linearised.whiten(study, column));
         let matrix = normal_matrix(rows, linearised, &self.nuisance_products, &columns);
         let ask = |column: &Vec<f64>| dot_over(rows, column, residual);
         let pulled = linearised.columns.iter().zip(&hypothesis.nuisances).map(|(c, sigmas)| ask(c) - sigmas);
@@ -171,7 +171,7 @@ impl Model for Fitted<'_> {
         let of_nuisances = unknowns.iter().take(n).map(|u| (-self.most_sigmas - u, self.most_sigmas - u));
         let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
             let (low, high) = coordinate.ends();
-            ((low - at).clamp(-MAX_STEPS, 0.0), (high - at).clamp(0.0, MAX_STEPS))
+            room_within(low, high, *at)
         });
         of_nuisances.chain(of_effects).collect()
     }
@@ -182,10 +182,6 @@ fn cost_of(rows: &[std::ops::Range<usize>], residual: &[f64], hypothesis: &Hypot
     if cost.is_finite() { cost } else { f64::INFINITY }
 }
 
-/// Distance from a hypothesis to the runs from which slopes are taken, in typical steps.
-const FINE: f64 = 0.02;
-const COARSE: f64 = 0.2;
-
 /// Whitened change for a unit of each effect's coordinate, by runs of the model next to the hypothesis.
 pub fn effect_changes(
     study: &Study,
@@ -194,13 +190,14 @@ pub fn effect_changes(
     here: &Prediction,
     coordinates: &[Coordinate],
 ) -> Vec<Vec<f64>> {
-    changes_near(study, linearised, hypothesis, here, coordinates, FINE)
+    let mut changes = changes_near(study, hypothesis, here, coordinates, Reach::Fine.distance());
+    changes.iter_mut().for_each(|change| linearised.whiten(study, change));
+    changes
 }
 
-/// As [`effect_changes`], from runs at `distance` from the hypothesis, in the coordinate's unit.
-fn changes_near(
+/// Change for a unit of each effect's coordinate, from runs at `distance` from the hypothesis, in the coordinate's unit.
+pub(crate) fn changes_near(
     study: &Study,
-    linearised: &Linearised,
     hypothesis: &Hypothesis,
     here: &Prediction,
     coordinates: &[Coordinate],
@@ -212,27 +209,18 @@ fn changes_near(
         .zip(&values)
         .enumerate()
         .map(|(place, (coordinate, value))| {
-            let at = coordinate.of(*value);
-            // To the side where there is room.
-            let tried = [at + distance, at - distance];
-            let away = tried.into_iter().find(|x| (coordinate.of(coordinate.value(*x)) - x).abs() < 1e-9);
-            let away = away.unwrap_or(at - distance);
+            let (next, step) = coordinate.next_to(*value, distance);
             let mut moved = hypothesis.clone();
-            set_parameter(&mut moved, place, coordinate.value(away));
-            let step = coordinate.of(coordinate.value(away)) - at;
-            let mut change: Vec<f64> = match study.predict(&moved) {
+            set_parameter(&mut moved, place, next);
+            match study.predict(&moved) {
                 Ok(there) if step != 0.0 => {
                     there.values.iter().zip(&here.values).map(|(t, h)| (t - h) / step).collect()
                 }
                 _ => vec![0.0; here.values.len()],
-            };
-            linearised.whiten(study, &mut change);
-            change
+            }
         })
         .collect()
 }
 
 /// Limit of a nuisance in declared sigmas: a larger deviation does not count as a tolerance.
 pub const MAX_SIGMAS: f64 = 6.0;
-/// Maximum number of typical steps an effect moves in one iteration: effects bend.
-const MAX_STEPS: f64 = 2.0;

@@ -1,9 +1,6 @@
 //! Number of steps with a gap, and the confidence interval of the share that a cause removes.
 
-use mapper_numerics::statistics::share_interval_95;
-
-/// Minimum misfit of a step with a gap, in standard deviations above noise.
-const SHOWS_SIGMAS: f64 = 3.0;
+use mapper_numerics::statistics::{DOUBT_SIGMAS, share_interval_95};
 
 /// Gap reduction, step by step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +26,7 @@ pub(crate) struct StepMisfit {
 impl StepMisfit {
     fn shows(&self) -> bool {
         // For noise, |r|^2 has mean n and variance 2 n.
-        self.before > SHOWS_SIGMAS * (2.0 / self.values.max(1) as f64).sqrt()
+        self.before > DOUBT_SIGMAS * (2.0 / self.values.max(1) as f64).sqrt()
     }
 
     /// Share of its own gap removed, 0..1.

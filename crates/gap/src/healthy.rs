@@ -62,11 +62,7 @@ impl Study {
         let recording = &with_command_times(recording);
         let table = Table::new(recording).ok_or(Problem::Empty)?;
         let warnings = usable(recording, &table, &declared)?;
-        let actuators = if tolerances_declared {
-            Actuators::declared(&table, recording, &declared)
-        } else {
-            Actuators::undeclared(&table, recording, &declared)
-        };
+        let actuators = Actuators::of(&table, recording, &declared, tolerances_declared);
         let before = Study::with_actuators(recording, table, declared, model, Vec::new(), actuators);
         same_steps(&before, &self)?;
         let linearised = Linearised::new(&before)?;

@@ -11,6 +11,7 @@ use crate::selection::{Selection, dot_over};
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, rows_of_step};
 use mapper_numerics::parallel;
+use mapper_numerics::statistics::DOUBT_SIGMAS;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -81,9 +82,6 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
     }
 }
 
-/// Minimum deviation at which a tolerance counts as outside its prior, sigmas.
-const STRAINED_SIGMAS: f64 = 3.0;
-
 /// The tolerance of a fit furthest outside its prior. Initial metal state and clock errors are excluded, because they are not rig
 /// properties.
 fn strained(study: &Study, fit: &Fit) -> Option<Strained> {
@@ -91,7 +89,7 @@ fn strained(study: &Study, fit: &Fit) -> Option<Strained> {
     let machine = own.filter(|(n, _)| !is_start(n.kind) && !matches!(n.kind, NuisanceKind::Delay(_)));
     let (nuisance, sigmas) = machine.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
     let strained = Strained { what: nuisance.kind.to_string(), sigmas: sigmas.abs() };
-    (strained.sigmas > STRAINED_SIGMAS).then_some(strained)
+    (strained.sigmas > DOUBT_SIGMAS).then_some(strained)
 }
 
 fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
@@ -150,9 +148,8 @@ pub fn channels_on(
     by_channel(study, [&nominal, &of(before), &of(after)], steps)
 }
 
-/// A channel is worse if its residual grows by this ratio, and by more than this many standard deviations of chance.
+/// A channel is worse if its residual grows by this ratio, and by more than chance.
 const WORSE_RATIO: f64 = 1.1;
-const WORSE_SIGMAS: f64 = 3.0;
 
 /// Root mean square of measured minus predicted block means of these steps, per channel in its unit: nominal model, fitted tolerances, and
 /// cause. Also returns the channels that the cause makes worse.
@@ -184,7 +181,7 @@ fn by_channel(
         let more = squares(&after.residual) - squares(&before.residual);
         // For two equally good predictions, the misfit difference has a standard deviation of twice their distance.
         let chance = 2.0 * squares(&apart).sqrt();
-        if gap.after > WORSE_RATIO * gap.before && more > WORSE_SIGMAS * chance.max(WORSE_SIGMAS) {
+        if gap.after > WORSE_RATIO * gap.before && more > DOUBT_SIGMAS * chance.max(DOUBT_SIGMAS) {
             worse.push(channel.symbol().to_owned());
         }
         channels.insert(channel.symbol().to_owned(), gap);

@@ -3,12 +3,11 @@
 use mapper_core::with_unit;
 use mapper_physics::bearing_friction::at_150_krpm;
 use mapper_physics::effect::EffectParameter;
+use mapper_physics::housing::STEFAN_BOLTZMANN_W_M2K4;
 
 /// Housing temperatures between which radiation is stated, K.
 const HOT_K: f64 = 700.0;
 const COLD_K: f64 = 350.0;
-/// Stefan and Boltzmann's constant, W/(m2 K4).
-const SIGMA: f64 = 5.670_374_419e-8;
 
 /// A parameter value as text: "+5 %" for a factor of 1.05, "370 W at 150 krpm" for friction.
 pub fn size(parameter: &EffectParameter, value: f64) -> String {
@@ -20,7 +19,7 @@ pub fn size(parameter: &EffectParameter, value: f64) -> String {
         "m" => format!("{} mm", figures(1e3 * value)),
         "kg/kg" => format!("{} g/kg", figures(1e3 * value)),
         "m2" => {
-            let power_w = value * SIGMA * (HOT_K.powi(4) - COLD_K.powi(4));
+            let power_w = value * STEFAN_BOLTZMANN_W_M2K4 * (HOT_K.powi(4) - COLD_K.powi(4));
             format!("{} W between {HOT_K:.0} and {COLD_K:.0} K", figures(power_w))
         }
         "W s2/rad2" => at_150_krpm(value),

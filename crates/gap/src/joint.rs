@@ -14,7 +14,9 @@ use crate::report::Verdict;
 use crate::selection::Selection;
 use crate::study::{EffectValues, Hypothesis, Study};
 use mapper_core::confidence_interval_95;
+use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_numerics::parallel;
+use mapper_numerics::statistics::DOUBT_SIGMAS;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
@@ -68,11 +70,6 @@ pub struct Over {
     pub size: String,
 }
 
-/// Minimum misfit increase without a present cause, sigmas; also the minimum difference of a changed size, standard errors.
-const THERE: f64 = 3.0;
-/// Maximum number of causes followed.
-const MAX: usize = 4;
-
 /// Jointly analyses several recordings of one rig. Empty if no recording has a named cause, or if their channels differ and so their
 /// nuisances do too.
 pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> Vec<Over> {
@@ -87,7 +84,7 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
     }
     let (fits, there): (Vec<Fit>, Vec<Vec<bool>>) = fitted.into_iter().unzip();
     let study = &first.study;
-    let at = coordinates(study, &fits[0].hypothesis);
+    let at = coordinates(&study.effects, &fits[0].hypothesis);
     let neutral = neutral_coordinates(study, &fits[0].hypothesis, &at);
     let factor = calibration.interval_factor;
     let places: Vec<Vec<f64>> = fits
@@ -117,7 +114,8 @@ pub fn over_recordings(diagnosed: &[&Diagnosed], calibration: &Calibration) -> V
         let spread = factor * spread;
         let apart = (0..fits.len()).filter(|i| present[*i]).any(|i| {
             let own = sigma(&fits[i], k);
-            (places[i][k] - x).abs() > THERE * (own * own - spread * spread).max(1e-4 * own * own).sqrt()
+            (places[i][k] - x).abs()
+                > DOUBT_SIGMAS * (own * own - spread * spread).max(1e-4 * own * own).sqrt()
         });
         let (begins, ends) = (present.first() == Some(&true), present.last() == Some(&true));
         let fate = match (present.iter().all(|p| *p), begins, ends) {
@@ -165,12 +163,12 @@ fn named_anywhere(diagnosed: &[&Diagnosed]) -> EffectValues {
             }
         }
     }
-    effects.truncate(MAX);
+    effects.truncate(MAX_MEMBERS);
     effects
 }
 
 /// Refits one recording with all effects named in any of them. Also returns whether it has each effect: whether removing it worsens the fit
-/// by [`THERE`] sigmas.
+/// by [`DOUBT_SIGMAS`].
 fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<(Fit, Vec<bool>)> {
     let study = &diagnosed.study;
     let everywhere = Selection::all(study);
@@ -191,7 +189,7 @@ fn refitted(diagnosed: &Diagnosed, effects: &EffectValues) -> Option<(Fit, Vec<b
         let mut without = whole.hypothesis.clone();
         without.effects.remove(*place);
         let without = fit(study, &linearised, &without, &everywhere, Effort::default());
-        without.is_ok_and(|without| without.cost - whole.cost > THERE * THERE)
+        without.is_ok_and(|without| without.cost - whole.cost > DOUBT_SIGMAS * DOUBT_SIGMAS)
     });
     Some((whole, there))
 }

@@ -49,5 +49,5 @@ pub mod smallest_seen;
 pub mod study;
 pub mod twin;
 pub mod usable;
-mod weigh;
+pub mod weigh;
 pub mod whiten;

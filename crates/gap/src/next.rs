@@ -15,12 +15,12 @@ use mapper_physics::effect::Submodel;
 pub const SETTLED: f64 = 0.95;
 /// Experiments expected to resolve less than this share of the open question are dropped.
 const MIN_ANSWER: f64 = 0.1;
-/// Number of jumps, and of experiments of each other kind, that are evaluated with refits.
+/// Number of jumps that are evaluated with refits.
 const CLOSE_LOOKS: usize = 6;
-const CLOSE_LOOKS_BESIDE: usize = 2;
-/// Maximum number of experiments shown, and of one kind.
+/// Maximum number of experiments shown.
 const SHOWN: usize = 5;
-const SHOWN_OF_KIND: usize = 2;
+/// The same of one kind; also of those of each other kind that are evaluated.
+const OF_KIND: usize = 2;
 /// Maximum number of candidates to distinguish.
 const RIVALS: usize = 4;
 /// All experiments are compared with the same random draws.
@@ -73,7 +73,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     looks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut close: Vec<Experiment> = Vec::new();
     for kind in Kind::ALL {
-        let most = if kind == Kind::Jump { CLOSE_LOOKS } else { CLOSE_LOOKS_BESIDE };
+        let most = if kind == Kind::Jump { CLOSE_LOOKS } else { OF_KIND };
         let of_kind = looks.iter().map(|(_, experiment)| *experiment).filter(|e| Kind::of(e) == kind);
         close.extend(of_kind.take(most));
     }
@@ -100,8 +100,7 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
     let mut experiments: Vec<Suggestion> = Vec::new();
     for (experiment, odds, _) in &looked {
         let kind = Kind::of(experiment);
-        if experiments.len() < SHOWN && experiments.iter().filter(|e| e.kind == kind).count() < SHOWN_OF_KIND
-        {
+        if experiments.len() < SHOWN && experiments.iter().filter(|e| e.kind == kind).count() < OF_KIND {
             experiments.push(suggestion(kind, experiment, odds, open_bit));
         }
     }

@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// Time at the start point before a jump that is also simulated, s.
 const HOLD_S: f64 = 30.0;
 /// Sample intervals of the first pass and of the detailed pass, s.
-const COARSE_S: f64 = 0.5;
+pub(crate) const COARSE_S: f64 = 0.5;
 const FINE_S: f64 = 0.1;
 /// Maximum time at the target that is simulated, s; longer dwells are cut.
 const MAX_S: f64 = 600.0;
@@ -166,7 +166,7 @@ pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option
         let here = nominal.at(&study, &hypothesis).ok()?;
         let mut values = here.base.values.clone();
         nominal.whiten(&study, &mut values);
-        let coordinates = coordinates(&study, &hypothesis);
+        let coordinates = coordinates(&study.effects, &hypothesis);
         let mut columns = here.columns.clone();
         columns.extend(effect_changes(&study, &nominal, &hypothesis, &here.base, &coordinates));
         predicted.push((values, columns, precision(&study, fit)));

@@ -7,6 +7,7 @@ use crate::selection::Selection;
 use crate::study::{Hypothesis, PredictError, Study, members};
 use crate::weigh::{prior, weight};
 use crate::whiten::Linearised;
+use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
 
 /// What the search works with.
@@ -25,7 +26,7 @@ pub struct Search<'a> {
 }
 
 /// Judgement: bounds the time. The slack is the evidence that a cause has to have over nothing.
-const LIMITS: Limits = Limits { members: 4, starts: 2, fits: 6, slack: 3.0 };
+const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack: 3.0 };
 /// If a single takes at least this off the cost, nuisances are linearised again at its fit: tolerances of what an
 /// effect changes act otherwise there than at the nominal point.
 const STRONG: f64 = 30.0;

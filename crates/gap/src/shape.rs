@@ -16,10 +16,6 @@ const WAY_WIDTH: f64 = 0.3;
 /// Number of basis functions.
 pub const SHAPES: usize = SPEEDS * WAYS;
 
-/// Divisor of the declared size for one coefficient. The root mean square of all together would be 1.7, but a deviation confined to one
-/// corner of the map must remain plausible.
-pub const SHAPE_SUM: f64 = 1.0;
-
 /// A map whose efficiency is multiplied by `1 + sum c_i phi_i(speed, place on the speed line)`.
 #[derive(Debug, Clone)]
 pub struct ShapedMap {

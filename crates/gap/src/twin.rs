@@ -2,13 +2,14 @@
 
 use crate::coordinate::coordinates;
 use crate::diagnose::Diagnosed;
-use crate::fit::{Fit, effect_changes};
+use crate::fit::{Fit, changes_near, effect_changes};
 use crate::nuisance::{OFFSET_PREFIX, OUTPUTS};
-use crate::outlook::{Alike, imagined_steps};
+use crate::outlook::{Alike, COARSE_S, imagined_steps};
 use crate::report::Verdict;
 use crate::study::{Hypothesis, Study};
 use crate::whiten::{Linearised, dot};
 use mapper_core::{Channel, StepMarker, half_width_95};
+use mapper_inference::descent::FINE;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -186,7 +187,7 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
     let (hypothesis, covariance) = found.hypothesis(study)?;
     let nominal = Linearised::new(study)?;
     let there = nominal.at(study, &hypothesis)?;
-    let at = coordinates(study, &hypothesis);
+    let at = coordinates(&study.effects, &hypothesis);
     let mut columns = there.columns.clone();
     columns.extend(effect_changes(study, &nominal, &hypothesis, &there.base, &at));
     let residual = nominal.residual(study, &there.base);
@@ -245,12 +246,9 @@ pub fn forecast_steps(
     found: &Found,
 ) -> Result<Vec<Expected>, TwinError> {
     let rest = steps.first().and_then(|step| step.to);
-    let study = rest.and_then(|rest| imagined_steps(like, steps, &rest, INTERVAL_S, |_| None));
+    let study = rest.and_then(|rest| imagined_steps(like, steps, &rest, COARSE_S, |_| None));
     study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
 }
-
-/// Sample interval of a forecast, s.
-const INTERVAL_S: f64 = 0.5;
 
 /// Forecasts the ends of a study's steps; the bands include model uncertainty and the noise of a reading.
 ///
@@ -269,15 +267,8 @@ fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, TwinError> {
         moved.nuisances[i] += 1.0;
         columns.push(changed(&moved, 1.0));
     }
-    let values = crate::coordinate::parameters(&hypothesis);
-    for (k, (coordinate, value)) in coordinates(study, &hypothesis).iter().zip(values).enumerate() {
-        let mut moved = hypothesis.clone();
-        let at = coordinate.of(value);
-        let away = [at + 0.02, at - 0.02].into_iter().find(|x| coordinate.of(coordinate.value(*x)) != at);
-        let away = coordinate.of(coordinate.value(away.unwrap_or(at)));
-        crate::coordinate::set_parameter(&mut moved, k, coordinate.value(away));
-        columns.push(if away == at { vec![0.0; here.values.len()] } else { changed(&moved, away - at) });
-    }
+    let at = coordinates(&study.effects, &hypothesis);
+    columns.extend(changes_near(study, &hypothesis, &here, &at, FINE));
     let mut expected: Vec<Expected> =
         (0..study.steps.len()).map(|step| Expected { step, channels: BTreeMap::new() }).collect();
     for group in &study.groups {

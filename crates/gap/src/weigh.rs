@@ -2,15 +2,18 @@
 
 use crate::adequacy::Adequacy;
 use crate::calibration::Calibration;
-use crate::coordinate::{coordinates, parameters};
+use crate::coordinate::Coordinate;
 use crate::effect_timing::Course;
 use crate::fit::Fit;
 use crate::in_words;
 use crate::next::{Rivals, SETTLED};
 use crate::report::{Candidate, Estimate, Onset};
-use crate::study::{Hypothesis, Study};
+use crate::study::{EffectValues, Hypothesis, Study};
 use mapper_core::half_width_95;
+use mapper_physics::effect::{Effect, EffectInfo, EffectParameter};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Probabilities of the causes.
 pub(crate) struct CauseProbabilities {
@@ -33,9 +36,15 @@ const LATE_RATIO: f64 = 0.005;
 /// Logarithm of the prior of a cause. Pairs are rarer than singles, and there are many pairs. Causes that begin during the recording are
 /// rarer still, and may begin with any step.
 pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypothesis) -> f64 {
-    let count = study.catalogue.max(2) as f64;
-    let effects = hypothesis.effects.len();
-    let of_number = match effects {
+    let of_number = prior_of_number(calibration, study.catalogue, hypothesis.effects.len());
+    let late = hypothesis.effects.iter().filter(|(index, _)| study.courses[*index] != Course::Throughout);
+    of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
+}
+
+/// Logarithm of the prior of one set of so many effects, of a library of `count`.
+pub fn prior_of_number(calibration: &Calibration, count: usize, effects: usize) -> f64 {
+    let count = count.max(2) as f64;
+    match effects {
         0 => calibration.prior_none.ln(),
         1 => (calibration.prior_single / count).ln(),
         2 => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
@@ -43,9 +52,7 @@ pub(crate) fn prior(calibration: &Calibration, study: &Study, hypothesis: &Hypot
             let sets: f64 = (0..effects).map(|i| ((count - i as f64) / (i as f64 + 1.0)).max(0.1).ln()).sum();
             (effects - 2) as f64 * calibration.prior_triple.ln() - sets
         }
-    };
-    let late = hypothesis.effects.iter().filter(|(index, _)| study.courses[*index] != Course::Throughout);
-    of_number + late.count() as f64 * (LATE_RATIO / (2.0 * study.steps.len().max(1) as f64)).ln()
+    }
 }
 
 /// Evidence of a fit, including its prior.
@@ -99,7 +106,12 @@ pub(crate) fn weigh(
                 effects: ids(study, fit),
                 names: names(study, fit),
                 probability,
-                parameters: estimates(study, calibration, fit),
+                parameters: estimates(
+                    calibration,
+                    &study.effects,
+                    &fit.hypothesis.effects,
+                    Some(&fit.covariance),
+                ),
                 onsets: onsets(study, fit),
                 equivalent: if *place == 0 && named {
                     equivalents(study, calibration, fits, &scores, &shown)
@@ -135,7 +147,9 @@ fn onsets(study: &Study, fit: &Fit) -> BTreeMap<String, Onset> {
 }
 
 /// Maximum number of alternatives named with the first cause; a longer list does not help.
-const MAX_EQUIVALENT: usize = 2;
+pub const MAX_EQUIVALENT: usize = 2;
+/// Evidence difference below which data do not distinguish causes, in calibration temperatures: a factor of 20.
+pub const ALIKE: f64 = 3.0;
 
 /// Causes whose scores the data cannot distinguish from the best, nearest first, without supersets of a better cause.
 fn equivalents(
@@ -148,44 +162,46 @@ fn equivalents(
     shown
         .iter()
         .skip(1)
-        .filter(|place| scores[1] - scores[**place + 1] < 3.0 * calibration.temperature)
+        .filter(|place| scores[1] - scores[**place + 1] < ALIKE * calibration.temperature)
         .map(|place| ids(study, &fits[*place]))
         .take(MAX_EQUIVALENT)
         .collect()
 }
 
-/// Parameters with 95 % intervals, computed in the search coordinate so that they stay within range.
-pub(crate) fn estimates(study: &Study, calibration: &Calibration, fit: &Fit) -> BTreeMap<String, Estimate> {
-    let coordinates = coordinates(study, &fit.hypothesis);
-    let values = parameters(&fit.hypothesis);
-    let mut estimates = BTreeMap::new();
-    let mut place = 0;
-    for (index, of_effect) in &fit.hypothesis.effects {
-        let info = study.effects[*index].info();
-        for parameter in info.parameters.iter().take(of_effect.len()) {
-            let coordinate = coordinates[place];
-            let at = coordinate.of(values[place]);
-            let variance = fit.covariance.get((place, place)).copied().unwrap_or(f64::INFINITY);
-            let away = half_width_95(calibration.interval_factor * variance.max(0.0).sqrt());
-            let (a, b) = (coordinate.value(at - away), coordinate.value(at + away));
-            let name = if info.parameters.len() == 1 {
-                info.id.to_string()
-            } else {
-                format!("{}.{}", info.id, parameter.name)
-            };
-            let estimate = Estimate {
-                value: values[place],
-                low: a.min(b),
-                high: a.max(b),
-                unit: parameter.unit.to_string(),
-                neutral: parameter.neutral,
-                size: in_words::size(parameter, values[place]),
-            };
-            estimates.insert(name, estimate);
-            place += 1;
-        }
-    }
-    estimates
+/// Parameters of effects with 95 % intervals, computed in the search coordinate so that they stay within range. `covariance`: of the search
+/// coordinates, in order.
+pub fn estimates(
+    calibration: &Calibration,
+    effects: &[Arc<dyn Effect>],
+    values: &EffectValues,
+    covariance: Option<&DMatrix<f64>>,
+) -> BTreeMap<String, Estimate> {
+    let parameters = values.iter().flat_map(|(index, values)| {
+        let info = effects[*index].info();
+        info.parameters.iter().zip(values).map(move |(parameter, value)| (info, parameter, *value))
+    });
+    let estimate = |(place, (info, parameter, value)): (usize, (&EffectInfo, &EffectParameter, f64))| {
+        let coordinate = Coordinate::new(parameter);
+        let at = coordinate.of(value);
+        let variance = covariance.and_then(|c| c.get((place, place))).copied().unwrap_or(f64::INFINITY);
+        let away = half_width_95(calibration.interval_factor * variance.max(0.0).sqrt());
+        let (a, b) = (coordinate.value(at - away), coordinate.value(at + away));
+        let estimate = Estimate {
+            value,
+            low: a.min(b),
+            high: a.max(b),
+            unit: parameter.unit.to_string(),
+            neutral: parameter.neutral,
+            size: in_words::size(parameter, value),
+        };
+        (name_of(info, parameter), estimate)
+    };
+    parameters.enumerate().map(estimate).collect()
+}
+
+/// Name of a parameter among those of all effects.
+pub fn name_of(info: &EffectInfo, parameter: &EffectParameter) -> String {
+    if info.parameters.len() == 1 { info.id.to_string() } else { format!("{}.{}", info.id, parameter.name) }
 }
 
 /// If no cause is named but one is more probable than none: the causes and the null hypothesis, most probable first.

@@ -6,6 +6,7 @@ use mapper_core::Channel;
 use mapper_numerics::coloured_noise::{ColouredNoise, WhiteningFactor, covariance_of_means};
 use mapper_numerics::parallel;
 use mapper_observe::channels::DRIVERS;
+use mapper_observe::perturbation::UNINFORMATIVE;
 use mapper_observe::smoothed_inputs::InputNoise;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -178,15 +179,13 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Position on the speed line beyond which a jump runs along or across the surge line. Flow and outlet pressure during the jump are then
-/// too sensitive to be used.
+/// Position on the speed line beyond which a jump runs along or across the surge line: flow and outlet pressure are then too sensitive to be
+/// used in it.
 const NEAR_SURGE: f64 = 0.975;
 /// Length of a jump, s.
 const JUMP_S: f64 = 3.0;
 /// Time after the last surge cycle in which no reading counts, s: its end is chaotic, and the shaft takes some seconds to recover.
 const AFTER_SURGE_S: f64 = 15.0;
-/// Factor on the noise of uninformative values.
-const SAYS_NOTHING: f64 = 1e4;
 
 /// For each step, the time after its jump, s, in which flow and outlet pressure are uninformative, and that in which all readings are.
 fn lost_to_surge(study: &Study, nothing: &Hypothesis) -> Vec<(f64, f64)> {
@@ -265,7 +264,7 @@ fn covariances(
             let moves = matches!(OUTPUTS[group.output], Channel::CompressorFlow | Channel::P2);
             let lost_s = if moves { jump_s.max(surge_s) } else { surge_s };
             for (i, _) in blocks.iter().enumerate().filter(|(_, block)| block.since_jump_s < lost_s) {
-                covariance[(i, i)] += (SAYS_NOTHING * sigma).powi(2);
+                covariance[(i, i)] += (UNINFORMATIVE * sigma).powi(2);
             }
             if let Some(more) = study.noise_besides.get(place) {
                 covariance += more;

@@ -5,13 +5,12 @@ use crate::findings::{Findings, code};
 use crate::samples::Samples;
 use mapper_core::Channel;
 use mapper_numerics::statistics::{median_of_sorted, robust_sigma};
+use mapper_physics::sensor_fault::repeats_s;
 
 /// Number of samples on either side whose median a spike is compared with.
 const NEIGHBOURS: usize = 7;
 /// Robust standard deviations beyond which a sample is a spike.
-const SIGMAS: f64 = 8.0;
-/// Time for which a noisy channel may repeat one value, s.
-const STUCK_S: f64 = 5.0;
+pub(crate) const SPIKE_SIGMAS: f64 = 8.0;
 
 /// The samples without spikes; reports removals in `findings`.
 pub(crate) fn without_spikes(samples: Samples, findings: &mut Findings) -> Samples {
@@ -43,7 +42,7 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         if !noisy {
             continue;
         }
-        let stuck = stuck_of(&samples.t_s, column);
+        let stuck = stuck_of(&samples.t_s, column, repeats_s(channel));
         if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
             let message = format!(
                 "{channel} shows the same value for {:.0} s though noise is declared: these samples are left out",
@@ -92,18 +91,18 @@ fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
         off.push(value - median_of_sorted(&sorted).unwrap_or(*value));
     }
     let Some(sigma) = robust_sigma(&off) else { return Vec::new() };
-    let limit = (SIGMAS * sigma).max(smallest);
+    let limit = (SPIKE_SIGMAS * sigma).max(smallest);
     (0..off.len()).filter(|i| off[*i].abs() > limit).collect()
 }
 
-fn stuck_of(t_s: &[f64], column: &[f64]) -> Vec<usize> {
+fn stuck_of(t_s: &[f64], column: &[f64], repeats_s: f64) -> Vec<usize> {
     let mut stuck = Vec::new();
     let mut start = 0;
     for i in 1..=column.len() {
         if i < column.len() && column[i] == column[start] {
             continue;
         }
-        if t_s[i - 1] - t_s[start] >= STUCK_S {
+        if t_s[i - 1] - t_s[start] >= repeats_s {
             stuck.extend(start..i);
         }
         start = i;

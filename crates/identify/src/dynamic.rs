@@ -1,7 +1,7 @@
 //! The dynamic method (Burke et al., section 3): efficiency and heat-transfer coefficient from the transient.
 
 use crate::bias::{DeclaredEffect, declared_effect};
-use crate::cleaning::without_spikes;
+use crate::cleaning::{SPIKE_SIGMAS, without_spikes};
 use crate::covariance::{Correlation, NoiseVariances};
 use crate::findings::{Findings, code};
 use crate::fit::{Fit, Geometry, fit};
@@ -15,9 +15,7 @@ use mapper_numerics::statistics::{mean, median, robust_sigma};
 
 /// Ratio of isentropic temperature rise to inlet temperature below which the machine does not compress.
 const SMALLEST_RISE_RATIO: f64 = 1e-3;
-/// A residual this many robust standard deviations, and [`OUTLIER_K`], from its neighbours is an outlier.
-const OUTLIER_SIGMAS: f64 = 8.0;
-/// Number of neighbours on either side: a lag of the probe moves them all, a spike only a few.
+/// Number of neighbours of an outlier on either side: a lag of the probe moves them all, a spike only a few.
 const OUTLIER_NEIGHBOURS: usize = 10;
 /// Distance below which a sample is never taken for an outlier, K.
 const OUTLIER_K: f64 = 1.0;
@@ -75,9 +73,10 @@ pub(crate) fn estimate(
     let Some(step) = recording.steps.get(position) else { return estimate };
     let limits = &config.thresholds;
     if !commands::begins_with_jump(&recording.steps, position) {
-        let message =
-            "no jump leads to this step, so it has no transient; the dynamic method needs one".to_owned();
-        findings.refuse(code::NO_TRANSIENT, message);
+        findings.refuse(
+            code::NO_TRANSIENT,
+            "no jump leads to this step, so it has no transient; the dynamic method needs one",
+        );
         return estimate;
     }
     let Some(window) = window::choose(recording, step, config.window, &config.settle_bands, findings) else {
@@ -96,16 +95,18 @@ pub(crate) fn estimate(
     estimate.dtc_k = samples.change(&samples.tc_k, limits.end_mean_s);
     let rise_ratio = mean(&samples.rise_ratio).unwrap_or(0.0);
     if rise_ratio < SMALLEST_RISE_RATIO {
-        let message =
-            "the pressure ratio is 1 or less: nothing is compressed, efficiency has no meaning".to_owned();
-        findings.refuse(code::NO_COMPRESSION, message);
+        findings.refuse(
+            code::NO_COMPRESSION,
+            "the pressure ratio is 1 or less: nothing is compressed, efficiency has no meaning",
+        );
         return estimate;
     }
     let geometry = Geometry::of(config);
     let Some((samples, fit)) = fit_without_outliers(samples, geometry, findings) else {
-        let message =
-            "least squares for efficiency and heat-transfer coefficient did not converge".to_owned();
-        findings.refuse(code::FIT_FAILED, message);
+        findings.refuse(
+            code::FIT_FAILED,
+            "least squares for efficiency and heat-transfer coefficient did not converge",
+        );
         return estimate;
     };
     estimate.residual_rms_k = Some(fit.residual_rms_k());
@@ -161,7 +162,7 @@ fn fit_without_outliers(
     findings: &mut Findings,
 ) -> Option<(Samples, Fit)> {
     let first = fit(&samples, geometry)?;
-    let limit_k = (OUTLIER_SIGMAS * robust_sigma(&first.residual_k)?).max(OUTLIER_K);
+    let limit_k = (SPIKE_SIGMAS * robust_sigma(&first.residual_k)?).max(OUTLIER_K);
     let last = samples.len().saturating_sub(1);
     let kept: Vec<bool> = (0..samples.len())
         .map(|i| {
@@ -224,12 +225,7 @@ fn judge_width(view: &View<'_>, eta: EstimateUncertainty, dt2_k: Option<f64>, fi
     if sigma_eta <= limits.sigma_eta && dt2_k.abs() >= limits.dt2_k {
         return;
     }
-    let (code, message) = width::cause(eta, dt2_k, limits.dt2_k, "");
-    if sigma_eta > limits.unusable_sigma_eta {
-        findings.refuse(code, message);
-    } else {
-        findings.doubt(code, message);
-    }
+    width::judge(eta, dt2_k, "", view.config, findings);
 }
 
 /// Checks that the assumed alpha_A is known well enough. `off_eta`: its error of eta, one standard deviation.
@@ -284,10 +280,7 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
         );
         findings.doubt(code::POOR_FIT, message);
     }
-    if view.config.declared.is_empty() {
-        let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
-        findings.remark(code::NOTHING_DECLARED, message);
-    }
+    findings.remark_undeclared(view.config);
 }
 
 /// Root mean square of the residual's means over blocks, K.

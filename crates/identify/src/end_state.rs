@@ -1,13 +1,11 @@
 //! The position on the map at which a step ended: means over its last seconds.
 
+use crate::cleaning::SPIKE_SIGMAS;
 use crate::findings::{Findings, code};
 use crate::{IdentifyConfig, StepError, taps};
 use mapper_core::{Channel, Recording, Series, StepMarker};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_observe::plausible::is_reading;
-
-/// Robust standard deviations beyond which a single value is a spike.
-const SPIKE_SIGMAS: f64 = 8.0;
 
 /// The operating point at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,5 +1,6 @@
 //! Collects the warnings and remarks about a point.
 
+use crate::IdentifyConfig;
 use mapper_core::{Verdict, Warning};
 
 /// Stable codes of the warnings.
@@ -91,8 +92,8 @@ impl Findings {
     }
 
     /// Adds a remark, which does not affect the verdict.
-    pub(crate) fn remark(&mut self, code: &str, message: String) {
-        self.warnings.push(Warning { code: code.to_owned(), message });
+    pub(crate) fn remark(&mut self, code: &str, message: impl Into<String>) {
+        self.warnings.push(Warning { code: code.to_owned(), message: message.into() });
     }
 
     /// Adds the findings of another check.
@@ -109,9 +110,17 @@ impl Findings {
         };
     }
 
-    pub(crate) fn doubt(&mut self, code: &str, message: String) {
-        self.warn(self.doubts, Warning { code: code.to_owned(), message });
+    pub(crate) fn doubt(&mut self, code: &str, message: impl Into<String>) {
+        self.warn(self.doubts, Warning { code: code.to_owned(), message: message.into() });
         self.verdict = self.verdict.doubted();
+    }
+
+    /// Remarks that no interval includes undeclared errors.
+    pub(crate) fn remark_undeclared(&mut self, config: &IdentifyConfig) {
+        if config.declared.is_empty() {
+            let message = "no sensor uncertainty was declared: the interval holds noise alone";
+            self.remark(code::NOTHING_DECLARED, message);
+        }
     }
 
     /// Adds a doubt about the readings themselves, before all others.
@@ -120,8 +129,8 @@ impl Findings {
         self.verdict = self.verdict.doubted();
     }
 
-    pub(crate) fn refuse(&mut self, code: &str, message: String) {
-        self.warn(self.doubts, Warning { code: code.to_owned(), message });
+    pub(crate) fn refuse(&mut self, code: &str, message: impl Into<String>) {
+        self.warn(self.doubts, Warning { code: code.to_owned(), message: message.into() });
         self.verdict = Verdict::Unusable;
     }
 
@@ -139,10 +148,10 @@ mod tests {
     #[test]
     fn doubts_come_before_remarks_whatever_was_found_first() {
         let (mut findings, mut other) = (Findings::new(), Findings::new());
-        findings.remark(code::OUTLIERS, "two samples are left out".to_owned());
-        findings.doubt(code::SMALL_GRADIENT, "T2 hardly moves".to_owned());
-        other.remark(code::THROUGH_THE_LAW, "no jump".to_owned());
-        other.refuse(code::AT_BOUND, "on a bound".to_owned());
+        findings.remark(code::OUTLIERS, "two samples are left out");
+        findings.doubt(code::SMALL_GRADIENT, "T2 hardly moves");
+        other.remark(code::THROUGH_THE_LAW, "no jump");
+        other.refuse(code::AT_BOUND, "on a bound");
         findings.take(other);
         findings.doubt_first(code::DEAD_CHANNEL, "T2 is dead".to_owned());
         let codes: Vec<&str> = findings.warnings.iter().map(|warning| warning.code.as_str()).collect();

@@ -216,9 +216,10 @@ fn without_the_refused(
     let few = refused.iter().any(|refused| !refused);
     for (position, _) in refused.iter().enumerate().filter(|(_, refused)| few && **refused) {
         if known[position].take().is_some() {
-            let message =
-                "this step does not count in what the points share, and has no numbers of its own".to_owned();
-            findings[position].doubt(code::LEFT_OUT, message);
+            findings[position].doubt(
+                code::LEFT_OUT,
+                "this step does not count in what the points share, and has no numbers of its own",
+            );
         }
     }
     known
@@ -240,42 +241,19 @@ fn speed_not_reached(recording: &Recording, step: &StepMarker, state: &EndState,
 }
 
 pub(crate) fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
+    let share = |name, value: f64| (name, value, (0.0..=1.0).contains(&value), "a share from 0 to 1");
+    let positive = |name, value: f64, expected| (name, value, value.is_finite() && value > 0.0, expected);
+    let colour = config.noise_colour;
     let mut checks = vec![
-        (
-            "alpha_area_ratio",
-            config.alpha_area_ratio,
-            (0.0..=1.0).contains(&config.alpha_area_ratio),
-            "a share from 0 to 1",
-        ),
-        (
-            "alpha_area_sigma_ratio",
-            config.alpha_area_sigma_ratio,
-            (0.0..=1.0).contains(&config.alpha_area_sigma_ratio),
-            "a share from 0 to 1",
-        ),
-        (
-            "internal_area_m2",
-            config.internal_area_m2,
-            config.internal_area_m2.is_finite() && config.internal_area_m2 > 0.0,
-            "a positive area, m2",
-        ),
-        (
-            "time_constant_s",
-            config.noise_colour.time_constant_s,
-            config.noise_colour.time_constant_s.is_finite() && config.noise_colour.time_constant_s > 0.0,
-            "a positive time, s",
-        ),
-        (
-            "first_order_share_ratio",
-            config.noise_colour.first_order_share_ratio,
-            (0.0..=1.0).contains(&config.noise_colour.first_order_share_ratio),
-            "a share from 0 to 1",
-        ),
+        share("alpha_area_ratio", config.alpha_area_ratio),
+        share("alpha_area_sigma_ratio", config.alpha_area_sigma_ratio),
+        positive("internal_area_m2", config.internal_area_m2, "a positive area, m2"),
+        positive("time_constant_s", colour.time_constant_s, "a positive time, s"),
+        share("first_order_share_ratio", colour.first_order_share_ratio),
     ];
     for tap in [config.inlet_tap, config.outlet_tap] {
         if let PressureTap::Static { pipe_diameter_m } = tap {
-            let usable = pipe_diameter_m.is_finite() && pipe_diameter_m > 0.0;
-            checks.push(("pipe_diameter_m", pipe_diameter_m, usable, "a positive diameter, m"));
+            checks.push(positive("pipe_diameter_m", pipe_diameter_m, "a positive diameter, m"));
         }
     }
     if let WindowRule::Fixed { start_s, end_s } = config.window {

@@ -112,12 +112,8 @@ pub(crate) fn estimate(
         let (code, message) = width::cause_of_rise(uncertainty, means.t2_k - means.t1_k);
         findings.doubt(code, message);
     }
-    let message = "apparent efficiency: heat exchanged with the housing counts as work".to_owned();
-    findings.remark(code::APPARENT, message);
-    if config.declared.is_empty() {
-        let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
-        findings.remark(code::NOTHING_DECLARED, message);
-    }
+    findings.remark(code::APPARENT, "apparent efficiency: heat exchanged with the housing counts as work");
+    findings.remark_undeclared(config);
     estimate.eta = Some((eta, Some(uncertainty)));
     estimate.common[0] = common;
     estimate

@@ -1,16 +1,29 @@
 //! Explains why an efficiency is uncertain and what helps: too small a signal, offsets, or noise.
 
-use crate::findings::code;
+use crate::IdentifyConfig;
+use crate::findings::{Findings, code};
 use mapper_core::EstimateUncertainty;
+
+/// Doubts an efficiency for the width of its interval, or refuses it: see [`cause`].
+pub(crate) fn judge(
+    eta: EstimateUncertainty,
+    dt2_k: f64,
+    also: &str,
+    config: &IdentifyConfig,
+    findings: &mut Findings,
+) {
+    let limits = &config.thresholds;
+    let (code, message) = cause(eta, dt2_k, limits.dt2_k, also);
+    if eta.combined_standard_error() > limits.unusable_sigma_eta {
+        findings.refuse(code, message);
+    } else {
+        findings.doubt(code, message);
+    }
+}
 
 /// Code and sentence for an efficiency with the standard errors `eta`, of a window in which T2 changes by `dt2_k`, K. `least_dt2_k`: the
 /// smallest change that separates efficiency from heat transfer; `also`: systematic sources in addition to declared offsets.
-pub(crate) fn cause(
-    eta: EstimateUncertainty,
-    dt2_k: f64,
-    least_dt2_k: f64,
-    also: &str,
-) -> (&'static str, String) {
+fn cause(eta: EstimateUncertainty, dt2_k: f64, least_dt2_k: f64, also: &str) -> (&'static str, String) {
     let points = |sigma: f64| format!("{:.1}", 100.0 * sigma);
     let all = points(eta.combined_standard_error());
     if dt2_k.abs() < least_dt2_k {

@@ -9,8 +9,8 @@
 use crate::lab::{Machine as LabMachine, campaign, measured};
 use mapper_core::{Channel, Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_beside};
-use mapper_observe::sensor_fault::CATALOGUE;
 use mapper_physics::model::Model;
+use mapper_physics::sensor_fault::additive;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -129,9 +129,9 @@ fn faults_are_found_and_named_and_none_is_invented() {
             .tells
             .iter()
             .enumerate()
-            .filter(|(index, _)| *index < CATALOGUE.len())
+            .filter(|(index, _)| *index < additive().count())
             // If a detectable fault would exceed the usual fault size, the recording cannot find it.
-            .filter(|(index, (_, error))| SIGMAS * error < 10.0 * CATALOGUE[*index].sigma)
+            .filter(|(index, (_, error))| SIGMAS * error < 10.0 * additive().nth(*index).unwrap().sigma)
             .map(|(index, (suspect, error))| (index, *suspect, *error))
             .collect();
         let outcomes: Vec<(usize, Outcome)> = (0..per_machine.min(tellable.len()))
@@ -168,7 +168,7 @@ fn faults_are_found_and_named_and_none_is_invented() {
         );
         (share(|o| o.found), share(|o| o.named))
     };
-    for (index, fault) in CATALOGUE.iter().enumerate() {
+    for (index, fault) in additive().enumerate() {
         let own: Vec<Outcome> =
             all.iter().filter(|(of, _)| *of == index).map(|(_, outcome)| *outcome).collect();
         if !own.is_empty() {

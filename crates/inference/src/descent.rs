@@ -33,6 +33,28 @@ pub enum Reach {
     Coarse,
 }
 
+/// Distance from a point to the runs from which slopes are taken, in the coordinates' units: rounding and curvature are both small there.
+pub const FINE: f64 = 0.02;
+/// The same past small steps.
+const COARSE: f64 = 0.2;
+/// Furthest that an unknown moves in one iteration, in its unit: models bend.
+const MAX_MOVE: f64 = 2.0;
+
+impl Reach {
+    /// Distance to the runs from which slopes are taken.
+    pub fn distance(self) -> f64 {
+        if self == Reach::Fine { FINE } else { COARSE }
+    }
+}
+
+/// Room of an unknown between these ends, in one iteration.
+pub fn room_within(low: f64, high: f64, at: f64) -> (f64, f64) {
+    ((low - at).clamp(-MAX_MOVE, 0.0), (high - at).clamp(0.0, MAX_MOVE))
+}
+
+/// What an iteration has to promise in the cost, if the end is compared with others: evidence of a hundredth is none.
+pub const ENOUGH: f64 = 0.02;
+
 /// When a descent ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Until {

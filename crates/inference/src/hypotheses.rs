@@ -15,7 +15,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::collections::BTreeMap;
 
 /// Most members of an explanation: bounds the search. Judgement.
-const MAX_MEMBERS: usize = 4;
+pub const MAX_MEMBERS: usize = 4;
 /// Most changes of the explanation on the way to the best: each member is found, replaced and taken back once. If every family is one
 /// hypothesis the search ends by itself, since each change makes the set more probable.
 const MAX_CHANGES: usize = 4 * MAX_MEMBERS;

@@ -19,7 +19,6 @@ pub mod perturbation;
 pub mod plausible;
 pub mod same_machine;
 pub mod schedule;
-pub mod sensor_fault;
 pub mod smoothed_inputs;
 pub mod smoother;
 pub mod start;

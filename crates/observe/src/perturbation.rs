@@ -6,6 +6,9 @@ use mapper_physics::inputs::Inputs;
 use mapper_physics::model::State;
 use mapper_physics::params::{BoundaryConditions, Params};
 
+/// Factor on the standard deviation of a value that carries no information.
+pub const UNINFORMATIVE: f64 = 1e4;
+
 /// One quantity of model, inputs or initial state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Perturbation {

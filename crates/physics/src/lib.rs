@@ -35,6 +35,7 @@ pub mod pressure_tap;
 pub mod reach;
 pub mod rodas5p;
 pub mod rosenbrock;
+pub mod sensor_fault;
 pub mod settled;
 pub mod similarity;
 pub mod simulate;

@@ -259,11 +259,7 @@ fn study_of(
 ) -> Result<Study, GapError> {
     let table = Table::new(recording).ok_or(GapError::from(Problem::Empty))?;
     usable(recording, &table, &declared)?;
-    let actuators = if campaign.tolerances_declared {
-        Actuators::declared(&table, recording, &declared)
-    } else {
-        Actuators::undeclared(&table, recording, &declared)
-    };
+    let actuators = Actuators::of(&table, recording, &declared, campaign.tolerances_declared);
     Ok(Study::with_actuators(recording, table, declared, model, effects, actuators))
 }
 

@@ -1,6 +1,7 @@
 //! The effect library: deviations of a rig from the nominal model, one file each.
 //!
-//! To add one, write its file (a struct of its parameters, its description, its changes to the model), and its line below.
+//! To add one, write its file (a struct of its parameters, its description, its changes to the model), and its line below. Faults of sensors
+//! are rows of [`mapper_physics::sensor_fault`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -12,6 +13,7 @@ pub use script::{HOOK_NAMES, ScriptEffect, ScriptEffectError};
 
 use mapper_physics::effect::Effect;
 use mapper_physics::effect_kind::effect_of;
+use mapper_physics::sensor_fault;
 use std::sync::Arc;
 
 /// Declares the effects' modules and the list of them.
@@ -21,7 +23,13 @@ macro_rules! effects {
 
         /// Every effect of the library, in the order of reports.
         pub fn catalogue() -> Vec<Arc<dyn Effect>> {
-            vec![$(effect_of::<$name::$kind>()),*]
+            let mut all = vec![$(effect_of::<$name::$kind>()),*];
+            let mut faults = sensor_fault::effects();
+            // Conduction along the probe stands with the probe, the others before the air. Blind cases draw by these places.
+            let (probe, air) = (3, all.len() - 2);
+            all.splice(air..air, faults.split_off(1));
+            all.splice(probe..probe, faults);
+            all
         }
     };
 }
@@ -30,7 +38,6 @@ effects! {
     area_split::AreaSplit,
     inlet_htc::InletHtc,
     tip_diameter::TipDiameter,
-    stem_conduction::StemConduction,
     recovery::Recovery,
     directional_htc::DirectionalHtc,
     htc_scale::HtcScale,
@@ -45,12 +52,6 @@ effects! {
     flow_map_scale::FlowMapScale,
     valve_area::ValveArea,
     actuator_lag::ActuatorLag,
-    flowmeter_lag::FlowmeterLag,
-    flowmeter_gain::FlowmeterGain,
-    t1_offset::T1Offset,
-    t2_offset::T2Offset,
-    tc_offset::TcOffset,
-    p2_offset::P2Offset,
     humidity::Humidity,
     inlet_preheat::InletPreheat,
 }

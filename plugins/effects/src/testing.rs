@@ -1,9 +1,7 @@
 //! One instant of the machine with an effect, for tests with known results.
 
-use mapper_core::Channel;
 use mapper_physics::effect::Rig;
 use mapper_physics::effect_kind::EffectKind;
-use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::model::{Model, Outputs, State, rad_s_of_rpm};
 use mapper_physics::params::BoundaryConditions;
 
@@ -41,12 +39,5 @@ impl Instant {
     /// Evaluates once more after a change of the state.
     pub(crate) fn evaluate(&mut self) {
         self.outputs = self.rig.model.prepare(&self.boundary).evaluate(&self.state);
-    }
-
-    /// The instantaneous reading of a channel's sensor.
-    pub(crate) fn reading(&self, channel: Channel) -> f64 {
-        let prepared = self.rig.model.prepare(&self.boundary);
-        let value = true_value(channel, &prepared, &self.state, &self.outputs).unwrap();
-        ChannelFollower::new(*self.rig.instruments.path(channel)).read(0.0, value)
     }
 }

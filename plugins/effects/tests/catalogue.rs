@@ -172,3 +172,43 @@ proptest! {
         prop_assert!(apart(&readings(&one), &readings(&other)) < 1e-9);
     }
 }
+
+/// Reading over true value.
+type Equation = fn(f64) -> f64;
+
+/// Each fault of a sensor changes its own reading by its equation, and no other.
+#[test]
+fn a_fault_of_a_sensor_changes_its_reading_alone() {
+    let without = readings(&nominal());
+    let of = |channel: Channel| CHANNELS[..15].iter().position(|row| row.channel == channel).unwrap();
+    let cases: [(&str, f64, Channel, Equation); 5] = [
+        ("t1_offset", 0.8, Channel::T1, |x| x + 0.8),
+        ("t2_offset", -1.5, Channel::T2, |x| x - 1.5),
+        ("tc_offset", 2.0, Channel::Tc, |x| x + 2.0),
+        ("p2_offset", -700.0, Channel::P2, |x| x - 700.0),
+        ("flowmeter_gain", 1.03, Channel::CompressorFlow, |x| 1.03 * x),
+    ];
+    for (id, value, channel, equation) in cases {
+        let faulty = readings(&with(&[(&mapper_effects::find(id).unwrap(), vec![value])]));
+        for (i, (read, before)) in faulty.iter().zip(&without).enumerate() {
+            let expected = if i % 15 == of(channel) { equation(*before) } else { *before };
+            assert!((read - expected).abs() <= 1e-12 * expected.abs(), "{id}, reading {i}: {read}");
+        }
+    }
+}
+
+/// A probe that conducts along its stem reads its share of the way to the housing; a flow meter with a lag reads a rising flow late.
+#[test]
+fn a_stem_and_a_lag_follow_their_equations() {
+    let stem = mapper_effects::find("stem_conduction").unwrap();
+    let rig = with(&[(&stem, vec![0.1])]);
+    let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..Default::default() };
+    let at = steady::hold_speed(&rig.model, 110e3, &boundary).unwrap();
+    let outputs = rig.model.prepare(&at.boundary).evaluate(&at.state);
+    assert!((outputs.t2_probe_k - (0.9 * outputs.t2_k + 0.1 * at.state.tc_k)).abs() < 1e-9);
+    let lag = mapper_effects::find("flowmeter_lag").unwrap();
+    let rig = with(&[(&lag, vec![2.0])]);
+    let mut meter = ChannelFollower::new(*rig.instruments.path(Channel::CompressorFlow));
+    let readings = (0..600).map(|i| meter.read(f64::from(i) * 0.1, f64::from(i) * 1e-4));
+    assert!((readings.last().unwrap() - (599e-4 - 2e-3)).abs() < 1e-12);
+}

@@ -1,9 +1,11 @@
 //! Compressor side of the model with all effects. Flow and efficiency come from measurement and free parameters instead of the map.
 
 use super::side::{Side, Smooth, Which, truth};
+use crate::density::{ALIKE_S, HOUSING_ALIKE_S, HOUSING_SIGMA_K};
 use crate::parameters::Spread;
 use crate::readings::COMPRESSOR;
 use crate::rows::{Rows, Wanted};
+use crate::side::{EFFICIENCY, flow_coefficient, geometric_mean};
 use crate::{PARAMETERS, Parameter};
 use mapper_core::{Channel, ReferenceState};
 use mapper_physics::air;
@@ -66,23 +68,18 @@ impl Side for CompressorSide {
     fn smooth() -> &'static [Smooth] {
         // T2: error of a polynomial map and a single housing node. Tc: one thermocouple for a whole housing.
         &[
-            Smooth { median_k: 0.18, width: 0.25, alike_s: 2.0 },
-            Smooth { median_k: 3.0, width: 0.0, alike_s: 60.0 },
+            Smooth { median_k: 0.18, width: 0.25, alike_s: ALIKE_S },
+            Smooth { median_k: HOUSING_SIGMA_K, width: 0.0, alike_s: HOUSING_ALIKE_S },
         ]
     }
 
     fn of(rows: Rows) -> Self {
-        let middle = |values: &mut dyn Iterator<Item = f64>| {
-            let (sum, count) =
-                values.fold((0.0, 0.0), |(sum, count), value: f64| (sum + value.ln(), count + 1.0));
-            if count > 0.0 { f64::exp(sum / count) } else { 1.0 }
-        };
-        let middle_speed_rpm = middle(&mut rows.drive(Channel::ShaftSpeed).iter().copied());
+        let middle_speed_rpm = geometric_mean(rows.drive(Channel::ShaftSpeed).iter().copied());
         let at = |i: usize| {
             let [speed_rpm, flow_kg_s, p1_pa, _, t1_k] = std::array::from_fn(|place| rows.drives[place].1[i]);
             flow_coefficient(speed_rpm, flow_kg_s, p1_pa, t1_k)
         };
-        let middle_flow = middle(&mut (0..rows.len()).map(at));
+        let middle_flow = geometric_mean((0..rows.len()).map(at));
         CompressorSide { rows, middle_speed_rpm, middle_flow }
     }
 
@@ -149,7 +146,7 @@ impl Side for CompressorSide {
                 + speed * flow * (sf + ssf * speed + sff * flow)
                 + sss * speed.powi(3)
                 + fff * flow.powi(3))
-            .clamp(crate::side::EFFICIENCY.0, crate::side::EFFICIENCY.1);
+            .clamp(EFFICIENCY.0, EFFICIENCY.1);
             let flow_corrected_kg_s = wheel_kg_s
                 / (MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]) * moist_flow_ratio);
             model.map = Arc::new(AsMeasured { flow_corrected_kg_s, efficiency });
@@ -227,11 +224,6 @@ impl CompressorSide {
         let tc_k = first(Channel::Tc).unwrap_or(0.5 * (t1_k + t2_k)) + start_over_k;
         State::new(1.0, 1e5, tc_k, tc_k, t2_k)
     }
-}
-
-/// Flow over speed at inlet density: the flow coefficient without wheel size and gas constant.
-fn flow_coefficient(speed_rpm: f64, flow_kg_s: f64, p1_pa: f64, t1_k: f64) -> f64 {
-    flow_kg_s * t1_k / (p1_pa * speed_rpm)
 }
 
 /// Probe tip between rows: its target is a straight line, for which the lag is exact.

@@ -1,22 +1,17 @@
 //! Which library effects a side can diagnose, their smallest detectable size, and why the others cannot be diagnosed.
 
 use super::diagnosis::NotAsked;
-use super::fit::{Fit, Question, SLOPE_STEP, normal, whitened};
+use super::fit::{Fit, Question, normal, whitened};
 use super::side::Side;
 use mapper_gap::calibration::Calibration;
-use mapper_gap::coordinate::Coordinate;
 use mapper_gap::in_words;
-use mapper_gap::normal::PRIOR_STEPS;
 use mapper_gap::report::SmallestSeen;
+use mapper_gap::smallest_seen::{NO_LENGTH, evidence_needed, smallest_size};
 use mapper_gap::study::Hypothesis;
+use mapper_inference::descent::FINE;
 use mapper_numerics::parallel;
-use mapper_physics::effect::EffectInfo;
+use mapper_physics::effect::{EffectInfo, EffectParameter};
 
-/// 95 % quantile of the standard normal distribution: at this margin above the threshold, an effect is named in 95 of 100 logs.
-const SURELY: f64 = 1.645;
-/// Maximum number of sizes tried, and the tolerance in the logarithm.
-const LOOKS: usize = 6;
-const NEAR: f64 = 0.05;
 /// An effect with a smaller change than this is undetectable, K.
 const NOTHING_K: f64 = 1e-6;
 
@@ -78,17 +73,14 @@ pub(crate) fn smallest<S: Side>(
     let base = Hypothesis { effects: Vec::new(), nuisances: found.hypothesis.nuisances.clone() };
     let Some(predicted) = question.predict(&base) else { return (Vec::new(), Vec::new()) };
     let whitenings = question.whitenings(counts, &found.left_k);
-    let slopes = question.slopes(&base, &predicted, &[], SLOPE_STEP);
+    let slopes = question.slopes(&base, &predicted, &[], FINE);
     let none: Vec<Vec<f64>> = predicted.iter().map(|column| vec![0.0; column.len()]).collect();
     let (normal, columns) = normal(&whitenings, &slopes, &none, &vec![(0.0, 1.0); unknowns]);
     let Some(cholesky) = normal.matrix.cholesky() else { return (Vec::new(), Vec::new()) };
-    let count = asked.len().max(2) as f64;
-    let against =
-        calibration.threshold + calibration.prior_none.ln() - (calibration.prior_single / count).ln();
+    let against = evidence_needed(calibration, asked.len());
     let looked = parallel::map(asked, |effect| {
         let info = question.effects[*effect].info();
         let (parameter, others) = info.parameters.split_last()?;
-        let coordinate = Coordinate::new(parameter);
         let length_with = |others: &[f64], value: f64| -> Option<(f64, usize)> {
             let there = Hypothesis { effects: vec![(*effect, [others, &[value]].concat())], ..base.clone() };
             let there = question.predict(&there)?;
@@ -108,59 +100,19 @@ pub(crate) fn smallest<S: Side>(
                 (0..unknowns).max_by(|a, b| (taken[*a] * right[*a]).total_cmp(&(taken[*b] * right[*b])))?;
             Some(((whole - right.dot(&taken)).max(0.0).sqrt(), most))
         };
-        // For a parameter that spans decades, its inverse measures the distance from neutral.
-        let away =
-            |value: f64| if coordinate.is_logarithmic() { 1.0 / value } else { value - parameter.neutral };
-        let value_at = |away: f64| {
-            let value = if coordinate.is_logarithmic() { 1.0 / away } else { parameter.neutral + away };
-            value.clamp(parameter.low, parameter.high)
-        };
-        let typical = away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high));
-        let furthest = away(value_at(typical * 1e9));
         // Alone if visible alone: a wall without mass is invisible, but the lag of an element without a sheath is not.
+        let typical = |p: &EffectParameter| (p.neutral + p.typical_step).clamp(p.low, p.high);
         let neutral: Vec<f64> = others.iter().map(|p| p.neutral).collect();
-        let usual: Vec<f64> =
-            others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high)).collect();
-        let alone = length_with(&neutral, value_at(typical))?.0 > 1e-6;
-        let length = |value: f64| length_with(if alone { &neutral } else { &usual }, value);
-        let (mut here, mut taker) = (typical, 0);
-        // The smallest sufficient size tried.
-        let mut seen: Option<f64> = None;
-        let mut before: Option<(f64, f64)> = None;
-        for _ in 0..LOOKS {
-            let (sigma, most) = length(value_at(here))?;
+        let usual: Vec<f64> = others.iter().map(typical).collect();
+        let alone = length_with(&neutral, typical(parameter))?.0 > NO_LENGTH;
+        let mut taker = 0;
+        let smallest = smallest_size(parameter, against, |value| {
+            let (sigma, most) = length_with(if alone { &neutral } else { &usual }, value)?;
             taker = most;
-            if sigma <= 1e-6 || here == 0.0 {
-                break;
-            }
-            let unit = coordinate.of(value_at(here)) - coordinate.of(parameter.neutral);
-            let curvature = (sigma / unit.abs().max(1e-9)).powi(2);
-            let needed =
-                against + 0.5 * curvature.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln() + PRIOR_STEPS.ln();
-            let wanted = (2.0 * needed.max(0.0)).sqrt() + SURELY;
-            if sigma > 0.9 * wanted && seen.is_none_or(|other| here.abs() < other.abs()) {
-                seen = Some(here);
-            }
-            if (sigma / wanted).ln().abs() < NEAR {
-                break;
-            }
-            let power = before.map_or(1.0, |(there, length): (f64, f64)| {
-                ((sigma / length).ln() / (here / there).ln()).clamp(0.6, 3.0)
-            });
-            before = Some((here, sigma));
-            let moved = here * (wanted / sigma).powf(1.0 / if power.is_finite() { power } else { 1.0 });
-            here = if moved.abs() > furthest.abs() { furthest } else { moved };
-        }
-        let value = seen.map(value_at);
-        let smallest = SmallestSeen {
-            effect: info.id.to_string(),
-            name: info.name.to_string(),
-            parameter: parameter.name.to_string(),
-            value,
-            unit: parameter.unit.to_string(),
-            size: value.map(|value| in_words::size(parameter, value)),
-        };
-        let largest = in_words::size(parameter, value_at(furthest));
+            Some(sigma)
+        })?;
+        let largest = in_words::size(parameter, smallest.furthest);
+        let smallest = SmallestSeen::of(info, parameter, smallest.value);
         let unknown = &S::unknowns()[taker];
         let reason = format!(
             "even {largest} would not be told from what is not known: {} ({}) takes its place",

@@ -1,7 +1,6 @@
 //! Diagnosis of one side of a machine from a log without steps.
 
 use super::compressor::CompressorSide;
-use super::compressor_sensors::compressor_sensors;
 use super::denoise::calm;
 use super::detectable::{audible, smallest};
 use super::diagnosis::{Cause, Course, Diagnosis, Unknown, Word};
@@ -11,18 +10,16 @@ use super::phases::phases;
 use super::search::{search, weigh};
 use super::side::{Side, Which};
 use super::turbine::TurbineSide;
-use super::turbine_sensors::turbine_sensors;
 use crate::DrivenError;
-use crate::outcome::TOLD_RATIO;
 use crate::rows::Rows;
-use mapper_core::{Channel, Recording, half_width_95};
+use mapper_core::{Channel, Recording};
 use mapper_gap::calibration::Calibration;
-use mapper_gap::coordinate::Coordinate;
-use mapper_gap::in_words;
-use mapper_gap::report::Estimate;
-use mapper_numerics::statistics::rms;
+use mapper_gap::weigh::{estimates, name_of};
+use mapper_inference::interval::IDENTIFIED_RATIO;
+use mapper_numerics::statistics::{NORMAL_975, rms};
 use mapper_observe::Declared;
 use mapper_physics::effect::{Effect, Rig};
+use mapper_physics::sensor_fault::log_effects;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -61,15 +58,11 @@ pub struct Ask<'a> {
 /// [`DrivenError::Channel`] if a required channel is missing, [`DrivenError::TooFewRows`] if there are too few rows to fit,
 /// [`DrivenError::NoAnswer`] if the nominal machine has no solution under the driving channels.
 pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
+    let effects = [ask.effects, &log_effects(side == Which::Compressor)].concat();
+    let ask = &Ask { effects: &effects, ..*ask };
     match side {
-        Which::Compressor => {
-            let effects = [ask.effects, &compressor_sensors()].concat();
-            of_side::<CompressorSide>(&Ask { effects: &effects, ..*ask })
-        }
-        Which::Turbine => {
-            let effects = [ask.effects, &turbine_sensors()].concat();
-            of_side::<TurbineSide>(&Ask { effects: &effects, ..*ask })
-        }
+        Which::Compressor => of_side::<CompressorSide>(ask),
+        Which::Turbine => of_side::<TurbineSide>(ask),
     }
 }
 
@@ -177,36 +170,18 @@ fn cause<S: Side>(
 ) -> Cause {
     let infos: Vec<_> =
         fit.hypothesis.effects.iter().map(|(index, _)| question.effects[*index].info()).collect();
-    let covariance = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
-    let mut place = fit.hypothesis.nuisances.len();
-    let (mut parameters, mut at_the_end) = (std::collections::BTreeMap::new(), Vec::new());
-    for (info, (_, values)) in infos.iter().zip(&fit.hypothesis.effects) {
-        for (parameter, value) in info.parameters.iter().zip(values) {
-            let coordinate = Coordinate::new(parameter);
-            let at = coordinate.of(*value);
-            let variance = covariance.as_ref().map_or(f64::INFINITY, |c| c[(place, place)]);
-            let away = half_width_95(calibration.interval_factor * variance.max(0.0).sqrt());
-            let (a, b) = (coordinate.value(at - away), coordinate.value(at + away));
-            let name = if info.parameters.len() == 1 {
-                info.id.to_string()
-            } else {
-                format!("{}.{}", info.id, parameter.name)
-            };
-            if [parameter.low, parameter.high].contains(value) && *value != parameter.neutral {
-                at_the_end.push(name.clone());
-            }
-            let estimate = Estimate {
-                value: *value,
-                low: a.min(b),
-                high: a.max(b),
-                unit: parameter.unit.to_string(),
-                neutral: parameter.neutral,
-                size: in_words::size(parameter, *value),
-            };
-            parameters.insert(name, estimate);
-            place += 1;
-        }
-    }
+    let unknowns = fit.hypothesis.nuisances.len();
+    let inverse = fit.precision.clone().cholesky().map(|cholesky| cholesky.inverse());
+    let covariance = inverse.map(|all| all.remove_rows(0, unknowns).remove_columns(0, unknowns));
+    let effects = &fit.hypothesis.effects;
+    let parameters = estimates(calibration, question.effects, effects, covariance.as_ref());
+    let with_values = infos.iter().zip(effects).flat_map(|(info, (_, values))| {
+        info.parameters.iter().zip(values).map(move |(parameter, value)| (info, parameter, value))
+    });
+    let at_the_end = with_values
+        .filter(|(_, p, value)| [p.low, p.high].contains(value) && **value != p.neutral)
+        .map(|(info, parameter, _)| name_of(info, parameter))
+        .collect();
     Cause {
         effects: ids(question, &fit.hypothesis),
         names: infos.iter().map(|info| info.name.to_string()).collect(),
@@ -222,10 +197,11 @@ fn unknowns<S: Side>(fit: &Fit) -> Vec<Unknown> {
     let each = S::unknowns().iter().zip(&fit.hypothesis.nuisances).enumerate();
     each.map(|(place, (unknown, z))| {
         let sigma = covariance.as_ref().map_or(1.0, |c| c[(place, place)].max(0.0).sqrt());
-        let ends =
-            |middle: f64, sigma: f64| (unknown.at(middle - 1.96 * sigma), unknown.at(middle + 1.96 * sigma));
+        let ends = |middle: f64, sigma: f64| {
+            (unknown.at(middle - NORMAL_975 * sigma), unknown.at(middle + NORMAL_975 * sigma))
+        };
         let ((low, high), (prior_low, prior_high)) = (ends(*z, sigma), ends(0.0, 1.0));
-        let identified = high - low < TOLD_RATIO * (prior_high - prior_low);
+        let identified = high - low < IDENTIFIED_RATIO * (prior_high - prior_low);
         let (name, description, unit) = (unknown.name, unknown.description, unknown.unit);
         Unknown { name, description, unit, value: unknown.at(*z), low, high, identified }
     })

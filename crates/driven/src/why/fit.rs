@@ -5,10 +5,10 @@
 
 use super::noise::Whitening;
 use super::side::{Side, Smooth};
-use mapper_gap::coordinate::{Coordinate, parameters, set_parameter};
+use mapper_gap::coordinate::{Coordinate, coordinates, parameters, set_parameter};
 use mapper_gap::normal::PRIOR_STEPS;
 use mapper_gap::study::Hypothesis;
-use mapper_inference::descent::{End, Model, Normal, Reach, Until, descend};
+use mapper_inference::descent::{ENOUGH, End, FINE, Model, Normal, Reach, Until, descend, room_within};
 use mapper_numerics::minimise::minimise;
 use mapper_physics::effect::{Effect, Rig, add};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -45,21 +45,13 @@ pub(crate) struct Fit {
 
 /// A cause outside the catalogue leaves so many times more than the model.
 const OUTSIDE_RATIO: f64 = 12.0;
-/// Width of the logarithm of that.
-const OUTSIDE_WIDTH: f64 = 1.0;
 /// No model of this kind leaves less than so many widths below the median, however well it happens to fit; nor does what is
 /// called a cause outside the catalogue.
 const MIN_LEFT: f64 = -2.0;
 /// An unknown so many standard deviations off is beyond what is known of any machine.
 const MAX_SIGMAS: f64 = 5.0;
-/// Most that an unknown, or an effect in typical steps, moves at once.
-const MAX_MOVED: f64 = 2.0;
-/// Iterations, and what one has to promise in the cost.
+/// Maximum number of iterations.
 const ITERATIONS: usize = 15;
-const ENOUGH: f64 = 0.02;
-/// Step from a hypothesis to the runs from which slopes are taken, in the coordinates' units, and the step if such slopes lead nowhere.
-pub(crate) const SLOPE_STEP: f64 = 0.02;
-const COARSE_SLOPE_STEP: f64 = 0.2;
 
 impl<S: Side> Question<'_, S> {
     /// Nothing but what is not known.
@@ -92,12 +84,6 @@ impl<S: Side> Question<'_, S> {
             S::unknowns().iter().zip(&hypothesis.nuisances).map(|(unknown, z)| unknown.at(*z)).collect();
         let predicted = self.side.predict(&rig, &unknowns);
         predicted.iter().flatten().all(|k| k.is_finite()).then_some(predicted)
-    }
-
-    /// Coordinates of the effects' parameters, in order.
-    pub(crate) fn coordinates(&self, hypothesis: &Hypothesis) -> Vec<Coordinate> {
-        let infos = hypothesis.effects.iter().map(|(index, _)| self.effects[*index].info());
-        infos.flat_map(|info| &info.parameters).map(Coordinate::new).collect()
     }
 
     /// Readings less predictions in rows that count, and 0 elsewhere.
@@ -149,7 +135,7 @@ impl<S: Side> Question<'_, S> {
 
     /// The best fit to the rows selected by `counts`, starting at `start`; `None` if the model has no answer there.
     pub(crate) fn fit(&self, start: &Hypothesis, counts: &[bool]) -> Option<Fit> {
-        let coordinates = self.coordinates(start);
+        let coordinates = coordinates(self.effects, start);
         let at = coordinates.iter().zip(parameters(start)).map(|(coordinate, value)| coordinate.of(value));
         let unknowns = DVector::from_iterator(
             start.nuisances.len() + coordinates.len(),
@@ -163,7 +149,8 @@ impl<S: Side> Question<'_, S> {
         let half_ln_determinant = normal.half_ln_determinant()?;
         let outside = |smooth: &Smooth| match smooth.width {
             0.0 => (smooth.median_k, 0.0),
-            _ => (OUTSIDE_RATIO * smooth.median_k, OUTSIDE_WIDTH),
+            // By a factor of e, one standard deviation.
+            _ => (OUTSIDE_RATIO * smooth.median_k, 1.0),
         };
         let evidence = |prior: &dyn Fn(&Smooth) -> (f64, f64)| {
             let left = self.all_left(counts, &point.residual, prior);
@@ -180,8 +167,8 @@ impl<S: Side> Question<'_, S> {
     /// The linearisation of a fit, for the gain of further effects.
     pub(crate) fn beside(&self, fit: &Fit, counts: &[bool]) -> Option<LinearisedFit<'_, '_, S>> {
         let whitenings = self.whitenings(counts, &fit.left_k);
-        let coordinates = self.coordinates(&fit.hypothesis);
-        let slopes = self.slopes(&fit.hypothesis, &fit.predicted, &coordinates, SLOPE_STEP);
+        let coordinates = coordinates(self.effects, &fit.hypothesis);
+        let slopes = self.slopes(&fit.hypothesis, &fit.predicted, &coordinates, FINE);
         let columns = slopes.iter().map(|slope| whitened(&whitenings, slope)).collect();
         let residual = whitened(&whitenings, &self.residual(&fit.predicted));
         let precision = fit.precision.clone().cholesky()?;
@@ -220,7 +207,7 @@ impl<S: Side> Question<'_, S> {
         step: f64,
     ) -> Vec<Vec<Vec<f64>>> {
         let of = |moved: &Hypothesis, by: f64| -> Vec<Vec<f64>> {
-            let Some(there) = self.predict(moved) else {
+            let Some(there) = self.predict(moved).filter(|_| by != 0.0) else {
                 return here.iter().map(|h| vec![0.0; h.len()]).collect();
             };
             there
@@ -236,13 +223,10 @@ impl<S: Side> Question<'_, S> {
             slopes.push(of(&moved, step));
         }
         for (place, (coordinate, value)) in coordinates.iter().zip(parameters(hypothesis)).enumerate() {
-            let at = coordinate.of(value);
-            // To the side where there is room.
-            let room = |x: &f64| (coordinate.of(coordinate.value(*x)) - x).abs() < 1e-9;
-            let away = [at + step, at - step].into_iter().find(room).unwrap_or(at - step);
+            let (next, by) = coordinate.next_to(value, step);
             let mut moved = hypothesis.clone();
-            set_parameter(&mut moved, place, coordinate.value(away));
-            slopes.push(of(&moved, away - at));
+            set_parameter(&mut moved, place, next);
+            slopes.push(of(&moved, by));
         }
         slopes
     }
@@ -347,18 +331,17 @@ impl<S: Side> Model for Fitted<'_, '_, S> {
     }
 
     fn normal(&mut self, unknowns: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
-        let step = if reach == Reach::Fine { SLOPE_STEP } else { COARSE_SLOPE_STEP };
-        let slopes = self.question.slopes(&point.hypothesis, &point.predicted, &self.coordinates, step);
+        let slopes =
+            self.question.slopes(&point.hypothesis, &point.predicted, &self.coordinates, reach.distance());
         normal(&self.whitenings, &slopes, &point.residual, &self.pulls(unknowns)).0
     }
 
     fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
-        let within = |low: f64, high: f64| (low.clamp(-MAX_MOVED, 0.0), high.clamp(0.0, MAX_MOVED));
         let n = unknowns.len() - self.coordinates.len();
-        let of_unknowns = unknowns.iter().take(n).map(|z| within(-MAX_SIGMAS - z, MAX_SIGMAS - z));
+        let of_unknowns = unknowns.iter().take(n).map(|z| room_within(-MAX_SIGMAS, MAX_SIGMAS, *z));
         let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
             let (low, high) = coordinate.ends();
-            within(low - at, high - at)
+            room_within(low, high, *at)
         });
         of_unknowns.chain(of_effects).collect()
     }

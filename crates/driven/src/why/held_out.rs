@@ -6,7 +6,7 @@ use super::search::weight;
 use super::side::Side;
 use mapper_core::Channel;
 use mapper_gap::calibration::Calibration;
-use mapper_gap::coordinate::{parameters, set_parameter};
+use mapper_gap::coordinate::{coordinates, parameters, set_parameter};
 use mapper_gap::study::Hypothesis;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, quantile, rms, standard_deviation, student_quantile};
@@ -130,7 +130,7 @@ pub(crate) fn beyond<S: Side>(
 fn draws<S: Side>(question: &Question<'_, S>, fit: &Fit, seed: u64) -> Vec<Vec<f64>> {
     let Some(cholesky) = fit.precision.clone().cholesky() else { return Vec::new() };
     let unknowns = fit.hypothesis.nuisances.len();
-    let coordinates = question.coordinates(&fit.hypothesis);
+    let coordinates = coordinates(question.effects, &fit.hypothesis);
     let (t_s, alike_s) = (&question.side.rows().t_s, S::smooth()[0].alike_s);
     let numbers: Vec<u64> = (0..DRAWS as u64).collect();
     let drawn = parallel::map(&numbers, |number| {

@@ -1,7 +1,6 @@
 //! Gap diagnosis without steps: which cause explains the judged channels of a side driven by its measured neighbours.
 
 mod compressor;
-mod compressor_sensors;
 mod denoise;
 mod detectable;
 mod diagnose;
@@ -13,10 +12,7 @@ mod phases;
 mod search;
 mod side;
 mod turbine;
-mod turbine_sensors;
 
-pub use compressor_sensors::compressor_sensors;
 pub use diagnose::{Ask, diagnose};
 pub use diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
 pub use side::{NoSide, Which};
-pub use turbine_sensors::turbine_sensors;

@@ -6,6 +6,7 @@ use mapper_gap::calibration::Calibration;
 use mapper_gap::coordinate::Coordinate;
 use mapper_gap::next::SETTLED;
 use mapper_gap::study::{Hypothesis, members};
+use mapper_gap::weigh::prior_of_number;
 use mapper_inference::search::{Causes, Known, Limits, Offer, extend};
 use mapper_numerics::parallel;
 use mapper_physics::effect::EffectInfo;
@@ -23,12 +24,7 @@ pub(crate) const PRIOR_OUTSIDE: f64 = 0.1;
 
 /// Log prior of a cause.
 pub(crate) fn prior(calibration: &Calibration, asked: usize, fit: &Fit) -> f64 {
-    let count = asked.max(2) as f64;
-    match fit.hypothesis.effects.len() {
-        0 => calibration.prior_none.ln(),
-        1 => (calibration.prior_single / count).ln(),
-        _ => (calibration.prior_pair / (0.5 * count * (count - 1.0))).ln(),
-    }
+    prior_of_number(calibration, asked, fit.hypothesis.effects.len())
 }
 
 /// Evidence of a fit, including its prior.

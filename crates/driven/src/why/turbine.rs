@@ -2,7 +2,9 @@
 
 use super::side::{Side, Smooth, Which, truth};
 use crate::Parameter;
+use crate::density::{ALIKE_S, HOUSING_ALIKE_S};
 use crate::parameters::Spread;
+use crate::readings::{SMALLEST_FLOW_KG_S, WORKING_RATIO};
 use crate::rows::{Rows, Wanted};
 use mapper_core::Channel;
 use mapper_physics::effect::{Rig, Submodel};
@@ -11,11 +13,6 @@ use mapper_physics::instruments::ChannelFollower;
 use mapper_physics::model::rad_s_of_rpm;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::turbine::TurbineInlet;
-
-/// Expansion ratio below which a turbine does hardly any work.
-const WORKING_RATIO: f64 = 1.02;
-/// Minimum flow at which the gas path is evaluated, kg/s (it divides by it).
-const SMALLEST_FLOW_KG_S: f64 = 1e-3;
 
 const fn unknown(
     name: &'static str,
@@ -111,8 +108,8 @@ impl Side for TurbineSide {
     fn smooth() -> &'static [Smooth] {
         // T4: error of a parabola over the blade-speed ratio, at a temperature drop of some hundred kelvin.
         &[
-            Smooth { median_k: 0.45, width: 0.25, alike_s: 2.0 },
-            Smooth { median_k: 8.0, width: 0.0, alike_s: 60.0 },
+            Smooth { median_k: 0.45, width: 0.25, alike_s: ALIKE_S },
+            Smooth { median_k: 8.0, width: 0.0, alike_s: HOUSING_ALIKE_S },
         ]
     }
 

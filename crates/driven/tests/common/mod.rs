@@ -3,7 +3,6 @@
 #![allow(dead_code, reason = "each test binary needs some of it")]
 
 use mapper_core::{Channel, Recording, Series};
-use mapper_driven::why::turbine_sensors;
 use mapper_effects::catalogue;
 use mapper_observe::Declared;
 use mapper_physics::driven::{FrozenGrid, drive};
@@ -12,6 +11,7 @@ use mapper_physics::inputs::InterpolatedInputs;
 use mapper_physics::instruments::{ChannelFollower, true_value};
 use mapper_physics::model::Model;
 use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_physics::sensor_fault::log_effects;
 use mapper_physics::steady::hold_speed;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -92,7 +92,7 @@ pub fn engine(
             rig.instruments.path_mut(Channel::T2).lag_s += value;
             continue;
         }
-        let effects = [catalogue(), turbine_sensors()].concat();
+        let effects = [catalogue(), log_effects(false)].concat();
         let effect = effects.iter().find(|effect| effect.info().id == *id).unwrap();
         let wall = [INNER_WALL_RATIO, *value];
         let values = if *id == "inner_node" { &wall[..] } else { &wall[1..] };

@@ -10,7 +10,7 @@ use crate::faults::readings::{CHANNELS, Readings, TC};
 use crate::faults::rows::{Machine, Rows, common, own};
 use crate::nominal_rig::NominalRig;
 use mapper_core::Channel;
-use mapper_observe::sensor_fault::FaultKind;
+use mapper_physics::sensor_fault::FaultKind;
 use mapper_physics::nusselt;
 use nalgebra::DMatrix;
 
@@ -54,7 +54,7 @@ pub(crate) fn measured(
         readings: known.iter().map(|(_, readings)| *readings).collect(),
         by_machine: Vec::new(),
         by_fault: vec![
-            (Channel::T2, FaultKind::TowardsHousing, units.iter().map(|units| units.recip()).collect()),
+            (Channel::T2, FaultKind::TowardsWall, units.iter().map(|units| units.recip()).collect()),
             (Channel::Tc, FaultKind::Gain, by_gain.iter().map(|gain| -gain).collect()),
             (Channel::T2, FaultKind::Gain, by_gain),
             (Channel::T1, FaultKind::Gain, vec![0.0; count]),

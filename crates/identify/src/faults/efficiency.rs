@@ -7,10 +7,10 @@
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::readings::{PerChannel, Readings};
 use crate::faults::rows::{Machine, Rows, common, own};
-use crate::faults::smooth::{At, Smooth};
+use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
 use crate::nominal_rig::NominalRig;
 use mapper_core::{Channel, ReferenceState};
-use mapper_observe::sensor_fault::FaultKind;
+use mapper_physics::sensor_fault::FaultKind;
 use mapper_physics::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
 use nalgebra::{DMatrix, DVector};
 
@@ -61,8 +61,6 @@ const ANY_MAP: Smooth = Smooth {
     amplitude: 0.03,
     lengths: (0.7, 0.5),
 };
-/// Deviation from the smooth function, ratio: with it the chi-square of a public measured map (TurboTools, 93 points) is 95.
-const ANY_ROUGHNESS: f64 = 4e-3;
 /// Shape of a declared map's error, in units of its tolerance.
 const DECLARED_MAP: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
 /// Deviation of the rig from a declared map, ratio: a tenth of a point of efficiency.
@@ -148,7 +146,7 @@ pub(crate) fn rows(
     let readings =
         known.iter().map(|(row, readings, _)| as_gains_count(readings, fitted.eta[*row])).collect();
     // It changes the slope of T2 over Tc, which convection absorbs, and nothing at equal temperatures.
-    let by_fault = vec![(Channel::T2, FaultKind::TowardsHousing, vec![0.0; count])];
+    let by_fault = vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])];
     Some(Rows { residual, covariance, readings, by_reading, by_machine, by_fault })
 }
 
@@ -171,7 +169,7 @@ pub(crate) fn measured(fitted: &FittedEfficiencies, readings: &[Option<Readings>
         by_reading: known.iter().map(by_reading).collect(),
         readings: known.iter().map(|(row, readings)| as_gains_count(readings, fitted.eta[*row])).collect(),
         by_machine: Vec::new(),
-        by_fault: vec![(Channel::T2, FaultKind::TowardsHousing, vec![0.0; count])],
+        by_fault: vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])],
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::faults::rows::Machine;
 use mapper_core::Channel;
-use mapper_observe::sensor_fault::{FaultKind, SensorFault};
+use mapper_physics::sensor_fault::{FaultKind, SensorFault};
 use serde::{Serialize, Serializer};
 use std::fmt;
 
@@ -49,7 +49,7 @@ impl Suspect {
             };
         };
         match (kind, channels) {
-            (FaultKind::Gain | FaultKind::TowardsHousing, _)
+            (FaultKind::Gain | FaultKind::TowardsWall, _)
             | (FaultKind::Drift, [Channel::CompressorFlow | Channel::ShaftSpeed]) => (100.0, "%"),
             (_, [Channel::P1 | Channel::P2, ..]) => (1e-3, "kPa"),
             (_, [Channel::CompressorFlow]) => (1e3, "g/s"),
@@ -98,18 +98,7 @@ impl Serialize for FoundFault {
 impl fmt::Display for Suspect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Suspect::Sensor(fault) => {
-                let kind = match fault.kind {
-                    FaultKind::Offset => "offset",
-                    FaultKind::Gain => "gain error",
-                    FaultKind::Drift => "drift",
-                    FaultKind::TowardsHousing => "heat conduction to the housing at",
-                };
-                match fault.kind {
-                    FaultKind::TowardsHousing => write!(f, "{kind} {}", together(fault.channels)),
-                    _ => write!(f, "{kind} of {}", together(fault.channels)),
-                }
-            }
+            Suspect::Sensor(fault) => fault.fmt(f),
             Suspect::Machine(machine) => f.write_str(&machine_name(*machine)),
         }
     }
@@ -122,18 +111,16 @@ impl fmt::Display for FoundFault {
         let size = format!("{:+.2} +/- {:.2} {unit}", scale * self.value, 1.96 * scale * self.sigma);
         match self.suspect {
             Suspect::Sensor(fault) => {
-                let channels = together(fault.channels);
+                let channels = fault.channel_names();
                 let several = fault.channels.len() > 1;
                 let verb = |one, many| if several { many } else { one };
                 match fault.kind {
                     FaultKind::Offset => write!(f, "{channels} {} {size} too high", verb("reads", "read")),
                     FaultKind::Gain => write!(f, "{channels} {} a gain error of {size}", verb("has", "have")),
-                    FaultKind::Drift => {
-                        write!(f, "{channels} {} by {size} over the run", verb("drifts", "drift"))
-                    }
-                    FaultKind::TowardsHousing => {
+                    FaultKind::TowardsWall => {
                         write!(f, "{channels} reads {size} of the way to the housing temperature")
                     }
+                    _ => write!(f, "{channels} {} by {size} over the run", verb("drifts", "drift")),
                 }?;
             }
             Suspect::Machine(machine) => {
@@ -159,12 +146,4 @@ fn machine_name(machine: Machine) -> String {
         Machine::Condition(channel) => return format!("{} ({channel})", channel.info().description),
     };
     name.to_owned()
-}
-
-fn together(channels: &[Channel]) -> String {
-    let names: Vec<String> = channels.iter().map(ToString::to_string).collect();
-    match names.as_slice() {
-        [rest @ .., last] if !rest.is_empty() => format!("{} and {last} together", rest.join(", ")),
-        _ => names.join(""),
-    }
 }

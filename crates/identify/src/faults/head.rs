@@ -6,7 +6,7 @@
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::readings::{PerChannel, Readings};
 use crate::faults::rows::{Machine, Rows, common, errors, own};
-use crate::faults::smooth::{At, Smooth};
+use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
 use crate::nominal_rig::NominalRig;
 use mapper_core::ReferenceState;
 use nalgebra::DVector;
@@ -33,8 +33,6 @@ const ANY_CURVE: Smooth = Smooth {
     amplitude: 0.02,
     lengths: (0.7, 0.5),
 };
-/// Deviation from a smooth curve, ratio: with it the chi-square of a public measured map (TurboTools, 93 points) is 118.
-const ANY_ROUGHNESS: f64 = 4e-3;
 /// Smooth error of a declared map, in units of its declared tolerance of flow: the remaining error is a common factor.
 const DECLARED_HEAD: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
 /// Deviation of the rig from a declared map, ratio: readings at the end of a step that is not fully settled.

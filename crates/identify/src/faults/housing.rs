@@ -17,7 +17,7 @@ use crate::faults::rows::{Rows, common, own};
 use crate::samples::Samples;
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
 use mapper_numerics::statistics::mean;
-use mapper_observe::sensor_fault::FaultKind;
+use mapper_physics::sensor_fault::FaultKind;
 
 /// Start of the evaluation after the step's start, s: speed, flow and probe have settled.
 const AFTER_S: f64 = 10.0;
@@ -139,7 +139,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
         by_reading: parts.iter().map(by_reading).collect(),
         by_machine: Vec::new(),
         // It scales the conductance and the difference of the temperatures, which capacity and loss absorb.
-        by_fault: vec![(Channel::T2, FaultKind::TowardsHousing, column(&|_| 0.0))],
+        by_fault: vec![(Channel::T2, FaultKind::TowardsWall, column(&|_| 0.0))],
     })
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Each balance is a law with a declared uncertainty: one opening of the valve has one area, and heads go with the speed squared. The housing
 //! stores the heat from the gas, and efficiency is a smooth function of the map position. The hypotheses are the catalogue of sensor faults
-//! ([`mapper_observe::sensor_fault`]) and a machine of another scale. [`mapper_inference::hypotheses`] finds the most probable set of them.
+//! ([`mapper_physics::sensor_fault`]) and a machine of another scale. [`mapper_inference::hypotheses`] finds the most probable set of them.
 
 mod conditions;
 mod convection;
@@ -28,7 +28,7 @@ use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
 use mapper_core::{Channel, Method, Recording};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
-use mapper_observe::sensor_fault::CATALOGUE;
+use mapper_physics::sensor_fault::additive;
 
 /// Prior probability of a fault: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
 const EXPECTED_FAULTS: f64 = 0.1;
@@ -45,7 +45,7 @@ const ALTERNATIVE: f64 = 0.05;
 pub(crate) const EXCLUDED: f64 = 1e-3;
 
 /// Maximum number of steps, evenly spread: the cost grows with the cube, and these take a second.
-const MAX_STEPS: usize = 500;
+pub(crate) const MAX_STEPS: usize = 500;
 
 /// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if
 /// available.
@@ -60,7 +60,7 @@ pub(crate) fn likelihood(
     let mut likelihood = Likelihood::new(priors.always.len() + priors.hypotheses.len());
     for rows in balances(recording, ends, fitted, config, nominal)? {
         // A balance without a density gives no evidence.
-        let _ = likelihood.add(&rows.balance(&CATALOGUE));
+        let _ = likelihood.add(&rows.balance());
     }
     Some((likelihood, priors))
 }
@@ -127,9 +127,9 @@ pub(crate) fn standard_errors(likelihood: &Likelihood, priors: &Priors) -> Vec<(
 
 /// The hypothesis at this position: the catalogue, then the machine.
 pub(crate) fn suspect(index: usize) -> Suspect {
-    match CATALOGUE.get(index) {
+    match additive().nth(index) {
         Some(fault) => Suspect::Sensor(*fault),
-        None => Suspect::Machine(MACHINE[index - CATALOGUE.len()]),
+        None => Suspect::Machine(MACHINE[index - additive().count()]),
     }
 }
 
@@ -185,7 +185,7 @@ fn priors(config: &IdentifyConfig, nominal: Option<&NominalRig<'_>>) -> Priors {
         Machine::Condition(_) => OTHER_TEMPERATURE_K,
         _ => OTHER_MACHINE_RATIO,
     });
-    let sigmas: Vec<f64> = CATALOGUE.iter().map(|fault| fault.sigma).chain(machine).collect();
+    let sigmas: Vec<f64> = additive().map(|fault| fault.sigma).chain(machine).collect();
     let always = offsets.chain(CHANNELS.iter().map(gain)).chain([config.barometer_sigma_pa]).collect();
     Priors::even(always, &sigmas, EXPECTED_FAULTS)
 }

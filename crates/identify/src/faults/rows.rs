@@ -3,7 +3,7 @@
 use crate::faults::readings::{CHANNELS, PerChannel, Readings, TC};
 use mapper_core::Channel;
 use mapper_inference::hypotheses::Balance;
-use mapper_observe::sensor_fault::{FaultKind, SensorFault, gain_error};
+use mapper_physics::sensor_fault::{FaultKind, SensorFault, gain_error};
 use nalgebra::{DMatrix, DVector};
 
 /// A balance of the recording.

@@ -10,10 +10,9 @@
 use crate::joint::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
 use crate::joint::solve::{Covariance, FULLY, Problem};
 use mapper_core::{FoundInlet, InletConvection, Origin};
+use mapper_numerics::statistics::{HINT_SIGMAS, mean};
 use nalgebra::DMatrix;
 
-/// Number of standard errors of alpha_A below which the difference of the models is smaller than the uncertainty of alpha_A.
-const AT_WORK_SIGMAS: f64 = 2.0;
 /// Change of alpha_A that small model errors can cause: a clearance that grows by a percent as the housing warms up by 100 K looks like 0.06.
 const PASSES_FOR_ALPHA: f64 = 0.025;
 /// Minimum spread of the points about the efficiency surface when the models are compared, fraction. A true map steeper than the surface
@@ -44,7 +43,8 @@ fn convection_of(power: f64) -> InletConvection {
 /// uncertainty of the power, one standard deviation; `None` if it makes no difference.
 pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let error = problem.covariance()?.error_of(ALPHA).unwrap_or(0.0);
-    if problem.shared[ALPHA] <= AT_WORK_SIGMAS * error {
+    // The difference of the models is then smaller than the uncertainty of alpha_A.
+    if problem.shared[ALPHA] <= HINT_SIGMAS * error {
         return Some(None);
     }
     let tight = problem.surface_sigma;
@@ -126,7 +126,7 @@ fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
     let by_noise = problem.information(INLET)?.powf(-0.5);
     let alpha = problem.shared[ALPHA];
     let ln_ratios = problem.ln_inlet_ratios();
-    let ln_ratio = mapper_numerics::statistics::mean(&ln_ratios)?;
+    let ln_ratio = mean(&ln_ratios)?;
     // The change of alpha_A equivalent to the whole way from one model to the other.
     let way = (alpha * (1.0 - alpha) * ln_ratio).abs();
     let by_faults = PASSES_FOR_ALPHA / way;
@@ -159,7 +159,7 @@ fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     if problem.active[ALPHA] && alpha > 0.0 && alpha < 1.0 {
         // Start with equal heat flows: keep h alpha_A, and h (1 - alpha_A) times the ratio before the wheel.
         let ln_ratios = problem.ln_inlet_ratios();
-        let ln_ratio = mapper_numerics::statistics::mean(&ln_ratios)?;
+        let ln_ratio = mean(&ln_ratios)?;
         let towards_own = other.shared[INLET] - problem.shared[INLET];
         let odds = alpha / (1.0 - alpha) * (-towards_own * ln_ratio).exp();
         other.shared[ALPHA] = odds / (1.0 + odds);

@@ -4,11 +4,11 @@ use crate::IdentifyConfig;
 use crate::findings::{Findings, code};
 use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
 use crate::joint::refinements::Refinements;
-use crate::joint::smoothness::{Judged, STRAIN_SIGMAS, Smoothed};
+use crate::joint::smoothness::{Judged, Smoothed};
 use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
 use crate::width;
 use mapper_core::EstimateUncertainty;
-use mapper_numerics::statistics::{mean, median, rms};
+use mapper_numerics::statistics::{DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, mean, median, rms};
 
 /// Whitened mean square above which a step is doubtful.
 const DOUBT_SQUARE: f64 = 2.0;
@@ -23,16 +23,12 @@ const SLOW_SQUARE: f64 = 1.3;
 const STRETCH_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which the law does not apply, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
-/// Standard errors by which a parameter must be outside its range to count against the model.
-const OUTSIDE_SIGMAS: f64 = 2.0;
 /// Exponents of the Reynolds number possible in pipe-like flow: 0.33 is laminar, 0.8 turbulent, and Burke et al. have 1.13.
 const EXPONENT_RANGE: (f64, f64) = (0.5, 1.5);
 /// Largest practical probe tip in a compressor outlet, mm.
 const LARGEST_PROBE_MM: f64 = 4.0;
 /// Isentropic efficiency, total to total, above that of any turbocharger compressor (the best stay below 0.85).
 const HIGHEST_EFFICIENCY: f64 = 0.88;
-/// Standard errors by which rising and falling steps may differ.
-const SPLIT_SIGMAS: f64 = 4.0;
 
 /// Mean square of a step's whitened residual.
 pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
@@ -88,16 +84,8 @@ pub(crate) fn judge_step(
             format!("the fitted efficiency is {eta:.3}: something outside the model has an influence");
         findings.refuse(code::POOR_FIT, message);
     }
-    let limits = &config.thresholds;
-    let sigma_eta = eta_error.combined_standard_error();
-    if sigma_eta > limits.sigma_eta {
-        let (code, message) =
-            width::cause(eta_error, dt2_k.unwrap_or(0.0), limits.dt2_k, " and what is shared");
-        if sigma_eta > limits.unusable_sigma_eta {
-            findings.refuse(code, message);
-        } else {
-            findings.doubt(code, message);
-        }
+    if eta_error.combined_standard_error() > config.thresholds.sigma_eta {
+        width::judge(eta_error, dt2_k.unwrap_or(0.0), " and what is shared", config, findings);
     }
     let declared = !config.declared.is_empty();
     let square = mean_square(problem, member);
@@ -109,10 +97,10 @@ pub(crate) fn judge_step(
         findings.doubt(code::POOR_FIT, message);
     }
     if !member.shares && !member.barred {
-        let message =
-            "this step fits so much worse than the others that it does not count in what they share"
-                .to_owned();
-        findings.doubt(code::LEFT_OUT, message);
+        findings.doubt(
+            code::LEFT_OUT,
+            "this step fits so much worse than the others that it does not count in what they share",
+        );
     }
     let deviation = member.local[LN_DEVIATION];
     if problem.setting.with_law
@@ -163,7 +151,7 @@ pub(crate) fn doubts(
     if let Some(sigma) = error(EXPONENT) {
         let exponent = problem.shared[EXPONENT];
         let outside = (EXPONENT_RANGE.0 - exponent).max(exponent - EXPONENT_RANGE.1);
-        if outside > OUTSIDE_SIGMAS * sigma {
+        if outside > HINT_SIGMAS * sigma {
             doubts.push(format!(
                 "the convection law's exponent comes out as {exponent:.2} +/- {:.2}, which is impossible for flow in a housing",
                 1.96 * sigma
@@ -172,7 +160,7 @@ pub(crate) fn doubts(
     }
     if let Some(sigma) = error(PROBE_MM2) {
         let square = problem.shared[PROBE_MM2];
-        if square - OUTSIDE_SIGMAS * sigma > LARGEST_PROBE_MM * LARGEST_PROBE_MM {
+        if square - HINT_SIGMAS * sigma > LARGEST_PROBE_MM * LARGEST_PROBE_MM {
             doubts.push(format!(
                 "T2 lags as if behind a probe of {:.1} mm, which no outlet has: something else delays it",
                 square.sqrt()
@@ -184,7 +172,7 @@ pub(crate) fn doubts(
         doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));
     }
     let above = |judged: &&Judged| {
-        judged.value - OUTSIDE_SIGMAS * judged.uncertainty.combined_standard_error() > HIGHEST_EFFICIENCY
+        judged.value - HINT_SIGMAS * judged.uncertainty.combined_standard_error() > HIGHEST_EFFICIENCY
     };
     let above = smoothed.eta.iter().filter(above).count();
     if above > 0 {
@@ -192,7 +180,7 @@ pub(crate) fn doubts(
             "the efficiency comes out above {HIGHEST_EFFICIENCY:.2} at {above} points, which no turbocharger's compressor reaches"
         ));
     }
-    if smoothed.strain > STRAIN_SIGMAS {
+    if smoothed.strain > DOUBT_SIGMAS {
         doubts.push(format!(
             "the efficiencies bend towards low speed more than in any map; attributed to offsets, these are {:.1} times the declared ones",
             smoothed.strain
@@ -226,7 +214,7 @@ fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Opti
     [LN_COEFFICIENT, ALPHA, LN_DIRECTION].into_iter().find_map(|index| {
         let (a, b) = (up_covariance.error_of(index)?, down_covariance.error_of(index)?);
         let (difference, sigma) = (up[index] - down[index], a.hypot(b));
-        (difference.abs() > SPLIT_SIGMAS * sigma).then(|| {
+        (difference.abs() > EXCLUDE_SIGMAS * sigma).then(|| {
             format!(
                 "steps with rising T2 and steps with falling T2 disagree on the {}: {:.3} and {:.3}, {:.1} standard errors apart",
                 crate::joint::parameters::symbol(index),

@@ -39,7 +39,7 @@ use mapper_core::{
     Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Verdict, Window,
     confidence_interval_95,
 };
-use mapper_numerics::statistics::rms;
+use mapper_numerics::statistics::{DOUBT_SIGMAS, rms};
 
 /// Number of fits before the last one.
 const ROUNDS: usize = 3;
@@ -103,9 +103,10 @@ pub(crate) fn estimate(
         // Single-step results are better than none.
         let mut estimates = vec![Estimate::default(); recording.steps.len()];
         for step in &steps {
-            let message = "least squares over all steps did not converge: this step was identified by itself"
-                .to_owned();
-            findings[step.position].doubt(code::FIT_FAILED, message);
+            findings[step.position].doubt(
+                code::FIT_FAILED,
+                "least squares over all steps did not converge: this step was identified by itself",
+            );
             estimates[step.position] = alone[step.position].clone();
         }
         return Joint { estimates, thermal: None, two_parameter, fitted: None };
@@ -161,14 +162,12 @@ pub(crate) fn estimate(
             own.doubt(code::LEFT_OUT, message.clone());
         }
         if !commands::begins_with_jump(&recording.steps, step.position) {
-            let message =
-                "no jump leads to this step: its efficiency rests on what the points share".to_owned();
-            own.remark(code::THROUGH_THE_LAW, message);
+            own.remark(
+                code::THROUGH_THE_LAW,
+                "no jump leads to this step: its efficiency rests on what the points share",
+            );
         }
-        if config.declared.is_empty() {
-            let message = "no sensor uncertainty was declared: the interval holds noise alone".to_owned();
-            own.remark(code::NOTHING_DECLARED, message);
-        }
+        own.remark_undeclared(config);
         if resting > MAX_RESTING_ETA {
             let message = format!(
                 "the recording alone knows the efficiencies to {:.1} points only; the rest is trust in the declared alpha_A, probe and \
@@ -216,7 +215,7 @@ impl<'a> Attempt<'a> {
                 smoothness::smoothed(problem, covariance, refined, steps, config.reference)
             };
         let mut found = smoothed(&problem, &covariance, &refined);
-        if found.strain > smoothness::STRAIN_SIGMAS {
+        if found.strain > DOUBT_SIGMAS {
             // The declaration is wrong: the offsets then get the spread that they show.
             let strain = found.strain;
             for prior in &mut problem.priors[OFFSETS..FLOW_GAIN] {

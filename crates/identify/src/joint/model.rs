@@ -7,7 +7,7 @@ use crate::joint::parameters::{
 use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
 use crate::probe::{self, Lag, follow};
-use mapper_observe::sensor_fault::CALIBRATED_AT_K;
+use mapper_physics::sensor_fault::CALIBRATED_AT_K;
 use mapper_physics::air::{self, Air};
 use mapper_physics::compression::{
     CompressionInputs, actual_rise_k, compress, compressed_k, isentropic_rise_ratio,

@@ -5,20 +5,19 @@
 //! the remaining steps only carry less information: the variance of the difference is then the difference of the variances (Hausman,
 //! Econometrica 46, 1978, eq. 2.10).
 
-use crate::joint::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_DIRECTION};
+use crate::joint::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_DIRECTION, Place};
 use crate::joint::rows::StepRows;
 use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::SurfaceScale;
 use mapper_core::ReferenceState;
+use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 
 /// Shares of the steps in a region; the smallest one that helps is left out.
 const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
 /// Minimum number of steps for leaving any out.
 const MIN: usize = 9;
-/// Standard errors of the difference beyond which the remaining steps disagree.
-const DISAGREES_SIGMAS: f64 = 4.0;
 /// Minimum standard error of the difference of each parameter: the effect of small smooth model errors.
-const FLOORS: [(usize, f64); 4] =
+const FLOORS: [(Place, f64); 4] =
     [(ALPHA, 0.02), (EXPONENT, 0.02), (LN_COEFFICIENT, 0.02), (LN_DIRECTION, 0.01)];
 
 /// Steps at one end of the map.
@@ -75,6 +74,6 @@ pub(crate) fn disagreement(
             let variance = (of_rest * of_rest - of_all * of_all).max(0.0) + floor * floor;
             Some((all.0.shared[index] - rest.0.shared[index]).abs() / variance.sqrt())
         })
-        .filter(|sigmas| *sigmas > DISAGREES_SIGMAS)
+        .filter(|sigmas| *sigmas > EXCLUDE_SIGMAS)
         .reduce(f64::max)
 }

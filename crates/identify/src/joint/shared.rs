@@ -4,7 +4,7 @@ use crate::IdentifyConfig;
 use crate::joint::judge;
 use crate::joint::parameters::{
     ALPHA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS, PROBE_MM2,
-    PROBE_SIGMA_MM2, SURFACE, symbol,
+    SURFACE, symbol,
 };
 use crate::joint::profile;
 use crate::joint::quantity::is_offset;
@@ -13,11 +13,10 @@ use crate::joint::rows::StepRows;
 use crate::joint::smoothness::Smoothed;
 use crate::joint::solve::{Covariance, Problem};
 use mapper_core::{ConvectionLaw, Entangled, EstimateUncertainty, Origin, SharedValue, ThermalModel};
+use mapper_inference::interval::IDENTIFIED_RATIO;
 
 /// Correlation above which two parameters count as entangled.
 const ENTANGLED: f64 = 0.95;
-/// Ratio of standard error to prior spread above which the recording carries no information.
-const UNINFORMED_RATIO: f64 = 0.7;
 
 /// Collects the shared parameters.
 pub(crate) fn thermal_model(
@@ -109,7 +108,7 @@ fn value(
     let beforehand = problem.priors[index].sigma;
     // For a parameter with a prior, use the error from the recording alone.
     let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
-    let uninformed = known > UNINFORMED_RATIO * beforehand;
+    let uninformed = known > IDENTIFIED_RATIO * beforehand;
     let is_offset = is_offset(index);
     SharedValue {
         // An offset has its declared spread even if the recording adds nothing.
@@ -142,7 +141,7 @@ fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
     };
     let error_m = 1e-3 * ((square + sigma).sqrt() - square.sqrt());
     SharedValue {
-        value: (sigma < UNINFORMED_RATIO * PROBE_SIGMA_MM2).then_some(1e-3 * square.sqrt()),
+        value: (sigma < IDENTIFIED_RATIO * problem.priors[PROBE_MM2].sigma).then_some(1e-3 * square.sqrt()),
         uncertainty: EstimateUncertainty { noise_standard_error: error_m, bias_standard_error: 0.0 },
         origin: Origin::Fitted,
     }

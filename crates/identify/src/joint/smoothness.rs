@@ -6,6 +6,7 @@
 //! Learning, 2006, ch. 2 and 5). Its amplitude and lengths are averaged with their posterior weights. On a strongly curved map the offsets
 //! keep their declared spread; on a flat one they lose about half of it. All quantities correlated with the efficiencies are corrected too.
 
+use crate::faults::MAX_STEPS;
 use crate::faults::efficiency::{FittedEfficiencies, FittedHeat};
 use crate::faults::readings::CHANNELS;
 use crate::joint::budget::{self, Pull, Stated};
@@ -18,7 +19,7 @@ use crate::joint::solve::{Covariance, Problem};
 use crate::joint::surface::{SLOW_LOSS, SurfaceScale};
 use mapper_core::{BudgetRow, Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::median;
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, median};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Standard deviations of the efficiencies about their mean, fraction: the range of compressor maps along a valve opening and across.
@@ -33,15 +34,8 @@ const ROUGHNESSES: [f64; 2] = [1e-3, 4e-3];
 const MEAN: (f64, f64) = (0.65, 1.0);
 /// Number of points above which the weights come from a subset: the cost grows with the cube.
 const MANY: usize = 120;
-/// Number of points above which offsets keep their declared spread: the computation would take minutes.
-const MAX: usize = 500;
-/// Standard deviations between a point and its prediction from the others beyond which it is left out.
-const FAR_SIGMAS: f64 = 4.0;
 /// Share of the weight below which a choice of amplitude and lengths is not solved.
 const MIN_WEIGHT: f64 = 0.01;
-
-/// Maximum shift of the offsets for a smooth map, in declared standard deviations.
-pub(crate) const STRAIN_SIGMAS: f64 = 3.0;
 
 /// A number with its error by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -99,7 +93,8 @@ pub(crate) fn smoothed(
     let carried = (0..covariance.fitted.len()).any(|row| is_offset(covariance.fitted[row]));
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
     let scale = SurfaceScale::of(&places, reference);
-    let few = etas.len() <= MAX;
+    // With more, the computation would take minutes: offsets keep their declared spread.
+    let few = etas.len() <= MAX_STEPS;
     let solved = match scale.filter(|_| few && problem.setting.shaped && carried) {
         None => Vec::new(),
         Some(scale) => {
@@ -362,7 +357,7 @@ fn farthest(solved: &[Solved], used: &[bool]) -> Option<usize> {
     (0..used.len())
         .filter(|i| used[*i])
         .map(|i| (i, best.drive[i].abs() / inverse[(i, i)].max(f64::MIN_POSITIVE).sqrt()))
-        .filter(|(_, sigmas)| *sigmas > FAR_SIGMAS)
+        .filter(|(_, sigmas)| *sigmas > EXCLUDE_SIGMAS)
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(i, _)| i)
 }

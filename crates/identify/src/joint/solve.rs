@@ -383,7 +383,7 @@ impl Problem<'_> {
         let mut free = self.clone();
         free.surface_sigma = NO_SURFACE_SIGMA;
         free.active[SURFACE..].fill(false);
-        for (index, slab_sigma, _) in REFINEMENTS {
+        for (index, _, slab_sigma, _) in REFINEMENTS {
             free.priors[index].sigma = slab_sigma;
         }
         free.minimise(ROUGHLY)?;

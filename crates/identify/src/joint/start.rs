@@ -8,9 +8,9 @@ use crate::joint::inlet;
 use crate::joint::input_noise_spline::Explained;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
-    ALPHA, ALPHA_SIGMA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS,
-    HUMIDITY, INLET, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LN_DIRECTION_SIGMA, LOCAL, OFFSET_CHANNELS,
-    OFFSETS, PROBE_MM2, PROBE_SIGMA_MM2, Prior, SHARED, SLOPE, SURFACE,
+    ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
+    LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED,
+    SLOPE, SURFACE,
 };
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, NO_SURFACE_SIGMA, Problem};
@@ -21,7 +21,7 @@ use crate::{IdentifyConfig, WindowRule, commands};
 use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::{mean, median};
+use mapper_numerics::statistics::{DOUBT_SIGMAS, mean, median};
 use mapper_physics::air;
 use nalgebra::DVector;
 
@@ -43,8 +43,6 @@ const SUSPECT_K: f64 = 0.5;
 const LAW_SIGMA: f64 = 3e-3;
 /// Weight of the expected spread, in points: small next to the dozens of points of a campaign, sufficient without any.
 const PRIOR_WEIGHT: f64 = 4.0;
-/// Standard deviations beyond which a point does not increase the spread: one in four hundred by chance.
-const FAR_SIGMAS: f64 = 3.0;
 /// Number of spreads tried on either side of the expected one, and their distance in logarithms: from a thirtieth to thirty times.
 const SPREADS: i32 = 34;
 const SPREAD_STEP: f64 = 0.1;
@@ -154,15 +152,15 @@ pub(crate) fn problem<'a>(
     priors[EXPONENT] = Prior { mean: 0.9, sigma: 0.5 };
     active[LN_COEFFICIENT] = with_law;
     active[EXPONENT] = with_law;
+    REFINEMENTS.into_iter().for_each(|(index, sigma, ..)| priors[index].sigma = sigma);
     shared[ALPHA] = config.alpha_area_ratio;
-    priors[ALPHA] = Prior { mean: config.alpha_area_ratio, sigma: ALPHA_SIGMA };
+    priors[ALPHA].mean = config.alpha_area_ratio;
     active[ALPHA] = choice.alpha_area == Choice::Fitted;
     let probe_mm2 = (1e3 * config.probe_diameter_m).powi(2);
     shared[PROBE_MM2] = if choice.probe == Choice::Fitted { probe_mm2.max(0.5) } else { probe_mm2 };
-    priors[PROBE_MM2] = Prior { mean: probe_mm2, sigma: PROBE_SIGMA_MM2 };
+    priors[PROBE_MM2].mean = probe_mm2;
     active[PROBE_MM2] = choice.probe == Choice::Fitted;
     lowest[PROBE_MM2] = 0.0;
-    priors[LN_DIRECTION] = Prior { mean: 0.0, sigma: LN_DIRECTION_SIGMA };
     active[LN_DIRECTION] = choice.direction == Choice::Fitted;
     shared[INLET] = inlet::power_of(config.inlet_convection);
     if choice.offsets == Choice::Fitted {
@@ -336,7 +334,7 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
         let of_point = |(value, variance): &(f64, f64)| {
             let total = sigma * sigma + variance;
             // A bad step must not widen its own tolerance.
-            -0.5 * (total.ln() + (value * value / total).min(FAR_SIGMAS * FAR_SIGMAS))
+            -0.5 * (total.ln() + (value * value / total).min(DOUBT_SIGMAS * DOUBT_SIGMAS))
         };
         let prior = -PRIOR_WEIGHT * (sigma.ln() + 0.5 * (expected / sigma).powi(2));
         seen.iter().map(of_point).sum::<f64>() + prior

@@ -46,7 +46,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     if 2 * known.iter().filter(exchanged).count() > known.len() {
         let message = "T2 is hotter than T3 and than this pressure ratio makes the gas at most points: the channels are exchanged; correct the \
              channel map";
-        found.push(Objection::new(code::SWAPPED_CHANNELS, message.to_owned(), all()));
+        found.push(Objection::new(code::SWAPPED_CHANNELS, message, all()));
     }
     let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > MIN_RISE_K).collect();
     // Without a rise of T2 the efficiency is undefined; treat it as too high.
@@ -69,7 +69,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     } else if !impossible.is_empty() {
         let message = "T2 - T1 is not what any compressor makes of the pressure ratio (apparent efficiency outside 0.2 to 1.6): T1, T2, \
                        P1 or P2 failed there";
-        found.push(Objection::new(code::SCALED_CHANNEL, message.to_owned(), impossible));
+        found.push(Objection::new(code::SCALED_CHANNEL, message, impossible));
     }
     found
 }

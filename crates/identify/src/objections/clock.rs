@@ -21,9 +21,8 @@ const EVERY_S: f64 = 0.5;
 const AHEAD_S: f64 = SLOPE_S + 1.0;
 /// Lag behind the others above which a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
-/// Minimum number of jumps for an average, and the maximum used.
+/// Minimum number of jumps for an average.
 const MIN: usize = 4;
-const MAX: usize = 60;
 
 /// Whether a channel changes its level or its slope at a jump.
 const WATCHED: [(Channel, bool); 5] = [
@@ -41,7 +40,6 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
         // The window after the last moment must not include the next jump.
         .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + AHEAD_S)
         .map(|position| steps[position].start_s)
-        .take(MAX)
         .collect();
     if jumps_s.len() < MIN {
         return Vec::new();

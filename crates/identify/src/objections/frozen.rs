@@ -5,13 +5,13 @@
 
 use crate::IdentifyConfig;
 use crate::findings::code;
+use crate::needs::needs;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use crate::objections::plausible::read_by;
 use mapper_core::{Channel, Recording, Series, with_unit};
+use mapper_physics::sensor_fault::repeats_s;
 
-/// Time for which a noisy channel may repeat one value, s, and the minimum number of samples.
-const SHORTEST_S: f64 = 5.0;
+/// Minimum number of equal samples.
 const MIN: usize = 8;
 /// Share of equal neighbours outside the long runs above which a logger counts as coarse.
 const COARSE_SHARE: f64 = 0.3;
@@ -33,7 +33,10 @@ pub(crate) fn objections(
     config: &IdentifyConfig,
 ) -> Vec<Objection> {
     let moves = moves(ends);
-    read_by(config).filter_map(|channel| of_channel(recording, channel, moves, config)).collect()
+    needs(config.method)
+        .into_iter()
+        .filter_map(|channel| of_channel(recording, channel, moves, config))
+        .collect()
 }
 
 /// Whether the operating point changes between any steps.
@@ -55,7 +58,8 @@ fn of_channel(
     config: &IdentifyConfig,
 ) -> Option<Objection> {
     let series = recording.series.get(&channel)?;
-    let mut long = runs(series);
+    let shortest_s = repeats_s(channel);
+    let mut long = runs(series, shortest_s);
     let in_runs: usize = long.iter().map(|run| run.last - run.first).sum();
     let pairs = series.values.len().saturating_sub(1);
     let equal = series.values.windows(2).filter(|pair| pair[0] == pair[1]).count();
@@ -74,7 +78,7 @@ fn of_channel(
     let rests = |(position, step): (usize, &mapper_core::StepMarker)| {
         let shared_s =
             |run: &Run| series.t_s[run.last].min(step.end_s) - series.t_s[run.first].max(step.start_s);
-        long.iter().any(|run| shared_s(run) >= 0.5 * SHORTEST_S).then_some(position)
+        long.iter().any(|run| shared_s(run) >= 0.5 * shortest_s).then_some(position)
     };
     let steps: Vec<usize> = recording.steps.iter().enumerate().filter_map(rests).collect();
     let longest = long.iter().max_by(|a, b| {
@@ -93,13 +97,13 @@ fn of_channel(
     (!objection.steps.is_empty()).then_some(objection)
 }
 
-/// The long runs of one repeated value.
-fn runs(series: &Series) -> Vec<Run> {
+/// The runs of one repeated value that are at least this long.
+fn runs(series: &Series, shortest_s: f64) -> Vec<Run> {
     let mut runs = Vec::new();
     let mut first = 0;
     for stretch in series.values.chunk_by(|a, b| a == b) {
         let last = first + stretch.len() - 1;
-        if stretch.len() >= MIN && series.t_s[last] - series.t_s[first] >= SHORTEST_S {
+        if stretch.len() >= MIN && series.t_s[last] - series.t_s[first] >= shortest_s {
             runs.push(Run { first, last });
         }
         first = last + 1;

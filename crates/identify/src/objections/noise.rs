@@ -5,8 +5,8 @@
 
 use crate::IdentifyConfig;
 use crate::findings::code;
+use crate::needs::needs;
 use crate::objections::objection::Objection;
-use crate::objections::plausible::read_by;
 use mapper_core::{Recording, with_unit};
 use mapper_numerics::statistics::robust_sigma;
 
@@ -16,7 +16,8 @@ const MAX_RATIO: f64 = 3.0;
 const NEIGHBOUR_S: f64 = 1.5;
 
 pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
-    read_by(config)
+    needs(config.method)
+        .into_iter()
         .filter_map(|channel| {
             let declared = config.declared.get(&channel)?.noise_sigma;
             let series = recording.series.get(&channel)?;

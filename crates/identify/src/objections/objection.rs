@@ -14,7 +14,7 @@ pub(crate) struct Objection {
 }
 
 impl Objection {
-    pub(crate) fn new(code: &'static str, message: String, steps: Vec<usize>) -> Self {
-        Objection { code, message, steps, samples_left_out: false }
+    pub(crate) fn new(code: &'static str, message: impl Into<String>, steps: Vec<usize>) -> Self {
+        Objection { code, message: message.into(), steps, samples_left_out: false }
     }
 }

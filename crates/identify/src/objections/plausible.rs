@@ -4,22 +4,15 @@
 
 use crate::IdentifyConfig;
 use crate::findings::code;
+use crate::needs::needs;
 use crate::objections::objection::Objection;
-use mapper_core::{Channel, Method, Recording};
+use mapper_core::Recording;
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 
-/// Channels that every method reads.
-pub(crate) const READ: [Channel; 6] =
-    [Channel::ShaftSpeed, Channel::CompressorFlow, Channel::P1, Channel::T1, Channel::P2, Channel::T2];
-
-/// The channels that a method reads.
-pub(crate) fn read_by(config: &IdentifyConfig) -> impl Iterator<Item = Channel> {
-    READ.into_iter().chain((config.method != Method::Steady).then_some(Channel::Tc))
-}
-
 pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
-    read_by(config)
+    needs(config.method)
+        .into_iter()
         .filter_map(|channel| {
             let series = recording.series.get(&channel)?;
             let (mut steps, mut middles) = (Vec::new(), Vec::new());

@@ -6,6 +6,16 @@ use statrs::function::beta::inv_beta_reg;
 /// 97.5 % quantile of the standard normal distribution: half of a 95 % interval, standard errors.
 pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 
+/// 95 % quantile of the standard normal distribution: a quantity this far above a threshold exceeds it in 95 of 100 cases.
+pub const NORMAL_95: f64 = 1.644_853_626_951_472;
+
+/// Standard deviations that a normal quantity is off once in 22 times by chance: a hint.
+pub const HINT_SIGMAS: f64 = 2.0;
+/// The same once in 370 times: enough to doubt one number.
+pub const DOUBT_SIGMAS: f64 = 3.0;
+/// The same once in 16,000 times: enough to leave out one of hundreds.
+pub const EXCLUDE_SIGMAS: f64 = 4.0;
+
 /// 95 % quantile of chi-square with one degree of freedom: the square of [`NORMAL_975`].
 pub const CHI_SQUARE_1_95: f64 = 3.841_458_820_694_124;
 
@@ -39,6 +49,7 @@ mod tests {
     #[test]
     fn the_constants_are_those_of_scipy() {
         assert!((NORMAL_975 - 1.959963984540054).abs() < 1e-15);
+        assert!((NORMAL_95 - normal_quantile(0.95).unwrap()).abs() < 1e-10);
         assert!((CHI_SQUARE_1_95 - 3.841458820694124).abs() < 1e-14);
         assert!((NORMAL_975 - normal_quantile(0.975).unwrap()).abs() < 1e-10);
         assert_eq!(normal_quantile(1.0), None);

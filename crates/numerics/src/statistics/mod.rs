@@ -10,7 +10,10 @@ mod order;
 mod robust;
 
 pub use bounded_normal::BoundedNormal;
-pub use distributions::{CHI_SQUARE_1_95, NORMAL_975, normal_quantile, share_interval_95, student_quantile};
+pub use distributions::{
+    CHI_SQUARE_1_95, DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, NORMAL_95, NORMAL_975, normal_quantile,
+    share_interval_95, student_quantile,
+};
 pub use moments::{mean, rms, standard_deviation};
 pub use order::{median, median_of_sorted, nearest_rank, quantile};
 pub use robust::{MEDIAN_SIZE_TO_SIGMA, robust_sigma};

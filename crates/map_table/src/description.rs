@@ -6,7 +6,7 @@ use mapper_core::{
     ReferenceState,
 };
 use mapper_yaml::units::{Kind, parse};
-use mapper_yaml::{Document, FindingKind, Findings, Notes, Schema, Source, path_text, steps};
+use mapper_yaml::{Document, FindingKind, Findings, Schema, Source, steps};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::io;
@@ -208,30 +208,20 @@ pub fn read_description(path: &Path) -> Result<MapDescription, DescriptionError>
 /// # Errors
 /// All mistakes of the text together.
 pub fn description_from_yaml(text: &str, origin: &Path) -> Result<MapDescription, Findings> {
-    let source = Source::new(&DOCUMENT, origin, text);
-    let mut notes = Notes::default();
+    let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, origin, text))?;
+    SCHEMA.check(&tree, &mut notes);
     let mut description = MapDescription::default();
-    if let Some(root) = mapper_yaml::read(&source, &mut notes) {
-        SCHEMA.check(&source, &root, &mut notes);
-        if notes.is_empty() {
-            for entry in root.entries() {
-                let value = &entry.value;
-                let text = value.text().map(str::to_owned).or_else(|| Some(value.number()?.to_string()));
-                let Err(error) = set_key(&mut description, &entry.key, &text.unwrap_or_default()) else {
-                    continue;
-                };
-                let row = DESCRIPTION_KEYS.iter().find(|row| row.name == entry.key);
-                let remedy = row.map_or("", |row| row.description).to_owned();
-                let steps = steps![entry.key.as_str()];
-                let (path, place) = (path_text(&steps), root.place(&steps));
-                notes.push(source.finding(FindingKind::WrongValue, path, place, error.to_string(), remedy));
-            }
-        }
-        if notes.is_empty() {
-            return Ok(description);
+    if notes.is_empty() {
+        for key in tree.keys(&[]) {
+            let steps = steps![key];
+            let number = || tree.get(&steps).and_then(Value::as_f64).map(|number| number.to_string());
+            let text = tree.text(&steps).map(str::to_owned).or_else(number).unwrap_or_default();
+            let Err(error) = set_key(&mut description, key, &text) else { continue };
+            let remedy = DESCRIPTION_KEYS.iter().find(|row| row.name == key).map_or("", |row| row.description);
+            notes.push(tree.finding(FindingKind::WrongValue, &steps, &error.to_string(), remedy));
         }
     }
-    Err(Findings::new(source, notes))
+    if notes.is_empty() { Ok(description) } else { Err(tree.findings(notes)) }
 }
 
 fn schema() -> Value {

@@ -293,7 +293,9 @@ impl fmt::Display for SensorFault {
             FaultKind::Drift => "drift",
             FaultKind::Lag if self.sizes.len() > 1 => "sheathed probe",
             FaultKind::Lag => "lag",
-            FaultKind::TowardsWall => "heat conduction to the probe",
+            FaultKind::TowardsWall => {
+                return write!(f, "conduction along the {} probe", self.channel_names());
+            }
             FaultKind::Frozen => "frozen reading",
         };
         write!(f, "{kind} of {}", self.channel_names())

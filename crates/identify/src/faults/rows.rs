@@ -3,7 +3,7 @@
 use crate::faults::readings::{CHANNELS, PerChannel, Readings, TC};
 use mapper_core::Channel;
 use mapper_inference::hypotheses::Balance;
-use mapper_physics::sensor_fault::{FaultKind, SensorFault, gain_error};
+use mapper_physics::sensor_fault::{FaultKind, SensorFault, additive, gain_error};
 use nalgebra::{DMatrix, DVector};
 
 /// A balance of the recording.
@@ -85,8 +85,8 @@ impl Rows {
         )
     }
 
-    /// The balance with one column for each parameter: declared offsets and gains of [`CHANNELS`], the barometer, these faults, [`MACHINE`].
-    pub(crate) fn balance(&self, faults: &[SensorFault]) -> Balance {
+    /// The balance with one column for each parameter: declared offsets and gains of [`CHANNELS`], the barometer, sensor faults, [`MACHINE`].
+    pub(crate) fn balance(&self) -> Balance {
         let offsets =
             (0..CHANNELS.len()).map(|channel| self.column(|other, _| f64::from(u8::from(other == channel))));
         let gains = (0..CHANNELS.len()).map(|channel| {
@@ -95,7 +95,7 @@ impl Rows {
         });
         let pressure = |channel: usize| matches!(CHANNELS[channel], Channel::P1 | Channel::P2);
         let barometer = self.column(|channel, _| f64::from(u8::from(pressure(channel))));
-        let faults = faults.iter().map(|fault| self.by_fault(fault));
+        let faults = additive().map(|fault| self.by_fault(fault));
         let machine = MACHINE.iter().map(|machine| {
             let own = self.by_machine.iter().find(|(own, _)| own == machine);
             own.map_or_else(

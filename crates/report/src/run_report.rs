@@ -119,7 +119,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         machine,
         campaign,
         sources,
-        origin,
+        ref origin,
         remarks,
         events,
         points,

@@ -56,7 +56,8 @@ impl Registry {
 
     /// Format and content of a map file.
     fn map_bytes(&self, path: &Path) -> Result<(&'static MapFormat, Vec<u8>), SessionError> {
-        let path = &if path.is_dir() { path.join("map.json") } else { path.to_owned() };
+        let in_run = path.join("map.json");
+        let path = if path.is_dir() { in_run.as_path() } else { path };
         let of = |path: &Path| path.extension().map(|extension| extension.to_string_lossy().into_owned());
         let extension = match of(path).unwrap_or_default() {
             packed if packed.eq_ignore_ascii_case("gz") => of(&path.with_extension("")).unwrap_or_default(),

@@ -58,7 +58,7 @@ pub struct Barometer {
     pub sigma_pa: f64,
 }
 
-/// Word for an ambient pressure that nobody knows.
+/// Word for an unknown ambient pressure.
 pub(crate) const UNKNOWN_WORD: &str = "unknown";
 /// Pressure of the standard atmosphere at sea level, Pa.
 const STANDARD_PA: f64 = 101_325.0;

@@ -8,17 +8,17 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_assemble::{RepeatedJump, repeated_jumps};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
-    IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, ThermalModel, joined,
+    Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, ThermalModel, joined,
 };
 use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_beside,
     isothermal_zero, method_for,
 };
 use mapper_observe::FusedChannel;
-use mapper_record::ChannelMap;
 use mapper_record::score::{
     AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, beside_truths, score, score_marks,
 };
+use mapper_record::{AmbientPressure, Barometer, ChannelMap};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -164,6 +164,7 @@ impl Session<'_> {
             remarks.extend(why);
             method
         });
+        remarks.extend(unknown_barometer(map));
         let soak = campaign.and_then(|campaign| campaign.zero);
         let (mut recordings, mut sources) = (Vec::new(), Vec::new());
         for Recorded { read, approaches, .. } in recorded {
@@ -212,6 +213,20 @@ impl Session<'_> {
             remarks,
         })
     }
+}
+
+/// Remark that gauge pressures are added to an unknown ambient pressure.
+fn unknown_barometer(map: &ChannelMap) -> Option<String> {
+    let unknown = Barometer::unknown();
+    let used = [Channel::P1, Channel::P2].into_iter().any(|channel| map.is_gauge(channel));
+    (used && map.ambient_pressure == Some(AmbientPressure::Constant(unknown))).then(|| {
+        format!(
+            "the ambient pressure is unknown: it counts as {:.1} kPa with a standard uncertainty of {:.0} kPa, which the intervals include; write \
+             what the barometer read or the altitude of the stand as `ambient_pressure` in the channel map",
+            1e-3 * unknown.pressure_pa,
+            1e-3 * unknown.sigma_pa
+        )
+    })
 }
 
 /// Remark that a recording has a soak long enough for a zero, but no zero was requested.

@@ -12,6 +12,7 @@ pub struct SensorDeclaration {
     /// Noise, offset left after calibration, gain; those of the combined reading if there are several sensors.
     pub declared: DeclaredUncertainty,
     /// Whether a gain is declared, be it 0.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub gain_is_declared: bool,
     /// Inner diameter of the pipe at a static tap, m; `None` if the total value is measured.
     pub static_tap_pipe_diameter_m: Option<f64>,

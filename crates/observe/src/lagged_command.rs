@@ -151,8 +151,9 @@ pub(crate) fn alike(value: f64, other: f64) -> bool {
 /// Responses tried before the fine search: lags, and rates in jumps of the median size per second.
 const LOOKS: usize = 24;
 const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
-/// Minimum reduction of the squared residuals, relative to a lag alone, for accepting a rate limit.
-const LIMITED_RATIO: f64 = 0.5;
+/// Reduction of the squared residuals, in their mean square, from which a rate limit is accepted: ten standard deviations of white noise, five of
+/// coloured noise over the half second of a ramp. A limit that is not there costs nothing, since fast rates are a lag alone.
+const LIMITED: f64 = 100.0;
 
 /// Time constant of the measured P3 relative to its command, s, and its standard error; `None` without jumps or P3.
 ///
@@ -228,11 +229,14 @@ fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
     recording.steps.windows(2).filter(jumped).map(|pair| pair[1].start_s).collect()
 }
 
+/// Time before and after a jump over which a response is compared, s.
+const AROUND_S: (f64, f64) = (3.0, 12.0);
+
 /// Squared residuals of the seconds around each jump, with a free level.
 fn cost_of(table: &Table, values: &[f64], jumps: &[f64], predicted: impl Fn(f64) -> f64) -> f64 {
     let mut total = 0.0;
     for jump_s in jumps {
-        let range = table.range(jump_s - 3.0, jump_s + 12.0);
+        let range = table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1);
         let rest: Vec<f64> =
             range.filter(|i| values[*i].is_finite()).map(|i| values[i] - predicted(table.t_s[i])).collect();
         let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
@@ -264,17 +268,25 @@ fn measured_response<Prediction: Fn(f64) -> f64>(
     if jumps.is_empty() {
         return None;
     }
+    let around = |jump_s: &f64| table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1).len();
+    let samples = jumps.iter().map(around).sum::<usize>().max(1) as f64;
     let at_rate = |slew_per_s: f64| {
         let cost = |lag_s: f64| cost_of(table, values, jumps, follow(Response { lag_s, slew_per_s }));
         best_lag(cost).map(|(lag_s, cost)| (cost, Response { lag_s, slew_per_s }))
     };
     let alone = at_rate(f64::INFINITY)?;
-    let limited = RATES.iter().filter_map(|rate| at_rate(rate * size));
-    let limited = limited.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 < LIMITED_RATIO * alone.0);
-    let Some((_, coarse)) = limited else { return Some(alone.1) };
+    let coarse = RATES.iter().filter_map(|rate| at_rate(rate * size));
+    let (_, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    // Jumps that the limit does not touch give the cost a minimum of their own: a sweep comes first.
     let (low, high) = ((coarse.slew_per_s / 1.8).ln(), (coarse.slew_per_s * 1.8).ln());
+    let place = |i: usize| low + (high - low) * i as f64 / LOOKS as f64;
     let cost = |rate: f64| at_rate(rate.exp()).map_or(f64::INFINITY, |(cost, _)| cost);
-    at_rate(minimise(low, high, 1e-3, cost).at.exp()).map(|(_, response)| response)
+    let costs: Vec<f64> = (0..=LOOKS).map(|i| cost(place(i))).collect();
+    let best = (0..=LOOKS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(LOOKS)));
+    let limited = at_rate(minimise(low, high, 1e-4, cost).at.exp());
+    let seen = limited.filter(|(cost, _)| alone.0 - cost > LIMITED * cost / samples);
+    Some(seen.unwrap_or(alone).1)
 }
 
 #[cfg(test)]

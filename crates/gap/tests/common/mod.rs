@@ -41,6 +41,11 @@ const SENSORS: [(Channel, f64, f64); 14] = [
     (Channel::TOil, 0.2, 0.5),
 ];
 
+/// The measured channels.
+pub fn channels() -> Vec<Channel> {
+    SENSORS.iter().map(|(channel, ..)| *channel).collect()
+}
+
 pub fn boundary() -> BoundaryConditions {
     BoundaryConditions { valve_opening_ratio: 0.9, ..BoundaryConditions::default() }
 }

@@ -5,4 +5,5 @@ mod catalogue;
 mod common;
 mod diagnose;
 mod healthy;
+mod near_surge;
 mod next;

@@ -1,10 +1,8 @@
-//! A recording without any error, near surge: what a diagnosis finds there is the driven model's own error.
+//! A recording without any error, near surge: its residual is the driven model's own error.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::declared;
+use crate::common::{channels, declared};
 use mapper_core::{Channel, Recording, Series, StepKind, StepMarker};
 use mapper_gap::actuators::Actuators;
 use mapper_gap::additions::additions;
@@ -64,7 +62,7 @@ fn exact_recording() -> Recording {
     let inputs = Commanded(LaggedCommand::new(levels.collect(), P3, Response::lag(0.0)));
     let end_s = DWELL_S * SPEEDS_RPM.len() as f64;
     let t_s: Vec<f64> = (0..(10.0 * end_s) as usize).map(|sample| 0.1 * sample as f64).collect();
-    let channels = common::channels();
+    let channels = channels();
     let mut values: BTreeMap<Channel, Vec<f64>> = BTreeMap::new();
     let mut simulator = Simulator::new(&model, 0.0, steady[0].state, 1e-8, Watch::default());
     simulator

@@ -124,7 +124,7 @@ pub fn smooth(
     };
     let (likelihood, smooth) = likeliest(0.0, EXPONENTS);
     let mut best = (likelihood + KINKED, smooth, 0.0);
-    // What wanders without kinks is a constant with them at most.
+    // Kinks only reduce the wander, and a constant has none.
     if smooth > *EXPONENTS.start() && kinks.contains(&true) {
         for kink_per_s in KINKS_PER_S {
             let variance = (kink_per_s * noise_sigma).powi(2);
@@ -312,7 +312,7 @@ mod tests {
         assert!(smooth(&[], &[], 0.1, NoiseColour::default(), &[]).is_none());
     }
 
-    /// A temperature that follows its command with 20 s, in steps of 50 K every two minutes: what a lag rounds least is its first second.
+    /// A temperature that follows its command with 20 s, in steps of 50 K every two minutes.
     #[test]
     fn a_kink_is_not_rounded() {
         let kinks_s: Vec<f64> = (1..10).map(|step| 120.0 * f64::from(step)).collect();

@@ -110,9 +110,10 @@ def to_end(mapper, folder, arguments, delay_s, signals):
     time.sleep(delay_s)
     if process.child.poll() is not None:
         raise EOFError
-    for number in signals:
-        sent = process.send(number)
-        time.sleep(0.0 if number is signals[-1] else 0.3)
+    for number in signals[:-1]:
+        process.send(number)
+        time.sleep(0.05)
+    sent = process.send(signals[-1])
     return process.ended() - sent
 
 

@@ -40,7 +40,7 @@ impl Actuators {
     }
 
     /// For a campaign without declarations: both responses are estimated from the recording.
-    fn undeclared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
+    pub fn undeclared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
         let (p3, timed) = timed_p3(table, recording, declared);
         let valve = measured_valve_response(table, &timed, declared.nominal.p1_pa);
         let valve = valve.unwrap_or(Response::lag(0.0));

@@ -217,7 +217,8 @@ pub fn description_from_yaml(text: &str, origin: &Path) -> Result<MapDescription
             let number = || tree.get(&steps).and_then(Value::as_f64).map(|number| number.to_string());
             let text = tree.text(&steps).map(str::to_owned).or_else(number).unwrap_or_default();
             let Err(error) = set_key(&mut description, key, &text) else { continue };
-            let remedy = DESCRIPTION_KEYS.iter().find(|row| row.name == key).map_or("", |row| row.description);
+            let remedy =
+                DESCRIPTION_KEYS.iter().find(|row| row.name == key).map_or("", |row| row.description);
             notes.push(tree.finding(FindingKind::WrongValue, &steps, &error.to_string(), remedy));
         }
     }

@@ -9,7 +9,7 @@ use crate::recorded::Recorded;
 use crate::variant::{Variant, VariantError};
 use crate::{ErrorKind, Session, SessionError, planning, run_directory};
 use mapper_campaign::Campaign;
-use mapper_core::{Method, Plan};
+use mapper_core::{Method, Plan, RunEnding};
 use mapper_history::{RunKey, RunRow};
 use mapper_physics::model::Model;
 use mapper_record::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
@@ -151,7 +151,8 @@ impl NightlyRun {
         let end =
             drive(&self.campaign, &self.model, &mut steps, backend.as_mut(), &mut recorder, session.stop)
                 .map_err(|source| SessionError::Run { source, recording: recording.to_owned() })?;
-        recorder.finish("")?;
+        // A night has no journal to keep it.
+        recorder.finish(RunEnding::Completed)?;
         Ok(end)
     }
 }

@@ -10,7 +10,8 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
 use mapper_core::{
-    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, PointBudgets, RunEnding, ThermalModel,
+    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, PointBudgets, RunEnding,
+    ThermalModel,
 };
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
@@ -18,7 +19,8 @@ use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{
-    BUDGET_COLUMNS, Display, PointsOrigin, ReportSource, RunReport, SurgeReport, budget_rows, gap_part, instant, run_report,
+    BUDGET_COLUMNS, Display, PointsOrigin, ReportSource, RunReport, SurgeReport, budget_rows, gap_part,
+    instant, run_report,
 };
 use serde::Serialize;
 use serde_json::json;

@@ -5,7 +5,7 @@
 
 use crate::heading::heading;
 use crate::simulation_table::SimulationTable;
-use mapper_core::{CompressorMap, ExportError, MapFormat};
+use mapper_core::{CompressorMap, ExportError, MapFormat, TurbineFormat};
 
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "mat",
@@ -15,6 +15,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     write: Some(write),
     draw: None,
     read: None,
+    turbine: TurbineFormat::NONE,
 };
 
 /// Numbers in 64 bits, the least significant byte first.

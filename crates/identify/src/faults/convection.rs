@@ -10,8 +10,8 @@ use crate::faults::readings::{CHANNELS, Readings, TC};
 use crate::faults::rows::{Machine, Rows, common, own};
 use crate::nominal_rig::NominalRig;
 use mapper_core::Channel;
-use mapper_physics::sensor_fault::FaultKind;
 use mapper_physics::nusselt;
+use mapper_physics::sensor_fault::FaultKind;
 use nalgebra::DMatrix;
 
 /// Scatter of the points about the declared law, ratio: its shape over the map.

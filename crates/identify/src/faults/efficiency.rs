@@ -10,8 +10,8 @@ use crate::faults::rows::{Machine, Rows, common, own};
 use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
 use crate::nominal_rig::NominalRig;
 use mapper_core::{Channel, ReferenceState};
-use mapper_physics::sensor_fault::FaultKind;
 use mapper_physics::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
+use mapper_physics::sensor_fault::FaultKind;
 use nalgebra::{DMatrix, DVector};
 
 /// Efficiencies as fitted, before the smoothness prior.

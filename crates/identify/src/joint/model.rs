@@ -7,7 +7,6 @@ use crate::joint::parameters::{
 use crate::joint::rows::Row;
 use crate::joint::surface::{TERM_COUNT, dot};
 use crate::probe::{self, Lag, follow};
-use mapper_physics::sensor_fault::CALIBRATED_AT_K;
 use mapper_physics::air::{self, Air};
 use mapper_physics::compression::{
     CompressionInputs, actual_rise_k, compress, compressed_k, isentropic_rise_ratio,
@@ -15,6 +14,7 @@ use mapper_physics::compression::{
 };
 use mapper_physics::inlet_convection::InletLaw;
 use mapper_physics::nusselt;
+use mapper_physics::sensor_fault::CALIBRATED_AT_K;
 
 /// Settings common to all steps.
 #[derive(Debug, Clone, Copy)]

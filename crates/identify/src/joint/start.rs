@@ -9,8 +9,8 @@ use crate::joint::input_noise_spline::Explained;
 use crate::joint::model::{Course, Setting};
 use crate::joint::parameters::{
     ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
-    LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED,
-    SLOPE, SURFACE,
+    LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior,
+    REFINEMENTS, SHARED, SLOPE, SURFACE,
 };
 use crate::joint::rows::{StepRows, condensed};
 use crate::joint::solve::{Member, NO_SURFACE_SIGMA, Problem};

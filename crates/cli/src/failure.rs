@@ -1,7 +1,7 @@
 //! Why a command ended early, with what to print and what to return.
 
 use crate::exit_code::Code;
-use crate::output;
+use crate::terminal_lines::on_terminal;
 use crate::{output_options, standard_error};
 use mapper_blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
@@ -129,7 +129,7 @@ impl Failure {
             Manner::Rendered => standard_error::say(&self.message),
             Manner::Sentence => {
                 let sentence = format!("mapper: {}\n", shortened(&self.message));
-                standard_error::say(&output::on_terminal(&sentence, terminal_size_of(std::io::stderr())));
+                standard_error::say(&on_terminal(&sentence, terminal_size_of(std::io::stderr())));
             }
         }
         Some(ExitCode::from(self.code as u8))

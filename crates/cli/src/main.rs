@@ -19,6 +19,7 @@ mod shown;
 mod standard_error;
 mod subcommands;
 mod tasks;
+mod terminal_lines;
 mod wall;
 
 use clap::{CommandFactory, FromArgMatches, Parser};

@@ -3,15 +3,15 @@
 use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::standard_error;
+use crate::terminal_lines::on_terminal;
 use clap::Args;
 use mapper_core::terminal_text;
-use mapper_report::wrapped;
 use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use terminal_size::{Height, Width, terminal_size_of};
+use terminal_size::terminal_size_of;
 
 /// Whether the one JSON object has been printed.
 static PRINTED: AtomicBool = AtomicBool::new(false);
@@ -44,21 +44,6 @@ impl Replace {
 /// Writes text to standard output, on a terminal with long sentences wrapped to its width. A closed pipe ends the command quietly.
 pub fn print(text: &str) -> Result<(), Failure> {
     write(&on_terminal(&terminal_text(text), terminal_size_of(std::io::stdout())))
-}
-
-/// The text with its long lines wrapped; as it is without a terminal, so that other programs get whole lines.
-pub fn on_terminal(text: &str, size: Option<(Width, Height)>) -> String {
-    let Some((Width(columns), _)) = size else { return text.to_owned() };
-    let columns = usize::from(columns);
-    let lines = text.split_inclusive('\n').map(|line| {
-        // Coloured lines and rows of tables have their own layout.
-        let is_prose = !line.contains('\x1b') && !line.trim().contains("   ");
-        match is_prose && line.trim_end().chars().count() > columns {
-            true => wrapped(line, columns, line.len() - line.trim_start().len() + 2),
-            false => line.to_owned(),
-        }
-    });
-    lines.collect()
 }
 
 fn write(text: &str) -> Result<(), Failure> {

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_core::{ImportError, MapDescription, ReferenceState};
+use mapper_core::{CompressorMap, ImportError, MapDescription, ReferenceState};
 use mapper_map_table::{file_text, read_any_text, read_workbook};
 use std::io::{Cursor, Write};
 
@@ -106,5 +106,8 @@ fn the_text_of_a_workbook_is_the_same_map() {
     let book = workbook(&[("New", "visible", NEW)]);
     let given = MapDescription { reference: Some(ReferenceState::SAE), ..MapDescription::default() };
     let text = file_text(&book).unwrap();
-    assert_eq!(read_any_text(&text, &given).unwrap().map, read_workbook(&book, &given).unwrap().map);
+    // As JSON: a map has numbers that are not known, and those are equal to none.
+    let json = |map: CompressorMap| serde_json::to_string(&map).unwrap();
+    let of_text = read_any_text(&text, &given).unwrap().map;
+    assert_eq!(json(of_text), json(read_workbook(&book, &given).unwrap().map));
 }

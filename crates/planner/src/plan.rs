@@ -121,6 +121,8 @@ fn reaching(builder: &PlanBuilder<'_>, required: f64) -> Result<Draft, PlanError
         let next_s = match (misses, reaches) {
             (Some(low), Some(high)) if low.1.is_infinite() => (low.0 * high.0).sqrt().ceil(),
             _ if error.is_infinite() => 2.0 * dwell_s,
+            // Offsets and gains do not average: an error near them hardly falls.
+            (Some(_), None) => (dwell_s * (required / error).powf(1.0 / power)).max(1.5 * dwell_s).ceil(),
             _ => (dwell_s * (required / error).powf(1.0 / power)).ceil(),
         };
         let low_s = misses.map_or(SHORTEST_DWELL_S, |(dwell_s, _)| dwell_s + 1.0);

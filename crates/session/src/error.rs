@@ -479,9 +479,8 @@ impl SessionError {
             E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => {
                 ErrorKind::Failure
             }
-            E::LogOption(_) => ErrorKind::BadInput,
             E::Log(_) | E::NoPoints { .. } => ErrorKind::BadRecording,
-            E::Twin(_) | E::TwinFile { .. } => ErrorKind::BadInput,
+            E::LogOption(_) | E::Twin(_) | E::TwinFile { .. } => ErrorKind::BadInput,
             E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
                 ErrorKind::BadRecording
             }

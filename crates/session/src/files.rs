@@ -98,9 +98,8 @@ mod tests {
         let path = folder.path().join("file");
         write_new(&path, b"12345").unwrap();
         assert_eq!(read_at_most(&path, 5).unwrap(), b"12345");
-        for (path, limit_bytes) in [(path.as_path(), 4), (Path::new("/dev/zero"), 4096)] {
-            let error = read_at_most(path, limit_bytes).unwrap_err().to_string();
-            assert!(error.contains(&format!("larger than the {limit_bytes} bytes")), "{error}");
-        }
+        assert!(read_at_most(&path, 4).is_err());
+        // A device has no end.
+        assert!(read_at_most(Path::new("/dev/zero"), 4096).is_err());
     }
 }

@@ -33,6 +33,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod budget_file;
 mod declared;
 mod drift;
 mod drive;
@@ -59,6 +60,7 @@ mod journal;
 mod map_file;
 mod map_work;
 mod map_work_error;
+mod needed_dwell;
 mod night_report;
 mod nightly;
 mod nightly_row;

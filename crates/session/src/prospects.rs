@@ -1,6 +1,7 @@
 //! Forecast of a campaign before its run: duration, and parts that will give no result.
 
 use crate::drive::soak_s;
+use crate::needed_dwell::{needed_s, settled_time_s};
 use crate::planning::{PlanInputs, plan_of};
 use crate::rehearsal::rehearse;
 use crate::verdict_forecast::{advise, forecast_verdicts};
@@ -147,17 +148,6 @@ fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
         ),
         remedy,
     ))
-}
-
-/// Time at the end of a step, s, that must be settled for a good verdict.
-fn settled_time_s(dwell_s: f64, joint: bool) -> f64 {
-    if joint { WindowRule::rest_at_end_s(dwell_s) } else { WindowRule::SHORTEST_S }
-}
-
-/// Dwell, s, that a step needs for `window: auto`.
-pub(crate) fn needed_s(step: &PlanStep, joint: bool) -> f64 {
-    let earliest_s = if joint { 0.0 } else { WindowRule::EARLIEST_S };
-    step.predicted.settle_s.unwrap_or(f64::INFINITY).max(earliest_s) + settled_time_s(step.dwell_s, joint)
 }
 
 /// Steps that settle too late for `window: auto`.

@@ -1,5 +1,6 @@
 //! Results of a run or recording: points, map and report, as data and as files in its directory.
 
+use crate::budget_file::budget_csv;
 use crate::files::{json_text, write_new};
 use crate::identified::{Identified, SoughtSurge};
 use crate::program::program_and_commit;
@@ -10,8 +11,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
 use mapper_core::{
-    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, PointBudgets, RunEnding,
-    ThermalModel,
+    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, RunEnding, ThermalModel,
 };
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
@@ -19,8 +19,7 @@ use mapper_page::{OtherRun, RunPage, run_page};
 use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
 use mapper_record::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{
-    BUDGET_COLUMNS, Display, PointsOrigin, ReportSource, RunReport, SurgeReport, budget_rows, gap_part,
-    instant, run_report,
+    Display, PointsOrigin, ReportSource, RunReport, SurgeReport, gap_part, instant, run_report,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -345,18 +344,6 @@ impl ResultFiles<'_> {
         }
         path
     }
-}
-
-/// The budgets as a table of rows.
-fn budget_csv(budgets: &[PointBudgets]) -> Result<Vec<u8>, SessionError> {
-    let failed =
-        |error: csv::Error| SessionError::file("write", Path::new(run_directory::BUDGET))(error.into());
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(BUDGET_COLUMNS).map_err(failed)?;
-    for row in budget_rows(budgets) {
-        writer.write_record(row).map_err(failed)?;
-    }
-    writer.into_inner().map_err(|error| failed(error.into_error().into()))
 }
 
 /// Name of a recording in comparisons: its run directory, or its file.

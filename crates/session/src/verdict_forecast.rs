@@ -3,7 +3,7 @@
 use crate::SessionError;
 use crate::declared::identification;
 use crate::drive::soak_s;
-use crate::prospects::needed_s;
+use crate::needed_dwell::needed_s;
 use mapper_campaign::Campaign;
 use mapper_core::{
     Advice, CampaignChange, Dwell, JointSettings, Method, OperatingPoint, Plan, PlanStep, Soak, StepKind,
@@ -80,7 +80,7 @@ pub(crate) fn advise(
         for change in changes {
             let changed = with_change(campaign, change);
             let Some(forecast) = forecast_verdicts(&changed, &plan(&changed)?) else { continue };
-            if forecast.surely_good() > best.map_or(now.surely_good(), |best| best.forecast.good) {
+            if rank(forecast) > rank(best.map_or(now, |best| best.forecast)) {
                 best = Some(Advice { change, forecast });
             }
             if forecast.surely_good() == forecast.points {
@@ -91,6 +91,11 @@ pub(crate) fn advise(
     }
     advice.sort_by(|a, b| a.forecast.duration_s.total_cmp(&b.forecast.duration_s));
     Ok(advice)
+}
+
+/// Order of forecasts: by points that are surely good, then by those that are expected to be.
+fn rank(forecast: VerdictForecast) -> (usize, usize) {
+    (forecast.surely_good(), forecast.good)
 }
 
 /// The campaign after `change`.

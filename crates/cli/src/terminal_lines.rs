@@ -1,0 +1,19 @@
+//! Lines as wide as the terminal.
+
+use mapper_report::wrapped;
+use terminal_size::{Height, Width};
+
+/// The text with its long lines wrapped; as it is without a terminal, so that other programs get whole lines.
+pub fn on_terminal(text: &str, size: Option<(Width, Height)>) -> String {
+    let Some((Width(columns), _)) = size else { return text.to_owned() };
+    let columns = usize::from(columns);
+    let lines = text.split_inclusive('\n').map(|line| {
+        // Coloured lines and rows of tables have their own layout.
+        let is_prose = !line.contains('\x1b') && !line.trim().contains("   ");
+        match is_prose && line.trim_end().chars().count() > columns {
+            true => wrapped(line, columns, line.len() - line.trim_start().len() + 2),
+            false => line.to_owned(),
+        }
+    });
+    lines.collect()
+}

@@ -90,7 +90,8 @@ pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
 pub use map_columns::MAP_COLUMNS;
 pub use map_description::{DescribedColumn, DesignPoint, MapDescription, StaticTaps};
 pub use map_format::{
-    DrawMap, MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, MapUnits, ReadMap, TurbineFormat, WriteMap,
+    DrawMap, MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, MapUnits, ReadMap, ReadTurbine, TurbineFormat,
+    WriteMap, WriteTurbine,
 };
 pub use map_format_error::{ExportError, ImportError};
 pub use model_tolerances::ModelTolerances;

@@ -43,13 +43,18 @@ impl Default for MapUnits {
 /// A map without a reference state is rejected: a wrong one shifts speeds by 1.7 % and more, and goes unnoticed.
 pub type ReadMap = fn(&[u8], &MapDescription) -> Result<ImportedMap, ImportError>;
 
+/// Turns a turbine map into the bytes of a file.
+pub type WriteTurbine = fn(&TurbineMap) -> Result<Vec<u8>, ExportError>;
+/// Reads a turbine map from the bytes of a file.
+pub type ReadTurbine = fn(&[u8], &MapDescription) -> Result<ImportedTurbine, ImportError>;
+
 /// The writer and the reader of turbine maps in a format.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct TurbineFormat {
     /// Turns a map into the bytes of a file.
-    pub write: Option<fn(&TurbineMap) -> Result<Vec<u8>, ExportError>>,
+    pub write: Option<WriteTurbine>,
     /// Parses the bytes of a file.
-    pub read: Option<fn(&[u8], &MapDescription) -> Result<ImportedTurbine, ImportError>>,
+    pub read: Option<ReadTurbine>,
 }
 
 impl TurbineFormat {

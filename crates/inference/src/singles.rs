@@ -48,7 +48,8 @@ mod tests {
         };
         likelihood.add(&balance).unwrap();
         let singles = likelihood.singles(&Priors::even(Vec::new(), &[2.0], 0.1)).unwrap();
-        let [single] = singles.as_slice() else { panic!("{singles:?}") };
+        assert_eq!(singles.len(), 1, "{singles:?}");
+        let single = &singles[0];
         let density = |variance: f64| (-4.5 / variance).exp() / variance.sqrt();
         assert!((single.value - 2.4).abs() < 1e-12 && (single.sigma - 0.8_f64.sqrt()).abs() < 1e-12);
         assert!((single.odds / (0.1 * density(5.0) / density(1.0)) - 1.0).abs() < 1e-12);

@@ -219,7 +219,7 @@ pub fn description_from_yaml(text: &str, origin: &Path) -> Result<MapDescription
             let Err(error) = set_key(&mut description, key, &text) else { continue };
             let remedy =
                 DESCRIPTION_KEYS.iter().find(|row| row.name == key).map_or("", |row| row.description);
-            notes.push(tree.finding(FindingKind::WrongValue, &steps, &error.to_string(), remedy));
+            notes.push(tree.finding(FindingKind::WrongValue, &steps, error.to_string(), remedy));
         }
     }
     if notes.is_empty() { Ok(description) } else { Err(tree.findings(notes)) }

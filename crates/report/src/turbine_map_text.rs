@@ -46,7 +46,7 @@ pub fn turbine_fit_text(map: &TurbineMap, fitted: &FittedTurbine) -> String {
     let mut rows = table::with_heads(&heads.map(str::to_owned));
     for line in &fitted.lines {
         let measured = || line.nodes.iter().filter(|node| !node.extrapolated);
-        let Some((first, last)) = measured().next().zip(measured().last()) else { continue };
+        let Some((first, last)) = measured().next().zip(measured().next_back()) else { continue };
         let best = measured().max_by(|a, b| {
             a.efficiency.unwrap_or(f64::NEG_INFINITY).total_cmp(&b.efficiency.unwrap_or(f64::NEG_INFINITY))
         });

@@ -1,5 +1,4 @@
 //! Sound readings of jumps, surge and rest are good; jumps that no sensor of that lag can make are bad, for as long as they last.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_core::{Channel, ChannelColumn, Quality, Reaction, SampleBatch};
 use mapper_runner::{Commanded, PlausibilityWatch, ReadingBounds, Trip};

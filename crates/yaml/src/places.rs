@@ -310,5 +310,5 @@ fn is_finite(text: &str) -> bool {
     let digits = text.trim_start_matches(['+', '-']);
     let is_named = [".inf", ".nan"].iter().any(|name| digits.eq_ignore_ascii_case(name));
     let is_number = digits.starts_with(|c: char| c.is_ascii_digit() || c == '.');
-    !is_named && !(is_number && digits.parse().is_ok_and(f64::is_infinite))
+    !(is_named || is_number && digits.parse().is_ok_and(f64::is_infinite))
 }

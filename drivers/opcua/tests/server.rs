@@ -453,7 +453,7 @@ fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
             noted.get() && marked.get()
         };
         assert!(
-            (0..CONNECTIONS).any(|_| over_a_connection(&stand, &seen)),
+            (0..CONNECTIONS).any(|_| over_a_connection(&stand, seen)),
             "{misdeed}: neither marked nor noted"
         );
     }

@@ -15,7 +15,7 @@ fn stated(statements: &[(&str, &str)]) -> MapDescription {
 
 fn read(name: &str, text: &str, statements: &[(&str, &str)]) -> Result<ImportedMap, ImportError> {
     let extension = name.rsplit('.').next().unwrap();
-    FORMATS.read_from(extension).unwrap().read(text.as_bytes(), &stated(statements))
+    FORMATS.read_from(extension).unwrap().read(text.as_bytes(), stated(statements))
 }
 
 /// Speed, flow, pressure ratio and efficiency of every point, as measured.

@@ -13,7 +13,7 @@ fn read(name: &str, text: &str, statements: &[(&str, &str)]) -> Result<ImportedT
     }
     let format = FORMATS.read_from(name.rsplit('.').next().unwrap()).unwrap();
     // What is read as a turbine is refused as a compressor.
-    if matches!(format.read(text.as_bytes(), &given), Ok(_)) {
+    if format.read(text.as_bytes(), &given).is_ok() {
         panic!("{name} passes for a compressor");
     }
     format.read_turbine(text.as_bytes(), &given)

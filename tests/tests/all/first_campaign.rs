@@ -22,26 +22,33 @@ fn a_wheel_is_enough_for_a_map() {
     }
 }
 
-/// Verdicts come out as `check` forecasts them, before and after its first advice. Two of 18 points may differ: the standard errors of
-/// some are within a tenth of their limit.
+/// Verdicts come out as `check` forecasts them, before and after its advice to soak. Shares of good points may differ by 15 %: some of the
+/// standard errors are near their limit, and steps that repeat a point count among the measured ones.
 #[test]
 fn the_forecast_of_verdicts_comes_true() {
     let scratch = scratch();
-    let shipped = std::fs::read_to_string(mapper_tests::repository().join("campaigns/gap_rig.yaml")).unwrap();
+    init(scratch.path(), &["--wheel", "60mm"]).exits(0);
+    let path = scratch.path().join("own.yaml");
+    let written = std::fs::read_to_string(&path).unwrap();
+    let without: String =
+        written.lines().filter(|line| !line.starts_with("zero:")).map(|line| format!("{line}\n")).collect();
     let holds = |text: &str| {
-        std::fs::write(scratch.path().join("own.yaml"), text).unwrap();
+        std::fs::write(&path, text).unwrap();
         let checked = mapper_in(scratch.path(), ["check", "own.yaml", "--json"]).exits(0).json();
-        let expected = checked["expected"]["good"].as_u64().unwrap();
+        let expected = &checked["expected"];
+        let expected = expected["good"].as_f64().unwrap() / expected["points"].as_f64().unwrap();
         let run =
             mapper_in(scratch.path(), ["run", "own.yaml", "--json", "--progress", "off"]).exits(0).json();
         let points = run["points"].as_array().unwrap();
-        let good = points.iter().filter(|point| point["verdict"] == "good").count() as u64;
-        assert!(good.abs_diff(expected) <= 2, "{good} good of {}, {expected} expected", points.len());
-        (good, checked)
+        let good = points.iter().filter(|point| point["verdict"] == "good").count() as f64;
+        let share = good / points.len() as f64;
+        assert!((share - expected).abs() <= 0.15, "{share} good, {expected} expected");
+        (share, checked)
     };
-    let (before, checked) = holds(&shipped);
-    let soak_s = checked["advice"][0]["change"]["soak_s"].as_f64().unwrap();
-    let (after, _) = holds(&format!("{shipped}zero: {{soak: {soak_s} s}}\n"));
+    let (before, checked) = holds(&without);
+    let mut advice = checked["advice"].as_array().unwrap().iter();
+    let soak_s = advice.find_map(|advice| advice["change"]["soak_s"].as_f64()).unwrap();
+    let (after, _) = holds(&format!("{without}zero: {{soak: {soak_s} s}}\n"));
     assert!(after > before, "{after} after the advice, {before} before");
 }
 

@@ -43,7 +43,7 @@ impl Steps {
         self.done.push(run_step(name, work));
     }
 
-    /// Runs one step, and beside it others, one after the other: for a step that often waits. Their output is mixed.
+    /// Runs one step, and alongside it others, one after the other: for a step that often waits. Their output is mixed.
     pub fn run_with(
         &mut self,
         name: &'static str,

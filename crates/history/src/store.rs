@@ -194,7 +194,7 @@ impl History {
     }
 
     /// Compares a night with the band of the last `nights` nights and appends it, in one transaction. A night that has
-    /// moved, or is accepted as a new beginning, is marked so. Nights are told apart by the time they began: of two in one millisecond, the
+    /// moved, or is accepted as a new beginning, is marked so. Nights are distinguished by the time they began: of two in one millisecond, the
     /// second gets the next free one.
     ///
     /// # Errors

@@ -86,7 +86,7 @@ impl Column {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(super) enum ColumnError {
     #[error(
-        "the heading `{heading}` has the unit `{unit}`, which is no unit of {kind}; write one of {known}"
+        "the heading `{heading}` has the unit `{unit}`, which is not a unit of {kind}; write one of {known}"
     )]
     Unit { heading: String, unit: String, kind: &'static str, known: String },
     #[error("the heading `{heading}` belongs to a turbine map")]

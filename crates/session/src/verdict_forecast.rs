@@ -70,7 +70,7 @@ pub(crate) fn advise(
     plan: impl Fn(&Campaign) -> Result<Plan, SessionError>,
 ) -> Result<Vec<Advice>, SessionError> {
     let dwells = campaign.timing.dwell.fixed_s().into_iter().flat_map(|dwell_s| {
-        // Whole seconds: nobody writes another dwell into a campaign.
+        // Whole seconds, as campaigns have them.
         DWELL_RATIOS.map(|ratio| CampaignChange::DwellS((ratio * dwell_s).ceil()))
     });
     let soaks = SOAKS_S.into_iter().filter(|s| *s > soak_s(campaign)).map(CampaignChange::SoakS);

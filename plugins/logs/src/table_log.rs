@@ -62,6 +62,10 @@ pub(crate) enum Origin {
     /// A text or a sheet: its head is in rows.
     Rows,
     /// A file of columns, which has no rows of a head.
+    #[cfg_attr(
+        not(any(feature = "parquet", feature = "tdms")),
+        allow(dead_code, reason = "only files of columns need it")
+    )]
     Columns,
     /// As `Columns`; the file gives the interval of the samples too.
     Waveform,

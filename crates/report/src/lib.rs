@@ -48,7 +48,6 @@ mod points;
 mod production_text;
 mod recordings_text;
 mod repeated_jumps;
-mod reproduction_page;
 mod run_report;
 mod sensors_text;
 mod sequence_page;
@@ -110,7 +109,6 @@ pub use points::{opening, points_text, score_text, step_name, truth_text, verdic
 pub use production_text::production_text;
 pub use recordings_text::recordings_text;
 pub use repeated_jumps::repeated_jumps_text;
-pub use reproduction_page::{figure_json, reproduction_page};
 pub use run_report::{
     ReportSource, RunReport, SurgeReport, condition_facts, instant, provenance_facts, run_report,
 };

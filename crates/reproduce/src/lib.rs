@@ -17,10 +17,12 @@ mod format;
 mod lab;
 mod model_table;
 mod outcome;
+mod page;
 mod picture;
 mod result;
 
 pub use error::ReproduceError;
+pub use page::{figure_json, reproduction_page};
 pub use result::{FigureResult, Statement, Table, Verdict, picture_path};
 
 /// Numbers of the figures that [`reproduce`] redoes, in its order.

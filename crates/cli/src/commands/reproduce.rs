@@ -35,9 +35,9 @@ impl Reproduce {
             write(&self.out.join(picture_path(result)), result.svg.as_bytes())?;
         }
         let page = self.out.join("reproduction.md");
-        write(&page, mapper_report::reproduction_page(&results).as_bytes())?;
+        write(&page, mapper_reproduce::reproduction_page(&results).as_bytes())?;
         if self.json {
-            let figures: Vec<serde_json::Value> = results.iter().map(mapper_report::figure_json).collect();
+            let figures: Vec<serde_json::Value> = results.iter().map(mapper_reproduce::figure_json).collect();
             return output::print_json(&json!({"page": page, "figures": figures}));
         }
         let mut text = String::new();

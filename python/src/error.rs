@@ -1,7 +1,7 @@
 //! Errors of a session as Python exceptions, with the message that the command prints.
 
 use mapper_campaign::CampaignError as CampaignFault;
-use mapper_record::{ChannelMapError, RecordError};
+use mapper_recording::{ChannelMapError, RecordError};
 use mapper_session::SessionError;
 use pyo3::exceptions::PyException;
 use pyo3::{PyErr, create_exception};

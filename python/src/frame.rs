@@ -2,7 +2,7 @@
 //! this computer's order of bytes, the time, s, first.
 
 use mapper_log_formats::LOG_FORMATS;
-use mapper_logs::{
+use mapper_recording::logs::{
     Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogFormats, LogOptions, Row, RowSink,
 };
 use serde_json::Value;

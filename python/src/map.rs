@@ -3,7 +3,7 @@
 use crate::attended::compute;
 use crate::error::Fault;
 use crate::registry::registry;
-use mapper_assemble::{MapFitOptions, fit_map};
+use mapper_maps::{MapFitOptions, fit_map};
 use mapper_core::CompressorMap;
 use mapper_formats::{FORMATS, parse_reference};
 use mapper_session::{Existing, SessionError, write_map_fitted_if_needed};

@@ -6,7 +6,7 @@ use crate::error::Fault;
 use crate::registry::registry;
 use mapper_campaign::Campaign as Checked;
 use mapper_core::{Channel, Series};
-use mapper_record::{ChannelMap, ChannelMapError};
+use mapper_recording::{ChannelMap, ChannelMapError};
 use mapper_session::{Recorded, SessionError, channel_map};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;

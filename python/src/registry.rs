@@ -5,7 +5,7 @@ use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
-use mapper_host::{Driver, PATIENCE, Places};
+use mapper_driver_host::{Driver, PATIENCE, Places};
 use mapper_physics::effect::Effect;
 use mapper_session::{Registry, SessionError};
 use serde_json::Value;

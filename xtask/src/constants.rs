@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates whose results rest on chosen numbers.
-const CRATES: [&str; 6] = ["inference", "identify", "gap", "drift", "driven", "discover"];
+const CRATES: [&str; 3] = ["inference", "identify", "diagnose"];
 
 const HEAD: &str = "\
 # Numeric constants of the inference

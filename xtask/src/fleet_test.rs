@@ -19,7 +19,7 @@ pub fn fleet_test() -> Result<(), Error> {
     steps.run("tests", || {
         let (mut tally, mut well) = (Tally::default(), true);
         for tests in [
-            &["-p", "mapper-fleet", "-p", "mapper-studies", "--tests"][..],
+            &["-p", "mapper-fleet", "-p", "mapper-validation", "--tests"][..],
             &["-p", "mapper-tests", "--test", "all", "fleet"],
         ] {
             let arguments = [&["test", "--all-features", "--no-fail-fast"], tests].concat();

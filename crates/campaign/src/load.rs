@@ -8,7 +8,7 @@ use crate::prospects;
 use crate::reach::{self, Unreachable};
 use crate::resolved;
 use crate::schema::SCHEMA;
-use mapper_map_table::file_text;
+use mapper_maps::table::file_text;
 use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};
 use std::io;
 use std::path::{Path, PathBuf};

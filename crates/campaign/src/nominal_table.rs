@@ -1,7 +1,7 @@
 //! The nominal map of a campaign, from a file in any layout that map files have.
 
 use mapper_core::{IdentifiedPoint, ImportError, MapDescription};
-use mapper_map_table::read_any_text;
+use mapper_maps::table::read_any_text;
 use mapper_physics::tabulated_map::{MapError, MapRow, TabulatedMap};
 
 /// Why a file is not a nominal map.

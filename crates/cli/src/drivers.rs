@@ -2,7 +2,7 @@
 
 use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
-use mapper_host::{Driver, KNOWN, Places};
+use mapper_driver_host::{Driver, KNOWN, Places};
 use serde_json::Value;
 use std::path::PathBuf;
 

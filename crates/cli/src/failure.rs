@@ -3,13 +3,13 @@
 use crate::exit_code::Code;
 use crate::terminal_lines::on_terminal;
 use crate::{output_options, standard_error};
-use mapper_blind::BlindError;
+use mapper_validation::blind::BlindError;
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
 use mapper_fleet::{FleetError, StudyFileError};
-use mapper_host::DriverError;
+use mapper_driver_host::DriverError;
 use mapper_live::LiveError;
-use mapper_record::{ChannelMapError, RecordError};
+use mapper_recording::{ChannelMapError, RecordError};
 use mapper_session::{DescriptionError, ErrorKind, MapWorkError, SessionError};
 use serde_json::{Value, json};
 use std::path::Path;

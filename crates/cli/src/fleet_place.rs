@@ -18,7 +18,7 @@ pub fn on_this_machine<T>(
     let name = format!("{} process {}{task}", host.trim(), std::process::id());
     let machine =
         Machine { name: &name, thread_s: &|| thread_s(&wall), peak_memory_bytes: &peak_memory_bytes };
-    let kinds = mapper_studies::kinds(&registry);
+    let kinds = mapper_validation::studies::kinds(&registry);
     let kinds: Vec<&dyn Kind> = kinds.iter().map(AsRef::as_ref).collect();
     then(&registry, &kinds, &machine)
 }
@@ -30,7 +30,7 @@ pub fn in_fleet<T>(
     then: impl FnOnce(&Fleet, &dyn Kind, &Engine<'_>, &Machine<'_>) -> Result<T, FleetError>,
 ) -> Result<T, Failure> {
     on_this_machine(|registry, kinds, machine| {
-        let fleet = Fleet::open(directory, &mapper_studies::program(registry))?;
+        let fleet = Fleet::open(directory, &mapper_validation::studies::program(registry))?;
         let (kind, stop, progress) =
             (fleet.kind(kinds)?, interrupt::stop_flag()?, output_options::progress());
         let report = |done, of| progress.pieces(done, of);

@@ -6,7 +6,7 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{MapDescription, ReferenceState};
 use mapper_formats::parse_reference;
-use mapper_record::ChannelMap;
+use mapper_recording::ChannelMap;
 use mapper_session::map_description;
 use std::path::{Path, PathBuf};
 

@@ -3,6 +3,7 @@
 //! One file per command in `commands`: its options, its call, its words. The work is done in `mapper-session`;
 //! `registry` alone names plug-ins.
 
+mod terminal;
 mod commands;
 mod drivers;
 mod ending;

@@ -2,7 +2,7 @@
 
 use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
-use mapper_terminal::{ColourChoice, Progress, ProgressManner, is_coloured, understands_escapes};
+use crate::terminal::{ColourChoice, Progress, ProgressManner, is_coloured, understands_escapes};
 use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::sync::OnceLock;

@@ -2,7 +2,7 @@
 
 use crate::output_options;
 use clap::Args;
-use mapper_terminal::Shown;
+use crate::terminal::Shown;
 
 /// Of a command that prints identified points.
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ use crate::live_run::LiveRun;
 use crate::operator_commands::Pressed;
 use crate::server::{Served, serve};
 use crate::tls::{Tls, TlsFiles, read};
-use mapper_page::live_page;
+use mapper_report::page::live_page;
 use mapper_session::SessionEvent;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::atomic::Ordering;

@@ -1,6 +1,6 @@
 //! The state shown by a browser, with a size limit for any run.
 
-use mapper_page::{LiveMap, LivePoint, Planned};
+use mapper_report::page::{LiveMap, LivePoint, Planned};
 use serde::Serialize;
 use std::collections::VecDeque;
 

@@ -7,7 +7,7 @@ use foxglove::{
     ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
 };
 use mapper_core::{Channel, Group, IdentifiedPoint, step_number};
-use mapper_record::{StepPhase, Topic, event_message, readings_message, step_message};
+use mapper_recording::{StepPhase, Topic, event_message, readings_message, step_message};
 use mapper_session::SessionEvent;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

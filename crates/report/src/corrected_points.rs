@@ -1,9 +1,9 @@
 //! Points corrected for drift, for other programs.
 
 use mapper_core::step_number::step_number;
-use mapper_drift::DriftReport;
+use mapper_diagnose::drift::DriftReport;
 
-/// Corrected points as CSV, one row each under the names of [`CorrectedPoint`](mapper_drift::CorrectedPoint). Each drift has a column
+/// Corrected points as CSV, one row each under the names of [`CorrectedPoint`](mapper_diagnose::drift::CorrectedPoint). Each drift has a column
 /// for its correction, `correction_` and its cause. A missing number is empty.
 ///
 /// # Errors

@@ -4,7 +4,7 @@ use crate::display::Display;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, step_number};
 use mapper_identify::TwoParameter;
-use mapper_record::score::ScoredPoint;
+use mapper_recording::score::ScoredPoint;
 
 /// One sentence on the points whose 95 % intervals by both methods do not overlap; `None` if all overlap.
 pub fn disagreement_text(

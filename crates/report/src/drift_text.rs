@@ -2,7 +2,7 @@
 
 use crate::{number, table};
 use mapper_core::half_width_95;
-use mapper_drift::{Alternative, Cause, DriftReport, RateOrStep, RepeatGroup};
+use mapper_diagnose::drift::{Alternative, Cause, DriftReport, RateOrStep, RepeatGroup};
 use std::fmt::Write;
 
 /// The drift diagnosis as text.

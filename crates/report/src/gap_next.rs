@@ -1,6 +1,6 @@
 //! Recommended next steps, as text.
 
-use mapper_gap::report::{Diagnosis, Kind, Next, Suggestion};
+use mapper_diagnose::gap::report::{Diagnosis, Kind, Next, Suggestion};
 
 /// 0 degC, K.
 const ZERO_C_K: f64 = 273.15;

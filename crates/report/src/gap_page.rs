@@ -5,9 +5,9 @@ use crate::number::four_figures;
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
 use mapper_core::Channel;
-use mapper_gap::diagnose::Diagnosed;
-use mapper_gap::nuisance::OUTPUTS;
-use mapper_gap::study::Study;
+use mapper_diagnose::gap::diagnose::Diagnosed;
+use mapper_diagnose::gap::nuisance::OUTPUTS;
+use mapper_diagnose::gap::study::Study;
 use mapper_numerics::statistics::mean;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

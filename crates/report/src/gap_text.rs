@@ -3,8 +3,8 @@
 use crate::gap_next::next_text;
 use crate::number::four_figures;
 use mapper_core::{step_number, with_unit};
-use mapper_gap::baseline_assumptions::Since;
-use mapper_gap::report::{
+use mapper_diagnose::gap::baseline_assumptions::Since;
+use mapper_diagnose::gap::report::{
     Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
 };
 use std::collections::BTreeMap;
@@ -224,7 +224,7 @@ fn smallest_seen(effects: &[SmallestSeen]) -> String {
 const NAMED_SHARE: f64 = 0.2;
 
 /// Number of steps that support the cause, and the step that dominates the gap.
-fn carried_by(gap: &mapper_gap::report::Gap) -> String {
+fn carried_by(gap: &mapper_diagnose::gap::report::Gap) -> String {
     let all = gap.held_out_steps.len();
     if all == 0 {
         return String::new();

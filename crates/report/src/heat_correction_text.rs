@@ -1,6 +1,6 @@
 //! A map corrected for heat transfer, as text.
 
-use mapper_assemble::HeatCorrection;
+use mapper_maps::HeatCorrection;
 
 /// Scatter of the work above which the lines do not form one curve. On the lab: 0.35 % if they do, 1.7 % if they do not.
 const ONE_CURVE_RATIO: f64 = 0.01;

@@ -1,7 +1,7 @@
 //! Evaluation of a pre-registered prediction, as a page for a terminal.
 
 use crate::number::four_figures;
-use mapper_gap::twin::Held;
+use mapper_diagnose::gap::twin::Held;
 
 /// The page.
 pub fn held_text(held: &Held, seal: &str) -> String {

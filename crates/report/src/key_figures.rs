@@ -4,7 +4,7 @@ use crate::duration::duration;
 use mapper_campaign::Campaign;
 use mapper_core::{CompressorMap, IdentifiedPoint, Plan, Verdict};
 use mapper_numerics::statistics::median;
-use mapper_record::score::ScoredPoint;
+use mapper_recording::score::ScoredPoint;
 
 /// Measured range, uncertainty and planned duration; `None` without a map.
 pub fn key_figures(

@@ -5,6 +5,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod page;
 mod assumed_text;
 mod budget_table;
 mod campaign_page;
@@ -97,7 +98,7 @@ pub use map_comparison_picture::{distinct_names, map_comparison_figure};
 pub use map_comparison_text::map_comparison_text;
 pub use map_fit_text::map_fit_text;
 /// A point with its truth, if known.
-pub use mapper_record::score::ScoredPoint;
+pub use mapper_recording::score::ScoredPoint;
 pub use measured::{END_S, at_end};
 pub use night_text::night_text;
 pub use number::{number, percent};

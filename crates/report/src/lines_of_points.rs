@@ -11,7 +11,7 @@ use crate::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{CompressorMap, IdentifiedPoint, SpeedLine, Verdict, step_number};
 use mapper_numerics::statistics::mean;
-use mapper_record::score::ScoredPoint;
+use mapper_recording::score::ScoredPoint;
 
 /// Default width of a terminal, columns.
 const COLUMNS: usize = 80;

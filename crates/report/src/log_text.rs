@@ -2,8 +2,8 @@
 
 use crate::table;
 use comfy_table::CellAlignment;
-use mapper_logs::proposal::{Ambient, Certainty, Proposal};
-use mapper_logs::{Layout, Survey, sparkline};
+use mapper_recording::logs::proposal::{Ambient, Certainty, Proposal};
+use mapper_recording::logs::{Layout, Survey, sparkline};
 use std::fmt::Write;
 
 /// Width of a trace, characters.

@@ -1,6 +1,6 @@
 //! Two maps and their difference as a picture.
 
-use mapper_assemble::{ComparedPlace, MapComparison};
+use mapper_maps::{ComparedPlace, MapComparison};
 use mapper_chart::{
     Axis, Figure, Line, LineEnd, Marker, Panel, Rule, RuleAt, Scatter, ScatterPoint, palette,
 };

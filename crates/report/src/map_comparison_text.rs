@@ -2,7 +2,7 @@
 
 use crate::number::number;
 use crate::table;
-use mapper_assemble::{ComparedLine, ComparedPlace, MapComparison};
+use mapper_maps::{ComparedLine, ComparedPlace, MapComparison};
 use mapper_core::half_width_95;
 use std::fmt::Write;
 

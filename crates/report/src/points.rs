@@ -6,7 +6,7 @@ use crate::number::{number, percent};
 use crate::table;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, StepKind, Verdict, step_number};
-use mapper_record::score::{ScoreSummary, ScoredPoint};
+use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use std::fmt::Write;
 
 /// Identified points as a table with their warnings below; deviations from the truth if it is known.
@@ -26,7 +26,7 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) ->
         count(Verdict::Doubtful),
         count(Verdict::Unusable),
     );
-    if let Some(score) = mapper_record::score::summarise(points).filter(|_| truth) {
+    if let Some(score) = mapper_recording::score::summarise(points).filter(|_| truth) {
         text.push_str(&score_text(&score));
     }
     text
@@ -34,7 +34,7 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) ->
 
 /// Deviations of the points from the simulator's truth; `None` if the truth is unknown.
 pub fn truth_text(points: &[ScoredPoint]) -> Option<String> {
-    mapper_record::score::summarise(points).map(|score| score_text(&score))
+    mapper_recording::score::summarise(points).map(|score| score_text(&score))
 }
 
 /// Deviations of the points from the simulator's truth.

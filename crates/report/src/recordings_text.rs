@@ -2,7 +2,7 @@
 
 use crate::number::four_figures;
 use mapper_core::with_unit;
-use mapper_gap::joint::{Fate, Over, Value};
+use mapper_diagnose::gap::joint::{Fate, Over, Value};
 
 /// The page: each recording's headline, then each cause over all of them.
 pub fn recordings_text(headlines: &[(String, String)], over: &[Over]) -> String {

@@ -2,7 +2,7 @@
 
 use crate::display::Display;
 use crate::number::percent;
-use mapper_assemble::RepeatedJump;
+use mapper_maps::RepeatedJump;
 use std::fmt::Write;
 
 /// One sentence for each repeated jump.

@@ -18,7 +18,7 @@ use crate::repeated_jumps::repeated_jumps_text;
 use crate::shared_errors::shared_errors_text;
 use crate::surge_text::surge_text;
 use crate::zero_text::{ZERO_HEADS, zero_rows, zero_words};
-use mapper_assemble::RepeatedJump;
+use mapper_maps::RepeatedJump;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
@@ -27,7 +27,7 @@ use mapper_core::{
 };
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_observe::FusedChannel;
-use mapper_record::score::{ScoreSummary, ScoredMark, ScoredPoint};
+use mapper_recording::score::{ScoreSummary, ScoredMark, ScoredPoint};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

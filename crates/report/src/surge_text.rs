@@ -7,7 +7,7 @@ use crate::table::with_heads;
 use crate::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{SurgeFoundBy, SurgeMark, half_width_95};
-use mapper_record::score::ScoredMark;
+use mapper_recording::score::ScoredMark;
 
 /// Default width of a terminal, columns.
 const COLUMNS: usize = 80;

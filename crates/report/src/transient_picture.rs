@@ -1,7 +1,7 @@
 //! T2 of a log without steps compared with its prediction, and the efficiency behind it.
 
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Polygon, Rule, RuleAt, Scatter, ScatterPoint, palette};
-use mapper_driven::{DrivenOutcome, Trace};
+use mapper_diagnose::driven::{DrivenOutcome, Trace};
 
 /// Two panels over time: measured T2 and its prediction with interval; apparent and isentropic efficiency.
 pub fn transient_figure(name: &str, outcome: &DrivenOutcome) -> Figure {

@@ -1,7 +1,7 @@
 //! Results of a log without steps, for a terminal and a report.
 
 use crate::table;
-use mapper_driven::{DrivenOutcome, Judged, Moves};
+use mapper_diagnose::driven::{DrivenOutcome, Judged, Moves};
 use std::fmt::Write;
 
 /// Bare thermocouples and resistance thermometers of test stands are thinner than this, mm.

@@ -3,7 +3,7 @@
 use crate::imported_map_text::{columns_text, import_remark_text};
 use crate::number::number;
 use crate::table;
-use mapper_assemble::TurbineComparison;
+use mapper_maps::TurbineComparison;
 use mapper_core::{FittedTurbine, ImportedTurbine, TurbineMap, TurbineMapPoint};
 use std::fmt::Write;
 

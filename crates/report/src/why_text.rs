@@ -1,7 +1,7 @@
 //! The cause of a deviation on one side of a machine, for a terminal and a report.
 
 use crate::table;
-use mapper_driven::why::{Beyond, Cause, Diagnosis, HeldOut, Which, Word};
+use mapper_diagnose::driven::why::{Beyond, Cause, Diagnosis, HeldOut, Which, Word};
 use std::fmt::Write;
 
 /// Maximum number of causes shown in addition to the undecided ones.
@@ -103,7 +103,7 @@ fn causes(text: &mut String, found: &Diagnosis) {
     let heads = ["cause", "probability", "size", "95 % interval", "left, K"].map(str::to_owned);
     let mut rows = table::with_heads(&heads);
     for (_, cause) in found.causes.iter().enumerate().filter(shown) {
-        let each = |of: &dyn Fn(&mapper_gap::report::Estimate) -> String| {
+        let each = |of: &dyn Fn(&mapper_diagnose::gap::report::Estimate) -> String| {
             cause.parameters.values().map(of).collect::<Vec<_>>().join("; ")
         };
         let interval = each(&|e| {

@@ -4,7 +4,7 @@
 #[path = "../tests/faults/behind.rs"]
 mod behind;
 
-use mapper_conformance::Misbehaving;
+use mapper_driver_host::conformance::Misbehaving;
 use mapper_core::{Backend, BackendError};
 
 fn main() -> std::process::ExitCode {

@@ -4,6 +4,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod surge;
 mod auxiliary_instruments;
 mod batch_watch;
 mod deadline;

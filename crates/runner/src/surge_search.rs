@@ -6,7 +6,7 @@ use mapper_core::{
     Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
     StepKind, StepMarker, SurgeSeek,
 };
-use mapper_surge::{Move, SurgeEstimate, SurgeReading, Why, next_move};
+use crate::surge::{Move, SurgeEstimate, SurgeReading, Why, next_move};
 
 /// Time at the end of a line before the first reading, s: the machine comes from elsewhere on the map.
 const ARRIVE_S: f64 = 40.0;

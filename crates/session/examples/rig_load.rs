@@ -18,7 +18,7 @@ use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Element, ElementColumn, PacedClock, RigDescription,
     SafeTrajectory, SampleBatch, Setpoints, UnpacedClock, Wall,
 };
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_session::{BrokenOff, Registry, RunRequest, Session, SessionEvent};
 use std::path::Path;
 use std::sync::Mutex;

@@ -7,7 +7,7 @@ use mapper_core::{
 use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_observe::declared_uncertainties;
 use mapper_physics::air::Air;
-use mapper_record::{AmbientPressure, ChannelMap, MachineConstants};
+use mapper_recording::{AmbientPressure, ChannelMap, MachineConstants};
 use std::collections::BTreeMap;
 
 /// Identification settings for the recordings of this campaign.

@@ -6,10 +6,10 @@ use crate::recorded::{Recorded, all_differ, attached_campaign, same_machine};
 use crate::{Session, SessionError, planning};
 use mapper_campaign::Campaign;
 use mapper_core::Recording;
-use mapper_drift::{DriftReport, DriftRequest, RecordedRun, diagnose};
+use mapper_diagnose::drift::{DriftReport, DriftRequest, RecordedRun, diagnose};
 use mapper_identify::{IdentifyConfig, ZeroOutcome};
 use mapper_observe::FusedChannel;
-use mapper_record::ChannelMap;
+use mapper_recording::ChannelMap;
 
 /// Drift report of the recordings, with the zero that was subtracted from them.
 #[derive(Debug)]

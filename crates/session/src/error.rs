@@ -6,16 +6,16 @@ use crate::map_work_error::MapWorkError;
 use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
 use mapper_core::{BackendError, ExportError, ImportError};
-use mapper_drift::DriftError;
-use mapper_gap::diagnose::GapError;
-use mapper_gap::twin::TwinError;
+use mapper_diagnose::drift::DriftError;
+use mapper_diagnose::gap::diagnose::GapError;
+use mapper_diagnose::gap::twin::TwinError;
 use mapper_history::HistoryError;
 use mapper_identify::IdentifyError;
-use mapper_logs::{LogError, OptionError};
-use mapper_map_table::DescriptionError;
+use mapper_recording::logs::{LogError, OptionError};
+use mapper_maps::table::DescriptionError;
 use mapper_observe::OtherMachine;
 use mapper_planner::PlanError;
-use mapper_record::{ChannelMapError, RecordError};
+use mapper_recording::{ChannelMapError, RecordError};
 use mapper_runner::{RunError, StepSourceError};
 use mapper_sequence::SequenceError;
 use std::io;
@@ -58,7 +58,7 @@ pub enum SessionError {
     },
     /// A log without steps has too little data.
     #[error(transparent)]
-    Driven(#[from] mapper_driven::DrivenError),
+    Driven(#[from] mapper_diagnose::driven::DrivenError),
     /// A first campaign cannot get its nominal map.
     #[error(transparent)]
     FirstMap(#[from] Box<crate::first_map_error::FirstMapError>),
@@ -366,7 +366,7 @@ pub enum SessionError {
         /// The format.
         format: &'static str,
         /// The reason.
-        source: mapper_assemble::MapFitError,
+        source: mapper_maps::MapFitError,
     },
     /// A machine cannot be written as an FMU.
     #[error(transparent)]

@@ -5,13 +5,13 @@ use crate::planning::PlanInputs;
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, RigMode, SetpointRanges, Setpoints};
-use mapper_gap::experiment::{AllowedJump, AtRest, Beside, Experiment};
+use mapper_diagnose::gap::experiment::{AllowedJump, AtRest, Beside, Experiment};
 use mapper_identify::{ZeroSettings, expected_after_zero};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
 use mapper_physics::reach::reach;
 use mapper_planner::PlanRequest;
-use mapper_record::ChannelMap;
+use mapper_recording::ChannelMap;
 
 /// Maximum number of points for which all jumps are simulated to check the limits.
 const MAX_POINTS: usize = 40;

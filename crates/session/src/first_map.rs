@@ -3,7 +3,7 @@
 use crate::first_map_error::FirstMapError;
 use crate::first_request::{FirstCampaignRequest, digits};
 use crate::{Registry, SessionError};
-use mapper_assemble::{MapFit, MapFitOptions};
+use mapper_maps::{MapFit, MapFitOptions};
 use mapper_campaign::nominal_table;
 use mapper_core::{ReferenceState, one_line};
 use mapper_physics::characteristic::CompressorCharacteristic;

@@ -6,7 +6,7 @@ use mapper_core::{Channel, DeclaredUncertainty, Recording, RedundantSensors};
 use mapper_identify::IdentifyConfig;
 use mapper_observe::fuse::{alike, element_count};
 use mapper_observe::{FusedChannel, fuse, judge_elements};
-use mapper_record::ChannelMap;
+use mapper_recording::ChannelMap;
 use std::collections::BTreeMap;
 
 /// Recordings with one reading per channel, and the declared uncertainty of that reading.

@@ -4,7 +4,7 @@ use crate::SessionError;
 use crate::declared::declared;
 use mapper_campaign::Campaign;
 use mapper_core::{GuardName, RigDescription};
-use mapper_record::ChannelMap;
+use mapper_recording::ChannelMap;
 use mapper_runner::{
     BatchWatch, DriftWatch, FirstLook, Guard, ReadChannel, ReaderWatch, RigWatch, SignalWatch, StepSource,
     SurgeWatch,

@@ -5,7 +5,7 @@ use crate::fusing::fused;
 use crate::recorded::{Recorded, all_differ, same_machine};
 use crate::surge::marks_of;
 use crate::{Session, SessionError, SessionEvent};
-use mapper_assemble::{RepeatedJump, repeated_jumps};
+use mapper_maps::{RepeatedJump, repeated_jumps};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
     Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, ThermalModel, joined,
@@ -15,14 +15,14 @@ use mapper_identify::{
     isothermal_zero, method_for,
 };
 use mapper_observe::FusedChannel;
-use mapper_record::score::{
+use mapper_recording::score::{
     AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, beside_truths, score, score_marks,
 };
-use mapper_record::{AmbientPressure, Barometer, ChannelMap};
+use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use mapper_surge::SurgeMarks;
+use mapper_runner::surge::SurgeMarks;
 use std::path::{Path, PathBuf};
 
 /// Minimum soak before the first step, s, that triggers a remark. Thermocouples in a housing need this time to equalise.
@@ -196,7 +196,7 @@ impl Session<'_> {
         let truths = truths.wait()?;
         let surge = sought(&sources, &truths, off, campaign, &config);
         let points = scored(&sources, &truths, &recording, &origins, points);
-        let score = mapper_record::score::summarise(&points);
+        let score = mapper_recording::score::summarise(&points);
         Ok(Identified {
             recording,
             origins,

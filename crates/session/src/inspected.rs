@@ -1,8 +1,8 @@
 //! Inspects the log of another program.
 
 use crate::{Registry, SessionError};
-use mapper_logs::proposal::{Proposal, channel_map_text, propose};
-use mapper_logs::{Layout, LogFile, LogOptions, Survey, survey};
+use mapper_recording::logs::proposal::{Proposal, channel_map_text, propose};
+use mapper_recording::logs::{Layout, LogFile, LogOptions, Survey, survey};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 

@@ -263,7 +263,7 @@ mod tests {
             let mut journal = Journal::open(&directory.path().join("journal.jsonl"), false).unwrap();
             journal.write(&part("recording.mcap")).unwrap();
             journal.write(&Entry::Soaked).unwrap();
-            let header = mapper_record::RecordingHeader {
+            let header = mapper_recording::RecordingHeader {
                 library: "mapper".to_owned(),
                 profile: String::new(),
                 start_time_ns: 0,
@@ -272,7 +272,7 @@ mod tests {
                 campaign_yaml: None,
             };
             let path = directory.path().join("recording.mcap");
-            let mut writer = mapper_record::RecordingWriter::create(&path, &header).unwrap();
+            let mut writer = mapper_recording::RecordingWriter::create(&path, &header).unwrap();
             writer.write_event(&Event { t_s: 1.0, kind: recorded, message: String::new() }).unwrap();
             writer.finish().unwrap();
             let broken_off = crate::BrokenOff::read(directory.path()).unwrap();

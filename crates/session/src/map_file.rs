@@ -3,12 +3,12 @@
 use crate::files::{Existing, write_file};
 use crate::map_work_error::MapWorkError;
 use crate::{Registry, SessionError};
-use mapper_assemble::{MapFitOptions, fit_map};
+use mapper_maps::{MapFitOptions, fit_map};
 use mapper_campaign::Campaign;
 use mapper_core::{
     CompressorMap, ExportError, ImportedMap, ImportedTurbine, MAP_FILE_SIZE_LIMIT, MapDescription, MapFormat,
 };
-use mapper_map_table::{read_description, set_key, unpacked};
+use mapper_maps::table::{read_description, set_key, unpacked};
 use std::io::Read;
 use std::path::Path;
 

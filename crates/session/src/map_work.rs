@@ -4,12 +4,12 @@ use crate::files::Existing;
 use crate::map_file::write_map_fitted_if_needed;
 use crate::map_work_error::MapWorkError;
 use crate::{Registry, SessionError, write_file, write_map};
-use mapper_assemble::{MapFitOptions, compare, compare_turbines, convert_efficiency, fit_map, fit_turbine};
+use mapper_maps::{MapFitOptions, compare, compare_turbines, convert_efficiency, fit_map, fit_turbine};
 use mapper_core::{
     EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap, ImportedTurbine,
     MapDescription, MapFormat, ReferenceState, TurbineMap,
 };
-use mapper_map_table::{describe, describe_turbine};
+use mapper_maps::table::{describe, describe_turbine};
 use mapper_report::{
     distinct_names, import_remark_text, imported_map_text, imported_turbine_text, map_comparison_figure,
     map_comparison_text, map_fit_text, turbine_comparison_text, turbine_fit_text,

@@ -1,7 +1,7 @@
 //! Why a command on map files ended early.
 
-use mapper_assemble::{MapFitError, TurbineFitError};
-use mapper_map_table::{DescriptionError, KeyError};
+use mapper_maps::{MapFitError, TurbineFitError};
+use mapper_maps::table::{DescriptionError, KeyError};
 use std::path::PathBuf;
 
 /// Errors of commands on map files.

@@ -2,7 +2,7 @@
 
 use mapper_core::{Plan, Verdict};
 use mapper_history::{Metric, PointRow};
-use mapper_record::score::ScoredPoint;
+use mapper_recording::score::ScoredPoint;
 use std::collections::BTreeMap;
 
 /// The monitored metrics; those without a value are omitted.
@@ -11,7 +11,7 @@ pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f
         let count = values.len() as f64;
         (count > 0.0).then(|| values.iter().sum::<f64>() / count)
     };
-    let score = mapper_record::score::summarise(points);
+    let score = mapper_recording::score::summarise(points);
     let good = points.iter().filter(|scored| scored.point.verdict == Verdict::Good).count();
     // Means of the truth use the same points as means of the results.
     let both = |scored: &&ScoredPoint| scored.point.eta.is_some() && scored.truth.is_some();

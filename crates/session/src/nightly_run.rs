@@ -12,7 +12,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{Method, Plan, RunEnding};
 use mapper_history::{RunKey, RunRow};
 use mapper_physics::model::Model;
-use mapper_record::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, read_recording};
 use mapper_runner::{PlanSteps, RunEnd};
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -4,7 +4,7 @@ use crate::SessionEvent;
 use crate::event::OnEvent;
 use crate::journal::{Entry, Journal};
 use mapper_core::{Event, EventKind, RigDescription, RunEnding, SampleBatch, StepMarker};
-use mapper_record::{RecordError, RecordingWriter, StepPhase};
+use mapper_recording::{RecordError, RecordingWriter, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
 use std::fs::File;
 

@@ -6,7 +6,7 @@ use crate::{Registry, SessionError};
 use mapper_campaign::{Campaign, CampaignError};
 use mapper_core::Recording;
 use mapper_observe::OtherMachine;
-use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use std::path::{Path, PathBuf};
 
 /// A recording, its file and its campaign.

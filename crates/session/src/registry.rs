@@ -4,7 +4,7 @@ use crate::SessionError;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::BackendChoice;
 use mapper_core::{Backend, BackendError, MapFormats, SetpointRanges};
-use mapper_logs::LogFormats;
+use mapper_recording::logs::LogFormats;
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::effect::Effect;
 use mapper_physics::model::Model;

@@ -8,7 +8,7 @@ use mapper_core::{
     ChannelColumn, ElementColumn, Event, PlanStep, Recording, SampleBatch, Series, StepKind, StepMarker,
     step_number,
 };
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{RunEnd, RunError, StepSource, StepSourceError};
 
 /// Length of a replayed batch, s, as in the original polls.

@@ -6,7 +6,7 @@ use crate::identified::{Identified, SoughtSurge};
 use crate::program::program_and_commit;
 use crate::recorded::Recorded;
 use crate::{Gap, Registry, Session, SessionError, run_directory};
-use mapper_assemble::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
+use mapper_maps::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
@@ -15,9 +15,9 @@ use mapper_core::{
 };
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_observe::FusedChannel;
-use mapper_page::{OtherRun, RunPage, run_page};
-use mapper_record::score::{ScoreSummary, ScoredPoint, beside_truths};
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_report::page::{OtherRun, RunPage, run_page};
+use mapper_recording::score::{ScoreSummary, ScoredPoint, beside_truths};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::{
     Display, PointsOrigin, ReportSource, RunReport, SurgeReport, gap_part, instant, run_report,
 };
@@ -430,7 +430,7 @@ fn source(recorded: &Recorded) -> ReportSource {
 
 /// Reader warnings of a file, prefixed with its name if there are several.
 fn remarks_of(recorded: &Recorded, several: bool) -> Vec<String> {
-    let named = |warning: &mapper_record::ReadWarning| match several {
+    let named = |warning: &mapper_recording::ReadWarning| match several {
         true => format!("{}: {warning}", recorded.path.display()),
         false => warning.to_string(),
     };

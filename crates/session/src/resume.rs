@@ -4,7 +4,7 @@ use crate::journal::{Identity, JournalPart, read_journal};
 use crate::{SessionError, run_directory};
 use mapper_campaign::Campaign;
 use mapper_core::{EventKind, Plan, PlanStep, StepKind, StepMarker};
-use mapper_record::{ReadOptions, read_marks, read_steps};
+use mapper_recording::{ReadOptions, read_marks, read_steps};
 use mapper_runner::{StepSource, StepSourceError};
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};

@@ -5,8 +5,8 @@ use crate::recorded::Recorded;
 use crate::{Session, SessionError};
 use mapper_chart::Figure;
 use mapper_core::{ExportError, IdentifiedPoint, ThermalModel};
-use mapper_record::ChannelMap;
-use mapper_record::score::ScoredPoint;
+use mapper_recording::ChannelMap;
+use mapper_recording::score::ScoredPoint;
 use mapper_report::{
     ErrorAtGradient, ThermalExport, TurbinePoint, error_figure, heat_transfer_figure, turbine_points,
     turbine_text,

@@ -28,7 +28,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
 use mapper_core::{Clock, MadeFrom, Plan, RigDescription, UnpacedClock};
 use mapper_physics::model::Model;
-use mapper_record::{RecordingHeader, RecordingWriter};
+use mapper_recording::{RecordingHeader, RecordingWriter};
 use mapper_report::ending_sentence;
 use mapper_runner::{Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch};
 use std::io::ErrorKind;

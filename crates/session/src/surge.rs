@@ -7,9 +7,9 @@ use mapper_identify::IdentifyConfig;
 use mapper_physics::follow_outlet::hold_speed;
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;
-use mapper_record::ChannelMap;
+use mapper_recording::ChannelMap;
 use mapper_runner::{Held, SurgeSearch};
-use mapper_surge::{SurgeErrors, SurgeMarks, surge_marks};
+use mapper_runner::surge::{SurgeErrors, SurgeMarks, surge_marks};
 
 /// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
 /// campaign's limits.
@@ -54,7 +54,7 @@ pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option
     let margin = |end: &OperatingPoint| {
         hold_near_surge(campaign, model, *end).map_or(1.0, |held| held.surge_margin_ratio)
     };
-    let looks: usize = ends.iter().map(|end| mapper_surge::expected_looks(margin(end), &seek)).sum();
+    let looks: usize = ends.iter().map(|end| mapper_runner::surge::expected_looks(margin(end), &seek)).sum();
     Some(SurgeForecast {
         lines: ends.len(),
         steps: looks + 2 * ends.len(),

@@ -1,7 +1,7 @@
 //! Converts a diagnosed machine into the virtual lab of a campaign.
 
 use crate::SessionError;
-use mapper_gap::twin::{Found, TwinError};
+use mapper_diagnose::gap::twin::{Found, TwinError};
 use mapper_physics::effect::{Effect, EffectParameter};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -113,7 +113,7 @@ fn with_backend(text: &str, block: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_gap::twin::{FoundEffect, FoundTolerance};
+    use mapper_diagnose::gap::twin::{FoundEffect, FoundTolerance};
 
     /// Every effect of the library, and tolerances of both kinds, arrive in the campaign as numbers or values with units.
     #[test]

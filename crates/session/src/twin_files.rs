@@ -2,7 +2,7 @@
 
 use crate::SessionError;
 use crate::files::{json_text, read_at_most, write_new};
-use mapper_gap::twin::{Expected, Found};
+use mapper_diagnose::gap::twin::{Expected, Found};
 use mapper_planner::sha256_hex;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, Channel};
-use mapper_host::{Driver, PATIENCE};
+use mapper_driver_host::{Driver, PATIENCE};
 use serde_json::json;
 use std::io::{Read, Write};
 use std::net::TcpListener;

@@ -2,7 +2,7 @@
 
 use crate::descent::{Descent, Flight, STEP_S};
 use mapper_core::{Backend, RigDescription, Setpoints};
-use mapper_protocol::LEASE_S;
+use mapper_driver_host::protocol::LEASE_S;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// An armed rig.

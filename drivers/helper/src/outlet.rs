@@ -1,6 +1,6 @@
 //! The output queue: a host that does not read must not block the driver.
 
-use mapper_protocol::{Encoding, Message, encode, write_frame};
+use mapper_driver_host::protocol::{Encoding, Message, encode, write_frame};
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,7 +1,7 @@
 //! Refusals of requests, and results of an author's code as answers.
 
 use mapper_core::BackendError;
-use mapper_protocol::{Code, Failure, error_on_the_wire};
+use mapper_driver_host::protocol::{Code, Failure, error_on_the_wire};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::panic::{AssertUnwindSafe, catch_unwind};

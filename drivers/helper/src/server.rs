@@ -4,7 +4,7 @@ use crate::armed::Armed;
 use crate::descent::{Descent, make_safe};
 use crate::refusal::{Refusal, guarded, no_settings, read, refused, write};
 use mapper_core::{Backend, BackendError, RigDescription};
-use mapper_protocol::{
+use mapper_driver_host::protocol::{
     Code, Configure, Described, FRAME_LIMIT_BYTES, Hello, LEASE_S, LastSample, MAGIC, Message, Poll, VERSION,
     Welcome, description_on_the_wire, error_on_the_wire, pieces, setpoints,
 };
@@ -43,7 +43,7 @@ impl Server {
             rig: None,
             armed: None,
             greeted: false,
-            frame_limit_bytes: mapper_protocol::FIRST_FRAME_LIMIT_BYTES,
+            frame_limit_bytes: mapper_driver_host::protocol::FIRST_FRAME_LIMIT_BYTES,
             leaving: false,
             out: Vec::new(),
         }
@@ -98,7 +98,7 @@ impl Server {
             return Err(refused(Code::Refused, message));
         }
         self.greeted = true;
-        self.frame_limit_bytes = theirs.frame_limit_bytes.max(mapper_protocol::FIRST_FRAME_LIMIT_BYTES);
+        self.frame_limit_bytes = theirs.frame_limit_bytes.max(mapper_driver_host::protocol::FIRST_FRAME_LIMIT_BYTES);
         let hello = Hello {
             magic: MAGIC.to_owned(),
             protocol: VERSION,
@@ -307,7 +307,7 @@ fn lease_ended() -> Refusal {
 mod tests {
     use super::*;
     use mapper_core::{Channel, ChannelColumn, RigMode, SafeTrajectory, SampleBatch, Setpoints};
-    use mapper_protocol::Failure;
+    use mapper_driver_host::protocol::Failure;
     use proptest::prelude::*;
     use std::sync::{Arc, Mutex};
 
@@ -409,7 +409,7 @@ mod tests {
             valve_opening_ratio: 0.7,
             oil_temperature_k: 323.15,
         };
-        serde_json::to_value(mapper_protocol::setpoints_on_the_wire(&setpoints)).unwrap()
+        serde_json::to_value(mapper_driver_host::protocol::setpoints_on_the_wire(&setpoints)).unwrap()
     }
 
     fn ask(server: &mut Server, now_s: f64, method: &str, params: Value) -> Option<Failure> {

@@ -2,7 +2,7 @@
 
 use crate::outlet::Outlet;
 use crate::server::Server;
-use mapper_protocol::{FRAME_LIMIT_BYTES, Message, decode, read_frame};
+use mapper_driver_host::protocol::{FRAME_LIMIT_BYTES, Message, decode, read_frame};
 use std::io::Read;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};

@@ -4,7 +4,7 @@ use crate::Open;
 use crate::outlet::Outlet;
 use crate::server::Server;
 use crate::serving::{Came, WAITING, heed_signals, listen, serve_one, session, wait};
-use mapper_protocol::{
+use mapper_driver_host::protocol::{
     Code, Encoding, FIRST_FRAME_LIMIT_BYTES, Failure, Message, decode, encode, read_frame, write_frame,
 };
 use std::io::{Error, ErrorKind, Write};

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, RigMode, Setpoints};
-use mapper_host::{At, Driver, PATIENCE, Places};
+use mapper_driver_host::{At, Driver, PATIENCE, Places};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

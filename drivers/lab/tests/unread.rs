@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, BackendError, RigMode, Setpoints};
-use mapper_host::{Driver, PATIENCE, Patience};
-use mapper_protocol::{
+use mapper_driver_host::{Driver, PATIENCE, Patience};
+use mapper_driver_host::protocol::{
     Encoding, FRAME_LIMIT_BYTES, LEASE_S, MAGIC, Message, VERSION, decode, encode, read_frame,
     setpoints_on_the_wire, write_frame,
 };

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, BackendError, Channel, RigMode, SampleBatch, Setpoints};
-use mapper_host::{Driver, PATIENCE, Patience};
+use mapper_driver_host::{Driver, PATIENCE, Patience};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

@@ -7,7 +7,7 @@ use mapper_core::{
 };
 use mapper_physics::backend_plugin::BackendPlugin;
 use mapper_physics::nominal_rig::NominalRig;
-use mapper_record::{ChannelMap, ChannelMapError, ReadOptions, RecordError, read_recording};
+use mapper_recording::{ChannelMap, ChannelMapError, ReadOptions, RecordError, read_recording};
 use std::path::Path;
 
 /// Name of the backend, in campaigns and descriptions.

@@ -5,7 +5,7 @@ use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, palette};
 use mapper_core::{
     CompressorMap, FittedLine, FittedMap, FittedNode, MapUnits, SpeedLine, confidence_interval_95,
 };
-use mapper_mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
+use mapper_maps::mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
 
 const SURGE: palette::Colour = palette::VERMILLION;
 const CHOKE: palette::Colour = palette::PURPLE;

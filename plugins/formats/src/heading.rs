@@ -1,7 +1,7 @@
 //! The header of every text format: machine, reference state, definition of the efficiency.
 
 use mapper_core::{CompressorMap, Method, one_line};
-use mapper_map_table::DEFINITION;
+use mapper_maps::table::DEFINITION;
 use std::fmt::Write;
 
 /// Comment lines that begin with `mark`.

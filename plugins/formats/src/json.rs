@@ -3,7 +3,7 @@
 use mapper_core::{
     CompressorMap, ExportError, ImportError, ImportedMap, MapDescription, MapFormat, ReferenceState,
 };
-use mapper_map_table::{POINT_LIMIT, settle};
+use mapper_maps::table::{POINT_LIMIT, settle};
 use serde::Serialize;
 use serde_json::{Value, json};
 

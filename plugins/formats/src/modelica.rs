@@ -16,7 +16,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "tables over corrected speed and beta for Modelica.Blocks.Tables.CombiTable2Ds",
     write: Some(write),
     draw: None,
-    read: Some(mapper_map_table::read_any_bytes),
+    read: Some(mapper_maps::table::read_any_bytes),
     turbine: crate::turbine::MODELICA,
 };
 

@@ -12,7 +12,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "NPSS tables of flow, pressure ratio and efficiency over beta and corrected speed",
     write: Some(write),
     draw: None,
-    read: Some(mapper_map_table::read_any_bytes),
+    read: Some(mapper_maps::table::read_any_bytes),
     turbine: TurbineFormat::NONE,
 };
 

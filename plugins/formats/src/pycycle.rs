@@ -15,7 +15,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "Python module with a pyCycle map: [alpha][Nc][Rline]",
     write: Some(write),
     draw: None,
-    read: Some(mapper_map_table::read_any_bytes),
+    read: Some(mapper_maps::table::read_any_bytes),
     turbine: TurbineFormat::NONE,
 };
 

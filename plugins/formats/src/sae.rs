@@ -1,12 +1,12 @@
 //! SAE text, compressor (J1826, J922): `#` comments, then corrected rpm, corrected kg/s, pressure ratio, efficiency in a
 //! row, from choke to surge within a line.
 //!
-//! Manufacturers' files may begin with a title, wheel diameters and column names: [`mapper_map_table`] reads them.
+//! Manufacturers' files may begin with a title, wheel diameters and column names: [`mapper_maps::table`] reads them.
 
 use crate::heading::heading;
 
 use mapper_core::{CompressorMap, ExportError, MapFormat};
-use mapper_map_table::read_any_bytes;
+use mapper_maps::table::read_any_bytes;
 use std::fmt::Write;
 
 pub(crate) const FORMAT: MapFormat = MapFormat {

@@ -16,7 +16,7 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "MATLAB script: tables over corrected speed and beta, and over corrected speed and pressure ratio",
     write: Some(write),
     draw: None,
-    read: Some(mapper_map_table::read_any_bytes),
+    read: Some(mapper_maps::table::read_any_bytes),
     turbine: crate::turbine::SIMSCAPE,
 };
 

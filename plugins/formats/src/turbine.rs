@@ -4,7 +4,7 @@ use mapper_core::{
     ExportError, FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportError, ImportedTurbine,
     MapDescription, TurbineFormat, TurbineMap, one_line,
 };
-use mapper_map_table::{read_turbine_text, read_turbine_workbook, text_of};
+use mapper_maps::table::{read_turbine_text, read_turbine_workbook, text_of};
 use serde::Serialize;
 use std::fmt::Write;
 

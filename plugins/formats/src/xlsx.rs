@@ -9,6 +9,6 @@ pub(crate) const FORMAT: MapFormat = MapFormat {
     description: "workbook of Excel with a table of points",
     write: None,
     draw: None,
-    read: Some(mapper_map_table::read_workbook),
+    read: Some(mapper_maps::table::read_workbook),
     turbine: crate::turbine::WORKBOOK,
 };

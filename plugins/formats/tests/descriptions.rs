@@ -2,7 +2,7 @@
 
 use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
 use mapper_formats::FORMATS;
-use mapper_map_table::{describe, description_from_yaml, set_key};
+use mapper_maps::table::{describe, description_from_yaml, set_key};
 use std::path::Path;
 
 fn stated(statements: &[(&str, &str)]) -> MapDescription {

@@ -4,7 +4,7 @@ use mapper_core::{
     ImportError, ImportRemark, ImportedTurbine, MapDescription, ReferenceState, TurbineMap, TurbineMapPoint,
 };
 use mapper_formats::FORMATS;
-use mapper_map_table::set_key;
+use mapper_maps::table::set_key;
 
 fn read(name: &str, text: &str, statements: &[(&str, &str)]) -> Result<ImportedTurbine, ImportError> {
     let mut given = MapDescription::default();

@@ -3,7 +3,7 @@
 use crate::record_batches::{Batches, open_log};
 use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_schema::{ArrowError, Schema};
-use mapper_logs::{Log, LogError, LogFile, LogFormat, LogOptions};
+use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };

@@ -1,7 +1,7 @@
 //! One row of a table, independent of its storage.
 
 use crate::instant::Instant;
-use mapper_logs::{DateOrder, LogError};
+use mapper_recording::logs::{DateOrder, LogError};
 
 /// The cells of a row.
 pub(crate) trait Cells {

@@ -2,7 +2,7 @@
 
 use crate::cells::Cells;
 use crate::instant::NS_PER_DAY;
-use mapper_logs::DateOrder;
+use mapper_recording::logs::DateOrder;
 
 /// The source of a group's time.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,7 @@ use crate::instant::{NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant
 use crate::number::parse_number;
 use crate::sample::{Sample, SampleRow, cells};
 use crate::table_head::HeadColumn;
-use mapper_logs::{DateOrder, Group, LogOptions};
+use mapper_recording::logs::{DateOrder, Group, LogOptions};
 
 /// The clocks of a table.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -4,7 +4,7 @@ use crate::cells::{Cells, Rows};
 use crate::instant::{Instant, parse_instant};
 use crate::number::{NO_READING, number_in, parse_number};
 use crate::value::Value;
-use mapper_logs::{DateOrder, LogError};
+use mapper_recording::logs::{DateOrder, LogError};
 
 /// Some rows of a column. Rows after its end are empty.
 #[derive(Debug, Clone, PartialEq)]

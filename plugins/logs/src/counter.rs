@@ -3,7 +3,7 @@
 use crate::number::read_number;
 use crate::sample::{Sample, cells};
 use crate::table_head::HeadColumn;
-use mapper_logs::{Kind, header_unit};
+use mapper_recording::logs::{Kind, header_unit};
 
 /// Whether a column of numbers is labelled as a clock: by its name, unless its unit contradicts, or by its unit.
 pub(crate) fn is_clock_name(column: &HeadColumn) -> bool {

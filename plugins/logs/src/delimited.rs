@@ -6,7 +6,7 @@ use crate::long_table::{LongForm, LongRows};
 use crate::row_stream::{Dialect, RowStream};
 use crate::separator::{SEPARATORS, decimal, score};
 use crate::table_log::{Origin, Table};
-use mapper_logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink};
+use mapper_recording::logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink};
 use std::io::Cursor;
 
 /// The format.

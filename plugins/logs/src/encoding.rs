@@ -1,6 +1,6 @@
 //! Character encodings of a text file.
 
-use mapper_logs::Encoding;
+use mapper_recording::logs::Encoding;
 use std::io::{self, Read};
 
 /// The encoding of a file that starts with these bytes, and the length of its byte order mark.

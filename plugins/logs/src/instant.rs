@@ -1,7 +1,7 @@
 //! Dates and times of day in the notations of logs.
 
 use jiff::civil::Date;
-use mapper_logs::DateOrder;
+use mapper_recording::logs::DateOrder;
 
 /// Permitted years: the range of 64 bits in nanoseconds, and no log is older.
 const YEARS: std::ops::RangeInclusive<i64> = 1970..=2200;

@@ -27,7 +27,7 @@ mod table_head;
 mod table_log;
 mod value;
 
-use mapper_logs::LogFormats;
+use mapper_recording::logs::LogFormats;
 
 /// Declares the formats' modules and the list of them.
 macro_rules! logs {

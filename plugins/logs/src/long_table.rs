@@ -5,7 +5,7 @@ use crate::instant::{Instant, parse_instant};
 use crate::number::{is_missing, number_in, read_number};
 use crate::row_stream::RowStream;
 use crate::table_log::Table;
-use mapper_logs::{DateOrder, LogError, header_unit};
+use mapper_recording::logs::{DateOrder, LogError, header_unit};
 use std::collections::BTreeSet;
 
 /// Maximum number of quantities.

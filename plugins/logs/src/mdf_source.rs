@@ -4,8 +4,8 @@ use falcon_mdf::error::{Mf4Error, Result};
 use falcon_mdf::io::memory::MemorySource;
 use falcon_mdf::io::reader::BufferedSource;
 use falcon_mdf::io::{ByteSlice, ByteSource};
-use mapper_logs::limits::{BLOCK_BYTES, is_too_deep, unpacked_max};
-use mapper_logs::{LogError, LogFile};
+use mapper_recording::logs::limits::{BLOCK_BYTES, is_too_deep, unpacked_max};
+use mapper_recording::logs::{LogError, LogFile};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 

@@ -1,6 +1,6 @@
 //! Numbers in the notations of logs.
 
-use mapper_logs::header_unit;
+use mapper_recording::logs::header_unit;
 
 /// Maximum length of a number's text, bytes.
 const LIMIT: usize = 48;

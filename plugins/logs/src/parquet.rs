@@ -2,8 +2,8 @@
 
 use crate::record_batches::{Batches, open_log};
 use arrow_schema::Schema;
-use mapper_logs::limits::unpacked_max;
-use mapper_logs::{Log, LogError, LogFile, LogFormat, LogOptions};
+use mapper_recording::logs::limits::unpacked_max;
+use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::errors::ParquetError;
 use std::fs::File;

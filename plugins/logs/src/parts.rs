@@ -1,7 +1,7 @@
 //! Several tables of one file as one log: the sheets of a workbook, the groups of a measurement.
 
 use crate::table_log::Table;
-use mapper_logs::{Layout, LogError, Row, RowSink};
+use mapper_recording::logs::{Layout, LogError, Row, RowSink};
 
 /// A table of the file.
 #[derive(Debug)]

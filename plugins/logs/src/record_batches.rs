@@ -15,7 +15,7 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
-use mapper_logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Number of rows in the sample.

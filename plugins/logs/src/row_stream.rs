@@ -4,7 +4,7 @@ use crate::cells::{Cells, Rows};
 use crate::encoding::{self, Utf16Reader};
 use crate::instant::{Instant, parse_instant};
 use crate::number::{number_in, parse_number};
-use mapper_logs::{DateOrder, Encoding, LogError, LogFile};
+use mapper_recording::logs::{DateOrder, Encoding, LogError, LogFile};
 use std::cell::Cell;
 use std::io::{self, Read};
 use std::rc::Rc;

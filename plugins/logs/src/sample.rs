@@ -4,7 +4,7 @@ use crate::cells::Cells;
 use crate::instant::{Instant, parse_instant};
 use crate::number::{number_in, read_number};
 use crate::table_head::HeadColumn;
-use mapper_logs::DateOrder;
+use mapper_recording::logs::DateOrder;
 
 /// The first rows of data.
 pub(crate) struct Sample<'a> {

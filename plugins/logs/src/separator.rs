@@ -2,7 +2,7 @@
 
 use crate::instant::parse_instant;
 use crate::number::{is_missing, read_number};
-use mapper_logs::DateOrder;
+use mapper_recording::logs::DateOrder;
 
 /// Candidate separators, in order of preference for equal scores.
 pub(crate) const SEPARATORS: [u8; 5] = [b'\t', b';', b',', b'|', b' '];

@@ -3,7 +3,7 @@
 use crate::instant::parse_instant;
 use crate::number::{is_missing, number_with_unit, read_number};
 use crate::separator::typical_length;
-use mapper_logs::{DateOrder, LogOptions, header_unit, split_unit};
+use mapper_recording::logs::{DateOrder, LogOptions, header_unit, split_unit};
 use std::collections::BTreeMap;
 
 /// Maximum number of columns in a table.

@@ -7,7 +7,7 @@ use crate::instant::Instant;
 use crate::row_sorter::RowSorter;
 use crate::sample::Sample;
 use crate::table_head::{TableHead, look};
-use mapper_logs::{Column, DateOrder, Layout, LogError, LogOptions, Row, RowSink};
+use mapper_recording::logs::{Column, DateOrder, Layout, LogError, LogOptions, Row, RowSink};
 use std::collections::BTreeMap;
 
 /// A group while its rows are read.

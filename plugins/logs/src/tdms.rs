@@ -5,7 +5,7 @@ use crate::instant::Instant;
 use crate::parts::{Part, side_by_side};
 use crate::table_head::COLUMN_LIMIT;
 use crate::table_log::{Origin, Table};
-use mapper_logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 use std::io::{Seek as _, SeekFrom};
 use tedium::{ChannelPath, PropertyPath, PropertyValue, TdmsError, TdmsFile, TdmsStorageType};
 

@@ -4,7 +4,7 @@ use crate::instant::{Instant, NS_PER_DAY, parse_instant};
 use crate::number::{NO_READING, parse_number};
 use jiff::ToSpan;
 use jiff::civil::{Date, Time};
-use mapper_logs::DateOrder;
+use mapper_recording::logs::DateOrder;
 
 /// The contents of a cell.
 #[derive(Debug, Clone, PartialEq)]

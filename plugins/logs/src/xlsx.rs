@@ -11,7 +11,7 @@ use crate::separator::decimal;
 use crate::table_log::{Origin, Table};
 use crate::value::Value;
 use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
-use mapper_logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
+use mapper_recording::logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };

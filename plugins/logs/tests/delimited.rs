@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_log_formats::LOG_FORMATS;
-use mapper_logs::{Layout, LogFile, LogOptions};
+use mapper_recording::logs::{Layout, LogFile, LogOptions};
 use std::path::Path;
 
 /// Layout and, by group, times and rows.

@@ -5,8 +5,8 @@ use mapper_core::Channel::{
     self, CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, TOil, Tc, TurbineFlow,
 };
 use mapper_log_formats::LOG_FORMATS;
-use mapper_logs::proposal::{Certainty, propose};
-use mapper_logs::{LogFile, LogOptions, survey};
+use mapper_recording::logs::proposal::{Certainty, propose};
+use mapper_recording::logs::{LogFile, LogOptions, survey};
 use std::path::Path;
 
 /// What a column holds.

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_log_formats::LOG_FORMATS;
-use mapper_logs::proposal::{channel_map_text, propose};
-use mapper_logs::{LogFile, LogOptions, survey};
+use mapper_recording::logs::proposal::{channel_map_text, propose};
+use mapper_recording::logs::{LogFile, LogOptions, survey};
 use proptest::prelude::*;
 use std::io::Write;
 use std::path::Path;
@@ -212,7 +212,7 @@ fn bombs_are_refused_before_they_unpack() {
     let mut packed = Vec::new();
     writer.write(&mut packed).unwrap();
     let block = (0..packed.len()).find(|at| packed[*at..].starts_with(b"##DZ")).unwrap();
-    let read = |bytes: &[u8]| -> Result<(), mapper_logs::LogError> {
+    let read = |bytes: &[u8]| -> Result<(), mapper_recording::logs::LogError> {
         let file = LogFile::of_bytes(Path::new("log"), bytes);
         survey(LOG_FORMATS.open(&file, &LogOptions::default())?.1.as_mut()).map(drop)
     };
@@ -242,7 +242,7 @@ fn a_pipe_in_the_place_of_a_log_is_refused() {
     assert!(made.success());
     for path in [pipe.as_path(), Path::new("/dev/zero"), folder.path()] {
         let error = LOG_FORMATS.open(&LogFile::of_path(path), &LogOptions::default()).err().unwrap();
-        assert!(matches!(error, mapper_logs::LogError::Read { .. }), "{error}");
+        assert!(matches!(error, mapper_recording::logs::LogError::Read { .. }), "{error}");
     }
 }
 

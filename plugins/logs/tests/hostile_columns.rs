@@ -4,7 +4,7 @@
 
 use arrow_array::{ArrayRef, Float64Array, RecordBatch, StringArray};
 use mapper_log_formats::LOG_FORMATS;
-use mapper_logs::{LogFile, LogOptions, survey};
+use mapper_recording::logs::{LogFile, LogOptions, survey};
 use proptest::prelude::*;
 use std::io::Cursor;
 use std::path::Path;

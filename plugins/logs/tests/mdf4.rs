@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_log_formats::LOG_FORMATS;
-use mapper_logs::{LogFile, LogOptions, Row};
+use mapper_recording::logs::{LogFile, LogOptions, Row};
 use std::path::Path;
 
 fn file() -> LogFile {

@@ -3,8 +3,8 @@
 
 use mapper_core::Channel;
 use mapper_log_formats::LOG_FORMATS;
-use mapper_logs::proposal::{Certainty, Proposal, propose};
-use mapper_logs::{LogFile, LogOptions, survey};
+use mapper_recording::logs::proposal::{Certainty, Proposal, propose};
+use mapper_recording::logs::{LogFile, LogOptions, survey};
 use std::path::Path;
 
 /// A log of two minutes at 1 Hz with these headings; `row` has the values at a load of 0 to 1.

@@ -14,55 +14,39 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // Work in many pieces; knows nothing of what the pieces are.
     ("mapper-fleet",     &["numerics", "yaml"]),
     ("mapper-physics",   &["core", "numerics"]),
-    ("mapper-mesh",      &["core", "chart"]),
     ("mapper-fmu",       &["core", "physics"]),
-    // Read by campaigns and by map formats.
-    ("mapper-map-table", &["core", "physics", "yaml"]),
-    ("mapper-campaign",  &["core", "map-table", "physics", "yaml"]),
+    // Nominal maps of campaigns are tables of points, so maps lie below campaigns.
+    ("mapper-maps",      &["core", "chart", "numerics", "physics", "yaml"]),
+    ("mapper-campaign",  &["core", "maps", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
-    ("mapper-surge",     &["core", "numerics", "physics"]),
-    ("mapper-conformance", &["core"]),
-    ("mapper-runner",    &["core", "numerics", "surge"]),
-    ("mapper-protocol",  &["core"]),
-    ("mapper-host",      &["core", "protocol"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
-    ("mapper-logs",      &["core", "yaml"]),
-    ("mapper-record",    &["core", "logs", "numerics", "yaml"]),
+    ("mapper-runner",    &["core", "numerics", "physics"]),
+    ("mapper-driver-host", &["core"]),
+    ("mapper-recording", &["core", "numerics", "yaml"]),
     ("mapper-observe",   &["core", "numerics", "physics"]),
-    // Priors, coordinates and sizes of causes are those of the diagnosis with steps.
-    ("mapper-driven",    &["core", "numerics", "physics", "observe", "inference", "gap"]),
     ("mapper-inference", &["numerics"]),
     ("mapper-identify",  &["core", "inference", "numerics", "physics", "observe"]),
-    ("mapper-assemble",  &["core", "numerics", "physics", "identify"]),
-    ("mapper-drift",     &["core", "numerics", "physics", "observe", "inference", "identify"]),
-    ("mapper-gap",       &["core", "numerics", "physics", "observe", "inference"]),
-    ("mapper-discover",  &["core", "numerics", "physics", "gap"]),
+    ("mapper-diagnose",  &["core", "numerics", "physics", "observe", "inference", "identify"]),
     ("mapper-history",   &["numerics"]),
-    ("mapper-reproduce", &["core", "numerics", "physics", "identify", "chart"]),
     // Plug-ins never see each other.
     // A backend may read recordings: replay does.
-    ("mapper-backends",  &["core", "numerics", "physics", "record", "yaml"]),
+    ("mapper-backends",  &["core", "numerics", "physics", "recording", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
-    ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "map-table", "mesh"]),
-    ("mapper-log-formats", &["logs"]),
-    // Draws cases on the virtual lab and calibrates the diagnosis with them; above both, like the program.
-    ("mapper-blind",     &["core", "numerics", "physics", "campaign", "runner", "record", "observe", "gap", "backends", "effects", "fleet"]),
+    ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "maps"]),
+    ("mapper-log-formats", &["recording"]),
     // Words, pages and pictures made from data.
-    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "assemble", "gap", "drift", "driven", "history", "logs", "record", "reproduce", "sequence", "fleet"]),
-    // The page of a run, for a browser.
-    ("mapper-page",      &["core", "chart", "mesh", "campaign", "assemble", "identify", "numerics", "observe", "record", "report"]),
+    ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "maps", "diagnose", "history", "recording", "sequence", "fleet"]),
     // The application: everything between arguments and words. Plug-ins are handed in.
-    ("mapper-session",   &["core", "chart", "map-table", "physics", "campaign", "planner", "runner", "sequence", "logs", "record", "observe", "identify", "surge", "gap", "discover", "drift", "driven", "history", "assemble", "report", "page", "numerics", "fleet", "fmu", "yaml"]),
-    // What fleets work on: one file a kind, above the application and the blind cases.
-    ("mapper-studies",   &["blind", "campaign", "chart", "core", "fleet", "history", "record", "session"]),
-    // What a terminal, a pipe or another program sees; what a browser sees while a run goes on.
-    ("mapper-terminal",  &["core", "campaign", "assemble", "identify", "observe", "report", "session"]),
-    ("mapper-live",      &["core", "campaign", "page", "record", "report", "session"]),
+    ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "recording", "observe", "identify", "diagnose", "history", "maps", "report", "numerics", "fleet", "fmu", "yaml"]),
+    // What a browser sees while a run goes on.
+    ("mapper-live",      &["core", "campaign", "recording", "report", "session"]),
+    // Blind cases on the virtual lab, calibrations, the figures of the paper; above the application, like the program.
+    ("mapper-validation", &["core", "chart", "numerics", "physics", "campaign", "runner", "recording", "observe", "identify", "diagnose", "history", "report", "session", "backends", "effects", "fleet"]),
     // The program names the plug-ins; nothing sees the program.
-    ("mapper-cli",       &["core", "physics", "campaign", "conformance", "host", "planner", "record", "drift", "gap", "discover", "history", "assemble", "logs", "log-formats", "reproduce", "report", "session", "terminal", "live", "backends", "blind", "effects", "formats", "fleet", "studies"]),
-    ("mapper-python",    &["core", "physics", "campaign", "record", "assemble", "logs", "log-formats", "session", "host", "backends", "effects", "formats"]),
+    ("mapper-cli",       &["core", "physics", "campaign", "driver-host", "planner", "recording", "observe", "identify", "diagnose", "history", "maps", "log-formats", "report", "session", "live", "backends", "effects", "formats", "fleet", "validation"]),
+    ("mapper-python",    &["core", "physics", "campaign", "recording", "maps", "log-formats", "session", "driver-host", "backends", "effects", "formats"]),
     // Drivers are programs of their own: what they share, and whatever each needs for its rig.
-    ("mapper-driver",    &["core", "protocol"]),
+    ("mapper-driver",    &["core", "driver-host"]),
     ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),
     // What drivers behind a controller share.
     ("mapper-controller", &["core", "yaml"]),
@@ -72,7 +56,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     // A stand to rehearse on: no driver, but what drivers talk to; the telegrams of AK are written down once.
     ("mapper-lab-server", &["core", "campaign", "session", "backends", "effects", "backend-ak"]),
     // Tests run the program and read its files; chores know nothing of it.
-    ("mapper-tests",     &["core", "record"]),
+    ("mapper-tests",     &["core", "recording"]),
     ("xtask",            &[]),
 ];
 
@@ -80,9 +64,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
 const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
     ("mapper-observe", &["mapper-backends", "mapper-effects", "mapper-cli"]),
     ("mapper-identify", &["mapper-backends", "mapper-effects", "mapper-cli"]),
-    ("mapper-assemble", &["mapper-backends", "mapper-effects", "mapper-cli"]),
-    ("mapper-drift", &["mapper-backends", "mapper-effects", "mapper-cli"]),
-    ("mapper-gap", &["mapper-backends", "mapper-blind", "mapper-cli"]),
+    ("mapper-maps", &["mapper-backends", "mapper-effects", "mapper-cli"]),
+    ("mapper-diagnose", &["mapper-backends", "mapper-validation", "mapper-cli"]),
 ];
 
 /// Libraries that only some packages may use.

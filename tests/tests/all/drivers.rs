@@ -3,7 +3,7 @@
 
 use crate::interrupted::Running;
 use mapper_core::EventKind;
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{
     BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_drivers, made_once, mapper_command, repository,
 };

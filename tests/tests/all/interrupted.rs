@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use mapper_core::EventKind;
-use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{CampaignFile, Finished, mapper, mapper_command, only_run, python};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use std::path::{Path, PathBuf};

@@ -198,7 +198,7 @@ fn the_proposed_channel_map_loads_as_it_stands_and_replaces_no_file() {
     ] {
         assert!(text.contains(line), "`{line}` in\n{text}");
     }
-    mapper_record::ChannelMap::load(&channels).unwrap();
+    mapper_recording::ChannelMap::load(&channels).unwrap();
     let again = mapper([
         "log".as_ref(),
         "inspect".as_ref(),

@@ -6,7 +6,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 fn sample() -> PathBuf {
-    repository().join("crates/assemble/tests/data/sample_compressor.csv")
+    repository().join("crates/maps/tests/data/sample_compressor.csv")
 }
 
 fn run<const N: usize>(arguments: [&OsStr; N]) -> mapper_tests::Finished {

@@ -3,7 +3,7 @@
 
 use crate::interrupted::Running;
 use mapper_core::{Channel, EventKind};
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, mapper_command, only_run};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

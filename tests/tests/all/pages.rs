@@ -376,7 +376,7 @@ fn the_scripts_are_those_of_the_npm_packages() {
         run("npm", &["pack", "--silent", package]);
         let published =
             run("tar", &["--extract", "--to-stdout", "--file", packed, &format!("package/dist/{script}")]);
-        let ours = std::fs::read(repository().join("crates/page/assets").join(script)).unwrap();
+        let ours = std::fs::read(repository().join("crates/report/assets").join(script)).unwrap();
         assert!(published == ours, "{script} is not that of {package}");
     }
 }

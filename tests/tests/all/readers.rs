@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use mapper_core::{Channel, EventKind, Quality};
-use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{
     BY_ITSELF, CampaignFile, Finished, SHORT_GRID, build_driver, made_once, mapper, mapper_command, only_run,
     python,

@@ -1,7 +1,7 @@
 //! What a run records: the same bytes for the same seed, one directory a run, readable by others.
 
 use mapper_core::{CHANNELS, Group};
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{
     BY_ITSELF, CampaignFile, SHORT_GRID, made_once, mapper, mapper_command, only_run, python, scratch,
 };

@@ -1,6 +1,6 @@
 //! Several sensors of a channel, from the campaign's list to the points.
 
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, python, scratch};
 use serde_json::Value;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Campaigns whose steps come from a script.
 
 use mapper_core::Channel;
-use mapper_record::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_tests::{BY_ITSELF, CampaignFile, Finished, SHORT_GRID, mapper, only_run, scratch};
 use serde_json::Value;
 use std::path::Path;

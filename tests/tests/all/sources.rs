@@ -13,12 +13,12 @@ struct Rule {
 const RULES: &[Rule] = &[
     Rule {
         word: ("read_", "truth"),
-        places: &["crates/record/"],
+        places: &["crates/recording/"],
         why: "what only a simulator knows is read by scoring alone",
     },
     Rule {
         word: ("record::", "score"),
-        places: &["crates/record/", "crates/report/", "crates/session/"],
+        places: &["crates/recording/", "crates/report/", "crates/session/"],
         why: "whatever identifies, corrects or diagnoses never sees what only a simulator knows",
     },
     Rule {

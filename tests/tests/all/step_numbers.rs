@@ -1,6 +1,6 @@
 //! One number names a step, from 1, in everything that people and programs read of a run.
 
-use mapper_record::{ReadOptions, read_steps};
+use mapper_recording::{ReadOptions, read_steps};
 use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, only_run};
 use serde_json::Value;
 use std::path::Path;

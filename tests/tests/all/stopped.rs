@@ -3,7 +3,7 @@
 
 use crate::interrupted::Running;
 use mapper_core::EventKind;
-use mapper_record::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper};
 use std::path::Path;
 

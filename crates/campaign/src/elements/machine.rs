@@ -6,7 +6,7 @@ use crate::checking::{Check, beside};
 use crate::machine_sizes::AssumedSize;
 use crate::nominal_table::{NominalTableError, nominal_table};
 use mapper_core::{ImportError, MapDescription, ReferenceState};
-use mapper_map_table::description_from_yaml;
+use mapper_maps::table::description_from_yaml;
 use mapper_physics::params::Params;
 use mapper_physics::tabulated_map::TabulatedMap;
 use mapper_yaml::FindingKind;

@@ -7,7 +7,7 @@ use crate::{output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
 use mapper_session::{Recorded, Session};
-use mapper_terminal::{identified_text, results_text};
+use crate::terminal::{identified_text, results_text};
 use std::path::PathBuf;
 
 /// Identify efficiency and heat transfer from run directories, MCAP recordings or logs of other programs

@@ -50,7 +50,7 @@ impl Nightly {
         let started = jiff::Timestamp::now();
         let runs = match &self.fleet {
             Some(directory) => {
-                let rows = mapper_studies::rows_of(directory, &registry)?;
+                let rows = mapper_validation::studies::rows_of(directory, &registry)?;
                 prepared.checked(rows)
             }
             None => session.night(&prepared, self.jobs),

@@ -5,7 +5,7 @@ use crate::given::{channel_map, given_campaign};
 use crate::output::Replace;
 use crate::{output, output_options, registry};
 use clap::Args;
-use mapper_record::ChannelMap;
+use mapper_recording::ChannelMap;
 use mapper_session::{Gap, Recorded, Registry, Session, SessionError};
 use serde_json::json;
 use std::path::{Path, PathBuf};

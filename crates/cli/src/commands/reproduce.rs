@@ -4,7 +4,7 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::{output, output_options};
 use clap::Args;
-use mapper_reproduce::{FIGURES, picture_path};
+use mapper_validation::reproduction::{FIGURES, picture_path};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ impl Reproduce {
         let progress = output_options::progress();
         let mut done = 0;
         progress.pieces(0, FIGURES.len());
-        let results = mapper_reproduce::reproduce(|_| {
+        let results = mapper_validation::reproduction::reproduce(|_| {
             done += 1;
             progress.pieces(done, FIGURES.len());
         });
@@ -35,9 +35,9 @@ impl Reproduce {
             write(&self.out.join(picture_path(result)), result.svg.as_bytes())?;
         }
         let page = self.out.join("reproduction.md");
-        write(&page, mapper_reproduce::reproduction_page(&results).as_bytes())?;
+        write(&page, mapper_validation::reproduction::reproduction_page(&results).as_bytes())?;
         if self.json {
-            let figures: Vec<serde_json::Value> = results.iter().map(mapper_reproduce::figure_json).collect();
+            let figures: Vec<serde_json::Value> = results.iter().map(mapper_validation::reproduction::figure_json).collect();
             return output::print_json(&json!({"page": page, "figures": figures}));
         }
         let mut text = String::new();

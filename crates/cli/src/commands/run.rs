@@ -14,7 +14,7 @@ use mapper_session::{
     BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
     SessionEvent, run_directory, soak_s, start_time_ns,
 };
-use mapper_terminal::results_text;
+use crate::terminal::results_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 //! by its index.
 
 use mapper_backends::virtual_lab::{LabSettings, SensorErrors, VirtualLab};
-use mapper_conformance::Fault;
+use mapper_driver_host::conformance::Fault;
 use mapper_core::Channel::{self, P2, P3, ShaftSpeed, T2};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;

@@ -3,7 +3,7 @@
 use super::behind::{Ends, OVER_THE_PROTOCOL};
 use super::{night_on, usual};
 use mapper_core::EventKind;
-use mapper_host::{Driver, PATIENCE};
+use mapper_driver_host::{Driver, PATIENCE};
 use mapper_runner::RunEnd;
 
 #[test]

@@ -4,7 +4,7 @@
 use mapper_backends::other_lab::{self, OtherStructure};
 use mapper_backends::replay::{self, ReplayBackend};
 use mapper_backends::virtual_lab::{self, ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab};
-use mapper_conformance::{Candidate, RULES};
+use mapper_driver_host::conformance::{Candidate, RULES};
 use mapper_core::{Backend, BackendError, Channel, Recording, RigMode, Series, Setpoints};
 use mapper_physics::model::Model;
 use mapper_physics::params::BoundaryConditions;

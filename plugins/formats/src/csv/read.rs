@@ -1,11 +1,11 @@
-//! Reads files of `mapper` with all their columns; [`mapper_map_table`] reads those of other programs.
+//! Reads files of `mapper` with all their columns; [`mapper_maps::table`] reads those of other programs.
 
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use mapper_core::{
     CommonErrors, CompressorMap, EfficiencyDefinition, ImportError, ImportedMap, MapDescription, MapPoint,
     Method, ReferenceState, SpeedShift, Verdict, Warning,
 };
-use mapper_map_table::{
+use mapper_maps::table::{
     Row, efficiency_in_comment, in_comment, line, read_text, room_for_one_more, settle, text_of,
 };
 

@@ -117,6 +117,6 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
 /// [`turbo_a`] with a fitted surface.
 #[allow(dead_code)]
 pub fn fitted() -> CompressorMap {
-    let options = mapper_assemble::MapFitOptions { leave_one_out: false, ..Default::default() };
-    mapper_assemble::fit_map(turbo_a(), &options).unwrap()
+    let options = mapper_maps::MapFitOptions { leave_one_out: false, ..Default::default() };
+    mapper_maps::fit_map(turbo_a(), &options).unwrap()
 }

@@ -1,8 +1,8 @@
 //! Checks the unpacked size of a workbook, since the library unpacks it without limits.
 
 use super::NAME;
-use mapper_logs::limits::unpacked_max;
-use mapper_logs::{LogError, LogFile};
+use mapper_recording::logs::limits::unpacked_max;
+use mapper_recording::logs::{LogError, LogFile};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::cell::Cell;

@@ -5,7 +5,7 @@ use crate::fleet_place::on_this_machine;
 use crate::{output, output_options};
 use clap::Args;
 use mapper_fleet::{Made, kind_of, open_study};
-use mapper_studies::program;
+use mapper_validation::studies::program;
 use serde_json::json;
 use std::path::PathBuf;
 

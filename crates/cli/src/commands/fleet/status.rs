@@ -6,7 +6,7 @@ use crate::output;
 use clap::Args;
 use mapper_fleet::{Fleet, Template, running};
 use mapper_report::status_text;
-use mapper_studies::program;
+use mapper_validation::studies::program;
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -3,8 +3,8 @@
 use crate::failure::Failure;
 use crate::{output, registry};
 use clap::Args;
-use mapper_blind::study_without_causes;
-use mapper_discover::signatures::signatures;
+use mapper_validation::blind::study_without_causes;
+use mapper_diagnose::missing_terms::signatures::signatures;
 use mapper_physics::effect::Effect;
 use mapper_report::with_heads;
 use serde_json::json;

@@ -6,7 +6,7 @@ use crate::given::MapReading;
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
-use mapper_assemble::correct_for_heat;
+use mapper_maps::correct_for_heat;
 use mapper_report::heat_correction_text;
 use mapper_session::write_map_fitted_if_needed;
 use serde_json::json;

@@ -5,7 +5,7 @@ use crate::given::MapReading;
 use crate::output::Replace;
 use crate::{output, registry};
 use clap::Args;
-use mapper_assemble::MapFitOptions;
+use mapper_maps::MapFitOptions;
 use std::path::PathBuf;
 
 /// Fit all speed lines together and print the error at each line when it is left out

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::{output, output_options, registry};
 use clap::Args;
-use mapper_blind::{CaseKind, Draw, Laboratory, OutsideUse};
+use mapper_validation::blind::{CaseKind, Draw, Laboratory, OutsideUse};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -26,10 +26,10 @@ pub struct Make {
     #[arg(long = "kind", value_name = "KIND")]
     kinds: Vec<CaseKind>,
     /// Minimum signature of a cause, in sigmas
-    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[0])]
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_validation::blind::SIGMA_RANGE[0])]
     pub least_sigma: f64,
     /// Maximum signature of a cause, in sigmas
-    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_blind::SIGMA_RANGE[1])]
+    #[arg(long, value_name = "SIGMAS", default_value_t = mapper_validation::blind::SIGMA_RANGE[1])]
     pub most_sigma: f64,
     /// Draw outside causes from those kept for calibration, not from those reserved for the check
     #[arg(long)]
@@ -60,7 +60,7 @@ impl Make {
         let progress = output_options::progress();
         progress.pieces(0, self.cases);
         let done = |done| progress.pieces(done, self.cases);
-        let made = mapper_blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);
+        let made = mapper_validation::blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);
         progress.clear();
         let made = made?;
         if self.json {

@@ -4,7 +4,7 @@ use crate::exit_code::Code;
 use crate::failure::Failure;
 use crate::{interrupt, output, output_options};
 use clap::Args;
-use mapper_blind::{MANIFEST_NAME, Manifest};
+use mapper_validation::blind::{MANIFEST_NAME, Manifest};
 use mapper_fleet::{Engine, cores};
 use mapper_session::write_new;
 use serde_json::json;

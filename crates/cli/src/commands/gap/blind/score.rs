@@ -3,8 +3,8 @@
 use crate::failure::Failure;
 use crate::output;
 use clap::Args;
-use mapper_blind::score::{open_answers, score};
-use mapper_blind::{MANIFEST_NAME, Manifest};
+use mapper_validation::blind::score::{open_answers, score};
+use mapper_validation::blind::{MANIFEST_NAME, Manifest};
 use mapper_report::with_heads;
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,13 @@
+//! Output for a terminal, a pipe or another program: progress during the work, and the results of a run.
+//!
+//! Progress goes to standard error and never into results: a bar on a terminal, a line per step in a pipe, JSON lines for
+//! a program.
+
+mod bar_text;
+mod colour;
+mod progress;
+mod results_text;
+
+pub use colour::{ColourChoice, is_coloured, understands_escapes};
+pub use progress::{Progress, ProgressManner};
+pub use results_text::{Shown, identified_text, results_text};

@@ -1,0 +1,360 @@
+//! Progress on standard error: a bar, lines, or JSON.
+
+use crate::terminal::bar_text::{run_words, short};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use mapper_core::{StepMarker, terminal_text};
+use mapper_report::wrapped;
+use mapper_session::SessionEvent;
+use serde_json::json;
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::time::{Duration, Instant};
+
+/// Interval at which the clock of a bar is redrawn.
+const TICK: Duration = Duration::from_millis(250);
+/// Maximum width of a warning, columns.
+const COLUMNS: usize = 80;
+/// Number of times in a run that a program receives the rig's time.
+const RIG_TIMES: f64 = 200.0;
+/// The current activity is above the bar, the progress below it.
+const RUN_BAR: &str = "{prefix}\n[{bar:14}] {msg}";
+const PIECES_BAR: &str = "[{bar:30}] {pos} of {len}, {elapsed} so far{msg}";
+const WORK_BAR: &str = "[{bar:30}] {percent:>3} %, {elapsed} so far  {wide_msg}";
+const SPINNER: &str = "{spinner} {wide_msg} {elapsed}";
+
+/// The consumer of the progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProgressManner {
+    /// A user at a terminal.
+    Bar,
+    /// A file that is read later: one line per step.
+    Lines,
+    /// A program: JSON lines.
+    Json,
+    /// None.
+    Quiet,
+}
+
+impl ProgressManner {
+    /// As written on the command line.
+    pub const NAMES: [&str; 4] = ["bar", "lines", "json", "off"];
+
+    /// The format of this name; an unknown name shows nothing.
+    pub fn named(name: &str) -> Self {
+        match name {
+            "bar" => ProgressManner::Bar,
+            "lines" => ProgressManner::Lines,
+            "json" => ProgressManner::Json,
+            _ => ProgressManner::Quiet,
+        }
+    }
+
+    /// Whether an event is shown.
+    fn shows(self, event: &SessionEvent) -> bool {
+        use SessionEvent as E;
+        match self {
+            ProgressManner::Quiet => false,
+            ProgressManner::Json => !matches!(event, E::Readings { .. }),
+            ProgressManner::Lines => {
+                matches!(
+                    event,
+                    E::RunStarted { .. }
+                        | E::StepStarted(_)
+                        | E::Reported(_)
+                        | E::Progress { .. }
+                        | E::PiecesDone { .. }
+                )
+            }
+            ProgressManner::Bar => !matches!(
+                event,
+                E::StepEnded(_) | E::Readings { .. } | E::PointEstimated(_) | E::PointIdentified(_)
+            ),
+        }
+    }
+}
+
+/// Maximum number of queued events.
+const QUEUE: usize = 4096;
+/// Longest wait of a session for a slow consumer. It waits once; after that, events are lost until the queue has room.
+const PATIENCE: Duration = Duration::from_millis(10);
+/// Longest wait at the end for the queued events to be shown.
+const LAST_WORDS: Duration = Duration::from_secs(1);
+
+/// Shows the events of a session. Many threads may send them; a separate thread shows them, so no sender waits for a terminal
+/// or a pipe. A terminal on hold (Ctrl-S) or a pipe without a reader loses lines; the run and its guards continue.
+pub struct Progress {
+    manner: ProgressManner,
+    to: SyncSender<Queued>,
+    stalled: AtomicBool,
+}
+
+enum Queued {
+    Event(Box<SessionEvent>),
+    /// Removes the bar and acknowledges.
+    Clear(SyncSender<()>),
+}
+
+impl Progress {
+    /// Shows nothing before the first event.
+    pub fn new(manner: ProgressManner) -> Self {
+        let (to, queued) = sync_channel(QUEUE);
+        // If the thread cannot be started, nothing is shown and the work continues.
+        let started =
+            std::thread::Builder::new().name("progress".to_owned()).spawn(move || show_all(manner, &queued));
+        let manner = if started.is_ok() { manner } else { ProgressManner::Quiet };
+        Progress { manner, to, stalled: AtomicBool::new(false) }
+    }
+
+    /// Shows an event.
+    pub fn show(&self, event: &SessionEvent) {
+        if !self.manner.shows(event) {
+            return;
+        }
+        match self.to.try_send(Queued::Event(Box::new(event.clone()))) {
+            Ok(()) => self.stalled.store(false, Ordering::Relaxed),
+            Err(TrySendError::Full(queued)) if !self.stalled.load(Ordering::Relaxed) => {
+                std::thread::sleep(PATIENCE);
+                self.stalled.store(self.to.try_send(queued).is_err(), Ordering::Relaxed);
+            }
+            Err(_) => {}
+        }
+    }
+
+    /// Shows the current activity before a total is known.
+    pub fn begin(&self, what: &str) {
+        self.show(&SessionEvent::Progress { done_ratio: 0.0, what: what.to_owned() });
+    }
+
+    /// Shows how many of the pieces of work are done.
+    pub fn pieces(&self, done: usize, of: usize) {
+        self.show(&SessionEvent::PiecesDone { done, of });
+    }
+
+    /// Removes the bar once all events are shown.
+    pub fn clear(&self) {
+        let (done, is_done) = sync_channel(1);
+        if self.to.try_send(Queued::Clear(done)).is_ok() {
+            let _ = is_done.recv_timeout(LAST_WORDS);
+        }
+    }
+}
+
+/// Shows the queued events before an error.
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.clear();
+    }
+}
+
+fn show_all(manner: ProgressManner, queued: &Receiver<Queued>) {
+    let target = match manner {
+        ProgressManner::Bar => ProgressDrawTarget::stderr(),
+        _ => ProgressDrawTarget::hidden(),
+    };
+    let shown = Shown { bar: ProgressBar::with_draw_target(None, target) };
+    let mut state = State::default();
+    for queued in queued {
+        match (queued, manner) {
+            (Queued::Event(event), ProgressManner::Json) => print_json(&event, &mut state),
+            (Queued::Event(event), ProgressManner::Lines) => say_lines(&event, &mut state),
+            (Queued::Event(event), ProgressManner::Bar) => shown.draw(&event, &mut state),
+            (Queued::Event(_), ProgressManner::Quiet) => {}
+            (Queued::Clear(done), _) => {
+                shown.bar.finish_and_clear();
+                let _ = done.try_send(());
+            }
+        }
+    }
+}
+
+#[derive(Default)]
+struct State {
+    /// Current style of the bar.
+    look: Option<&'static str>,
+    /// Last line written to a pipe.
+    last_line: String,
+    /// Start of the first piece of work.
+    began: Option<Instant>,
+    steps: usize,
+    /// Number of the current step, from 1.
+    step: usize,
+    duration_s: f64,
+    /// Rig time last sent to a program, s.
+    sent_s: f64,
+}
+
+/// The bar.
+struct Shown {
+    bar: ProgressBar,
+}
+
+impl Shown {
+    fn draw(&self, event: &SessionEvent, state: &mut State) {
+        match event {
+            SessionEvent::RunStarted { steps, duration_s, .. } => {
+                (state.steps, state.duration_s, state.step) = (*steps, *duration_s, 0);
+                self.look(state, RUN_BAR, Some(duration_s.ceil() as u64));
+                self.bar.set_prefix("at rest, then warming up");
+            }
+            SessionEvent::RigTime { t_s } => {
+                self.bar.set_position(*t_s as u64);
+                let left_s = self.bar.eta().as_secs_f64();
+                self.bar.set_message(run_words(state.step, state.steps, *t_s, state.duration_s, left_s));
+            }
+            SessionEvent::StepStarted(marker) => {
+                state.step = marker.number().unwrap_or(state.step);
+                self.bar.set_prefix(format!(
+                    "{}, {} at this point",
+                    place(marker),
+                    short(marker.end_s - marker.start_s)
+                ));
+            }
+            SessionEvent::Reported(event) => {
+                self.bar.println(terminal_text(&event_line(event.t_s, &event.message)))
+            }
+            SessionEvent::Progress { done_ratio, what } => {
+                if *done_ratio > 0.0 || state.look == Some(WORK_BAR) {
+                    self.look(state, WORK_BAR, Some(1000));
+                    self.bar.set_position((1000.0 * done_ratio) as u64);
+                } else {
+                    self.look(state, SPINNER, None);
+                }
+                self.bar.set_message(what.clone());
+            }
+            SessionEvent::PiecesDone { done, of } => {
+                self.look(state, PIECES_BAR, Some(*of as u64));
+                self.bar.set_position(*done as u64);
+                if *done > 0 {
+                    self.bar.set_message(format!(", {} left", short(self.bar.eta().as_secs_f64())));
+                }
+            }
+            SessionEvent::StepEnded(_)
+            | SessionEvent::RigReleased
+            | SessionEvent::Readings { .. }
+            | SessionEvent::PointEstimated(_)
+            | SessionEvent::PointIdentified(_) => {}
+        }
+    }
+
+    /// Sets the style and length of the bar if they changed; its clock shows that work continues.
+    fn look(&self, state: &mut State, look: &'static str, length: Option<u64>) {
+        if state.look == Some(look) {
+            return;
+        }
+        state.look = Some(look);
+        // A template that does not parse leaves the plain style.
+        if let Ok(style) = ProgressStyle::with_template(look) {
+            self.bar.set_style(style.progress_chars("=> "));
+        }
+        self.bar.reset();
+        match length {
+            Some(length) => self.bar.set_length(length),
+            None => self.bar.unset_length(),
+        }
+        self.bar.set_message("");
+        self.bar.enable_steady_tick(TICK);
+    }
+}
+
+/// Target of a step: 110 krpm, opening 0.7.
+fn place(marker: &StepMarker) -> String {
+    let shown = marker.to.map(|point| point.shown());
+    shown.map_or_else(String::new, |(krpm, opening)| format!("{krpm} krpm, opening {opening}"))
+}
+
+fn event_line(t_s: f64, message: &str) -> String {
+    wrapped(&format!("{t_s:8.1} s  {message}"), COLUMNS, 12).trim_end().to_owned()
+}
+
+fn say_lines(event: &SessionEvent, state: &mut State) {
+    let line = match event {
+        SessionEvent::RunStarted { steps, duration_s, .. } => {
+            state.steps = *steps;
+            format!("{steps} steps in {} of rig time", short(*duration_s))
+        }
+        SessionEvent::StepStarted(marker) => format!(
+            "{:8.1} s  {}, {}, for {}",
+            marker.start_s,
+            marker.number().map_or_else(
+                || "a step once more".to_owned(),
+                |number| format!("step {number} of {}", state.steps.max(number))
+            ),
+            place(marker),
+            short(marker.end_s - marker.start_s)
+        ),
+        SessionEvent::Reported(event) => event_line(event.t_s, &event.message),
+        SessionEvent::Progress { what, .. } if *what != state.last_line => what.clone(),
+        SessionEvent::PiecesDone { done, of } => {
+            let began = *state.began.get_or_insert_with(Instant::now);
+            if !is_printed(*done, *of) {
+                return;
+            }
+            pieces_line(*done, *of, began.elapsed().as_secs_f64())
+        }
+        _ => return,
+    };
+    if let SessionEvent::Progress { what, .. } = event {
+        state.last_line.clone_from(what);
+    }
+    say(&line);
+}
+
+/// Maximum number of lines about finished pieces.
+const PIECES_LINES: usize = 200;
+
+/// Whether this number of finished pieces is printed.
+fn is_printed(done: usize, of: usize) -> bool {
+    done == of || done.is_multiple_of(of.div_ceil(PIECES_LINES).max(1))
+}
+
+/// Number of finished pieces, elapsed time, and the estimated time remaining.
+fn pieces_line(done: usize, of: usize, elapsed_s: f64) -> String {
+    match done {
+        0 => format!("0 of {of} done"),
+        _ if done < of => {
+            let left_s = elapsed_s * (of - done) as f64 / done as f64;
+            format!("{done} of {of} done in {}, {} left", short(elapsed_s), short(left_s))
+        }
+        _ => format!("{done} of {of} done in {}", short(elapsed_s)),
+    }
+}
+
+/// One JSON object a line: the event as the session has it. Readings are for a live page and are omitted; the rig's time is thinned.
+fn print_json(event: &SessionEvent, state: &mut State) {
+    match event {
+        SessionEvent::RunStarted { duration_s, .. } => state.duration_s = *duration_s,
+        SessionEvent::RigTime { t_s } => {
+            if *t_s < state.sent_s + state.duration_s / RIG_TIMES {
+                return;
+            }
+            state.sent_s = *t_s;
+        }
+        _ => {}
+    }
+    let value = serde_json::to_value(event);
+    say(&value.unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() })).to_string());
+}
+
+/// A closed pipe, as with `tee` on Ctrl-C, must not cause a panic.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PIECES_LINES, is_printed, pieces_line};
+
+    #[test]
+    fn a_pipe_gets_the_remaining_time_and_never_a_thousand_lines() {
+        assert_eq!(pieces_line(0, 14, 0.0), "0 of 14 done");
+        // A third done in 20 s: the other two thirds take 40 s.
+        assert_eq!(pieces_line(5, 15, 20.0), "5 of 15 done in 20 s, 40 s left");
+        assert_eq!(pieces_line(15, 15, 62.0), "15 of 15 done in 62 s");
+        for of in [1, 14, 200, 10_007] {
+            let lines = (0..=of).filter(|done| is_printed(*done, of)).count();
+            assert!(lines <= PIECES_LINES + 2 && is_printed(of, of), "{of}: {lines}");
+        }
+        assert_eq!((0..=14).filter(|done| is_printed(*done, 14)).count(), 15, "each of a few");
+    }
+}

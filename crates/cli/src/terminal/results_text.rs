@@ -1,0 +1,159 @@
+//! Results of a run or an identification, for a terminal.
+
+use mapper_maps::RepeatedJump;
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::{CompressorMap, ThermalModel, Verdict};
+use mapper_identify::{TwoParameter, ZeroOutcome};
+use mapper_observe::FusedChannel;
+use mapper_report::{
+    Display, Paint, ScoredPoint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text,
+    points_text, repeated_jumps_text, sensors_text, shared_errors_text, surge_columns_text, surge_text,
+    thermal_text, truth_text, verdict_sentence, wrapped, zero_text,
+};
+use mapper_session::{Identified, Results, SoughtSurge};
+use std::fmt::Write;
+
+/// Default width of a terminal, columns.
+const COLUMNS: usize = 80;
+
+/// Level of detail.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Shown {
+    /// Everything, in tables as wide as they need to be.
+    pub full: bool,
+    /// The simulator's truth next to each value.
+    pub truth: bool,
+    /// Colours.
+    pub paint: Paint,
+}
+
+/// Results of a run, or of identified recordings.
+struct Found<'a> {
+    points: &'a [ScoredPoint],
+    two_parameter: &'a [TwoParameter],
+    map: Option<&'a CompressorMap>,
+    repeats: Vec<RepeatedJump>,
+    thermal: Option<&'a ThermalModel>,
+    sensors: &'a [FusedChannel],
+    zero: &'a ZeroOutcome,
+    surge: Option<&'a SoughtSurge>,
+    remarks: Vec<String>,
+    /// The command that shows the rest.
+    more: &'a str,
+}
+
+/// The results of a run: a table, notes, verdict and files. `more`: the command that shows the rest, in words.
+pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: Shown) -> String {
+    let mut text = found_text(
+        units,
+        &Found {
+            points: &results.points,
+            two_parameter: &results.two_parameter,
+            map: results.compressor_map.as_ref(),
+            repeats: results.repeats.clone(),
+            thermal: results.thermal.as_ref(),
+            sensors: &results.sensors,
+            zero: &results.zero,
+            surge: results.surge.as_ref(),
+            remarks: results.remarks.clone(),
+            more,
+        },
+        shown,
+    );
+    let mut files: Vec<(&str, &std::path::Path)> = Vec::new();
+    files.extend(results.map.values().map(|path| ("map", path.as_path())));
+    files.extend([("report", results.report.as_path()), ("page", results.page.as_path())]);
+    let recordings = std::iter::once(&results.recording).chain(&results.further_recordings);
+    files.extend(recordings.map(|path| ("recording", path.as_path())));
+    for (what, path) in files {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{what:<11}{}", path.display());
+    }
+    text
+}
+
+/// The results of an identification that wrote no files. `more`: the command that shows the rest, in words; `warnings`: problems of
+/// the recordings.
+pub fn identified_text(
+    units: &DisplayUnits,
+    identified: &Identified,
+    more: &str,
+    warnings: &[String],
+    shown: Shown,
+) -> String {
+    let warnings = warnings.iter().map(|warning| format!("recording: {warning}"));
+    let found = Found {
+        points: &identified.points,
+        two_parameter: &identified.two_parameter,
+        map: None,
+        repeats: Vec::new(),
+        thermal: identified.thermal.as_ref(),
+        sensors: &identified.sensors,
+        zero: &identified.zero,
+        surge: identified.surge.as_ref(),
+        remarks: identified.remarks.iter().cloned().chain(warnings).collect(),
+        more,
+    };
+    found_text(units, &found, shown)
+}
+
+fn found_text(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
+    let mut text = if shown.full { full(units, found, shown) } else { short(units, found, shown) };
+    let has = |verdict| found.points.iter().any(|scored| scored.point.verdict == verdict);
+    let worst = [Verdict::Unusable, Verdict::Doubtful].into_iter().find(|verdict| has(*verdict));
+    let words = verdict_sentence(found.points.iter().map(|scored| &scored.point));
+    let words = paint_verdict(worst.unwrap_or(Verdict::Good), &words, shown.paint);
+    let _ = writeln!(text, "\n{words}\n");
+    text
+}
+
+fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
+    let mut text = String::new();
+    if let Some(disagreement) = disagreement_text(found.points, found.two_parameter, units) {
+        text.push_str(&wrapped(&disagreement, COLUMNS, 2));
+        text.push('\n');
+    }
+    text.push_str(&points_by_line_text(found.points, found.map, units, shown.truth, shown.paint));
+    text.push('\n');
+    text.push_str(&first_doubts_text(found.points));
+    if let Some(truth) = truth_text(found.points).filter(|_| shown.truth) {
+        text.push_str(&wrapped(&truth, COLUMNS, 2));
+    }
+    if let Some(surge) = found.surge {
+        text.push_str(&surge_columns_text(&surge.marks, &surge.remarks, surge.surges, units, shown.truth));
+    }
+    // Omit sensors that all agree.
+    for fused in found.sensors.iter().filter(|fused| !fused.left_out.is_empty()) {
+        text.push_str(&wrapped(&fused.to_string(), COLUMNS, 2));
+    }
+    for remark in &found.remarks {
+        text.push_str(&wrapped(remark, COLUMNS, 2));
+    }
+    let more = format!(
+        "+/- is half a 95 % interval. What all points share, repeats, sensors and the zero: {}, or the page of the run.",
+        found.more
+    );
+    text.push_str(&wrapped(&more, COLUMNS, 2));
+    text
+}
+
+fn full(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
+    let mut text = disagreement_text(found.points, found.two_parameter, units).unwrap_or_default();
+    text.push_str(&points_text(found.points, units, shown.truth));
+    if let Some(shared) = shared_errors_text(found.points.iter().map(|scored| &scored.point), units) {
+        let _ = writeln!(text, "{shared}");
+    }
+    text.push_str(&repeated_jumps_text(&found.repeats, &Display::new(units)));
+    if let Some(thermal) = found.thermal {
+        text.push_str(&thermal_text(thermal));
+    }
+    text.push_str(&sensors_text(found.sensors));
+    text.push_str(&zero_text(found.zero));
+    if let Some(surge) = found.surge {
+        let _ = write!(text, "\n{}", surge_text(&surge.marks, &surge.remarks, surge.surges, units));
+    }
+    for remark in &found.remarks {
+        let _ = writeln!(text, "{remark}");
+    }
+    text
+}

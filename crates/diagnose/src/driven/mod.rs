@@ -1,0 +1,24 @@
+//! Identification from a log without steps, driven by the measured neighbours of the compressor side.
+//!
+//! On an engine P3 and valve are not set, and the machine never settles. The compressor's effect on the gas follows from the measured
+//! speed, flow, pressures and inlet temperature. The judged channels are T2 and, if measured, Tc. [`identify`] samples all parameters that
+//! agree with one part of a log, and predicts the rest.
+//!
+//! The result is a posterior sample within the priors ([`PARAMETERS`]), not a best fit: a log of 13 s cannot distinguish a slow probe from
+//! a warm housing, and the result must show this.
+
+mod density;
+mod ensemble;
+mod error;
+mod outcome;
+mod parameters;
+mod readings;
+mod rows;
+mod side;
+pub mod why;
+
+pub use error::DrivenError;
+pub use outcome::{DrivenOutcome, FoundParameter, Judged, Moves, Trace, identify};
+pub use parameters::{PARAMETERS, Parameter, Values};
+pub use readings::Readings;
+pub use side::{Declared, Predicted, predict};

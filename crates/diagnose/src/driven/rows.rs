@@ -1,0 +1,115 @@
+//! Complete rows of a log: driving and judged channels of one side of the machine.
+
+use crate::driven::DrivenError;
+use mapper_core::{Channel, Recording};
+use mapper_observe::plausible::is_reading;
+
+/// Minimum spacing of rows, s: no judged quantity is faster than a probe.
+const SPACING_S: f64 = 0.1;
+/// Maximum number of rows, spread over the whole of a longer log: five minutes at 10 Hz. The sampler evaluates them some hundred thousand
+/// times.
+const MAX_ROWS: usize = 3_000;
+
+/// Channels that a side needs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted<'a> {
+    /// Driving channels.
+    pub(crate) drives: &'a [Channel],
+    /// Judged channels; the first is required and its times define the rows.
+    pub(crate) judged: &'a [Channel],
+    /// Whether the side's equations apply at these values of `drives`.
+    pub(crate) works: fn(&[f64]) -> bool,
+}
+
+/// Complete rows, as columns of equal length. SI units.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Rows {
+    /// Time, s, rising.
+    pub(crate) t_s: Vec<f64>,
+    /// Driving channels, in the requested order.
+    pub(crate) drives: Vec<(Channel, Vec<f64>)>,
+    /// Their rates of change, per second; empty if not requested.
+    pub(crate) rates: Vec<Vec<f64>>,
+    /// Judged channels, in the requested order; NaN if not measured (never for the first).
+    pub(crate) judged: Vec<(Channel, Vec<f64>)>,
+    /// Omitted rows of the first judged channel.
+    pub(crate) lost: usize,
+}
+
+impl Rows {
+    /// Rows of a recording at the times of the first judged channel.
+    ///
+    /// # Errors
+    /// [`DrivenError::Channel`] if a driving channel or the first judged one is missing.
+    pub(crate) fn read(recording: &Recording, wanted: Wanted<'_>) -> Result<Self, DrivenError> {
+        let Some(first) = wanted.judged.first() else {
+            return Ok(Rows::default());
+        };
+        let judged = recording.require(*first)?;
+        let mut series = Vec::with_capacity(wanted.drives.len());
+        for channel in wanted.drives {
+            series.push((*channel, recording.require(*channel)?));
+        }
+        let span_s =
+            judged.t_s.last().zip(judged.t_s.first()).map_or(0.0, |(last_s, first_s)| last_s - first_s);
+        let spacing_s = SPACING_S.max(span_s / MAX_ROWS as f64);
+        let columns = |channels: &[Channel]| channels.iter().map(|channel| (*channel, Vec::new())).collect();
+        let mut rows =
+            Rows { drives: columns(wanted.drives), judged: columns(wanted.judged), ..Rows::default() };
+        let mut row = Vec::with_capacity(series.len());
+        for (t_s, value) in judged.t_s.iter().zip(&judged.values) {
+            if rows.t_s.last().is_some_and(|last_s| t_s - last_s < 0.999 * spacing_s) {
+                continue;
+            }
+            row.clear();
+            row.extend(series.iter().map_while(|(channel, series)| {
+                // No extrapolation beyond the ends of a channel.
+                let inside = series.t_s.first() <= Some(t_s) && series.t_s.last() >= Some(t_s);
+                series.interpolate(*t_s).filter(|value| inside && is_reading(*channel, *value))
+            }));
+            if row.len() < series.len() || !is_reading(*first, *value) || !(wanted.works)(&row) {
+                rows.lost += 1;
+                continue;
+            }
+            // Spacing over the whole log may give one row too many.
+            if rows.t_s.len() > MAX_ROWS {
+                break;
+            }
+            rows.t_s.push(*t_s);
+            for ((_, column), value) in rows.drives.iter_mut().zip(&row) {
+                column.push(*value);
+            }
+            for (channel, column) in &mut rows.judged {
+                let other = || recording.series.get(channel).and_then(|other| other.interpolate(*t_s));
+                let read = if channel == first { Some(*value) } else { other() };
+                column.push(read.filter(|k| is_reading(*channel, *k)).unwrap_or(f64::NAN));
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Readings of a driving channel; empty for any other.
+    pub(crate) fn drive(&self, channel: Channel) -> &[f64] {
+        self.drives.iter().find(|(of, _)| *of == channel).map_or(&[], |(_, column)| column)
+    }
+
+    /// Every `n`-th row, so that at most `most` remain.
+    pub(crate) fn thinned(&self, most: usize) -> Rows {
+        let every = self.len().div_ceil(most.max(1)).max(1);
+        let thin = |column: &[f64]| column.iter().copied().step_by(every).collect::<Vec<f64>>();
+        let each = |columns: &[(Channel, Vec<f64>)]| columns.iter().map(|(c, v)| (*c, thin(v))).collect();
+        let rates = self.rates.iter().map(|column| thin(column)).collect();
+        Rows {
+            t_s: thin(&self.t_s),
+            drives: each(&self.drives),
+            rates,
+            judged: each(&self.judged),
+            lost: self.lost,
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! The whole diagnosis of one recording.
+
+use crate::gap::actuators::Actuators;
+use crate::gap::additions::additions;
+use crate::gap::adequacy::{Adequacy, adequacy};
+use crate::gap::calibration::Calibration;
+use crate::gap::default_tolerances::assumed;
+use crate::gap::experiment::Experiment;
+use crate::gap::fit::{Effort, Fit};
+use crate::gap::folds::Folds;
+pub use crate::gap::gap_error::GapError;
+use crate::gap::healthy::Healthy;
+use crate::gap::how_far::{Compared, how_far};
+use crate::gap::machine_mismatch::another_machine;
+use crate::gap::next::{Suggested, look_beside, next};
+use crate::gap::place::{Gain, places};
+use crate::gap::problem::Problem;
+use crate::gap::report::{Diagnosis, Verdict};
+use crate::gap::select::{Search, ranked, refit, search, search_onsets};
+use crate::gap::selection::Selection;
+use crate::gap::smallest_seen::smallest_seen;
+use crate::gap::study::{Hypothesis, Prediction, Study, members};
+use crate::gap::usable::usable;
+use crate::gap::weigh::{rivals, suspicions, weigh, weight};
+use crate::gap::whiten::Linearised;
+use mapper_core::Recording;
+use mapper_observe::declared::Declared;
+use mapper_observe::step_timing::with_command_times;
+use mapper_observe::table::Table;
+use mapper_physics::effect::Effect;
+use mapper_physics::model::Model;
+use std::sync::Arc;
+
+/// What a diagnosis starts from.
+pub struct Question<'a> {
+    /// What was recorded.
+    pub recording: &'a Recording,
+    /// What is declared.
+    pub declared: Declared,
+    /// A recording of the same rig and steps in which nothing was wrong: what is asked then is what changed since.
+    pub healthy: Option<Healthy<'a>>,
+    /// The nominal machine.
+    pub model: Model,
+    /// Candidate effects.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Whether the campaign declares its tolerances; where it does not, the usual ones hold, and its actuators follow as the
+    /// recording says.
+    pub tolerances_declared: bool,
+    /// Experiments allowed on this machine to distinguish causes; if they contain no jump, those of the recording.
+    pub experiments: Vec<Experiment>,
+    /// Numbers behind the probabilities.
+    pub calibration: Calibration,
+    /// Receives the share done and the name of the next stage.
+    pub progress: &'a (dyn Fn(f64, &str) + Sync),
+}
+
+/// A diagnosis with what it was made from, for pictures and calibration.
+#[derive(Debug)]
+pub struct Diagnosed {
+    /// The diagnosis.
+    pub diagnosis: Diagnosis,
+    /// The recording made ready.
+    pub study: Study,
+    /// Tolerances alone, on all steps.
+    pub null: Fit,
+    /// Prediction and whitened residual of the nominal model with the tolerances of the best fit, but without its cause:
+    /// in [`Diagnosed::null`] tolerances are strained to stand in for it. The null itself where no cause is named.
+    pub without_cause: (Prediction, Vec<f64>),
+    /// Best fits on all steps, best first.
+    pub fits: Vec<Fit>,
+    /// The best fit, or that of a law that [accounts](Diagnosed::accounted_by) for the gap, with what people call it; `None`
+    /// where nothing was fitted.
+    pub with_cause: Option<(&'static str, Fit)>,
+    /// What the best leaves.
+    pub adequacy: Adequacy,
+    /// Whitening and derivatives.
+    pub linearised: Linearised,
+}
+
+/// Fits of the search that are made again on all steps.
+const FINALISTS: usize = 7;
+/// Of these, beyond the first three, a fit this far behind the best in the logarithm of the evidence is left out.
+const HOPELESS: f64 = 60.0;
+/// Causes among which each fold chooses again, and how far behind the best in the logarithm of the evidence one may be.
+const CHOSEN_AGAIN: usize = 3;
+const CLOSE: f64 = 10.0;
+/// Share of the null's misfit that a cause must remove to explain a gap in part, also on steps that its fit did not see.
+pub const MIN_SHRINK: f64 = 0.5;
+
+/// Diagnoses a recording.
+///
+/// # Errors
+/// [`GapError`] with a clear word where no diagnosis can be made.
+pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
+    let Question {
+        recording,
+        declared,
+        healthy,
+        model,
+        effects,
+        tolerances_declared,
+        experiments,
+        calibration,
+        progress,
+    } = question;
+    progress(0.0, "reading");
+    let recording = &with_command_times(recording);
+    let table = Table::new(recording).ok_or(Problem::Empty)?;
+    let mut warnings = usable(recording, &table, &declared)?;
+    let actuators = Actuators::of(&table, recording, &declared, tolerances_declared);
+    let (nominal, mut since) = (model.clone(), None);
+    let mut study = Study::with_actuators(recording, table, declared, model, effects, actuators);
+    if let Some(healthy) = healthy {
+        progress(0.01, "the healthy recording");
+        let changed = study.since(healthy, nominal, tolerances_declared)?;
+        study = changed.study;
+        since = Some(changed.since);
+        let of_healthy = |warning: String| format!("the healthy recording: {warning}");
+        warnings.extend(changed.warnings.into_iter().map(of_healthy));
+    }
+    if study.scatter_s > 0.0 {
+        warnings.push(format!(
+            "the times of the samples are off by {:.0} ms, as P3 shows where it jumps: readings that move count for as much less",
+            1e3 * study.scatter_s
+        ));
+    }
+    progress(0.02, "tolerances");
+    let linearised = Linearised::new(&study)?;
+    another_machine(&study, &linearised.base.values)?;
+    // Hold-outs are chosen by place, before anything is fitted.
+    let folds = Folds::of(&study);
+    let everywhere = Selection::all(&study);
+    let at = |linearised| Search {
+        study: &study,
+        linearised,
+        selection: &everywhere,
+        calibration: &calibration,
+        onsets: false,
+    };
+    let found = search(at(&linearised), progress)?;
+    progress(0.65, "closest causes");
+    let null = found.null;
+    let at_best = found.refound.as_ref().map_or(&linearised, |(linearised, _)| linearised);
+    let hopeless = |f: &&Fit| found.fits.first().is_some_and(|best| best.score - f.score > HOPELESS);
+    let mut finalists: Vec<&Fit> = found
+        .fits
+        .iter()
+        .take(FINALISTS)
+        .enumerate()
+        .filter(|(place, f)| *place < 3 || !hopeless(f))
+        .map(|(_, f)| f)
+        .collect();
+    // Whatever a pair adds, its members alone must have lost likewise.
+    if let Some(best) = found.fits.first() {
+        for effect in members(&best.hypothesis) {
+            let alone = found.fits.iter().find(|f| members(&f.hypothesis) == [effect]);
+            finalists.extend(alone.filter(|f| !finalists.iter().any(|other| std::ptr::eq(*other, *f))));
+        }
+    }
+    let effort = Effort { iterations: 5, enough: 0.1, ..Effort::default() };
+    let mut fits = refit(&at(at_best), &finalists, effort);
+    // Close candidates are compared with the linearisation at the best fit, not at the nominal point.
+    let refound = match (fits.first(), &found.refound) {
+        (Some(best), Some((_, there))) if members(&best.hypothesis) != *there => {
+            linearised.at(&study, &best.hypothesis).ok()
+        }
+        _ => None,
+    };
+    let at_best = refound.as_ref().unwrap_or(at_best);
+    if refound.is_some() {
+        let (closest, others) = fits.split_at(fits.len().min(4));
+        let again = refit(&at(at_best), &closest.iter().collect::<Vec<_>>(), effort);
+        fits = ranked(&at(at_best), again.iter().chain(closest).chain(others));
+    }
+    progress(0.75, "what one more would do");
+    let mut one_more = most_gain(&study, at_best, &everywhere, fits.first().unwrap_or(&null));
+    let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
+    if calibration.outside(left.features()) > 0.5 && folds.steps.len() > 1 {
+        progress(0.8, "causes that begin");
+        study.add_onsets();
+        let at = Search {
+            study: &study,
+            linearised: at_best,
+            selection: &everywhere,
+            calibration: &calibration,
+            onsets: true,
+        };
+        search_onsets(at, &null, &mut fits);
+        fits.truncate(FINALISTS);
+        let best = fits.first().unwrap_or(&null);
+        one_more = most_gain(&study, at_best, &everywhere, best);
+        left = adequacy(&study, &linearised, best, one_more);
+    }
+    progress(0.88, "residual");
+    let best = fits.first().unwrap_or(&null);
+    let left_by_null = adequacy(&study, &linearised, &null, 0.0);
+    let posterior = weigh(&study, &calibration, &null, &fits, &left);
+    let named = posterior.named;
+    let weight = |fit: &Fit| weight(&calibration, &study, fit);
+    let causes: Vec<&Fit> = fits
+        .iter()
+        .filter(|_| named)
+        .take(CHOSEN_AGAIN)
+        .filter(|fit| weight(best) - weight(fit) < CLOSE)
+        .collect();
+    let compared = Compared {
+        study: &study,
+        linearised: [&linearised, at_best],
+        null: &null,
+        causes: &causes,
+        weight: &weight,
+    };
+    let gap = how_far(compared, &folds);
+    let verdict = if !named {
+        if posterior.outside > 0.5 { Verdict::Unexplained } else { Verdict::WithinTolerance }
+    } else if posterior.outside <= 0.5 {
+        Verdict::Explained
+    } else {
+        let n = null.residual.len() as f64;
+        let removed = 1.0 - (best.cost - n).max(0.0) / (null.cost - n).max(1.0);
+        let smooth = 1.0 - left.smooth_excess.max(0.0) / left_by_null.smooth_excess.max(1.0);
+        let better = gap.shrink > MIN_SHRINK;
+        if removed > MIN_SHRINK && smooth > MIN_SHRINK && better {
+            Verdict::PartlyExplained
+        } else {
+            Verdict::Unexplained
+        }
+    };
+    let mut gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
+    for fit in &found.fits {
+        if gains.iter().all(|other| members(&other.fit.hypothesis) != members(&fit.hypothesis)) {
+            gains.push(Gain { fit, gain: null.cost - fit.cost });
+        }
+    }
+    let r#where = if verdict == Verdict::WithinTolerance {
+        Vec::new()
+    } else {
+        places(&study, &linearised, &null, &gains, named)
+    };
+    progress(0.95, "what next");
+    let Suggested { next, experiments } = match verdict {
+        Verdict::WithinTolerance => suspicions(&posterior, &fits, &null)
+            .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
+            .unwrap_or_default(),
+        Verdict::Unexplained | Verdict::PartlyExplained => {
+            Suggested { next: Some(look_beside(&r#where)), experiments: Vec::new() }
+        }
+        Verdict::Explained => rivals(&posterior, &fits)
+            .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
+            .unwrap_or_default(),
+    };
+    let smallest_seen = if verdict == Verdict::WithinTolerance {
+        smallest_seen(&study, &linearised, &calibration)
+    } else {
+        Vec::new()
+    };
+    progress(1.0, "done");
+    let diagnosis = Diagnosis {
+        verdict,
+        since,
+        r#where,
+        candidates: posterior.candidates,
+        probability_none: posterior.none,
+        probability_outside: posterior.outside,
+        laws: Vec::new(),
+        forces: Vec::new(),
+        gap,
+        next,
+        experiments,
+        smallest_seen,
+        off_at_rest: Vec::new(),
+        assumed: if tolerances_declared { Vec::new() } else { assumed(&study) },
+        warnings,
+    };
+    let without_cause = without_cause(&study, &linearised, fits.first().filter(|_| named))
+        .unwrap_or_else(|| (null.prediction.clone(), null.residual.clone()));
+    let with_cause = fits.first().map(|best| ("the first cause", best.clone()));
+    Ok(Diagnosed { diagnosis, study, null, without_cause, with_cause, fits, adequacy: left, linearised })
+}
+
+impl Diagnosed {
+    /// From here on pictures show what a law that was found leaves, not what the nearest of the catalogue does.
+    pub fn accounted_by(&mut self, law: Fit) {
+        if let Some(without) = without_cause(&self.study, &self.linearised, Some(&law)) {
+            self.without_cause = without;
+        }
+        self.with_cause = Some(("the law", law));
+    }
+}
+
+/// What one more effect would take off the cost at most.
+fn most_gain(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> f64 {
+    additions(study, linearised, selection, base).into_iter().map(|a| a.gain).fold(0.0, f64::max)
+}
+
+fn without_cause(
+    study: &Study,
+    linearised: &Linearised,
+    named: Option<&Fit>,
+) -> Option<(Prediction, Vec<f64>)> {
+    let bare = Hypothesis { nuisances: named?.hypothesis.nuisances.clone(), effects: Vec::new() };
+    let prediction = study.predict(&bare).ok()?;
+    let residual = linearised.residual(study, &prediction);
+    Some((prediction, residual))
+}

@@ -1,0 +1,283 @@
+//! Calibrated model: machine, effects and tolerances from a diagnosis, its forecasts, and their verification.
+
+use crate::gap::coordinate::coordinates;
+use crate::gap::diagnose::Diagnosed;
+use crate::gap::fit::{Fit, changes_near, effect_changes};
+use crate::gap::nuisance::{OFFSET_PREFIX, OUTPUTS};
+use crate::gap::outlook::{Alike, COARSE_S, imagined_steps};
+use crate::gap::report::Verdict;
+use crate::gap::study::{Hypothesis, Study};
+use crate::gap::whiten::{Linearised, dot};
+use mapper_core::{Channel, StepMarker, half_width_95};
+use mapper_inference::descent::FINE;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// An effect with its values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FoundEffect {
+    /// Its id.
+    pub id: String,
+    /// One value per parameter, in its unit.
+    pub values: Vec<f64>,
+}
+
+/// A tolerance or offset with its value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FoundTolerance {
+    /// Name of the tolerance.
+    pub name: String,
+    /// Fitted value, in the unit of what it changes; ratios for gains and scales.
+    pub value: f64,
+    /// Prior standard deviation.
+    pub sigma: f64,
+}
+
+impl FoundTolerance {
+    /// The channel whose offset it is; `None` for other tolerances.
+    pub fn offset_of(&self) -> Option<Channel> {
+        self.name.strip_prefix(OFFSET_PREFIX)?.parse().ok()
+    }
+}
+
+/// A machine as identified by a diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Found {
+    /// Named effects; empty if none is named.
+    pub effects: Vec<FoundEffect>,
+    /// All tolerances and offsets.
+    pub tolerances: Vec<FoundTolerance>,
+    /// Covariance of the tolerances in their sigmas, followed by the effects in search coordinates (typical steps, or logarithms if they
+    /// span decades).
+    pub covariance: Vec<Vec<f64>>,
+}
+
+/// Errors that prevent the verification of a calibrated model.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TwinError {
+    /// The nuisance parameters differ.
+    #[error(
+        "the diagnosis knows other tolerances than this campaign and recording ({theirs} and {ours}): take the campaign, channels and sensors of the diagnosis"
+    )]
+    Tolerances {
+        /// In the diagnosis.
+        theirs: usize,
+        /// Here.
+        ours: usize,
+    },
+    /// An unknown effect.
+    #[error("effect `{0}` of the diagnosis is not in the catalogue; give it with --effect")]
+    Effect(String),
+    /// Invalid covariance.
+    #[error("the covariance of the diagnosis is not one of its {0} tolerances and parameters")]
+    Covariance(usize),
+    /// The model cannot follow the recording.
+    #[error(transparent)]
+    Predict(#[from] crate::gap::study::PredictError),
+}
+
+fn is_start(name: &str) -> bool {
+    name == "StartTc" || name == "StartTt"
+}
+
+impl Found {
+    /// Result of a diagnosis; `None` if the covariance cannot be formed.
+    pub fn of(diagnosed: &Diagnosed) -> Option<Found> {
+        let named = matches!(diagnosed.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+        let best = diagnosed.fits.first().filter(|_| named).unwrap_or(&diagnosed.null);
+        Found::of_fit(&diagnosed.study, best)
+    }
+
+    fn of_fit(study: &Study, fit: &Fit) -> Option<Found> {
+        let covariance = fit.precision.clone().cholesky()?.inverse();
+        let tolerance = |(nuisance, sigmas): (&crate::gap::nuisance::Nuisance, &f64)| FoundTolerance {
+            name: nuisance.kind.to_string(),
+            value: nuisance.value(*sigmas),
+            sigma: nuisance.sigma,
+        };
+        Some(Found {
+            effects: fit
+                .hypothesis
+                .effects
+                .iter()
+                .map(|(index, values)| FoundEffect {
+                    id: study.effects[*index].info().id.to_string(),
+                    values: values.clone(),
+                })
+                .collect(),
+            tolerances: study.nuisances.iter().zip(&fit.hypothesis.nuisances).map(tolerance).collect(),
+            covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        })
+    }
+
+    /// Hypothesis of a calibrated model for another recording, with its covariance; that recording's start is still unknown.
+    fn hypothesis(&self, study: &Study) -> Result<(Hypothesis, DMatrix<f64>), TwinError> {
+        let same = study.nuisances.len() == self.tolerances.len()
+            && study
+                .nuisances
+                .iter()
+                .zip(&self.tolerances)
+                .all(|(n, found)| n.kind.to_string() == found.name);
+        if !same {
+            let (theirs, ours) = (self.tolerances.len(), study.nuisances.len());
+            return Err(TwinError::Tolerances { theirs, ours });
+        }
+        let mut effects = Vec::new();
+        for found in &self.effects {
+            let index = (0..study.catalogue).find(|i| study.effects[*i].info().id == found.id.as_str());
+            let index = index.ok_or_else(|| TwinError::Effect(found.id.clone()))?;
+            effects.push((index, found.values.clone()));
+        }
+        let n = self.tolerances.len() + effects.iter().map(|(_, values)| values.len()).sum::<usize>();
+        if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
+            return Err(TwinError::Covariance(n));
+        }
+        let mut covariance = DMatrix::from_fn(n, n, |i, j| self.covariance[i][j]);
+        let mut nuisances = Vec::with_capacity(self.tolerances.len());
+        for (i, found) in self.tolerances.iter().enumerate() {
+            if is_start(&found.name) {
+                covariance.row_mut(i).fill(0.0);
+                covariance.column_mut(i).fill(0.0);
+                covariance[(i, i)] = 1.0;
+                nuisances.push(0.0);
+            } else {
+                nuisances.push((found.value - study.nuisances[i].centre) / study.nuisances[i].sigma);
+            }
+        }
+        Ok((Hypothesis { nuisances, effects }, covariance))
+    }
+}
+
+/// Verification of one channel's forecast.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeldChannel {
+    /// Root mean square of measured minus forecast, in the channel's unit.
+    pub rms: f64,
+    /// Residual relative to the noise: 1 is pure noise.
+    pub ratio: f64,
+    /// Share of the values within the 95 % band.
+    pub inside: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Verification of a forecast.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Held {
+    /// Residual of all channels relative to the noise: 1 is pure noise.
+    pub ratio: f64,
+    /// Share of all values within the 95 % band.
+    pub inside: f64,
+    /// Number of values.
+    pub values: usize,
+    /// Each channel.
+    pub channels: BTreeMap<String, HeldChannel>,
+}
+
+/// Compares a calibrated model with a recording it was not fitted to, driven by the recorded inputs. Values are decorrelated block means
+/// within a step; each band includes noise and the model's uncertainty.
+///
+/// # Errors
+/// [`TwinError`].
+pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
+    let (hypothesis, covariance) = found.hypothesis(study)?;
+    let nominal = Linearised::new(study)?;
+    let there = nominal.at(study, &hypothesis)?;
+    let at = coordinates(&study.effects, &hypothesis);
+    let mut columns = there.columns.clone();
+    columns.extend(effect_changes(study, &nominal, &hypothesis, &there.base, &at));
+    let residual = nominal.residual(study, &there.base);
+    let spread = |row: usize| {
+        let j = DVector::from_fn(columns.len(), |i, _| columns[i][row]);
+        1.0 + (covariance.clone() * &j).dot(&j).max(0.0)
+    };
+    let inside: Vec<f64> = residual
+        .iter()
+        .enumerate()
+        .map(|(row, r)| f64::from(u8::from(r.abs() < half_width_95(spread(row).sqrt()))))
+        .collect();
+    let mut channels = BTreeMap::new();
+    for (output, channel) in OUTPUTS.iter().enumerate() {
+        let rows: Vec<usize> =
+            study.groups.iter().filter(|g| g.output == output).flat_map(|g| g.rows.clone()).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let mean =
+            |of: &dyn Fn(usize) -> f64| rows.iter().map(|row| of(*row)).sum::<f64>() / rows.len() as f64;
+        let held = HeldChannel {
+            rms: mean(&|row| (study.measured[row] - there.base.values[row]).powi(2)).sqrt(),
+            ratio: mean(&|row| residual[row] * residual[row]).sqrt(),
+            inside: mean(&|row| inside[row]),
+            unit: channel.unit().to_owned(),
+        };
+        channels.insert(channel.symbol().to_owned(), held);
+    }
+    let n = residual.len().max(1) as f64;
+    Ok(Held {
+        ratio: (dot(&residual, &residual) / n).sqrt(),
+        inside: inside.iter().sum::<f64>() / n,
+        values: residual.len(),
+        channels,
+    })
+}
+
+/// Forecast at the end of a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Expected {
+    /// Index of the step, from 0; files use its number, from 1.
+    #[serde(with = "mapper_core::step_number")]
+    pub step: usize,
+    /// Each channel: value and half the width of its 95 % band, in the channel's unit.
+    pub channels: BTreeMap<String, [f64; 2]>,
+}
+
+/// Forecasts the ends of planned steps with the campaign's inputs.
+///
+/// # Errors
+/// [`TwinError`]; no steps if the nominal machine cannot settle at the first.
+pub fn forecast_steps(
+    like: Alike,
+    steps: Vec<StepMarker>,
+    found: &Found,
+) -> Result<Vec<Expected>, TwinError> {
+    let rest = steps.first().and_then(|step| step.to);
+    let study = rest.and_then(|rest| imagined_steps(like, steps, &rest, COARSE_S, |_| None));
+    study.map_or_else(|| Ok(Vec::new()), |study| forecast(&study, found))
+}
+
+/// Forecasts the ends of a study's steps; the bands include model uncertainty and the noise of a reading.
+///
+/// # Errors
+/// [`TwinError`].
+fn forecast(study: &Study, found: &Found) -> Result<Vec<Expected>, TwinError> {
+    let (hypothesis, covariance) = found.hypothesis(study)?;
+    let here = study.predict(&hypothesis)?;
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let changed = |moved: &Hypothesis, by: f64| -> Vec<f64> {
+        let Ok(there) = study.predict(moved) else { return vec![0.0; here.values.len()] };
+        there.values.iter().zip(&here.values).map(|(t, h)| (t - h) / by).collect()
+    };
+    for i in 0..hypothesis.nuisances.len() {
+        let mut moved = hypothesis.clone();
+        moved.nuisances[i] += 1.0;
+        columns.push(changed(&moved, 1.0));
+    }
+    let at = coordinates(&study.effects, &hypothesis);
+    columns.extend(changes_near(study, &hypothesis, &here, &at, FINE));
+    let mut expected: Vec<Expected> =
+        (0..study.steps.len()).map(|step| Expected { step, channels: BTreeMap::new() }).collect();
+    for group in &study.groups {
+        let Some(row) = group.rows.clone().last() else { continue };
+        let j = DVector::from_fn(columns.len(), |i, _| columns[i][row]);
+        let noise = study.declared.noise_sigma(OUTPUTS[group.output]);
+        let sigma = ((covariance.clone() * &j).dot(&j).max(0.0) + noise * noise).sqrt();
+        let channel = OUTPUTS[group.output].symbol().to_owned();
+        expected[group.step].channels.insert(channel, [here.values[row], half_width_95(sigma)]);
+    }
+    Ok(expected)
+}

@@ -1,0 +1,8 @@
+//! A recording compared with the model: gaps and their causes, drift, missing terms, logs without steps.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod gap;
+pub mod drift;
+pub mod missing_terms;
+pub mod driven;

@@ -1,0 +1,370 @@
+//! Searches for laws that explain the residual of a diagnosis, and locates their source terms.
+
+use crate::missing_terms::balance::Balance;
+use crate::missing_terms::candidate::{Bench, Candidate, keep_determined, worth};
+use crate::missing_terms::columns::{Base, Products};
+use crate::missing_terms::force::{Force, forces};
+use crate::missing_terms::held_out::shrink;
+use crate::missing_terms::library::library;
+use crate::missing_terms::onset::begun;
+use crate::missing_terms::script::script;
+use crate::missing_terms::select::{Choice, choices};
+use crate::missing_terms::sentence::{LawDescription, tell};
+use crate::gap::additions::additions;
+use crate::gap::adequacy::adequacy;
+use crate::gap::calibration::Calibration;
+use crate::gap::diagnose::{Diagnosed, MIN_SHRINK};
+use crate::gap::first_step::with_start_read;
+use crate::gap::fit::{Effort, Fit, fit};
+use crate::gap::how_far::channels_on;
+use crate::gap::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
+use crate::gap::report::{Law, MissingForce, Place, Verdict};
+use crate::gap::selection::Selection;
+use crate::gap::study::{Study, members};
+use crate::gap::weigh::{ALIKE, MAX_EQUIVALENT, weight};
+
+/// Results outside the effect library.
+#[derive(Debug, Default)]
+pub struct Discovered {
+    /// Proposed laws, best first; usually one or none.
+    pub laws: Vec<Law>,
+    /// Residual source term of each balance, most probable first.
+    pub forces: Vec<MissingForce>,
+    /// Locations of the gap; `None` if the diagnosis' locations remain valid.
+    pub places: Option<Vec<Place>>,
+    /// The first law fitted to all steps, if it is more probable than not.
+    pub settled: Option<Fit>,
+}
+
+/// Number of leave-one-out folds of steps in which a law must recur.
+const FOLDS: usize = 6;
+/// Minimum share of the folds in which a law must recur.
+const MIN_STABILITY: f64 = 0.5;
+/// Maximum number of reported source terms.
+const FORCES: usize = 3;
+
+/// Searches outside the effect library, if the diagnosis leaves a residual; see [`wanted`].
+pub fn discover(
+    diagnosed: &Diagnosed,
+    calibration: &Calibration,
+    progress: &(dyn Fn(f64, &str) + Sync),
+) -> Discovered {
+    if !wanted(diagnosed) {
+        return Discovered::default();
+    }
+    let Diagnosed { study, linearised, null, .. } = diagnosed;
+    progress(0.0, "laws");
+    let library = library();
+    let everywhere = Selection::all(study);
+    let mut training = everywhere.clone();
+    for step in held_out_steps(diagnosed) {
+        training.steps[*step] = false;
+    }
+    let nothing = Base::nothing(study, linearised);
+    let mut bench = Bench { study: study.clone(), library };
+    let mut found = found(&mut bench, &nothing, &training, &everywhere, &|fit| {
+        adequacy(study, linearised, fit, 0.0).may_be_noise()
+    });
+    progress(0.4, "a law together with a cause");
+    let left = found.as_ref().is_none_or(|found| !found.adequate);
+    if left
+        && diagnosed.diagnosis.verdict == Verdict::PartlyExplained
+        && let Some(best) = diagnosed.fits.first()
+        && let Some(both) = together_with_cause(&mut bench, diagnosed, best, &training, &everywhere)
+    {
+        let score = |found: &FittedLaws| found.fitted.first().map_or(f64::NEG_INFINITY, Candidate::score);
+        let better = found.as_ref().is_none_or(|alone| score(&both) > score(alone) + RARE_BESIDE);
+        found = if better { Some(both) } else { found };
+    }
+    progress(0.6, "what a law leaves");
+    let laws = propose(diagnosed, calibration, &bench, found.as_ref(), &training);
+    // If a law leaves only noise, linear gains of other parts are irrelevant.
+    let settled = laws.first().filter(|law| law.probability > 0.5);
+    let best = found.as_ref().and_then(|found| found.fitted.first());
+    let settled_fit = settled.and(best).map(|best| best.fit.clone());
+    let bend = if settled.is_some() { 0.0 } else { BEND };
+    progress(0.7, "missing forces");
+    let here = |balance: &Balance| settled.is_none_or(|law| law.submodel == balance.submodel().name());
+    let forces = forces(&nothing, &everywhere.steps, &here);
+    let places = places(diagnosed, &bench, found.as_ref(), &forces, null, bend);
+    progress(1.0, "done");
+    Discovered {
+        laws,
+        forces: forces.into_iter().take(FORCES).map(reported_force).collect(),
+        places: Some(places),
+        settled: settled_fit,
+    }
+}
+
+/// Steps withheld while a law is chosen: the first fold. A search for each fold would take three times as long.
+fn held_out_steps(diagnosed: &Diagnosed) -> &[usize] {
+    match diagnosed.diagnosis.gap.folds.as_slice() {
+        [first, _, ..] => first,
+        _ => &[],
+    }
+}
+
+/// Whether a diagnosis leaves a residual to explain.
+pub fn wanted(diagnosed: &Diagnosed) -> bool {
+    matches!(diagnosed.diagnosis.verdict, Verdict::PartlyExplained | Verdict::Unexplained)
+        || (diagnosed.diagnosis.verdict != Verdict::WithinTolerance
+            && diagnosed.diagnosis.probability_outside > 0.5)
+}
+
+/// Fitted laws.
+struct FittedLaws {
+    /// Fits to the training steps, best first.
+    trained: Vec<Candidate>,
+    /// The best of these fitted to all steps, best first.
+    fitted: Vec<Candidate>,
+    /// Share of the folds in which the best recurs.
+    stability: f64,
+    /// Whether the best leaves only noise.
+    adequate: bool,
+}
+
+/// A law in addition to a cause costs as much as a second cause.
+const RARE_BESIDE: f64 = 3.0;
+
+/// Search in addition to the best library cause.
+fn together_with_cause(
+    bench: &mut Bench,
+    diagnosed: &Diagnosed,
+    best: &Fit,
+    training: &Selection,
+    everywhere: &Selection,
+) -> Option<FittedLaws> {
+    let Diagnosed { study, linearised, .. } = diagnosed;
+    let there = linearised.at(study, &best.hypothesis).ok()?;
+    let base = Base::beside(study, &there, best);
+    found(bench, &base, training, everywhere, &|fit| adequacy(study, linearised, fit, 0.0).may_be_noise())
+}
+
+/// Searches the term library from a base: in closed form, then with model runs.
+fn found(
+    bench: &mut Bench,
+    base: &Base<'_>,
+    training: &Selection,
+    everywhere: &Selection,
+    adequate: &dyn Fn(&Fit) -> bool,
+) -> Option<FittedLaws> {
+    let changes = base.changes(&bench.library);
+    let usable: Vec<usize> = (0..changes.len()).filter(|place| changes[*place].is_some()).collect();
+    let columns: Vec<Vec<f64>> = changes.into_iter().flatten().collect();
+    let products = Products::new(base, &columns);
+    let of = |counts: &[bool]| Some(choices(&bench.library, &usable, &products.projected(counts)?));
+    let on_training = of(&training.steps)?;
+    let folds: Vec<Vec<bool>> = (0..FOLDS)
+        .map(|fold| {
+            let steps = training.steps.iter().enumerate();
+            steps.map(|(step, counts)| *counts && step % FOLDS != fold).collect()
+        })
+        .collect();
+    let in_folds: Vec<Vec<Choice>> = folds.iter().filter_map(|counts| of(counts)).collect();
+    let chosen = worth(&bench.library, &on_training);
+    let found = fitted(bench, base, &chosen, training, everywhere)?;
+    let (trained, fitted_best) = (found.0.first()?, found.1.first()?);
+    let part = |choice: &Choice| bench.library[choice.terms[0]].submodel();
+    let again = in_folds.iter().filter(|fold| {
+        let Some(first) = fold.first() else { return false };
+        let own = fold.iter().find(|choice| choice.terms == trained.choice.terms);
+        part(first) == part(&trained.choice) && own.is_some_and(|own| own.gain > LIKE * first.gain)
+    });
+    let stability = again.count() as f64 / folds.len().max(1) as f64;
+    if adequate(&fitted_best.fit) {
+        return Some(FittedLaws { trained: found.0, fitted: found.1, stability, adequate: true });
+    }
+    // If no law explains the residual, one may have begun during the recording.
+    let alone = FittedLaws { trained: found.0, fitted: found.1, stability, adequate: false };
+    let Some((later, stability)) = begun(base, &mut bench.library, &on_training, &training.steps, &folds)
+    else {
+        return Some(alone);
+    };
+    let promised =
+        later.first().is_some_and(|later| on_training.first().is_none_or(|first| later.gain > first.gain));
+    let fits = if promised { fitted(bench, base, &later, training, everywhere) } else { None };
+    Some(match fits {
+        Some((trained, fitted)) if fitted.first()?.score() > alone.fitted.first()?.score() => {
+            let adequate = adequate(&fitted.first()?.fit);
+            FittedLaws { trained, fitted, stability, adequate }
+        }
+        _ => alone,
+    })
+}
+
+/// Fits choices with model runs: to the training steps, and the best of them to all steps.
+fn fitted(
+    bench: &mut Bench,
+    base: &Base<'_>,
+    chosen: &[Choice],
+    training: &Selection,
+    everywhere: &Selection,
+) -> Option<(Vec<Candidate>, Vec<Candidate>)> {
+    let quick = Effort { iterations: 3, enough: 1.0, ..Effort::default() };
+    let mut trained = bench.fit(&base.hypothesis, base.linearised, chosen, training, quick);
+    keep_determined(&bench.library, &mut trained);
+    trained.truncate(FINALISTS);
+    // Tolerances act differently in the presence of a strong term.
+    let at_trained = base.linearised.at(&bench.study, &trained.first()?.fit.hypothesis).ok();
+    let linearised = at_trained.as_ref().unwrap_or(base.linearised);
+    let effort = Effort { iterations: 5, enough: 0.2, ..Effort::default() };
+    let trained = bench.refit(&trained, linearised, training, effort);
+    let mut fitted = bench.refit(&trained, linearised, everywhere, effort);
+    keep_determined(&bench.library, &mut fitted);
+    Some((trained, fitted))
+}
+
+/// Number of laws fitted to convergence.
+const FINALISTS: usize = 3;
+/// Minimum evidence of a recurring law in a fold, as a share of the best evidence.
+const LIKE: f64 = 0.95;
+
+/// The best law, if it passes all tests.
+fn propose(
+    diagnosed: &Diagnosed,
+    calibration: &Calibration,
+    bench: &Bench,
+    found: Option<&FittedLaws>,
+    training: &Selection,
+) -> Vec<Law> {
+    let Some(found) = found else { return Vec::new() };
+    let Some(best) = found.fitted.first() else { return Vec::new() };
+    let Some(trained) = found.trained.iter().find(|trained| trained.effect == best.effect) else {
+        return Vec::new();
+    };
+    let Diagnosed { study, linearised, null, fits, .. } = diagnosed;
+    // The best alternative: no cause, or a library cause.
+    let inside = fits
+        .iter()
+        .map(|fit| weight(calibration, study, fit))
+        .fold(weight(calibration, study, null), f64::max);
+    if best.score() + PRIOR_LAW.ln() - inside < calibration.threshold {
+        return Vec::new();
+    }
+    let Ok(before) = fit(&bench.study, linearised, &study.nothing(), training, Effort::default()) else {
+        return Vec::new();
+    };
+    let held_out = held_out_steps(diagnosed);
+    let read = |fit: Fit| {
+        if training.steps[0] { fit } else { with_start_read(&bench.study, linearised, fit) }
+    };
+    let (before, after) = (read(before), read(trained.fit.clone()));
+    let shrink = shrink(study, &before, &after, held_out);
+    if shrink < MIN_SHRINK || found.stability < MIN_STABILITY {
+        return Vec::new();
+    }
+    let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);
+    let everywhere = Selection::all(study);
+    let (own, own_fit) = bench.alone(study, best);
+    let one_more = additions(&own, linearised, &everywhere, &own_fit)
+        .into_iter()
+        .map(|addition| addition.gain)
+        .fold(0.0, f64::max);
+    let left = calibration.outside(adequacy(&bench.study, linearised, &best.fit, one_more).features());
+    let near = |other: &&Candidate| best.score() - other.score() < ALIKE * calibration.temperature;
+    let weights: f64 = found
+        .fitted
+        .iter()
+        .map(|other| ((other.score() - best.score()) / calibration.temperature).exp())
+        .sum::<f64>()
+        + ((inside - best.score() - PRIOR_LAW.ln()) / calibration.temperature).exp();
+    let describe = |candidate: &Candidate| tell(&bench.library, candidate, calibration.interval_factor);
+    let LawDescription { sentence, terms, sink_k } = describe(best);
+    let description = LawDescription { sentence: sentence.clone(), terms: terms.clone(), sink_k };
+    let equivalent =
+        found.fitted.iter().skip(1).filter(near).take(MAX_EQUIVALENT).map(|c| describe(c).sentence);
+    vec![Law {
+        submodel: bench.library[best.choice.terms[0]].submodel().name().to_owned(),
+        sentence,
+        terms,
+        probability: (1.0 - left) / weights,
+        shrink: if worse.is_empty() { shrink } else { 0.0 },
+        held_out_steps: held_out.len(),
+        channels,
+        worse,
+        beside: accompanying_effects(study, best),
+        stability: found.stability,
+        equivalent: equivalent.collect(),
+        rhai: None,
+        script: script(&bench.library, best, &description),
+    }]
+}
+
+/// Library effects fitted together with a law.
+fn accompanying_effects(study: &Study, law: &Candidate) -> Vec<String> {
+    let others = law.fit.hypothesis.effects.iter().filter_map(|(index, _)| study.effects.get(*index));
+    others.map(|effect| effect.info().id.to_string()).collect()
+}
+
+/// Prior of all laws together.
+const PRIOR_LAW: f64 = 0.15;
+
+/// Locations from all explanations tried: effects, laws, source terms.
+fn places(
+    diagnosed: &Diagnosed,
+    bench: &Bench,
+    found: Option<&FittedLaws>,
+    forces: &[Force],
+    null: &Fit,
+    bend: f64,
+) -> Vec<Place> {
+    let Diagnosed { study, linearised, fits, .. } = diagnosed;
+    let gains: Vec<Gain<'_>> = fits.iter().map(|fit| Gain { fit, gain: null.cost - fit.cost }).collect();
+    let mut explanations: Vec<Explanation<'_>> = of_fits(study, &gains);
+    let fitted = found.map_or(&[][..], |found| &found.fitted);
+    explanations.extend(fitted.iter().map(|law| {
+        let gain = null.cost - law.fit.cost;
+        let others: Vec<usize> =
+            members(&law.fit.hypothesis).into_iter().filter(|effect| *effect != law.effect).collect();
+        let without = fits.iter().find(|fit| members(&fit.hypothesis) == others);
+        let of_others = without.map_or(0.0, |fit| null.cost - fit.cost).clamp(0.0, gain.max(0.0));
+        let law_part = Part {
+            submodel: bench.library[law.choice.terms[0]].submodel(),
+            gain: (gain - of_others).max(0.0),
+            signature: Box::new(move || signature(&bench.study, &law.fit, law.effect)),
+        };
+        let each = of_others / others.len().max(1) as f64;
+        let other_parts = others.iter().map(|effect| {
+            let effect = *effect;
+            Part {
+                submodel: study.effects[effect].info().submodel,
+                gain: each,
+                signature: Box::new(move || signature(&bench.study, &law.fit, effect)),
+            }
+        });
+        let score = 0.5 * gain - law.choice.rarity - RARITY * (1 + others.len()) as f64;
+        Explanation { score, parts: std::iter::once(law_part).chain(other_parts).collect() }
+    }));
+    // Linear gains are relative to the linear cost of the null hypothesis.
+    let linear_null = 0.5 * (null.cost - linear_cost(diagnosed));
+    for force in forces.iter().filter(|force| force.gain > 0.0) {
+        let part = Part {
+            submodel: force.balance.submodel(),
+            gain: 2.0 * force.gain,
+            signature: Box::new(move || Some(force.signature.clone())),
+        };
+        explanations.push(Explanation { score: force.gain + linear_null, parts: vec![part] });
+    }
+    places_of(study, linearised, null, &explanations, bend)
+}
+
+/// Linear estimate of the cost with tolerances only, from the nominal model.
+fn linear_cost(diagnosed: &Diagnosed) -> f64 {
+    let base = Base::nothing(&diagnosed.study, &diagnosed.linearised);
+    let everywhere = Selection::all(&diagnosed.study);
+    Products::new(&base, &[]).projected(&everywhere.steps).map_or(diagnosed.null.cost, |left| left[(0, 0)])
+}
+
+fn reported_force(force: Force) -> MissingForce {
+    MissingForce {
+        submodel: force.balance.submodel().name().to_owned(),
+        force: force.balance.words(),
+        unit: force.balance.unit().to_owned(),
+        evidence: force.gain,
+        steps: force
+            .levels
+            .iter()
+            .map(|(level, sigma)| [*level, level - 1.96 * sigma, level + 1.96 * sigma])
+            .collect(),
+    }
+}

@@ -1,0 +1,4 @@
+//! Integration tests of the module `drift`.
+
+mod common;
+mod decision;

@@ -1,0 +1,455 @@
+//! A driver as a backend.
+
+use crate::error::DriverError;
+use crate::find::{At, PREFIX, Places, file_name};
+use crate::lease::Lease;
+use crate::link::Link;
+use crate::pending::{Pending, ROUNDING_S};
+use crate::secrets::Secrets;
+use mapper_core::{
+    Backend, BackendError, RigDescription, SampleBatch, SetpointRange, SetpointRanges, Setpoints,
+};
+use crate::protocol::{
+    Code, Configure, Described, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
+    description, rig_error, setpoints_on_the_wire,
+};
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Timeouts for a driver's responses.
+#[derive(Debug, Clone, Copy)]
+pub struct Patience {
+    /// For the handshake.
+    pub hello: Duration,
+    /// For settings, description, arming and release, which may open connections.
+    pub slow: Duration,
+    /// For setpoints and the safe state.
+    pub call: Duration,
+    /// For simulated time to advance, per call.
+    pub simulation: Duration,
+    /// For a sample in real time, after its due time.
+    pub late: Duration,
+    /// Without calls for this long, the lease of a rig in real time is no longer renewed.
+    pub silence: Duration,
+}
+
+/// Values of docs/reference/protocol.md.
+pub const PATIENCE: Patience = Patience {
+    hello: Duration::from_secs(5),
+    slow: Duration::from_secs(10),
+    call: Duration::from_secs(2),
+    simulation: Duration::from_secs(60),
+    late: Duration::from_millis(150),
+    silence: Duration::from_secs(5),
+};
+
+/// Time for a driver to exit by itself.
+const LEAVING: Duration = Duration::from_secs(2);
+
+/// A rig controlled by a driver.
+pub struct Driver {
+    name: String,
+    link: Link,
+    session: Option<String>,
+    /// Whether the driver knows the hold command. Older drivers hold setpoints without it.
+    knows_hold: bool,
+    description: Option<RigDescription>,
+    secrets: Secrets,
+    patience: Patience,
+    /// Number of the last request.
+    asked: u64,
+    armed: Option<Lease>,
+    /// Whether arming was requested without a later release, so that the rig's owner is unknown.
+    in_doubt: bool,
+    pending: Pending,
+    /// Errors in samples since the last poll.
+    spoiled: Option<DriverError>,
+    now_s: f64,
+}
+
+impl Driver {
+    /// Finds the driver called `name`, starts it and sends its settings. `built_in`: names of other backends, for the error message.
+    ///
+    /// # Errors
+    /// [`BackendError::Settings`] if the driver is missing, is not a driver, or refuses its settings.
+    pub fn find(
+        places: &Places,
+        name: &str,
+        settings: &Value,
+        built_in: &str,
+        hint: &str,
+    ) -> Result<Driver, BackendError> {
+        let wrong = |error| settings_error(name, String::new(), error);
+        let Some(at) = places.find(name) else {
+            if let Some(program) = places.not_executable(name) {
+                return Err(wrong(DriverError::NotExecutable { program }));
+            }
+            let looked = match places.programs.len() {
+                0 => "any directory, since PATH is empty".to_owned(),
+                _ => places.programs.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+            };
+            let program = file_name(name).unwrap_or_else(|| format!("{PREFIX}<name>"));
+            return Err(wrong(DriverError::NotFound {
+                program,
+                built_in: built_in.to_owned(),
+                looked,
+                hint: hint.to_owned(),
+            }));
+        };
+        let variable = |name: &str| std::env::var(name).ok();
+        // A driver that was already running has its own environment.
+        let needed = matches!(at, At::Program(_));
+        let secrets = Secrets::of(settings, &variable, needed)
+            .map_err(|(path, error)| settings_error(name, path, error))?;
+        Driver::start(&at, name, settings, secrets, PATIENCE)
+    }
+
+    /// Starts a driver program, without secrets.
+    ///
+    /// # Errors
+    /// As [`Driver::find`].
+    pub fn of_program(
+        program: &Path,
+        name: &str,
+        settings: &Value,
+        patience: Patience,
+    ) -> Result<Driver, BackendError> {
+        Driver::start(&At::Program(program.to_owned()), name, settings, Secrets::default(), patience)
+    }
+
+    /// Connects to a driver that listens on a socket, without secrets.
+    ///
+    /// # Errors
+    /// As [`Driver::find`].
+    pub fn at_socket(
+        socket: &Path,
+        name: &str,
+        settings: &Value,
+        patience: Patience,
+    ) -> Result<Driver, BackendError> {
+        Driver::start(&At::Socket(socket.to_owned()), name, settings, Secrets::default(), patience)
+    }
+
+    fn start(
+        at: &At,
+        name: &str,
+        settings: &Value,
+        secrets: Secrets,
+        patience: Patience,
+    ) -> Result<Driver, BackendError> {
+        let wrong = |error| settings_error(name, String::new(), error);
+        let mut driver = Driver {
+            name: name.to_owned(),
+            link: match at {
+                At::Program(program) => Link::start(program),
+                #[cfg(unix)]
+                At::Socket(socket) => Link::connect(socket),
+                #[cfg(not(unix))]
+                At::Socket(socket) => Err(DriverError::Away {
+                    socket: socket.clone(),
+                    source: std::io::ErrorKind::Unsupported.into(),
+                }),
+            }
+            .map_err(wrong)?,
+            session: None,
+            knows_hold: false,
+            description: None,
+            secrets,
+            patience,
+            asked: 0,
+            armed: None,
+            in_doubt: false,
+            pending: Pending::default(),
+            spoiled: None,
+            now_s: 0.0,
+        };
+        let version = driver.greet()?;
+        let settings = Configure { settings: settings.clone() };
+        driver.ask("configure", &settings, patience.slow)?;
+        let answer = driver.ask("describe", &json!({}), patience.slow)?;
+        let described: Described = serde_json::from_value(answer)
+            .map_err(|error| driver.lost(DriverError::Garbage(error.to_string())))?;
+        let rig =
+            description(&described.description, name, &version).map_err(|error| driver.lost(error.into()))?;
+        driver.description = Some(rig);
+        Ok(driver)
+    }
+
+    /// Exchanges hello messages and returns the driver's version.
+    fn greet(&mut self) -> Result<String, BackendError> {
+        let hello = Hello {
+            magic: MAGIC.to_owned(),
+            protocol: VERSION,
+            name: "mapper".to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            frame_limit_bytes: crate::protocol::FRAME_LIMIT_BYTES,
+        };
+        let answer = self.ask("hello", &hello, self.patience.hello)?;
+        // Secrets are removed from the driver's text.
+        let wrong = |error| self.lost(error);
+        let welcome: Welcome = serde_json::from_value(answer)
+            .map_err(|error| wrong(DriverError::NoDriver(format!("its hello is incomplete: {error}"))))?;
+        let theirs = welcome.hello;
+        if theirs.magic != MAGIC {
+            return Err(wrong(DriverError::NoDriver("its hello begins with another word".to_owned())));
+        }
+        if theirs.protocol.major != VERSION.major {
+            return Err(wrong(DriverError::Version { theirs: theirs.protocol, ours: VERSION }));
+        }
+        if theirs.name != self.name {
+            return Err(wrong(DriverError::Name(theirs.name)));
+        }
+        self.knows_hold = theirs.protocol.minor >= crate::protocol::HOLD_SINCE_MINOR;
+        self.link.limit_frames(theirs.frame_limit_bytes);
+        self.session = Some(welcome.session);
+        Ok(theirs.version)
+    }
+
+    fn rig(&self) -> Result<&RigDescription, BackendError> {
+        self.description.as_ref().ok_or(BackendError::OutOfOrder {
+            call: "describe",
+            state: "not described",
+            needed: "described",
+        })
+    }
+
+    fn simulated(&self) -> bool {
+        self.description.as_ref().is_some_and(|rig| rig.simulated_time)
+    }
+
+    fn lost(&self, error: DriverError) -> BackendError {
+        let source = Box::new(DriverError::Message(self.secrets.hide(&error.to_string())));
+        // Before the description arrives no rig can be lost.
+        match self.description {
+            Some(_) => BackendError::Lost { t_s: self.now_s, source },
+            None => BackendError::Settings { backend: self.name.clone(), path: String::new(), source },
+        }
+    }
+
+    /// Sends a request and waits for the response. Samples that arrive earlier are kept.
+    fn ask(
+        &mut self,
+        call: &'static str,
+        params: &impl Serialize,
+        within: Duration,
+    ) -> Result<Value, BackendError> {
+        let params = serde_json::to_value(params)
+            .map_err(|error| self.lost(DriverError::Garbage(error.to_string())))?;
+        self.asked += 1;
+        let request = Message {
+            id: Some(self.asked),
+            session: self.session.clone(),
+            deadline_s: Some(within.as_secs_f64()),
+            method: Some(call.to_owned()),
+            params,
+            ..Message::default()
+        };
+        self.link.outlet().and_then(|outlet| outlet.send(&request)).map_err(|error| self.lost(error))?;
+        if let Some(lease) = &self.armed {
+            lease.called();
+        }
+        let end = Instant::now() + within;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let came = self.link.next(left).map_err(|error| self.lost(error))?;
+            let Some(message) = came else {
+                return Err(BackendError::Deadline { call, limit_s: within.as_secs_f64() });
+            };
+            match (message.id, message.error, message.result) {
+                (Some(id), Some(failure), _) if id == self.asked => {
+                    let mut message = failure.message;
+                    // An earlier sample error explains more than the end of the lease.
+                    if let (Code::LeaseEnded, Some(spoiled)) = (failure.code, &self.spoiled) {
+                        message = format!("{message}; {spoiled}");
+                    }
+                    let failure = Failure { message: self.secrets.hide(&message), ..failure };
+                    return Err(self.refused(failure, call));
+                }
+                (Some(id), None, result) if id == self.asked => return Ok(result.unwrap_or(Value::Null)),
+                // A late response to an earlier request.
+                (Some(_), ..) => {}
+                (None, ..) => self.take_note(message.method.as_deref(), message.params),
+            }
+            if left.is_zero() {
+                // A driver that sends endless messages does not count as responding.
+                return Err(BackendError::Deadline { call, limit_s: within.as_secs_f64() });
+            }
+        }
+    }
+
+    /// Converts a refusal to a rig error.
+    fn refused(&self, failure: Failure, call: &'static str) -> BackendError {
+        match rig_error(failure, &self.name, call, self.now_s) {
+            // Before the description arrives no rig can be lost.
+            BackendError::Lost { source, .. } if self.description.is_none() => {
+                BackendError::Settings { backend: self.name.clone(), path: String::new(), source }
+            }
+            error => error,
+        }
+    }
+
+    /// Processes samples and notes.
+    fn take_note(&mut self, method: Option<&str>, params: Value) {
+        let (Some(rig), true) = (&self.description, self.spoiled.is_none()) else { return };
+        match method {
+            Some("samples") => {
+                let read = || {
+                    let samples: Samples = serde_json::from_value(params)
+                        .map_err(|error| DriverError::Garbage(error.to_string()))?;
+                    if samples.stream != "rig" {
+                        return Ok(());
+                    }
+                    let mut batch = batch(samples, &rig.channels)?;
+                    for event in &mut batch.events {
+                        event.message = self.secrets.hide(&event.message);
+                    }
+                    Ok(self.pending.push(batch)?)
+                };
+                self.spoiled = read().err();
+            }
+            Some("lost") => {
+                let words = params.get("message").and_then(Value::as_str).unwrap_or("the rig was lost");
+                self.spoiled = Some(DriverError::Message(words.to_owned()));
+            }
+            Some("note") => {
+                if let Some(words) = params.get("message").and_then(Value::as_str) {
+                    self.pending.note(self.now_s, &self.secrets.hide(words));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn need_armed(&self, call: &'static str) -> Result<(), BackendError> {
+        match self.armed {
+            Some(_) => Ok(()),
+            None => Err(BackendError::OutOfOrder { call, state: "not armed", needed: "armed" }),
+        }
+    }
+
+    /// Waits until a rig in real time has delivered the samples due at `until_s`, or is late.
+    fn wait_for(&mut self, until_s: f64) -> Result<(), BackendError> {
+        let sample_s = 1.0 / self.rig()?.sample_rate_hz;
+        let ahead = Duration::try_from_secs_f64((until_s - self.now_s).max(0.0)).unwrap_or(Duration::MAX);
+        let late = self.patience.late + Duration::try_from_secs_f64(sample_s).unwrap_or_default();
+        let end = Instant::now().checked_add(ahead.saturating_add(late));
+        if let Some(lease) = &self.armed {
+            lease.called();
+        }
+        // The next sample would be later than that.
+        while !self.pending.reaches(until_s - 0.999 * sample_s) && self.spoiled.is_none() {
+            let left = end.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
+            let Some(message) = self.link.next(left).map_err(|error| self.lost(error))? else { break };
+            if message.id.is_none() {
+                self.take_note(message.method.as_deref(), message.params);
+            }
+        }
+        // Processes messages that have already arrived.
+        while let Ok(Some(message)) = self.link.next(Duration::ZERO) {
+            if message.id.is_none() {
+                self.take_note(message.method.as_deref(), message.params);
+            }
+            if self.spoiled.is_some() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn settings_error(backend: &str, path: String, error: DriverError) -> BackendError {
+    BackendError::Settings { backend: backend.to_owned(), path, source: Box::new(error) }
+}
+
+impl Backend for Driver {
+    fn describe(&self) -> RigDescription {
+        self.description.clone().unwrap_or_else(|| RigDescription {
+            backend: self.name.clone(),
+            version: String::new(),
+            channels: Vec::new(),
+            sample_rate_hz: 1.0,
+            simulated_time: true,
+            controls: false,
+            exclusive: None,
+            reached_at: None,
+            needs_guarded: Vec::new(),
+            accepts: None,
+            safe: mapper_core::SafeTrajectory::default(),
+        })
+    }
+
+    fn arm(&mut self) -> Result<(), BackendError> {
+        if self.armed.is_some() {
+            return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
+        }
+        self.in_doubt = true;
+        (self.pending, self.spoiled, self.now_s) = (Pending::default(), None, 0.0);
+        let answer = self.ask("arm", &json!({}), self.patience.slow);
+        if let Err(error) = answer {
+            // After a refusal the rig stays with its earlier owner.
+            self.in_doubt = matches!(error, BackendError::Deadline { .. });
+            return Err(error);
+        }
+        let silence = (!self.simulated()).then_some(self.patience.silence);
+        let outlet = self.link.outlet().map_err(|error| self.lost(error))?.clone();
+        self.armed = Some(Lease::new(outlet, self.session.clone().unwrap_or_default(), silence)?);
+        Ok(())
+    }
+
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        // Non-finite numbers cannot be written in a frame, whatever range the rig accepts.
+        let any = SetpointRange { low: f64::MIN, high: f64::MAX };
+        let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
+        self.rig()?.accepts.unwrap_or(all).check(setpoints)?;
+        self.need_armed("set")?;
+        self.ask("set", &setpoints_on_the_wire(setpoints), self.patience.call).map(drop)
+    }
+
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        self.need_armed("poll")?;
+        let until_s = if until_s.is_finite() { until_s } else { self.now_s };
+        if self.simulated() {
+            self.ask("poll", &Poll { until_s }, self.patience.simulation)?;
+        } else {
+            self.wait_for(until_s)?;
+        }
+        self.now_s = self.now_s.max(until_s);
+        if let Some(error) = self.spoiled.take() {
+            return Err(self.lost(error));
+        }
+        let channels = self.rig()?.channels.clone();
+        // The driver's own simulated time is exact, and no sample waits for it.
+        let rounding_s = if self.simulated() { 0.0 } else { ROUNDING_S };
+        Ok(self.pending.take(until_s, rounding_s, &channels))
+    }
+
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.need_armed("hold")?;
+        match self.knows_hold {
+            true => self.ask("hold", &json!({}), self.patience.call).map(drop),
+            false => Ok(()),
+        }
+    }
+
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        self.need_armed("make_safe")?;
+        self.ask("make_safe", &json!({}), self.patience.call).map(drop)
+    }
+
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.need_armed("disarm")?;
+        self.ask("disarm", &json!({}), self.patience.slow)?;
+        (self.armed, self.in_doubt) = (None, false);
+        Ok(())
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        // The thread of the lease also holds the pipe.
+        self.armed = None;
+        self.link.close(self.in_doubt, LEAVING);
+    }
+}

@@ -1,0 +1,249 @@
+//! The pipes or the socket to a driver. Separate threads read and write, so that no call exceeds its timeout.
+
+use crate::error::DriverError;
+use crate::protocol::{
+    Encoding, FRAME_LIMIT_BYTES, FrameError, Message, decode, encode, read_frame, write_frame,
+};
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// Queue length in each direction, messages.
+const WAITING: usize = 64;
+/// Wait for the driver's final error output after its output has ended.
+const LAST_WORDS_WITHIN: Duration = Duration::from_millis(200);
+/// Size of the stored final error output, bytes.
+const LAST_WORDS_BYTES: usize = 2_000;
+
+/// An incoming message.
+type Incoming = Result<Message, DriverError>;
+
+/// Sends from any thread in the driver's own encoding. Before the first message from the driver it uses JSON, which every driver reads.
+#[derive(Clone)]
+pub(crate) struct Outlet {
+    to_write: SyncSender<Vec<u8>>,
+    packed: Arc<AtomicBool>,
+}
+
+impl Outlet {
+    /// Sends without waiting.
+    pub(crate) fn send(&self, message: &Message) -> Result<(), DriverError> {
+        let packed = self.packed.load(Ordering::Relaxed);
+        let encoding = if packed { Encoding::MessagePack } else { Encoding::Json };
+        let body = encode(message, encoding).map_err(|error| DriverError::Garbage(error.to_string()))?;
+        self.to_write.try_send(body).map_err(|error| match error {
+            TrySendError::Full(_) => DriverError::Deaf,
+            TrySendError::Disconnected(_) => DriverError::Ended(String::new()),
+        })
+    }
+}
+
+/// The other end of the link.
+enum Peer {
+    /// A program started for this run, which ends with the run.
+    Program(Child),
+    /// A driver that was already running.
+    #[cfg(unix)]
+    Socket(std::os::unix::net::UnixStream),
+}
+
+/// A connection to a driver.
+pub(crate) struct Link {
+    peer: Peer,
+    outlet: Option<Outlet>,
+    inlet: Receiver<Incoming>,
+    frame_limit: Arc<AtomicU32>,
+    last_words: Arc<Mutex<Vec<u8>>>,
+    /// Closed by the reading thread after the last message.
+    heard: Receiver<()>,
+}
+
+impl Link {
+    /// Starts a driver.
+    pub(crate) fn start(program: &Path) -> Result<Link, DriverError> {
+        let not_started = |source| DriverError::NotStarted { program: program.to_owned(), source };
+        let mut command = Command::new(program);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        // Ctrl-C in a terminal reaches the whole process group; the runner decides on the reaction.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut child = command.spawn().map_err(not_started)?;
+        let (Some(stdin), Some(stdout), Some(stderr)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            return Err(not_started(std::io::Error::other("it has no pipes")));
+        };
+        Link::over(stdin, stdout, Some(stderr), Peer::Program(child)).map_err(not_started)
+    }
+
+    /// Connects to a driver that listens on this socket.
+    #[cfg(unix)]
+    pub(crate) fn connect(socket: &Path) -> Result<Link, DriverError> {
+        let away = |source| DriverError::Away { socket: socket.to_owned(), source };
+        let stream = std::os::unix::net::UnixStream::connect(socket).map_err(away)?;
+        let both = || stream.try_clone().map_err(away);
+        let (input, output) = (HalfClosing(both()?), both()?);
+        Link::over(input, output, None::<std::io::Empty>, Peer::Socket(stream)).map_err(away)
+    }
+
+    fn over(
+        input: impl Write + Send + 'static,
+        output: impl Read + Send + 'static,
+        words_of: Option<impl Read + Send + 'static>,
+        peer: Peer,
+    ) -> std::io::Result<Link> {
+        let frame_limit = Arc::new(AtomicU32::new(crate::protocol::FIRST_FRAME_LIMIT_BYTES));
+        let (send, to_write) = sync_channel(WAITING);
+        let (to_inlet, inlet) = sync_channel(WAITING);
+        let last_words = Arc::new(Mutex::new(Vec::new()));
+        let packed = Arc::new(AtomicBool::new(false));
+        let (listens, heard) = sync_channel::<()>(1);
+        let (limit, words, its) = (frame_limit.clone(), last_words.clone(), packed.clone());
+        // These threads are not joined: each ends with its pipe.
+        std::thread::Builder::new()
+            .name("to driver".to_owned())
+            .spawn(move || write_all(input, &to_write, &limit))
+            .and_then(|_| {
+                std::thread::Builder::new()
+                    .name("from driver".to_owned())
+                    .spawn(move || read_all(output, &to_inlet, &its))
+            })
+            .and_then(|_| {
+                std::thread::Builder::new().name("driver's words".to_owned()).spawn(move || {
+                    if let Some(stderr) = words_of {
+                        listen(stderr, &words);
+                    }
+                    drop(listens);
+                })
+            })?;
+        Ok(Link {
+            peer,
+            outlet: Some(Outlet { to_write: send, packed }),
+            inlet,
+            frame_limit,
+            last_words,
+            heard,
+        })
+    }
+
+    /// The sender.
+    pub(crate) fn outlet(&self) -> Result<&Outlet, DriverError> {
+        self.outlet.as_ref().ok_or_else(|| DriverError::Ended(String::new()))
+    }
+
+    /// Sets the maximum frame size of the driver, bytes.
+    pub(crate) fn limit_frames(&self, bytes: u32) {
+        self.frame_limit.store(bytes, Ordering::Relaxed);
+    }
+
+    /// The next message; `None` if none arrives in time.
+    pub(crate) fn next(&self, within: Duration) -> Result<Option<Message>, DriverError> {
+        match self.inlet.recv_timeout(within) {
+            Ok(incoming) => incoming.map(Some),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => Err(DriverError::Ended(self.words())),
+        }
+    }
+
+    /// The driver's final error output, to be appended to a sentence.
+    fn words(&self) -> String {
+        // The output has ended, but the final error output may still be on its way.
+        let _ = self.heard.recv_timeout(LAST_WORDS_WITHIN);
+        let Ok(words) = self.last_words.lock() else { return String::new() };
+        let text = String::from_utf8_lossy(&words);
+        let line = text.lines().map(str::trim).rfind(|line| !line.is_empty());
+        line.map_or_else(String::new, |line| format!("; its last words: {line}"))
+    }
+
+    /// Closes the driver's input, which ends the driver or, for a socket, its session. A driver that holds a rig is left to execute its safe
+    /// trajectory. Any other is killed or disconnected after this time.
+    pub(crate) fn close(&mut self, holds_a_rig: bool, within: Duration) {
+        self.outlet = None;
+        let end = Instant::now() + within;
+        // The driver's output ends when it exits.
+        while let Some(left) = end.checked_duration_since(Instant::now()) {
+            if matches!(self.inlet.recv_timeout(left), Err(RecvTimeoutError::Disconnected)) {
+                break;
+            }
+        }
+        match &mut self.peer {
+            Peer::Program(child) => {
+                if !holds_a_rig && !matches!(child.try_wait(), Ok(Some(_))) {
+                    // If its output is closed it is about to exit, so killing it is safe.
+                    let _ = child.kill();
+                    let _ = child.wait();
+                }
+            }
+            #[cfg(unix)]
+            Peer::Socket(stream) => {
+                use std::net::Shutdown::{Both, Write};
+                // The driver may have gone already.
+                let _ = stream.shutdown(if holds_a_rig { Write } else { Both });
+            }
+        }
+    }
+}
+
+/// The writing half of a socket. Dropping it closes that direction, as with a pipe, while the reading half stays open.
+#[cfg(unix)]
+struct HalfClosing(std::os::unix::net::UnixStream);
+
+#[cfg(unix)]
+impl Write for HalfClosing {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+#[cfg(unix)]
+impl Drop for HalfClosing {
+    fn drop(&mut self) {
+        // If the other side has gone there is nothing to close.
+        let _ = self.0.shutdown(std::net::Shutdown::Write);
+    }
+}
+
+fn write_all(mut stdin: impl Write, to_write: &Receiver<Vec<u8>>, limit: &AtomicU32) {
+    for body in to_write {
+        if write_frame(&mut stdin, &body, limit.load(Ordering::Relaxed)).is_err() {
+            break;
+        }
+    }
+}
+
+fn read_all(mut stdout: impl Read, to_inlet: &SyncSender<Incoming>, packed: &AtomicBool) {
+    loop {
+        let incoming = match read_frame(&mut stdout, FRAME_LIMIT_BYTES) {
+            Ok(Some(body)) => {
+                packed.store(Encoding::of(&body) == Encoding::MessagePack, Ordering::Relaxed);
+                decode(&body)
+            }
+            Ok(None) => break,
+            Err(error) => Err(error),
+        };
+        let incoming = incoming.map_err(|error: FrameError| DriverError::Garbage(error.to_string()));
+        let lost = incoming.is_err();
+        // After an invalid message the start of the next frame is unknown.
+        if to_inlet.send(incoming).is_err() || lost {
+            break;
+        }
+    }
+}
+
+fn listen(mut stderr: impl Read, words: &Mutex<Vec<u8>>) {
+    let mut piece = [0; 512];
+    while let Ok(bytes @ 1..) = stderr.read(&mut piece) {
+        let Ok(mut words) = words.lock() else { break };
+        words.extend_from_slice(&piece[..bytes]);
+        let too_many = words.len().saturating_sub(LAST_WORDS_BYTES);
+        words.drain(..too_many);
+    }
+}

@@ -1,0 +1,206 @@
+//! Messages in the words of the core, and back.
+
+use crate::protocol::message::{ChannelDescription, Description, Mode, Ranges, SafeWay, Setpoints};
+use mapper_core::{
+    Channel, GuardName, RigDescription, RigMode, SafeTrajectory, SetpointRange, SetpointRanges,
+    UnknownChannel,
+};
+use std::collections::BTreeSet;
+
+/// Most samples per second that a rig may have, Hz.
+const FASTEST_HZ: f64 = 100_000.0;
+
+/// A statement of a driver that cannot be right.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unusable {
+    /// A channel that the program does not have.
+    #[error("it describes a channel that is not known: {0}")]
+    Channel(#[from] UnknownChannel),
+    /// A channel in another unit.
+    #[error("it gives {channel} in {unit}; {channel} is in {right}")]
+    Unit {
+        /// The channel.
+        channel: Channel,
+        /// The unit in the description.
+        unit: String,
+        /// The unit of the channel.
+        right: &'static str,
+    },
+    /// A channel, twice.
+    #[error("it gives {0} twice")]
+    Twice(String),
+    /// A guard that the program does not have.
+    #[error("it needs a guard `{0}`, which is not known; this program may be older than the driver")]
+    Guard(String),
+    /// A number that is not possible.
+    #[error("its {name} is {value} {unit}")]
+    Number {
+        /// What.
+        name: &'static str,
+        /// Value.
+        value: f64,
+        /// Unit.
+        unit: &'static str,
+    },
+    /// Columns of different lengths.
+    #[error("{name} has {length} values for {count} samples")]
+    Torn {
+        /// The column.
+        name: String,
+        /// Its length.
+        length: usize,
+        /// Number of samples.
+        count: usize,
+    },
+    /// Times that do not go forward.
+    #[error("a sample at {t_s} s after one at {before_s} s")]
+    Time {
+        /// The time before, s.
+        before_s: f64,
+        /// The time, s.
+        t_s: f64,
+    },
+    /// Samples that are missing, or come again.
+    #[error("sample {expected} was expected and sample {found} came{}", missing(*expected, *found))]
+    Sequence {
+        /// Number of the next sample.
+        expected: u64,
+        /// What came.
+        found: u64,
+    },
+    /// More than were requested.
+    #[error("it sends more samples than were requested")]
+    TooMany,
+}
+
+fn missing(expected: u64, found: u64) -> String {
+    match found.saturating_sub(expected) {
+        0 => String::new(),
+        count => format!("; {count} are missing, lost by the driver or not read in time"),
+    }
+}
+
+/// The description of a rig by its driver. `backend` and `version`: of its hello.
+///
+/// # Errors
+/// [`Unusable`] for what this program does not know or no rig can have.
+pub fn description(wire: &Description, backend: &str, version: &str) -> Result<RigDescription, Unusable> {
+    let mut channels = Vec::new();
+    for described in &wire.channels {
+        let channel: Channel = described.name.parse()?;
+        let right = channel.unit();
+        if described.unit != right {
+            return Err(Unusable::Unit { channel, unit: described.unit.clone(), right });
+        }
+        channels.push(channel);
+    }
+    let different: BTreeSet<_> = channels.iter().collect();
+    if different.len() < channels.len() {
+        return Err(Unusable::Twice("a channel".to_owned()));
+    }
+    number("sample rate", wire.sample_rate_hz, "Hz", f64::MIN_POSITIVE..=FASTEST_HZ)?;
+    let safe = &wire.safe;
+    number("time for its way into the safe state", safe.within_s, "s", f64::MIN_POSITIVE..=600.0)?;
+    number("valve opening on that way", safe.valve_opening_ratio, "", 0.0..=10.0)?;
+    if let Some(slew_pa_s) = safe.p3_slew_pa_s {
+        number("slew of P3 on that way", slew_pa_s, "Pa/s", f64::MIN_POSITIVE..=1e9)?;
+    }
+    let guard = |name: &String| {
+        let known = serde_json::from_value::<GuardName>(serde_json::Value::String(name.clone()));
+        known.map_err(|_| Unusable::Guard(name.clone()))
+    };
+    Ok(RigDescription {
+        backend: backend.to_owned(),
+        version: version.to_owned(),
+        channels,
+        sample_rate_hz: wire.sample_rate_hz,
+        simulated_time: wire.simulated_time,
+        controls: wire.controls,
+        exclusive: wire.exclusive.clone(),
+        reached_at: wire.reached_at.clone(),
+        needs_guarded: wire.needs_guarded.iter().map(guard).collect::<Result<_, _>>()?,
+        accepts: wire.accepts.as_ref().map(ranges),
+        safe: SafeTrajectory {
+            p3_slew_pa_s: safe.p3_slew_pa_s,
+            valve_opening_ratio: safe.valve_opening_ratio,
+            within_s: safe.within_s,
+        },
+    })
+}
+
+fn number(
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+    range: std::ops::RangeInclusive<f64>,
+) -> Result<(), Unusable> {
+    if range.contains(&value) { Ok(()) } else { Err(Unusable::Number { name, value, unit }) }
+}
+
+fn ranges(wire: &Ranges) -> SetpointRanges {
+    let range = |(low, high): (f64, f64)| SetpointRange { low, high };
+    SetpointRanges {
+        p3_pa: range(wire.p3_pa),
+        t3_k: range(wire.t3_k),
+        valve_opening_ratio: range(wire.valve_opening_ratio),
+        oil_temperature_k: range(wire.oil_temperature_k),
+    }
+}
+
+/// The description of a rig, as a driver sends it.
+pub fn description_on_the_wire(rig: &RigDescription) -> Description {
+    let channel = |channel: &Channel| ChannelDescription {
+        name: channel.to_string(),
+        unit: channel.unit().to_owned(),
+        sensors: None,
+    };
+    let range = |range: SetpointRange| (range.low, range.high);
+    Description {
+        channels: rig.channels.iter().map(channel).collect(),
+        sample_rate_hz: rig.sample_rate_hz,
+        simulated_time: rig.simulated_time,
+        controls: rig.controls,
+        exclusive: rig.exclusive.clone(),
+        reached_at: rig.reached_at.clone(),
+        needs_guarded: rig.needs_guarded.iter().map(ToString::to_string).collect(),
+        accepts: rig.accepts.map(|accepts| Ranges {
+            p3_pa: range(accepts.p3_pa),
+            t3_k: range(accepts.t3_k),
+            valve_opening_ratio: range(accepts.valve_opening_ratio),
+            oil_temperature_k: range(accepts.oil_temperature_k),
+        }),
+        safe: SafeWay {
+            p3_slew_pa_s: rig.safe.p3_slew_pa_s,
+            valve_opening_ratio: rig.safe.valve_opening_ratio,
+            within_s: rig.safe.within_s,
+        },
+    }
+}
+
+/// Setpoints as a host sends them.
+pub fn setpoints_on_the_wire(setpoints: &mapper_core::Setpoints) -> Setpoints {
+    Setpoints {
+        mode: match setpoints.mode {
+            RigMode::Standstill => Mode::Standstill,
+            RigMode::Running => Mode::Running,
+        },
+        p3_pa: setpoints.p3_pa,
+        t3_k: setpoints.t3_k,
+        valve_opening_ratio: setpoints.valve_opening_ratio,
+        oil_temperature_k: setpoints.oil_temperature_k,
+    }
+}
+
+/// Setpoints as a driver gets them.
+pub fn setpoints(wire: &Setpoints) -> mapper_core::Setpoints {
+    mapper_core::Setpoints {
+        mode: match wire.mode {
+            Mode::Standstill => RigMode::Standstill,
+            Mode::Running => RigMode::Running,
+        },
+        p3_pa: wire.p3_pa,
+        t3_k: wire.t3_k,
+        valve_opening_ratio: wire.valve_opening_ratio,
+        oil_temperature_k: wire.oil_temperature_k,
+    }
+}

@@ -1,0 +1,241 @@
+//! Frames: four bytes of length, most significant first, and a message as MessagePack or JSON; the first byte shows which.
+
+use crate::protocol::message::Message;
+use serde::Deserialize;
+use std::io::{Read, Write};
+
+/// Deepest nesting of a message: settings are the deepest part, and a deeper one could exhaust the stack.
+const DEEPEST: usize = 64;
+
+/// How a message is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Encoding {
+    /// MessagePack, maps with names.
+    #[default]
+    MessagePack,
+    /// JSON, for eyes and for languages that bring nothing else.
+    Json,
+}
+
+impl Encoding {
+    /// By the first byte of a message: `{` in JSON; in MessagePack that byte is a number, which no message is.
+    pub fn of(body: &[u8]) -> Encoding {
+        if body.first() == Some(&b'{') { Encoding::Json } else { Encoding::MessagePack }
+    }
+}
+
+/// Why a frame or its content cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// Its declared length exceeds the limit.
+    #[error("a frame of {bytes} bytes; at most {limit} may be sent")]
+    TooLarge {
+        /// Its length, bytes.
+        bytes: u64,
+        /// What may be sent, bytes.
+        limit: u32,
+    },
+    /// It is text.
+    #[error(
+        "text that begins with `{begins}` where frames belong: standard output is for frames alone, and words for people go to standard error"
+    )]
+    Text {
+        /// Its first letters.
+        begins: String,
+    },
+    /// It is empty.
+    #[error("an empty frame")]
+    Empty,
+    /// The stream ended inside it.
+    #[error("the stream ended after {got} of {wanted} bytes of a frame")]
+    Cut {
+        /// Bytes that came.
+        got: usize,
+        /// Bytes that should have come.
+        wanted: usize,
+    },
+    /// It is not a message.
+    #[error("not a message: {0}")]
+    Content(String),
+    /// The stream failed.
+    #[error(transparent)]
+    Stream(#[from] std::io::Error),
+}
+
+/// The next frame; `None` where the stream ends between two.
+///
+/// # Errors
+/// [`FrameError`]; the stream is of no further use then. No more than `limit_bytes` are kept, whatever length the frame declares.
+pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec<u8>>, FrameError> {
+    let mut length = Vec::with_capacity(4);
+    stream.take(4).read_to_end(&mut length)?;
+    let length: [u8; 4] = match length.len() {
+        0 => return Ok(None),
+        got => length.try_into().map_err(|_| FrameError::Cut { got, wanted: 4 })?,
+    };
+    let bytes = u32::from_be_bytes(length);
+    match bytes {
+        0 => return Err(FrameError::Empty),
+        // Letters would be a length of half a gigabyte and more.
+        _ if bytes > limit_bytes
+            && length.iter().all(|byte| matches!(byte, b' '..=b'~' | b'\n' | b'\r' | b'\t')) =>
+        {
+            let begins = String::from_utf8_lossy(&length).escape_debug().to_string();
+            return Err(FrameError::Text { begins });
+        }
+        _ if bytes > limit_bytes => {
+            return Err(FrameError::TooLarge { bytes: bytes.into(), limit: limit_bytes });
+        }
+        _ => {}
+    }
+    let (mut body, wanted) = (Vec::new(), bytes as usize);
+    stream.take(bytes.into()).read_to_end(&mut body)?;
+    if body.len() < wanted {
+        return Err(FrameError::Cut { got: body.len(), wanted });
+    }
+    Ok(Some(body))
+}
+
+/// Writes one frame and flushes it.
+///
+/// # Errors
+/// [`FrameError::TooLarge`], and what the stream says.
+pub fn write_frame(stream: &mut impl Write, body: &[u8], limit_bytes: u32) -> Result<(), FrameError> {
+    let length = u32::try_from(body.len()).ok().filter(|length| *length <= limit_bytes);
+    let Some(length) = length else {
+        return Err(FrameError::TooLarge { bytes: body.len() as u64, limit: limit_bytes });
+    };
+    stream.write_all(&length.to_be_bytes())?;
+    stream.write_all(body)?;
+    Ok(stream.flush()?)
+}
+
+/// The body of a frame.
+///
+/// # Errors
+/// [`FrameError::Content`] where it cannot be written, which no message of this crate causes.
+pub fn encode(message: &Message, encoding: Encoding) -> Result<Vec<u8>, FrameError> {
+    match encoding {
+        Encoding::Json => serde_json::to_vec(message).map_err(|error| FrameError::Content(error.to_string())),
+        Encoding::MessagePack => {
+            rmp_serde::to_vec_named(message).map_err(|error| FrameError::Content(error.to_string()))
+        }
+    }
+}
+
+/// The message in the body of a frame. Fields that are not known are ignored.
+///
+/// # Errors
+/// [`FrameError::Content`].
+pub fn decode(body: &[u8]) -> Result<Message, FrameError> {
+    match Encoding::of(body) {
+        Encoding::Json => {
+            serde_json::from_slice(body).map_err(|error| FrameError::Content(error.to_string()))
+        }
+        Encoding::MessagePack => {
+            let mut reader = rmp_serde::Deserializer::from_read_ref(body);
+            reader.set_max_depth(DEEPEST);
+            Message::deserialize(&mut reader).map_err(|error| FrameError::Content(error.to_string()))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use serde_json::json;
+
+    fn message() -> Message {
+        Message {
+            id: Some(7),
+            session: Some("s".to_owned()),
+            method: Some("set".to_owned()),
+            params: json!({"p3_pa": 150_000.125, "t3_k": null, "nested": [1, -2, "x", {"y": true}]}),
+            ..Message::default()
+        }
+    }
+
+    #[test]
+    fn both_encodings_give_back_what_was_written() {
+        for encoding in [Encoding::Json, Encoding::MessagePack] {
+            let body = encode(&message(), encoding).unwrap();
+            assert_eq!(Encoding::of(&body), encoding);
+            assert_eq!(decode(&body).unwrap(), message());
+        }
+    }
+
+    /// One key whose value is nested deeper than any stack.
+    #[test]
+    fn what_is_nested_without_end_is_refused() {
+        for depth in [1_000, 100_000] {
+            let json = format!("{{\"params\":{}{}}}", "[".repeat(depth), "]".repeat(depth));
+            assert!(decode(json.as_bytes()).is_err(), "{depth}");
+            // Also in an unknown field.
+            for field in ["params", "fields"] {
+                let mut packed = vec![0x81, 0xa6];
+                packed.extend(field.bytes());
+                packed.extend(std::iter::repeat_n(0x91, depth));
+                packed.push(0xc0);
+                assert!(decode(&packed).is_err(), "{depth}");
+            }
+        }
+    }
+
+    #[test]
+    fn lengths_are_believed_only_as_far_as_they_are_allowed() {
+        let mut bytes = u32::MAX.to_be_bytes().to_vec();
+        bytes.extend(b"{}");
+        assert!(matches!(read_frame(&mut &bytes[..], 100), Err(FrameError::TooLarge { limit: 100, .. })));
+        assert!(matches!(read_frame(&mut &[0u8, 0, 0, 0][..], 100), Err(FrameError::Empty)));
+        assert!(matches!(
+            read_frame(&mut &[0u8, 0, 0, 9, b'{'][..], 100),
+            Err(FrameError::Cut { got: 1, wanted: 9 })
+        ));
+        assert!(matches!(read_frame(&mut &[0u8, 0][..], 100), Err(FrameError::Cut { got: 2, wanted: 4 })));
+        assert!(read_frame(&mut &[][..], 100).unwrap().is_none());
+        assert!(write_frame(&mut Vec::new(), &[b'{'; 101], 100).is_err());
+        let text = read_frame(&mut &b"\nWelcome!"[..], 1 << 20).unwrap_err().to_string();
+        assert!(text.contains("begins with `\\nWel`") && text.contains("standard error"), "{text}");
+    }
+
+    proptest! {
+        #[test]
+        fn frames_come_back_whole_however_many(bodies in prop::collection::vec(prop::collection::vec(any::<u8>(), 1..50), 0..8)) {
+            let mut stream = Vec::new();
+            for body in &bodies {
+                write_frame(&mut stream, body, 50).unwrap();
+            }
+            let mut stream = &stream[..];
+            for body in &bodies {
+                let read = read_frame(&mut stream, 50).unwrap();
+                prop_assert_eq!(read.as_ref(), Some(body));
+            }
+            prop_assert!(read_frame(&mut stream, 50).unwrap().is_none());
+        }
+
+        /// Neither a panic nor more than the limit in memory, whatever comes.
+        #[test]
+        fn any_bytes_are_a_message_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+            let mut stream = &bytes[..];
+            while let Ok(Some(body)) = read_frame(&mut stream, 300) {
+                prop_assert!(body.len() <= 300);
+                let _ = decode(&body);
+            }
+            let _ = decode(&bytes);
+        }
+
+        /// A message with bytes changed or cut off.
+        #[test]
+        fn a_damaged_message_is_a_message_or_an_error(
+            at in 0usize..200, value in any::<u8>(), keep in 0usize..200, json in any::<bool>(),
+        ) {
+            let encoding = if json { Encoding::Json } else { Encoding::MessagePack };
+            let mut body = encode(&message(), encoding).unwrap();
+            let length = body.len();
+            body[at % length] = value;
+            body.truncate(keep);
+            let _ = decode(&body);
+        }
+    }
+}

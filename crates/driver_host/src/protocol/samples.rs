@@ -1,0 +1,308 @@
+//! Samples in columns, and how they become a batch.
+
+use crate::protocol::convert::Unusable;
+use mapper_core::{
+    Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, Provenance, Quality, SampleBatch,
+    TruthColumn,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Bytes that a value takes at most as JSON, its comma included.
+const BYTES_PER_VALUE: usize = 26;
+
+/// `samples`: samples of one stream, in order and without gap.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Samples {
+    /// Name of the stream; `rig` is the one that is recorded, others are ignored.
+    pub stream: String,
+    /// Number of the first sample since arming.
+    pub sequence: u64,
+    /// When each sample arrived at the driver, s since arming on a clock that never goes back; strictly increasing.
+    pub t_s: Vec<f64>,
+    /// Values of each channel, as long as `t_s`.
+    pub columns: Vec<Column>,
+    /// Each sensor of the channels that have several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elements: Vec<ElementSamples>,
+    /// What only a simulator knows.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub truth: Vec<TruthSamples>,
+    /// What happened.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub events: Vec<Happened>,
+}
+
+/// Values of a channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Column {
+    /// Symbol of the channel.
+    pub channel: String,
+    /// SI; `null` without a reading.
+    pub values: Vec<Option<f64>>,
+    /// When the source took each reading, s since arming; when it arrived if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source_t_s: Option<Vec<f64>>,
+    /// `good`, `uncertain` or `bad` of each reading; good if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quality: Option<Vec<String>>,
+}
+
+/// Values of one of several sensors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ElementSamples {
+    /// Channel and number, e.g. `T2/3`.
+    pub element: String,
+    /// SI; `null` without a reading.
+    pub values: Vec<Option<f64>>,
+}
+
+/// Values that only a simulator knows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TruthSamples {
+    /// Name with its unit suffix.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Values; `null` where there is none.
+    pub values: Vec<Option<f64>>,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Happened {
+    /// Run time, s.
+    pub t_s: f64,
+    /// Kind, e.g. `rig_tripped`; one that is not known becomes a note.
+    pub kind: String,
+    /// One sentence with values and units.
+    pub message: String,
+}
+
+fn filled(values: Vec<Option<f64>>) -> Vec<f64> {
+    values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect()
+}
+
+fn of_number(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+fn quality(word: &str) -> Quality {
+    match word {
+        "good" => Quality::Good,
+        "uncertain" => Quality::Uncertain,
+        // An unknown word is not a good quality.
+        _ => Quality::Bad,
+    }
+}
+
+fn word(quality: Quality) -> String {
+    match quality {
+        Quality::Good => "good",
+        Quality::Uncertain => "uncertain",
+        Quality::Bad => "bad",
+    }
+    .to_owned()
+}
+
+/// Samples of a driver as a batch; channels that are not described are left out.
+///
+/// # Errors
+/// [`Unusable`] where columns differ in length, or times do not go forward.
+pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Unusable> {
+    let count = samples.t_s.len();
+    let right = |name: &str, length: usize| match length == count {
+        true => Ok(()),
+        false => Err(Unusable::Torn { name: name.to_owned(), length, count }),
+    };
+    if let Some(t_s) = samples.t_s.iter().find(|t_s| !t_s.is_finite()) {
+        return Err(Unusable::Time { before_s: *t_s, t_s: *t_s });
+    }
+    if let Some(pair) = samples.t_s.windows(2).find(|pair| pair[1] <= pair[0]) {
+        return Err(Unusable::Time { before_s: pair[0], t_s: pair[1] });
+    }
+    let (mut columns, mut provenance) = (Vec::<ChannelColumn>::new(), Vec::new());
+    for column in samples.columns {
+        right(&column.channel, column.values.len())?;
+        let Ok(channel) = column.channel.parse::<Channel>() else { continue };
+        if !described.contains(&channel) {
+            continue;
+        }
+        if columns.iter().any(|there| there.channel == channel) {
+            return Err(Unusable::Twice(column.channel));
+        }
+        if column.source_t_s.is_some() || column.quality.is_some() {
+            let source_t_s = column.source_t_s.unwrap_or_else(|| samples.t_s.clone());
+            let good = || vec![Quality::Good; count];
+            let of_words = |words: Vec<String>| words.iter().map(|word| quality(word)).collect();
+            let quality: Vec<Quality> = column.quality.map_or_else(good, of_words);
+            right(&column.channel, source_t_s.len())?;
+            right(&column.channel, quality.len())?;
+            provenance.push(Provenance { channel, source_t_s, quality });
+        }
+        columns.push(ChannelColumn { channel, values: filled(column.values) });
+    }
+    let mut elements = Vec::new();
+    for column in samples.elements {
+        right(&column.element, column.values.len())?;
+        let Ok(element) = Element::try_from(column.element) else { continue };
+        elements.push(ElementColumn { element, values: filled(column.values) });
+    }
+    let mut truth = Vec::new();
+    for column in samples.truth {
+        right(&column.name, column.values.len())?;
+        truth.push(TruthColumn { name: column.name, unit: column.unit, values: filled(column.values) });
+    }
+    let kind =
+        |word: String| serde_json::from_value(serde_json::Value::String(word)).unwrap_or(EventKind::Note);
+    let event = |event: Happened| Event { t_s: event.t_s, kind: kind(event.kind), message: event.message };
+    Ok(SampleBatch {
+        first_sequence: samples.sequence,
+        t_s: samples.t_s,
+        columns,
+        elements,
+        provenance,
+        truth,
+        events: samples.events.into_iter().map(event).collect(),
+    })
+}
+
+/// A batch in pieces that fit into frames of this size. Nothing for an empty batch.
+pub fn pieces(batch: &SampleBatch, frame_limit_bytes: u32) -> Vec<Samples> {
+    // Source time and quality are two values more.
+    let width =
+        1 + batch.columns.len() + batch.elements.len() + batch.truth.len() + 2 * batch.provenance.len();
+    let most = (frame_limit_bytes as usize / 2 / (width * BYTES_PER_VALUE)).max(1);
+    let count = batch.t_s.len();
+    let mut starts: Vec<usize> = (0..count).step_by(most).collect();
+    if starts.is_empty() && !batch.events.is_empty() {
+        starts.push(0);
+    }
+    let mut pieces: Vec<Samples> =
+        starts.into_iter().map(|start| piece(batch, start, count.min(start + most))).collect();
+    if let Some(last) = pieces.last_mut() {
+        let kind = |kind: EventKind| serde_json::to_value(kind).ok()?.as_str().map(str::to_owned);
+        let happened = |event: &Event| Happened {
+            t_s: event.t_s,
+            kind: kind(event.kind).unwrap_or_default(),
+            message: event.message.clone(),
+        };
+        last.events = batch.events.iter().map(happened).collect();
+    }
+    pieces
+}
+
+fn piece(batch: &SampleBatch, start: usize, end: usize) -> Samples {
+    let cut = |values: &[f64]| values.get(start..end).unwrap_or_default().to_vec();
+    let numbers =
+        |values: &[f64]| values.get(start..end).unwrap_or_default().iter().map(|v| of_number(*v)).collect();
+    let column = |column: &ChannelColumn| {
+        let from = batch.provenance_of(column.channel);
+        Column {
+            channel: column.channel.to_string(),
+            values: numbers(&column.values),
+            source_t_s: from.map(|from| cut(&from.source_t_s)),
+            quality: from.map(|from| {
+                from.quality.get(start..end).unwrap_or_default().iter().map(|one| word(*one)).collect()
+            }),
+        }
+    };
+    Samples {
+        stream: "rig".to_owned(),
+        sequence: batch.first_sequence + start as u64,
+        t_s: cut(&batch.t_s),
+        columns: batch.columns.iter().map(column).collect(),
+        elements: batch
+            .elements
+            .iter()
+            .map(|one| ElementSamples { element: one.element.to_string(), values: numbers(&one.values) })
+            .collect(),
+        truth: batch
+            .truth
+            .iter()
+            .map(|one| TruthSamples {
+                name: one.name.clone(),
+                unit: one.unit.clone(),
+                values: numbers(&one.values),
+            })
+            .collect(),
+        events: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// In however many pieces a batch travels: together they are the batch, and each fits its frame in both encodings.
+        #[test]
+        fn pieces_are_the_batch(
+            values in prop::collection::vec(prop::option::of(-1e6..1e6f64), 0..200), limit in 2_000u32..20_000,
+        ) {
+            let t_s: Vec<f64> = (0..values.len()).map(|i| i as f64 / 10.0).collect();
+            let column = filled(values);
+            let whole = SampleBatch {
+                first_sequence: 40,
+                columns: vec![ChannelColumn { channel: Channel::T2, values: column.clone() }],
+                provenance: vec![Provenance {
+                    channel: Channel::T2,
+                    source_t_s: t_s.clone(),
+                    quality: vec![Quality::Uncertain; t_s.len()],
+                }],
+                events: vec![Event { t_s: 1.0, kind: EventKind::RigTripped, message: "tripped".to_owned() }],
+                t_s,
+                ..SampleBatch::default()
+            };
+            let (mut next, mut values, mut sources) = (40, Vec::new(), Vec::new());
+            let sent = pieces(&whole, limit);
+            prop_assert!(!sent.is_empty());
+            for piece in sent {
+                let note = crate::protocol::Message::note("samples", serde_json::to_value(&piece).unwrap());
+                for encoding in [crate::protocol::Encoding::Json, crate::protocol::Encoding::MessagePack] {
+                    let body = crate::protocol::encode(&note, encoding).unwrap();
+                    prop_assert!(body.len() <= limit as usize);
+                    let back = crate::protocol::decode(&body).unwrap();
+                    // JSON is read to the last bit but one.
+                    prop_assert!(encoding == crate::protocol::Encoding::Json || back == note);
+                }
+                let part = batch(piece, &[Channel::T2]).unwrap();
+                prop_assert_eq!(part.first_sequence, next);
+                next += part.t_s.len() as u64;
+                values.extend(part.columns[0].values.iter().map(|value| value.to_bits()));
+                sources.extend(part.provenance[0].source_t_s.clone());
+                prop_assert!(part.provenance[0].quality.iter().all(|one| *one == Quality::Uncertain));
+            }
+            prop_assert_eq!(values, column.iter().map(|value| value.to_bits()).collect::<Vec<_>>());
+            prop_assert_eq!(sources, whole.t_s);
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_together_is_refused() {
+        let good = || Samples {
+            t_s: vec![0.0, 0.1],
+            columns: vec![Column {
+                channel: "T2".to_owned(),
+                values: vec![Some(300.0), None],
+                source_t_s: None,
+                quality: None,
+            }],
+            ..Samples::default()
+        };
+        let read = |change: &dyn Fn(&mut Samples)| {
+            let mut samples = good();
+            change(&mut samples);
+            batch(samples, &[Channel::T2])
+        };
+        assert!(read(&|_| ()).unwrap().columns[0].values[1].is_nan());
+        assert!(matches!(read(&|s| s.t_s.reverse()), Err(Unusable::Time { .. })));
+        assert!(matches!(read(&|s| s.t_s[1] = f64::NAN), Err(Unusable::Time { .. })));
+        assert!(matches!(read(&|s| s.columns[0].values.clear()), Err(Unusable::Torn { .. })));
+        assert!(matches!(read(&|s| s.columns[0].quality = Some(vec![])), Err(Unusable::Torn { .. })));
+        assert!(matches!(read(&|s| s.columns.push(s.columns[0].clone())), Err(Unusable::Twice(_))));
+        // What is not known is left out.
+        assert!(read(&|s| s.columns[0].channel = "T9".to_owned()).unwrap().columns.is_empty());
+    }
+}

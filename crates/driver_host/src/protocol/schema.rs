@@ -1,0 +1,197 @@
+//! The JSON schema of all messages, made from the types that read and write them.
+
+use crate::protocol::{
+    Configure, Described, Failure, Hello, LastSample, Message, Note, Poll, Samples, Setpoints, Welcome,
+};
+use schemars::generate::SchemaSettings;
+use serde_json::{Value, json};
+
+/// The schema: `Message` is what a frame holds, the others what `params` and `result` hold, by method.
+pub fn schema() -> Value {
+    let mut generator = SchemaSettings::draft2020_12().into_generator();
+    let message = generator.subschema_for::<Message>();
+    let methods = json!({
+        "hello": {"params": generator.subschema_for::<Hello>(), "result": generator.subschema_for::<Welcome>()},
+        "configure": {"params": generator.subschema_for::<Configure>(), "result": {}},
+        "describe": {"result": generator.subschema_for::<Described>()},
+        "arm": {"result": {}},
+        "set": {"params": generator.subschema_for::<Setpoints>(), "result": {}},
+        "hold": {"result": {}},
+        "poll": {"params": generator.subschema_for::<Poll>(), "result": generator.subschema_for::<LastSample>()},
+        "make_safe": {"result": {}},
+        "disarm": {"result": {}},
+        "lease": {},
+        "samples": {"params": generator.subschema_for::<Samples>()},
+        "lost": {"params": generator.subschema_for::<Failure>()},
+        "note": {"params": generator.subschema_for::<Note>()},
+    });
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Messages between mapper and a driver",
+        "allOf": [message],
+        "x-methods": methods,
+        "$defs": generator.take_definitions(true),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    /// What a driver's author checks his messages with, and what they look like: method, part of the message, one that is right.
+    fn examples() -> [(&'static str, &'static str, Value); 9] {
+        let hello = json!({
+            "magic": "mapper-backend", "protocol": {"major": 1, "minor": 1}, "name": "x", "version": "1", "frame_limit_bytes": 65536,
+        });
+        let mut welcome = hello.clone();
+        welcome["session"] = json!("s");
+        [
+            ("hello", "params", hello),
+            ("hello", "result", welcome),
+            ("configure", "params", json!({"settings": {"password": {"env": "NAME"}}})),
+            (
+                "describe",
+                "result",
+                json!({"identity": "x", "description": {
+                    "channels": [{"name": "T2", "unit": "K", "sensors": 2}, {"name": "N", "unit": "rpm"}], "sample_rate_hz": 10.5,
+                    "simulated_time": true, "exclusive": "cell_3", "needs_guarded": ["overspeed"],
+                    "accepts": {"p3_pa": [1.5, 2.5], "t3_k": [1.5, 2.5], "valve_opening_ratio": [0.1, 2.5], "oil_temperature_k": [1.5, 2.5]},
+                    "safe": {"p3_slew_pa_s": null, "valve_opening_ratio": 1.5, "within_s": 1.5},
+                }}),
+            ),
+            (
+                "set",
+                "params",
+                json!({"mode": "running", "p3_pa": 1.5, "t3_k": 1.5, "valve_opening_ratio": 0.7, "oil_temperature_k": 1.5}),
+            ),
+            ("poll", "params", json!({"until_s": 1.5})),
+            ("poll", "result", json!({"next_sequence": 7})),
+            (
+                "samples",
+                "params",
+                json!({
+                    "stream": "rig", "sequence": 3, "t_s": [0.5, 1.5],
+                    "columns": [{"channel": "T2", "values": [300.5, null], "source_t_s": [0.25, 1.25], "quality": ["good", "bad"]}],
+                    "elements": [{"element": "T2/1", "values": [1.5, null]}],
+                    "truth": [{"name": "x", "unit": "K", "values": [1.5, 2.5]}],
+                    "events": [{"t_s": 0.5, "kind": "rig_tripped", "message": "x"}],
+                }),
+            ),
+            ("lost", "params", json!({"code": "lost", "message": "x", "t_s": 1.5})),
+        ]
+    }
+
+    /// As this crate reads it, with what it makes of it in the words of the runner.
+    fn read(method: &str, part: &str, value: Value) -> Result<(), serde_json::Error> {
+        match (method, part) {
+            ("hello", "params") => serde_json::from_value::<Hello>(value).map(drop),
+            ("hello", _) => serde_json::from_value::<Welcome>(value).map(drop),
+            ("configure", _) => serde_json::from_value::<Configure>(value).map(drop),
+            ("describe", _) => serde_json::from_value::<Described>(value).map(|described| {
+                let _ = crate::protocol::description(&described.description, "x", "1");
+            }),
+            ("set", _) => serde_json::from_value::<Setpoints>(value).map(|wanted| {
+                let _ = crate::protocol::setpoints(&wanted);
+            }),
+            ("poll", "params") => serde_json::from_value::<Poll>(value).map(drop),
+            ("poll", _) => serde_json::from_value::<LastSample>(value).map(drop),
+            ("samples", _) => serde_json::from_value::<Samples>(value).map(|samples| {
+                let _ = crate::protocol::batch(samples, &[mapper_core::Channel::T2]);
+            }),
+            _ => serde_json::from_value::<Failure>(value)
+                .map(|failure| drop(crate::protocol::rig_error(failure, "x", "set", 0.0))),
+        }
+    }
+
+    fn validators() -> BTreeMap<(&'static str, &'static str), jsonschema::Validator> {
+        let whole = schema();
+        let of = |(method, part, _): (&'static str, &'static str, Value)| {
+            let mut schema = whole["x-methods"][method][part].clone();
+            schema["$defs"] = whole["$defs"].clone();
+            ((method, part), jsonschema::validator_for(&schema).unwrap())
+        };
+        examples().into_iter().map(of).collect()
+    }
+
+    /// All places of a value, its own first.
+    fn places(value: &Value, here: &str, all: &mut Vec<String>) {
+        all.push(here.to_owned());
+        let inside: Vec<(String, &Value)> = match value {
+            Value::Object(map) => map.iter().map(|(key, value)| (key.clone(), value)).collect(),
+            Value::Array(list) => {
+                list.iter().enumerate().map(|(at, value)| (at.to_string(), value)).collect()
+            }
+            _ => Vec::new(),
+        };
+        inside.into_iter().for_each(|(key, value)| places(value, &format!("{here}/{key}"), all));
+    }
+
+    /// A number with a fraction, since 1.0 is a whole number to a schema and none to a reader.
+    fn thing() -> impl Strategy<Value = Value> {
+        prop_oneof![
+            Just(Value::Null),
+            any::<bool>().prop_map(Value::from),
+            (-1000i32..70_000).prop_map(Value::from),
+            (-1e9f64..1e9).prop_map(|number| json!(number.floor() + 0.5)),
+            "[a-zA-Z_0-9/]{0,12}".prop_map(Value::from),
+            prop::collection::vec(any::<bool>(), 0..3).prop_map(Value::from),
+            Just(json!({"name": "T2", "values": [], "t_s": [null]})),
+        ]
+    }
+
+    #[test]
+    fn what_is_right_fits_the_schema_and_is_read() {
+        let validators = validators();
+        for (method, part, value) in examples() {
+            assert!(validators[&(method, part)].is_valid(&value), "{method} {part}");
+            read(method, part, value).unwrap();
+        }
+    }
+
+    proptest! {
+        /// Right messages with up to four places changed or taken away: nothing panics, and what the schema lets through is read.
+        #[test]
+        fn what_the_schema_lets_through_is_read(
+            which in 0usize..9, changes in prop::collection::vec((any::<prop::sample::Index>(), prop::option::of(thing())), 0..4),
+        ) {
+            thread_local! { static VALIDATORS: BTreeMap<(&'static str, &'static str), jsonschema::Validator> = validators(); }
+            let (method, part, mut value) = examples()[which].clone();
+            for (at, thing) in changes {
+                let mut all = Vec::new();
+                places(&value, "", &mut all);
+                let place = at.get(&all).clone();
+                match (thing, place.rsplit_once('/')) {
+                    (Some(thing), _) => *value.pointer_mut(&place).unwrap() = thing,
+                    (None, Some((above, key))) => {
+                        if let Some(Value::Object(map)) = value.pointer_mut(above) {
+                            map.remove(key);
+                        }
+                    }
+                    (None, None) => {}
+                }
+            }
+            let fits = VALIDATORS.with(|validators| validators[&(method, part)].is_valid(&value));
+            let read = read(method, part, value.clone());
+            prop_assert!(!fits || read.is_ok(), "{} {}: {} is {:?}", method, part, value, read);
+        }
+    }
+
+    /// What is committed for authors of drivers is what this crate reads and writes. To make it again:
+    /// `MAPPER_WRITE_SCHEMA=1 cargo test -p mapper-driver-host the_committed_schema`.
+    #[test]
+    fn the_committed_schema_is_that_of_the_types() {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../docs/reference/protocol.schema.json");
+        let made = format!("{}\n", serde_json::to_string_pretty(&super::schema()).unwrap());
+        if std::env::var_os("MAPPER_WRITE_SCHEMA").is_some() {
+            std::fs::write(&file, &made).unwrap();
+        }
+        assert_eq!(
+            std::fs::read_to_string(&file).unwrap(),
+            made,
+            "make docs/reference/protocol.schema.json again"
+        );
+    }
+}

@@ -1,0 +1,11 @@
+//! Efficiency between the points of a compressor map, as a mesh over flow and pressure ratio: one for the picture among
+//! the map's files and for the page, so that both show the same contours.
+
+mod fitted;
+mod levels;
+mod monotone;
+mod surface;
+
+pub use fitted::fitted_surface;
+pub use levels::contour_levels;
+pub use surface::{SUBDIVISIONS, across, efficiency_surface, ordered, speed_curve};

@@ -1,0 +1,175 @@
+//! Efficiency between the measured points, for pictures alone, and only where points stand on all sides.
+//!
+//! Each speed line is a row of a structured grid. Along a line the position runs from 0 at its surge-side point to 1
+//! at its choke-side point, by length on the map with both axes scaled to the map's spans; flow, pressure ratio and
+//! efficiency are monotone cubics of it. Between lines the same three, at equal position, are monotone cubics of
+//! corrected speed. A monotone cubic never leaves the range of the two values it joins, so the picture shows no
+//! efficiency better than the best measured nor worse than the worst.
+//!
+//! NaN (no support): before the first and after the last point of a line that has an efficiency, and between two
+//! lines wherever one of them has none. A point without efficiency between two with one is bridged. Lines with fewer
+//! than two places on the map take no part. Points closer than 1 % of the map's diagonal (repeats) count as one, their
+//! mean.
+
+use crate::mesh::monotone::Monotone;
+use mapper_chart::StructuredGrid;
+use mapper_core::{CompressorMap, MapPoint, SpeedLine};
+
+/// Nodes along a line.
+const COLUMNS: usize = 49;
+/// Rows of the mesh from one line to the next.
+pub const SUBDIVISIONS: usize = 8;
+/// Distance below which points count as one, share of the map's diagonal.
+const SAME_PLACE: f64 = 0.01;
+
+/// Efficiency (fraction) over corrected flow (x, kg/s) and pressure ratio (y) inside the measured region, as
+/// described in the source of this module; NaN where not supported. `None` where fewer than two lines can take part.
+pub fn efficiency_surface(map: &CompressorMap) -> Option<StructuredGrid> {
+    let spans = spans(map)?;
+    let mut rows: Vec<Row> = map.lines.iter().filter_map(|line| row(line, spans)).collect();
+    // Speeds must rise strictly; of two lines at one speed the first is taken.
+    rows.dedup_by(|b, a| b.speed_corrected_rpm <= a.speed_corrected_rpm);
+    if rows.len() < 2 {
+        return None;
+    }
+    let speeds: Vec<f64> = rows.iter().map(|row| row.speed_corrected_rpm).collect();
+    let row_count = (rows.len() - 1) * SUBDIVISIONS + 1;
+    let [mut x, mut y, mut z] = [(); 3].map(|()| vec![f64::NAN; row_count * COLUMNS]);
+    for column in 0..COLUMNS {
+        let pick = |field: usize| rows.iter().map(|row| row.nodes[column][field]).collect::<Vec<f64>>();
+        for (field, out) in [&mut x, &mut y, &mut z].into_iter().enumerate() {
+            for (r, value) in across(&speeds, &pick(field)).into_iter().enumerate() {
+                out[r * COLUMNS + column] = value;
+            }
+        }
+    }
+    StructuredGrid::new(row_count, COLUMNS, x, y, z).ok()
+}
+
+/// A speed line resampled: flow, pressure ratio, efficiency at equal steps of position.
+struct Row {
+    speed_corrected_rpm: f64,
+    nodes: Vec<[f64; 3]>,
+}
+
+/// Spans of flow (kg/s) and pressure ratio over the map, above 0.
+fn spans(map: &CompressorMap) -> Option<(f64, f64)> {
+    let span = |value: fn(&MapPoint) -> f64| {
+        let all = map.lines.iter().flat_map(|line| &line.points).map(value).filter(|v| v.is_finite());
+        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        (high > low).then_some(high - low)
+    };
+    Some((span(|p| p.flow_corrected_kg_s)?, span(|p| p.pressure_ratio)?))
+}
+
+/// The line's points from surge to choke side, by flow and falling pressure ratio together, so that noise does not
+/// shuffle points on the steep part at choke or the flat part at surge.
+pub fn surge_to_choke(line: &SpeedLine, (flow_span, ratio_span): (f64, f64)) -> Vec<&MapPoint> {
+    let mut points: Vec<&MapPoint> = line.points.iter().collect();
+    let key = |p: &MapPoint| p.flow_corrected_kg_s / flow_span - p.pressure_ratio / ratio_span;
+    points.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    points
+}
+
+/// The points of a line from surge to choke side, by flow and falling pressure ratio together in shares of the map's spans.
+pub fn ordered<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint> {
+    surge_to_choke(line, spans(map).unwrap_or((1.0, 1.0)))
+}
+
+/// The speed line as drawn: (corrected flow, kg/s; pressure ratio) from surge to choke side, the surface's own edge.
+///
+/// A line that takes no part in the surface gives its points as they are.
+pub fn speed_curve(map: &CompressorMap, line: &SpeedLine) -> Vec<(f64, f64)> {
+    match spans(map).and_then(|spans| row(line, spans)) {
+        Some(row) => row.nodes.iter().map(|node| (node[0], node[1])).collect(),
+        None => ordered(map, line).iter().map(|p| (p.flow_corrected_kg_s, p.pressure_ratio)).collect(),
+    }
+}
+
+/// Mean of points that stand at one place.
+struct Place {
+    flow: f64,
+    ratio: f64,
+    eta: Option<f64>,
+}
+
+fn row(line: &SpeedLine, spans: (f64, f64)) -> Option<Row> {
+    let places = places(line, spans);
+    let mut position = vec![0.0];
+    for pair in places.windows(2) {
+        let step = ((pair[1].flow - pair[0].flow) / spans.0).hypot((pair[1].ratio - pair[0].ratio) / spans.1);
+        position.push(position.last()? + step);
+    }
+    let total = *position.last()?;
+    position.iter_mut().for_each(|p| *p /= total);
+    let flows: Vec<f64> = places.iter().map(|p| p.flow).collect();
+    let ratios: Vec<f64> = places.iter().map(|p| p.ratio).collect();
+    let (eta_positions, etas): (Vec<f64>, Vec<f64>) =
+        places.iter().zip(&position).filter_map(|(p, s)| p.eta.map(|eta| (*s, eta))).unzip();
+    // No place, one place, or all in one: no interpolant, and the line takes no part.
+    let (flow, ratio) = (Monotone::new(&position, &flows)?, Monotone::new(&position, &ratios)?);
+    let eta = Monotone::new(&eta_positions, &etas);
+    let nodes = (0..COLUMNS)
+        .map(|i| {
+            let s = i as f64 / (COLUMNS - 1) as f64;
+            [flow.at(s), ratio.at(s), eta.as_ref().and_then(|eta| eta.at(s))].map(|v| v.unwrap_or(f64::NAN))
+        })
+        .collect();
+    Some(Row { speed_corrected_rpm: line.speed_corrected_rpm, nodes })
+}
+
+fn places(line: &SpeedLine, spans: (f64, f64)) -> Vec<Place> {
+    let points = surge_to_choke(line, spans);
+    let known =
+        points.into_iter().filter(|p| p.flow_corrected_kg_s.is_finite() && p.pressure_ratio.is_finite());
+    let mut clusters: Vec<Vec<&MapPoint>> = Vec::new();
+    for point in known {
+        let near = |other: &&MapPoint| {
+            let flow = (point.flow_corrected_kg_s - other.flow_corrected_kg_s) / spans.0;
+            let ratio = (point.pressure_ratio - other.pressure_ratio) / spans.1;
+            flow.hypot(ratio) < SAME_PLACE * std::f64::consts::SQRT_2
+        };
+        match clusters.last_mut() {
+            Some(cluster) if cluster.first().is_some_and(near) => cluster.push(point),
+            _ => clusters.push(vec![point]),
+        }
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    clusters
+        .iter()
+        .map(|cluster| {
+            let all =
+                |value: fn(&MapPoint) -> f64| mean(&cluster.iter().map(|p| value(p)).collect::<Vec<_>>());
+            let etas: Vec<f64> = cluster.iter().filter_map(|p| p.eta).collect();
+            Place {
+                flow: all(|p| p.flow_corrected_kg_s),
+                ratio: all(|p| p.pressure_ratio),
+                eta: (!etas.is_empty()).then(|| mean(&etas)),
+            }
+        })
+        .collect()
+}
+
+/// Values between lines, `SUBDIVISIONS` a gap; NaN in every gap with an unknown end.
+pub fn across(speeds: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut out = vec![f64::NAN; (speeds.len() - 1) * SUBDIVISIONS + 1];
+    let mut start = 0;
+    while start < values.len() {
+        let known = values[start..].iter().take_while(|v| v.is_finite()).count();
+        if known > 0 {
+            out[start * SUBDIVISIONS] = values[start];
+        }
+        let end = start + known;
+        if let Some(curve) = Monotone::new(&speeds[start..end], &values[start..end]) {
+            for i in start..end - 1 {
+                for k in 0..=SUBDIVISIONS {
+                    let share = k as f64 / SUBDIVISIONS as f64;
+                    let speed = (speeds[i] + share * (speeds[i + 1] - speeds[i])).min(speeds[end - 1]);
+                    out[i * SUBDIVISIONS + k] = curve.at(speed).unwrap_or(f64::NAN);
+                }
+            }
+        }
+        start = end + 1;
+    }
+    out
+}

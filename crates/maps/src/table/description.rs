@@ -1,0 +1,345 @@
+//! Map descriptions: the keys behind `--with`, the YAML file with the same keys, and the description of a map that was read.
+
+use crate::table::reference::parse_reference;
+use mapper_core::{
+    DescribedColumn, ImportRemark, ImportedColumn, ImportedMap, ImportedTurbine, MapDescription,
+    ReferenceState,
+};
+use mapper_yaml::units::{Kind, parse};
+use mapper_yaml::{Document, FindingKind, Findings, Schema, Source, steps};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+/// Largest map description that is read, bytes.
+const SIZE_LIMIT: usize = 1 << 16;
+
+static DOCUMENT: Document = Document { name: "map description", example: "docs/reference/files.md" };
+static SCHEMA: LazyLock<Schema> = LazyLock::new(|| Schema::new(schema()));
+
+/// One key of a map description.
+#[derive(Debug, Clone, Copy)]
+pub struct DescriptionKey {
+    /// As written in the file and behind `--with`.
+    pub name: &'static str,
+    /// One line for people.
+    pub description: &'static str,
+    /// A value as one would write it.
+    pub example: &'static str,
+    set: Set,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Set {
+    Column,
+    Value(fn(&mut MapDescription, &str) -> Option<()>),
+}
+
+const fn column(name: &'static str, example: &'static str) -> DescriptionKey {
+    DescriptionKey {
+        name,
+        description: "Column by its heading (`X [lb/min]`) or number (`#2 [kg/s]`), or the unit alone.",
+        example,
+        set: Set::Column,
+    }
+}
+
+/// Every key.
+pub const DESCRIPTION_KEYS: [DescriptionKey; 20] = [
+    DescriptionKey {
+        name: "reference",
+        description: "Reference state of the corrected quantities: SAE, Garrett, BorgWarner, or temperature and pressure.",
+        example: "298 K, 100 kPa",
+        set: Set::Value(|given, text| set(&mut given.reference, parse_reference(text).ok())),
+    },
+    DescriptionKey {
+        name: "sheet",
+        description: "Sheet of a workbook; the first visible one with numbers if none is named.",
+        example: "Map",
+        set: Set::Value(|given, text| set(&mut given.sheet, Some(text.to_owned()))),
+    },
+    DescriptionKey {
+        name: "design_speed",
+        description: "Corrected speed of the design point, for files with relative speeds.",
+        example: "150000 rpm",
+        set: Set::Value(|given, text| {
+            set(&mut given.design.speed_corrected_rpm, positive(Kind::Speed, text))
+        }),
+    },
+    DescriptionKey {
+        name: "design_flow",
+        description: "Corrected flow of the design point; the flows of the file are scaled to it.",
+        example: "0.2 kg/s",
+        set: Set::Value(|given, text| {
+            set(&mut given.design.flow_corrected_kg_s, positive(Kind::MassFlow, text))
+        }),
+    },
+    DescriptionKey {
+        name: "design_pressure_ratio",
+        description: "Pressure ratio of the design point.",
+        example: "2.4",
+        set: Set::Value(|given, text| {
+            let ratio = text.parse().ok().filter(|ratio: &f64| *ratio > 1.0 && ratio.is_finite());
+            set(&mut given.design.pressure_ratio, ratio)
+        }),
+    },
+    DescriptionKey {
+        name: "design_efficiency",
+        description: "Efficiency of the design point.",
+        example: "74 %",
+        set: Set::Value(|given, text| {
+            let eta = positive(Kind::Fraction, text).or_else(|| text.parse().ok());
+            set(&mut given.design.eta, eta.filter(|eta| *eta > 0.0 && *eta <= 1.0))
+        }),
+    },
+    DescriptionKey {
+        name: "inlet_pipe",
+        description: "Inner diameter of the pipe at P1, if P1 is a static pressure.",
+        example: "45 mm",
+        set: Set::Value(|given, text| {
+            set(&mut given.static_taps.inlet_diameter_m, positive(Kind::Length, text))
+        }),
+    },
+    DescriptionKey {
+        name: "outlet_pipe",
+        description: "Inner diameter of the pipe at P2, if P2 is a static pressure.",
+        example: "38 mm",
+        set: Set::Value(|given, text| {
+            set(&mut given.static_taps.outlet_diameter_m, positive(Kind::Length, text))
+        }),
+    },
+    column("speed", "N [krpm]"),
+    column("reduced_speed", "N/sqrt(T) [rpm/K^0.5]"),
+    column("flow", "lb/min"),
+    column("volume_flow", "V [m3/h]"),
+    column("reduced_flow", "kg/s*K^0.5/kPa"),
+    column("pressure_ratio", "Y"),
+    column("efficiency", "#4 [%]"),
+    column("vane", "VGT [%]"),
+    column("p1", "P1 [kPa]"),
+    column("p2", "P2 [kPa]"),
+    column("t1", "T1 [degC]"),
+    column("t2", "T2 [degC]"),
+];
+
+fn set<T>(place: &mut Option<T>, value: Option<T>) -> Option<()> {
+    *place = Some(value?);
+    Some(())
+}
+
+fn positive(kind: Kind, text: &str) -> Option<f64> {
+    parse(kind, text).ok().filter(|value| *value > 0.0)
+}
+
+/// A key or a value that does not exist.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum KeyError {
+    /// No such key.
+    #[error("there is no key `{key}`; the keys are {}", DESCRIPTION_KEYS.map(|key| key.name).join(", "))]
+    Key {
+        /// What was written.
+        key: String,
+    },
+    /// Not a value of the key.
+    #[error("`{value}` is not a value of `{key}`; write e.g. `{example}`")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What was written.
+        value: String,
+        /// A right one.
+        example: &'static str,
+    },
+}
+
+/// Adds a statement to a description.
+///
+/// # Errors
+/// [`KeyError`] for a key that does not exist and for a value that is none of its.
+pub fn set_key(description: &mut MapDescription, key: &str, value: &str) -> Result<(), KeyError> {
+    let row = DESCRIPTION_KEYS.iter().find(|row| row.name == key);
+    let row = row.ok_or_else(|| KeyError::Key { key: key.chars().take(60).collect() })?;
+    let done = match row.set {
+        Set::Value(set) => set(description, value.trim()),
+        Set::Column => (!value.trim().is_empty()).then(|| {
+            description.columns.retain(|column| column.quantity != row.name);
+            description.columns.push(DescribedColumn { quantity: row.name, text: value.trim().to_owned() });
+        }),
+    };
+    done.ok_or_else(|| KeyError::Value {
+        key: row.name,
+        value: value.chars().take(60).collect(),
+        example: row.example,
+    })
+}
+
+/// Why a map description cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum DescriptionError {
+    /// The file cannot be read.
+    #[error("failed to read the map description {}: {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file has mistakes.
+    #[error("{0}")]
+    Mistakes(Box<Findings>),
+}
+
+/// Reads the file of a map description.
+///
+/// # Errors
+/// [`DescriptionError`] with all mistakes of the file.
+pub fn read_description(path: &Path) -> Result<MapDescription, DescriptionError> {
+    let mistakes = |findings| DescriptionError::Mistakes(Box::new(findings));
+    let text = mapper_yaml::open(&DOCUMENT, path, SIZE_LIMIT)
+        .map_err(|source| DescriptionError::Read { path: path.to_owned(), source })?
+        .map_err(mistakes)?;
+    description_from_yaml(&text, path).map_err(mistakes)
+}
+
+/// Reads a map description; `origin` names it in messages.
+///
+/// # Errors
+/// All mistakes of the text together.
+pub fn description_from_yaml(text: &str, origin: &Path) -> Result<MapDescription, Findings> {
+    let (tree, mut notes) = mapper_yaml::read(Source::new(&DOCUMENT, origin, text))?;
+    SCHEMA.check(&tree, &mut notes);
+    let mut description = MapDescription::default();
+    if notes.is_empty() {
+        for key in tree.keys(&[]) {
+            let steps = steps![key];
+            let number = || tree.get(&steps).and_then(Value::as_f64).map(|number| number.to_string());
+            let text = tree.text(&steps).map(str::to_owned).or_else(number).unwrap_or_default();
+            let Err(error) = set_key(&mut description, key, &text) else { continue };
+            let remedy =
+                DESCRIPTION_KEYS.iter().find(|row| row.name == key).map_or("", |row| row.description);
+            notes.push(tree.finding(FindingKind::WrongValue, &steps, error.to_string(), remedy));
+        }
+    }
+    if notes.is_empty() { Ok(description) } else { Err(tree.findings(notes)) }
+}
+
+fn schema() -> Value {
+    let property = |key: &DescriptionKey| {
+        let value =
+            json!({"type": ["string", "number"], "description": key.description, "examples": [key.example]});
+        (key.name.to_owned(), value)
+    };
+    let properties: Map<String, Value> = DESCRIPTION_KEYS.iter().map(property).collect();
+    json!({"type": "object", "minProperties": 1, "properties": properties, "additionalProperties": false})
+}
+
+/// The description of a map that was read: all that was found or assumed, to be kept and corrected.
+pub fn describe(file_name: &str, found: &ImportedMap, given: &MapDescription) -> String {
+    text_of_description(file_name, Some(found.map.reference), &found.columns, &found.remarks, given)
+}
+
+/// The same of a turbine map.
+pub fn describe_turbine(file_name: &str, found: &ImportedTurbine, given: &MapDescription) -> String {
+    text_of_description(file_name, given.reference, &found.columns, &found.remarks, given)
+}
+
+fn text_of_description(
+    file_name: &str,
+    reference: Option<ReferenceState>,
+    columns: &[ImportedColumn],
+    remarks: &[ImportRemark],
+    given: &MapDescription,
+) -> String {
+    let mut text = format!(
+        "# How `mapper` reads {file_name}. Give this file by `--description FILE`, or in a campaign as\n\
+         # `map: {{file: {file_name}, description: FILE, reference: ...}}`. Keys and units: docs/reference/files.md.\n"
+    );
+    let mut line = |key: &str, value: &str| {
+        let _ = writeln!(text, "{key}: {}", Value::from(value));
+    };
+    if let Some(state) = reference {
+        line("reference", &format!("{} K, {} Pa", state.t_ref_k, state.p_ref_pa));
+    }
+    if let Some(sheet) = &given.sheet {
+        line("sheet", sheet);
+    }
+    let design = given.design;
+    for (key, value, unit) in [
+        ("design_speed", design.speed_corrected_rpm, " rpm"),
+        ("design_flow", design.flow_corrected_kg_s, " kg/s"),
+        ("design_pressure_ratio", design.pressure_ratio, ""),
+        ("design_efficiency", design.eta, ""),
+        ("inlet_pipe", given.static_taps.inlet_diameter_m, " m"),
+        ("outlet_pipe", given.static_taps.outlet_diameter_m, " m"),
+    ] {
+        if let Some(value) = value {
+            line(key, &format!("{value}{unit}"));
+        }
+    }
+    let in_percent = remarks.contains(&ImportRemark::EfficiencyInPercent);
+    let has_speed = columns.iter().any(|column| column.key.ends_with("speed"));
+    for column in columns {
+        let unit = match column.unit.as_str() {
+            "" if column.key == "efficiency" && in_percent => "%",
+            // A speed of a turbine that was taken as reduced from its size stays without a unit.
+            "" if remarks.contains(&ImportRemark::SpeedParameterAssumed) && column.key == "speed" => "",
+            "" => default_unit(column.key),
+            unit => unit,
+        };
+        let has_unit = column.heading.contains(unit) && !column.unit.is_empty();
+        // Lines side by side have the columns of the first line only.
+        if column.heading.is_empty() && !has_speed {
+            if !unit.is_empty() {
+                line(column.key, unit);
+            }
+            continue;
+        }
+        let place =
+            if column.heading.is_empty() { format!("#{}", column.number) } else { column.heading.clone() };
+        let unit = if has_unit || unit.is_empty() { String::new() } else { format!(" [{unit}]") };
+        line(column.key, &format!("{place}{unit}"));
+    }
+    for column in given.columns.iter().filter(|_| columns.is_empty()) {
+        line(column.quantity, &column.text);
+    }
+    text
+}
+
+/// The unit of a column that names none.
+fn default_unit(key: &str) -> &'static str {
+    match key {
+        "speed" => "rpm",
+        "flow" => "kg/s",
+        _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_example_is_a_value_of_its_key_and_nonsense_is_none() {
+        for key in DESCRIPTION_KEYS {
+            set_key(&mut MapDescription::default(), key.name, key.example).unwrap();
+        }
+        for (key, value) in
+            [("design_speed", "150000"), ("design_efficiency", "1.4"), ("flow", " "), ("x", "1")]
+        {
+            assert!(set_key(&mut MapDescription::default(), key, value).is_err(), "{key}: {value}");
+        }
+    }
+
+    #[test]
+    fn a_file_has_the_same_keys_and_its_mistakes_have_places() {
+        let text = "reference: SAE\ndesign_speed: 150 krpm\nflow: \"X [lb/min]\"\n";
+        let read = description_from_yaml(text, Path::new("x.yaml")).unwrap();
+        assert_eq!(read.design.speed_corrected_rpm, Some(150e3));
+        assert_eq!(read.columns, [DescribedColumn { quantity: "flow", text: "X [lb/min]".to_owned() }]);
+        for wrong in ["design_speed: fast\n", "flows: kg/s\n", "- flow\n", ""] {
+            assert!(description_from_yaml(wrong, Path::new("x.yaml")).unwrap_err().count() > 0, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Reads a turbine map from a table of points, in all layouts of compressor maps.
+
+use crate::table::column::{Column, Machine};
+use crate::table::given::Given;
+use crate::table::grid::Grid;
+use crate::table::layout;
+use crate::table::points::{Point, columns, efficiency_in_percent, points};
+use crate::table::quantity::Quantity;
+use crate::table::read::notes;
+use crate::table::reference;
+use mapper_core::{
+    ImportError, ImportRemark, ImportedTurbine, MapDescription, ReferenceState, TurbineMap, TurbineMapPoint,
+};
+
+/// The turbine map of a text.
+///
+/// # Errors
+/// [`ImportError`] with the line of the file.
+pub fn read_turbine_text(text: &str, given: &MapDescription) -> Result<ImportedTurbine, ImportError> {
+    read(&Grid::of_text(text)?, given)
+}
+
+/// The turbine map of a workbook.
+///
+/// # Errors
+/// [`ImportError`] with the row of the sheet.
+pub fn read_turbine_workbook(bytes: &[u8], given: &MapDescription) -> Result<ImportedTurbine, ImportError> {
+    read(&Grid::of_workbook(bytes, given.sheet.as_deref())?, given)
+}
+
+/// Speed parameters are below, corrected speeds above: 200 krpm at 1000 K are 6300 rpm/K^0.5, and no turbocharger's map ends at 10 krpm.
+const LARGEST_SPEED_PARAMETER: f64 = 10_000.0;
+
+fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, ImportError> {
+    let given = Given::of(description, Machine::Turbine)?;
+    let Some(layout) = layout::layout(grid, &given)? else { return Err(ImportError::Empty) };
+    let notes = notes(grid, layout.first_row);
+    let mut remarks = layout.remarks.clone();
+    let all = || layout.groups.iter().flat_map(|group| &group.columns);
+    let line = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row)).map_or(1, |row| row.at);
+    let without_unit = |quantity: Quantity| all().find(|c| c.quantity == quantity && !c.has_unit());
+    // A factor of a thousand between MPa and kPa, or ten between bar and MPa, is within what turbines have.
+    if let Some(column) = without_unit(Quantity::ReducedFlow).filter(|column| !is_sae(column)) {
+        let (heading, key) = (column.heading.clone(), Quantity::ReducedFlow.key());
+        return Err(ImportError::NoUnit { line, heading, key, example: "kg/s*K^0.5/kPa" });
+    }
+    if without_unit(Quantity::Flow).is_some() {
+        remarks.push(ImportRemark::FlowUnitAssumed);
+    }
+    let points = points(grid, &given, &layout, &mut remarks)?;
+    let fastest = points.iter().filter_map(speed_of).fold(0.0, f64::max);
+    let has_speed_unit = all().any(|column| column.quantity == Quantity::Speed && column.has_unit());
+    let speed_is_reduced = !has_speed_unit && fastest < LARGEST_SPEED_PARAMETER;
+    if speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed) {
+        remarks.push(ImportRemark::SpeedParameterAssumed);
+    }
+    let corrected = all().any(|column| column.quantity == Quantity::Flow)
+        || !speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed);
+    let reference = match reference::settle(notes.reference, description.reference) {
+        Err(ImportError::NoReference) if !corrected => None,
+        settled => Some(settled?),
+    };
+    let in_percent = efficiency_in_percent(&layout, &points);
+    if in_percent {
+        remarks.push(ImportRemark::EfficiencyInPercent);
+    }
+    let columns = columns(&layout, &points, None);
+    let state = reference.unwrap_or(ReferenceState::SAE);
+    let mut rows = points
+        .iter()
+        .map(|point| row(point, state, speed_is_reduced, in_percent))
+        .collect::<Result<Vec<TurbineMapPoint>, ImportError>>()?;
+    if rows.is_empty() {
+        return Err(ImportError::Empty);
+    }
+    if rows.iter().all(|row| row.efficiency.is_none()) {
+        remarks.push(ImportRemark::NoEfficiency);
+    }
+    sort(&mut rows);
+    Ok(ImportedTurbine {
+        map: TurbineMap { machine: notes.machine, points: rows, fitted: None },
+        columns,
+        remarks,
+    })
+}
+
+/// SAE's name of the flow parameter stands for kg K^0.5/(s kPa).
+fn is_sae(column: &Column) -> bool {
+    column.heading.eq_ignore_ascii_case("mfp")
+}
+
+/// The speed of a point in the unit of its column, or of its block.
+fn speed_of(point: &Point<'_>) -> Option<f64> {
+    let found = [Quantity::Speed, Quantity::ReducedSpeed].into_iter().find_map(|quantity| point.of(quantity));
+    found.map(|(column, value)| column.plain(value)).or(point.speed)
+}
+
+fn row(
+    point: &Point<'_>,
+    reference: ReferenceState,
+    speed_is_reduced: bool,
+    in_percent: bool,
+) -> Result<TurbineMapPoint, ImportError> {
+    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.plain(value));
+    let needed = |value: Option<f64>, quantity: Quantity| {
+        value.ok_or_else(|| ImportError::NotANumber {
+            line: point.at,
+            quantity: quantity.name().to_owned(),
+            text: String::new(),
+        })
+    };
+    let root = reference.t_ref_k.sqrt();
+    let speed = needed(speed_of(point), Quantity::Speed)?;
+    let is_parameter = speed_is_reduced || value(Quantity::ReducedSpeed).is_some();
+    let corrected_flow = value(Quantity::Flow).map(|kg_s| kg_s * root / (reference.p_ref_pa / 1000.0));
+    let efficiency = value(Quantity::Efficiency).map(|eta| if in_percent { 0.01 * eta } else { eta });
+    let row = TurbineMapPoint {
+        vane_position: value(Quantity::Vane).or(point.vane),
+        speed_parameter_rpm_sqrt_k: if is_parameter { speed } else { speed / root },
+        flow_parameter_kg_sqrt_k_s_kpa: needed(
+            value(Quantity::ReducedFlow).or(corrected_flow),
+            Quantity::ReducedFlow,
+        )?,
+        expansion_ratio: needed(value(Quantity::PressureRatio), Quantity::PressureRatio)?,
+        efficiency,
+    };
+    check(point.at, &row)?;
+    Ok(row)
+}
+
+/// # Errors
+/// [`ImportError::Value`] for a value that no turbine has.
+fn check(line: usize, row: &TurbineMapPoint) -> Result<(), ImportError> {
+    let flow = row.flow_parameter_kg_sqrt_k_s_kpa;
+    let eta = row.efficiency.unwrap_or(0.5);
+    for (quantity, value, good, needed) in [
+        (
+            "speed over the root of temperature",
+            row.speed_parameter_rpm_sqrt_k,
+            row.speed_parameter_rpm_sqrt_k > 0.0 && row.speed_parameter_rpm_sqrt_k < LARGEST_SPEED_PARAMETER,
+            "above 0, below 10 000 rpm/K^0.5",
+        ),
+        // A nozzle of air passes 0.0404 kg K^0.5/(s kPa) through each 10 cm2: 10 would be a throat of 2500 cm2.
+        ("flow parameter", flow, flow > 0.0 && flow < 10.0, "above 0, below 10 kg K^0.5/(s kPa)"),
+        (
+            "expansion ratio",
+            row.expansion_ratio,
+            row.expansion_ratio > 1.0 && row.expansion_ratio < 50.0,
+            "above 1, below 50",
+        ),
+        ("efficiency", eta, (-5.0..=1.5).contains(&eta), "a fraction (0.72), not a percentage"),
+    ] {
+        if !(value.is_finite() && good) {
+            return Err(ImportError::Value { line, quantity, value, needed });
+        }
+    }
+    Ok(())
+}
+
+/// In order of vane position, speed and expansion ratio.
+fn sort(rows: &mut [TurbineMapPoint]) {
+    let vane = |point: &TurbineMapPoint| point.vane_position.unwrap_or(f64::NEG_INFINITY);
+    rows.sort_by(|a, b| {
+        vane(a)
+            .total_cmp(&vane(b))
+            .then(a.speed_parameter_rpm_sqrt_k.total_cmp(&b.speed_parameter_rpm_sqrt_k))
+            .then(a.expansion_ratio.total_cmp(&b.expansion_ratio))
+    });
+}

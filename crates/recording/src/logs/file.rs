@@ -1,0 +1,83 @@
+//! A log as a file or as bytes in memory.
+
+use crate::logs::LogError;
+use std::io::{self, Cursor, Read, Seek};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What a format reads from.
+pub trait ReadSeek: Read + Seek {}
+
+impl<T: Read + Seek> ReadSeek for T {}
+
+/// A log's bytes, which may be read several times.
+#[derive(Debug, Clone)]
+pub struct LogFile {
+    path: PathBuf,
+    bytes: Option<Arc<[u8]>>,
+}
+
+impl LogFile {
+    /// A file.
+    pub fn of_path(path: &Path) -> Self {
+        LogFile { path: path.to_owned(), bytes: None }
+    }
+
+    /// Bytes in memory; `name` stands for the file in messages.
+    pub fn of_bytes(name: &Path, bytes: &[u8]) -> Self {
+        LogFile { path: name.to_owned(), bytes: Some(bytes.into()) }
+    }
+
+    /// The file, for messages.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The bytes, if they are in memory.
+    pub fn bytes(&self) -> Option<&[u8]> {
+        self.bytes.as_deref()
+    }
+
+    /// The bytes from the start.
+    ///
+    /// # Errors
+    /// [`LogError::Read`] if the file cannot be opened.
+    pub fn open(&self) -> Result<Box<dyn ReadSeek>, LogError> {
+        match &self.bytes {
+            Some(bytes) => Ok(Box::new(Cursor::new(bytes.clone()))),
+            None => Ok(Box::new(mapper_yaml::open_file(&self.path).map_err(|error| self.error(error))?)),
+        }
+    }
+
+    /// Its size, bytes.
+    ///
+    /// # Errors
+    /// [`LogError::Read`] if the file cannot be found.
+    pub fn size_bytes(&self) -> Result<u64, LogError> {
+        match &self.bytes {
+            Some(bytes) => Ok(bytes.len() as u64),
+            None => Ok(std::fs::metadata(&self.path).map_err(|error| self.error(error))?.len()),
+        }
+    }
+
+    /// At most the first `count` bytes.
+    ///
+    /// # Errors
+    /// [`LogError::Read`] if the file cannot be read.
+    pub fn head(&self, count: usize) -> Result<Vec<u8>, LogError> {
+        let mut head = Vec::new();
+        let limit = u64::try_from(count).unwrap_or(u64::MAX);
+        self.open()?.take(limit).read_to_end(&mut head).map_err(|error| self.error(error))?;
+        Ok(head)
+    }
+
+    /// That the file could not be read.
+    pub fn error(&self, source: io::Error) -> LogError {
+        LogError::Read { path: self.path.clone(), source }
+    }
+
+    /// That what is in the file cannot be used.
+    pub fn content(&self, format: &'static str, message: impl Into<String>) -> LogError {
+        LogError::Content { path: self.path.clone(), format, message: message.into() }
+    }
+}

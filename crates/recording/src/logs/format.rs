@@ -1,0 +1,119 @@
+//! The seam of log formats: a format recognises a file, and opens it as groups, columns and rows.
+
+use crate::logs::{Layout, LogError, LogFile, LogOptions};
+
+/// Rows of one group as they come.
+#[derive(Debug, Clone, Copy)]
+pub struct Row<'a> {
+    /// Index of the group.
+    pub group: usize,
+    /// Time, s, on the clock that all groups share; any finite number.
+    pub t_s: f64,
+    /// Values of those wanted columns that belong to the group, in the order in which they were wanted; NaN if the
+    /// log has none.
+    pub values: &'a [f64],
+}
+
+/// Takes rows; an error ends the reading.
+pub type RowSink<'a> = dyn FnMut(Row<'_>) -> Result<(), LogError> + 'a;
+
+/// An open log.
+pub trait Log {
+    /// What is in it.
+    fn layout(&self) -> &Layout;
+
+    /// Gives the rows of the wanted columns (indices of [`Layout::columns`]), each group in the order of the file.
+    ///
+    /// # Errors
+    /// [`LogError`] if the file cannot be read on; what came before was given.
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError>;
+}
+
+/// Opens a file as a log.
+pub type OpenLog = fn(&LogFile, &LogOptions) -> Result<Box<dyn Log>, LogError>;
+
+/// One format of logs.
+#[derive(Debug, Clone, Copy)]
+pub struct LogFormat {
+    /// Name for people, e.g. `CSV`.
+    pub name: &'static str,
+    /// Whether the first bytes of a file (up to [`LogFormats::HEAD_BYTES`]) are of this format.
+    pub recognises: fn(&[u8]) -> bool,
+    /// Opens a file of this format.
+    pub open: OpenLog,
+}
+
+/// The formats that a program knows, in the order in which they are asked.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LogFormats(pub &'static [LogFormat]);
+
+impl LogFormats {
+    /// How much of a file formats see to recognise it, bytes.
+    pub const HEAD_BYTES: usize = 4096;
+
+    /// The format of a file that starts with these bytes.
+    pub fn of_head(self, head: &[u8]) -> Option<&'static LogFormat> {
+        self.0.iter().find(|format| (format.recognises)(head))
+    }
+
+    /// Opens a log.
+    ///
+    /// # Errors
+    /// [`LogError`] if the file cannot be read, is of no known format, or holds nothing that can be used.
+    pub fn open(
+        self,
+        file: &LogFile,
+        options: &LogOptions,
+    ) -> Result<(&'static LogFormat, Box<dyn Log>), LogError> {
+        let head = file.head(Self::HEAD_BYTES)?;
+        let format = self.of_head(&head).ok_or_else(|| LogError::Unknown {
+            path: file.path().to_owned(),
+            found: what_it_is(&head),
+            known: self.names(),
+        })?;
+        Ok((format, (format.open)(file, options)?))
+    }
+
+    /// Names of the formats, for messages.
+    pub fn names(self) -> String {
+        let names: Vec<&str> = self.0.iter().map(|format| format.name).collect();
+        names.join(", ")
+    }
+}
+
+/// Formats that people have and that are not read, by their first bytes, with what to do.
+const OTHERS: [(&[u8], &str); 9] = [
+    (
+        b"\x89MCAP",
+        "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
+    ),
+    (
+        b"TDSm",
+        "it is TDMS, which this program was built without: `cargo build --release --features tdms`, or export it as CSV or MDF 4",
+    ),
+    (
+        b"PAR1",
+        "it is Parquet, which this program was built without: `cargo build --release --features parquet`, or export it as CSV, e.g. \
+         with `polars.read_parquet(FILE).write_csv(NEW)`",
+    ),
+    (
+        b"ARROW1",
+        "it is Arrow, which this program was built without: `cargo build --release --features parquet`, or export it as CSV, e.g. \
+         with `polars.read_ipc(FILE).write_csv(NEW)`",
+    ),
+    (b"\x89HDF", "it is HDF5 or a newer MATLAB file; export it as CSV"),
+    (b"MATLAB", "it is a MATLAB file; export it as CSV"),
+    (b"\xD0\xCF\x11\xE0", "it is a workbook of Excel before 2007; save it as .xlsx"),
+    (b"\x1F\x8B", "it is packed with gzip; unpack it"),
+    (b"PK", "it is a zip archive, and no whole workbook of Excel; unpack it, or save the workbook again"),
+];
+
+/// What a file of no known format is.
+fn what_it_is(head: &[u8]) -> String {
+    if head.is_empty() {
+        return "it is empty".to_owned();
+    }
+    let other = OTHERS.iter().find(|(magic, _)| head.starts_with(magic));
+    let start = || format!("it starts with {:?}", String::from_utf8_lossy(head.get(..8).unwrap_or(head)));
+    other.map_or_else(start, |(_, words)| (*words).to_owned())
+}

@@ -1,0 +1,29 @@
+//! Logs of other programs: the seam of the formats that read them, what is found in them, and the channel map that they
+//! suggest.
+//!
+//! A format ([`LogFormat`]) recognises a file by its first bytes and opens it as a [`Log`]: a [`Layout`] of groups and
+//! columns with what was found out by looking, and the rows of the columns that are wanted, one after the other. Nothing
+//! of a log is held in memory but what a reader asks for.
+
+mod error;
+mod file;
+mod format;
+mod layout;
+pub mod limits;
+mod options;
+pub mod plausible;
+pub mod proposal;
+mod sparkline;
+mod survey;
+mod trace;
+pub mod units;
+
+pub use error::LogError;
+pub use file::{LogFile, ReadSeek};
+pub use format::{Log, LogFormat, LogFormats, OpenLog, Row, RowSink};
+pub use layout::{Column, Group, Layout};
+pub use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, split_unit};
+pub use options::{DateOrder, Encoding, LogOptions, OPTION_KEYS, OptionError, OptionKey};
+pub use sparkline::sparkline;
+pub use survey::{ColumnSurvey, Gap, GroupSurvey, Survey, survey};
+pub use trace::Trace;

@@ -1,0 +1,343 @@
+//! Which column is which channel.
+
+use super::names::{Weight, channels_of, is_ambient, is_derived, plain};
+use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+use super::{physics, shared_units};
+use crate::logs::plausible::{AMBIENT_PA, OUTER, fits, fitting_units, looks_like_gauge};
+use crate::logs::units::kind_of;
+use crate::logs::{Column, ColumnSurvey, Layout, Survey};
+use mapper_core::{CHANNELS, Channel, plausible};
+use mapper_yaml::units::{HeaderUnit, Kind, Reference, Unit, header_unit, volume_flow_m3_s};
+
+/// A column as a candidate for a channel.
+struct Candidate {
+    column: usize,
+    weight: Weight,
+    fits: bool,
+}
+
+/// Suggests a channel map.
+pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
+    let units: Vec<Option<HeaderUnit>> =
+        layout.columns.iter().map(|column| column.unit.as_deref().and_then(header_unit)).collect();
+    let mut proposal = Proposal::default();
+    let mut taken = vec![false; layout.columns.len()];
+    // The surest first, so that a column that fits two channels goes to the one that it fits best.
+    let named: Vec<Vec<(Channel, Weight)>> =
+        (0..layout.columns.len()).map(|column| names_of(column, layout, &units)).collect();
+    let mut wishes: Vec<(Channel, Vec<Candidate>)> = CHANNELS
+        .iter()
+        .map(|row| (row.channel, candidates(row.channel, &named, layout, survey, &units)))
+        .collect();
+    wishes.sort_by_key(|(_, list)| std::cmp::Reverse(list.first().map_or(0, |best| best.weight)));
+    for (channel, list) in wishes {
+        let free: Vec<&Candidate> = list.iter().filter(|candidate| !taken[candidate.column]).collect();
+        let Some((best, others)) = free.split_first() else { continue };
+        taken[best.column] = true;
+        let sensors = same_place(best.column, others, layout, survey, &units);
+        for sensor in &sensors {
+            taken[*sensor] = true;
+        }
+        let rivals: Vec<&str> = others
+            .iter()
+            .filter(|other| other.fits == best.fits && other.weight + 10 > best.weight)
+            .filter(|other| !sensors.contains(&other.column))
+            .map(|other| layout.columns[other.column].name.as_str())
+            .take(3)
+            .collect();
+        let mut proposed = entry(channel, best, layout, survey, &units);
+        if !rivals.is_empty() {
+            proposed.certainty = proposed.certainty.min(Certainty::Likely);
+            proposed.remarks.push(format!("it could also be {}", rivals.join(" or ")));
+        }
+        proposed.others = sensors;
+        proposal.channels.push(proposed);
+    }
+    note_unknown_units(&mut proposal, &taken, layout, &units);
+    proposal.channels.sort_by_key(|proposed| proposed.channel);
+    shared_units::settle(&mut proposal, layout, survey);
+    settle_gauge(&mut proposal, layout, survey, &units);
+    shared_units::settle_flow(&mut proposal, layout, survey);
+    physics::judge(&mut proposal, layout, survey);
+    proposal
+}
+
+/// The channels that a column may be by its description.
+fn names_of(index: usize, layout: &Layout, units: &[Option<HeaderUnit>]) -> Vec<(Channel, Weight)> {
+    let Some(column) = layout.columns.get(index) else { return Vec::new() };
+    let unit = units.get(index).copied().flatten();
+    if column.unit.is_some() && unit.is_none() {
+        return Vec::new();
+    }
+    let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
+    let kind = unit.map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
+    channels_of(without_number(column), group, &column.description, kind)
+}
+
+/// A name without the number by which readers distinguish equal names: `Pressure (2)` is not a pressure at station 2.
+fn without_number(column: &Column) -> &str {
+    let numbered = column
+        .name
+        .rsplit_once(" (")
+        .filter(|(_, number)| number.trim_end_matches(')').parse::<usize>().is_ok());
+    match numbered {
+        Some((name, _)) if !column.header.contains(&column.name) => name,
+        _ => &column.name,
+    }
+}
+
+/// By so much two sensors at one place may differ in the middle, as a share: wakes and stratification make some per cent.
+const SAME_PLACE: f64 = 0.1;
+
+/// The candidates that measure what `best` measures with another sensor: their names differ by the number at the end alone, and
+/// their readings agree.
+fn same_place(
+    best: usize,
+    others: &[&Candidate],
+    layout: &Layout,
+    survey: &Survey,
+    units: &[Option<HeaderUnit>],
+) -> Vec<usize> {
+    let stem = |column: usize| {
+        let name = layout.columns.get(column).map_or("", |column| column.name.as_str());
+        let stem = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
+        (stem.len() < name.len() && stem.ends_with(['_', ' ', '-', '.', '#'])).then_some((stem, column))
+    };
+    let Some((own, _)) = stem(best) else { return Vec::new() };
+    let middle = |column: usize| {
+        let value = survey.columns.get(column).map_or(f64::NAN, |data| data.quantile(0.5));
+        units.get(column).copied().flatten().map_or(value, |unit| unit.unit.to_inside(value))
+    };
+    let agrees = |column: usize| (middle(column) - middle(best)).abs() <= SAME_PLACE * middle(best).abs();
+    let same = others.iter().map(|other| other.column).filter(|column| {
+        stem(*column).is_some_and(|(stem, _)| stem == own)
+            && units.get(*column).map(|unit| unit.map(|unit| unit.unit.symbol()))
+                == units.get(best).map(|unit| unit.map(|unit| unit.unit.symbol()))
+            && agrees(*column)
+    });
+    same.take(mapper_core::MAX_ELEMENTS - 1).collect()
+}
+
+/// Remarks columns that would be channels, had they a unit that is known.
+fn note_unknown_units(
+    proposal: &mut Proposal,
+    taken: &[bool],
+    layout: &Layout,
+    units: &[Option<HeaderUnit>],
+) {
+    for (index, column) in layout.columns.iter().enumerate() {
+        let (Some(spelling), None, false) = (&column.unit, units[index], taken[index]) else { continue };
+        let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
+        let named = channels_of(without_number(column), group, &column.description, None);
+        let kind = volume_flow_m3_s(spelling).map(|_| Kind::MassFlow);
+        let fits = |channel: Channel| kind.is_none_or(|kind| kind == kind_of(channel));
+        let Some((channel, _)) = named.iter().find(|(channel, _)| fits(*channel)) else { continue };
+        if proposal.of(*channel).is_some() {
+            continue;
+        }
+        let why = match volume_flow_m3_s(spelling) {
+            Some(None) => format!(
+                "`{spelling}` is a flow at a standard temperature that differs between makers: write the unit as one of {}",
+                standard_flows()
+            ),
+            Some(Some(_)) => format!(
+                "`{spelling}` is a volume flow, which is a mass flow only with the density where it was measured: compute it first"
+            ),
+            None => format!("the unit `{spelling}` is not known: write one that is"),
+        };
+        proposal.remarks.push(format!("{channel} may be `{}`, but {why}", column.name));
+    }
+}
+
+/// The units of flows at a standard temperature.
+fn standard_flows() -> String {
+    let standard = |unit: &&Unit| unit.symbol().contains('(') || unit.symbol().contains("m3/h");
+    let symbols: Vec<&str> = Kind::MassFlow.units().iter().filter(standard).map(Unit::symbol).collect();
+    symbols.join(", ")
+}
+
+/// The columns that may be a channel, best first; `named` has the channels of each column's name.
+fn candidates(
+    channel: Channel,
+    named: &[Vec<(Channel, Weight)>],
+    layout: &Layout,
+    survey: &Survey,
+    units: &[Option<HeaderUnit>],
+) -> Vec<Candidate> {
+    let mut list: Vec<Candidate> = Vec::new();
+    for (index, ((column, data), named)) in layout.columns.iter().zip(&survey.columns).zip(named).enumerate()
+    {
+        let Some((_, weight)) = named.iter().find(|(named, _)| *named == channel) else { continue };
+        if data.is_empty() {
+            continue;
+        }
+        let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
+        let fits = match units[index] {
+            Some(unit) => {
+                let (low, high) = (unit.unit.to_inside(low), unit.unit.to_inside(high));
+                fits(channel, low, high) || looks_like_gauge(channel, low, high)
+            }
+            None => !fitting_units(channel, low, high, 0.0).is_empty(),
+        };
+        let weight = weight + if fits { 20 } else { 0 };
+        // What was computed by the stand counts after all that was measured: no weight of a name is below ten.
+        let weight = if is_derived(&plain(&column.name)) { weight / 10 } else { weight };
+        list.push(Candidate { column: index, weight, fits });
+    }
+    list.sort_by_key(|candidate| std::cmp::Reverse(candidate.weight));
+    list
+}
+
+fn entry(
+    channel: Channel,
+    best: &Candidate,
+    layout: &Layout,
+    survey: &Survey,
+    units: &[Option<HeaderUnit>],
+) -> ProposedChannel {
+    let mut proposed = ProposedChannel {
+        channel,
+        column: best.column,
+        others: Vec::new(),
+        unit: None,
+        gauge: false,
+        certainty: Certainty::Sure,
+        remarks: Vec::new(),
+    };
+    let data = &survey.columns[best.column];
+    let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
+    let fitting = fitting_units(channel, low, high, 0.0);
+    let symbols =
+        |units: &[&'static Unit]| units.iter().map(|unit| unit.symbol()).collect::<Vec<_>>().join(" or ");
+    match (units[best.column], fitting.as_slice()) {
+        (Some(unit), _) => {
+            proposed.unit = Some(unit.unit.symbol());
+            proposed.gauge = unit.reference == Reference::Gauge;
+            if !best.fits {
+                proposed.certainty = Certainty::Unsure;
+                let instead = if fitting.is_empty() {
+                    String::new()
+                } else {
+                    format!("; {} would be plausible", symbols(&fitting))
+                };
+                proposed.remarks.push(format!(
+                    "{} to {} {} is not plausible{instead}",
+                    short(data.min),
+                    short(data.max),
+                    unit.unit.symbol()
+                ));
+            }
+        }
+        (None, [only]) => {
+            proposed.unit = Some(only.symbol());
+            proposed.certainty = Certainty::Likely;
+            proposed.remarks.push(format!("the log gives no unit; by its range it is {}", only.symbol()));
+        }
+        (None, []) => {
+            proposed.certainty = Certainty::Unsure;
+            proposed.remarks.push(format!(
+                "the log gives no unit, and {} to {} fits none",
+                short(data.min),
+                short(data.max)
+            ));
+        }
+        (None, several) => {
+            proposed.unit = several.first().map(|unit| unit.symbol());
+            proposed.certainty = Certainty::Unsure;
+            proposed.remarks.push(format!("the log gives no unit; its range fits {}", symbols(several)));
+        }
+    }
+    if let Some(remark) = impossible(channel, data, proposed.unit) {
+        proposed.certainty = proposed.certainty.min(Certainty::Likely);
+        proposed.remarks.push(remark);
+    }
+    if is_derived(&plain(&layout.columns[best.column].name)) {
+        proposed.certainty = Certainty::Unsure;
+        proposed.remarks.push("by its name it was computed, not measured".to_owned());
+    }
+    if best.weight < 60 && proposed.certainty == Certainty::Sure {
+        proposed.certainty = Certainty::Likely;
+        proposed.remarks.push("the name says little".to_owned());
+    }
+    proposed
+}
+
+/// Readings that no sensor of a channel has: marks of missing values, or faults.
+fn impossible(channel: Channel, data: &ColumnSurvey, unit: Option<&'static str>) -> Option<String> {
+    let unit = crate::logs::units::unit(kind_of(channel), unit?).ok()?;
+    let range = plausible(channel);
+    let (low, high) = (unit.to_inside(data.min), unit.to_inside(data.max));
+    // Gauge pressures go below zero.
+    let below = kind_of(channel) == Kind::Temperature && low < *range.any.start();
+    let value = if below {
+        data.min
+    } else if high > *range.running.end() {
+        data.max
+    } else {
+        return None;
+    };
+    Some(format!(
+        "some readings are {} {}, which cannot be: if they mark missing ones, name them (`--with missing={value}`)",
+        short(value),
+        unit.symbol()
+    ))
+}
+
+/// Which pressures are gauge pressures, and where the ambient pressure is.
+fn settle_gauge(proposal: &mut Proposal, layout: &Layout, survey: &Survey, units: &[Option<HeaderUnit>]) {
+    let in_pa = |proposed: &ProposedChannel| -> Option<(f64, f64)> {
+        let unit = crate::logs::units::unit(Kind::Pressure, proposed.unit?).ok()?;
+        let data: &ColumnSurvey = survey.columns.get(proposed.column)?;
+        Some((unit.to_inside(data.quantile(OUTER)), unit.to_inside(data.quantile(1.0 - OUTER))))
+    };
+    let unstated = |proposed: &ProposedChannel| {
+        kind_of(proposed.channel) == Kind::Pressure
+            && !units[proposed.column].is_some_and(|unit| unit.reference != Reference::Unstated)
+    };
+    let inlet_is_gauge = proposal.of(Channel::P1).is_some_and(|inlet| {
+        inlet.gauge || in_pa(inlet).is_some_and(|(low, high)| looks_like_gauge(Channel::P1, low, high))
+    });
+    for proposed in proposal.channels.iter_mut().filter(|proposed| unstated(proposed)) {
+        let Some((low, high)) = in_pa(proposed) else { continue };
+        if looks_like_gauge(proposed.channel, low, high) {
+            proposed.gauge = true;
+            proposed.certainty = proposed.certainty.min(Certainty::Likely);
+            proposed.remarks.push(format!(
+                "down to {:.1} kPa: too low for an absolute pressure, taken as gauge",
+                low / 1e3
+            ));
+        } else if inlet_is_gauge && low < 1.6e5 {
+            proposed.gauge = true;
+            proposed.certainty = proposed.certainty.min(Certainty::Likely);
+            proposed
+                .remarks
+                .push("the log does not say whether it is absolute; taken as gauge, as P1 is".to_owned());
+        }
+    }
+    if !proposal.channels.iter().any(|proposed| proposed.gauge) {
+        return;
+    }
+    let ambient = layout.columns.iter().enumerate().find_map(|(index, column)| {
+        let unit =
+            units[index].filter(|unit| unit.kind == Kind::Pressure && unit.reference != Reference::Gauge)?;
+        let named = is_ambient(&plain(&column.name)) || is_ambient(&plain(&column.description));
+        let median_pa = unit.unit.to_inside(survey.columns[index].quantile(0.5));
+        let (least, most) = AMBIENT_PA;
+        (named && (least..=most).contains(&median_pa))
+            .then_some(Ambient::Column { column: index, unit: unit.unit.symbol() })
+    });
+    proposal.ambient = Some(ambient.unwrap_or(Ambient::Assumed));
+}
+
+/// A number for people.
+pub(crate) fn short(value: f64) -> String {
+    match value.abs() {
+        _ if !value.is_finite() => "-".to_owned(),
+        0.0 => "0".to_owned(),
+        size if size >= 1e5 => format!("{value:.0}"),
+        size if size >= 100.0 => format!("{value:.1}"),
+        size if size >= 1.0 => format!("{value:.2}"),
+        size if size >= 1e-3 => format!("{value:.4}"),
+        _ => format!("{value:.2e}"),
+    }
+}

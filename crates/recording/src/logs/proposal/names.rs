@@ -1,0 +1,356 @@
+//! What the names of columns say about what was measured, in English, German, French and Spanish.
+
+use crate::logs::units::kind_of;
+use mapper_core::{CHANNELS, Channel};
+use mapper_yaml::units::Kind;
+use regex_lite::Regex;
+use std::sync::LazyLock;
+
+/// How well a name fits a channel; larger is better.
+pub(crate) type Weight = u32;
+
+/// Letters of a name that are looked at.
+const LONGEST: usize = 120;
+
+/// A name in small letters, umlauts written out, accents left out, with `_` for all that is neither letter nor digit.
+pub(crate) fn plain(text: &str) -> String {
+    let mut plain = String::new();
+    for letter in text.to_lowercase().chars().take(LONGEST) {
+        match letter {
+            'ä' => plain.push_str("ae"),
+            'ö' => plain.push_str("oe"),
+            'ü' => plain.push_str("ue"),
+            'ß' => plain.push_str("ss"),
+            'à' | 'á' | 'â' => plain.push('a'),
+            'è' | 'é' | 'ê' => plain.push('e'),
+            'í' | 'î' => plain.push('i'),
+            'ó' | 'ô' => plain.push('o'),
+            'ú' | 'û' => plain.push('u'),
+            'ç' => plain.push('c'),
+            'ñ' => plain.push('n'),
+            letter if letter.is_ascii_alphanumeric() => plain.push(letter),
+            _ if plain.ends_with('_') => {}
+            _ => plain.push('_'),
+        }
+    }
+    plain.trim_matches('_').to_owned()
+}
+
+/// Patterns of one place: `{q}` stands for the letters of the quantity.
+struct Place {
+    temperature: Option<Channel>,
+    pressure: Option<Channel>,
+    /// Each with its weight.
+    patterns: &'static [(Weight, &'static str)],
+}
+
+const COMPRESSOR: &str =
+    "(c|comp|compr|cmp|compressor|verd|verdichter|v|kompressor|lader|compresseur|compresor)";
+const TURBINE: &str = "(t|tur|turb|turbine|turbina)";
+const IN: &str = "(in|inlet|ein|eintritt|e|suction|entree|entrada|admission|admision)";
+const OUT: &str = "(out|outlet|aus|austritt|a|discharge|sortie|salida)";
+const BEFORE: &str = "(vor|before|upstream|upstream_of|us|pre|avant|amont|antes)";
+const AFTER: &str = "(nach|hinter|after|behind|downstream|downstream_of|ds|post|apres|aval|despues)";
+const HOUSING: &str =
+    "(housing|hsg|casing|wall|skin|metal|wand|geh|gehaeuse|gehause|body|material|carter|carcasa|paroi|pared)";
+
+/// What may stand between a place and a machine.
+const OF: &str = "(dem_|der_|of_|of_the_|du_|de_|de_la_|de_l_|del_)?";
+/// What may stand behind a station number: the machine, or that a value is total or static.
+const KIND: &str = "(c|v|l|tot|total|stat|static|st)?";
+
+#[rustfmt::skip]
+const PLACES: &[Place] = &[
+    Place { temperature: Some(Channel::T1), pressure: Some(Channel::P1), patterns: &[
+        (6, "(^|_){q}_?0?1_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{I}(_|$)"), (6, "(^|_){B}_{D}{C}(_|$)"),
+        (6, "(^|_){C}_?{I}(_|$)"), (3, "^(inlet|intake|ein|ansaug)"), (3, "(^|_){q}_?vv(_|$)"), (3, "ansaug|(^|_)(inlet|intake)(_|$)"),
+        (6, "(^|_){I}_{D}{C}(_|$)"), (4, "(^|_)ci{s}(_|$)"), (3, "(^|_){q}_?[12]1(_|$)"),
+    ]},
+    Place { temperature: Some(Channel::T2), pressure: Some(Channel::P2), patterns: &[
+        (6, "(^|_){q}_?0?2_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{O}(_|$)"), (6, "(^|_){A}_{D}{C}(_|$)"),
+        (6, "(^|_){C}_?{O}(_|$)"), (3, "(^|_){q}_?nv(_|$)"), (3, "boost|ladedruck|ladeluft"), (2, "(^|_)(outlet|discharge)(_|$)"),
+        (6, "(^|_){O}_{D}{C}(_|$)"), (4, "(^|_)co{s}(_|$)"), (3, "(^|_){q}_?2[12](_|$)"),
+    ]},
+    Place { temperature: Some(Channel::T3), pressure: Some(Channel::P3), patterns: &[
+        (6, "(^|_){q}_?0?3_?{K}(_|$)"), (6, "(^|_){q}_?1_?t(_|$)"), (6, "(^|_){q}_?{T}_?{I}(_|$)"), (6, "(^|_){B}_{D}{T}(_|$)"),
+        (6, "(^|_){T}_?{I}(_|$)"), (3, "(^|_){q}_?vt(_|$)"),
+        (6, "(^|_){I}_{D}{T}(_|$)"), (3, "(^|_)egt|abgas{q}|exhaust_gas_{q}|exhaust_{q}"), (4, "(^|_)ti{s}(_|$)"), (3, "(^|_){q}_?31(_|$)"),
+    ]},
+    Place { temperature: Some(Channel::T4), pressure: Some(Channel::P4), patterns: &[
+        (6, "(^|_){q}_?0?4_?{K}(_|$)"), (6, "(^|_){q}_?2_?t(_|$)"), (6, "(^|_){q}_?{T}_?{O}(_|$)"), (6, "(^|_){A}_{D}{T}(_|$)"),
+        (6, "(^|_){T}_?{O}(_|$)"), (3, "(^|_){q}_?nt(_|$)"),
+        (6, "(^|_){O}_{D}{T}(_|$)"), (4, "(^|_)to{s}(_|$)"), (3, "(^|_){q}_?41(_|$)"),
+    ]},
+    Place { temperature: Some(Channel::Tc), pressure: None, patterns: &[
+        (6, "^{q}_?c$"), (7, "{C}_?{H}"), (7, "{H}_?{C}(_|$)"), (3, "(^|_){H}"),
+    ]},
+    Place { temperature: Some(Channel::Tt), pressure: None, patterns: &[
+        (6, "^{q}_?t$"), (8, "turb\\w*_?{H}"), (8, "(^|_){q}_t_?{H}"), (8, "{H}_?{T}(_|$)"),
+    ]},
+    Place { temperature: Some(Channel::TOil), pressure: None, patterns: &[
+        (7, "(oil|oel).*(^|_)?{I}(_|$)"), (6, "(^|_)(oil|oel)"), (6, "(oil|oel)(_|$)"),
+    ]},
+    Place { temperature: Some(Channel::TAmb), pressure: None, patterns: &[
+        (6, "(^|_|{q})(amb|ambient|umg|umgebung|room|raum|cell|zelle|testbed|pruefstand)"),
+    ]},
+];
+
+struct Row {
+    channel: Channel,
+    weight: Weight,
+    pattern: Regex,
+}
+
+static ROWS: LazyLock<Vec<Row>> = LazyLock::new(rows);
+
+fn rows() -> Vec<Row> {
+    let mut rows = Vec::new();
+    let mut add = |channel: Channel, weight: Weight, pattern: &str| {
+        // The patterns stand in this file, and a test compiles them all.
+        rows.extend(Regex::new(pattern).ok().map(|pattern| Row { channel, weight, pattern }));
+    };
+    for place in PLACES {
+        for (weight, pattern) in place.patterns {
+            let filled = pattern
+                .replace("{C}", COMPRESSOR)
+                .replace("{T}", TURBINE)
+                .replace("{I}", IN)
+                .replace("{O}", OUT)
+                .replace("{B}", BEFORE)
+                .replace("{A}", AFTER)
+                .replace("{H}", HOUSING)
+                .replace("{D}", OF)
+                .replace("{K}", KIND);
+            if let Some(channel) = place.temperature {
+                add(
+                    channel,
+                    *weight,
+                    &filled
+                        .replace("{q}", "(t|tt|temp|temperature|temperatur|temperatura)")
+                        .replace("{s}", "t"),
+                );
+            }
+            if let Some(channel) = place.pressure {
+                add(
+                    channel,
+                    *weight,
+                    &filled
+                        .replace("{q}", "(p|pt|ps|press|pressure|druck|pression|presion)")
+                        .replace("{s}", "p"),
+                );
+            }
+        }
+    }
+    let flow =
+        "(m|dm|mdot|m_dot|mp|w|flow|massflow|mass_flow|massenstrom|massenfluss|durchsatz|debit|caudal)";
+    for (channel, weight, pattern) in [
+        (Channel::ShaftSpeed, 6, "(^|_)n_?(tc|atl|turbo|tl|lader|l|shaft)(_|$)".to_owned()),
+        (
+            Channel::ShaftSpeed,
+            6,
+            "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter|compresseur|arbre|eje).*(speed|drehzahl|rpm)".to_owned(),
+        ),
+        (
+            Channel::ShaftSpeed,
+            6,
+            "(speed|drehzahl|rpm|vitesse|regime|velocidad).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor|compresseur|compresor|arbre|eje)".to_owned(),
+        ),
+        (Channel::ShaftSpeed, 4, "^(n|shaft_speed|speed|drehzahl|speed_rpm|rpm|vitesse|regime|velocidad)$".to_owned()),
+        (
+            Channel::CompressorFlow,
+            6,
+            format!("(^|_){flow}_?(c|comp|compressor|verd|verdichter|v|air|luft|l|compresseur|compresor|aire)(_|$)"),
+        ),
+        (Channel::CompressorFlow, 6, format!("(comp|compressor|verd|verdichter|luft|air)_?{flow}(_|$)")),
+        (Channel::CompressorFlow, 6, "luftmasse|^maf|^caf(_|$)|airflow|air_flow".to_owned()),
+        (Channel::CompressorFlow, 3, format!("^{flow}(_kg_s)?$")),
+        (Channel::CompressorFlow, 3, format!("^{flow}_?1$")),
+        (Channel::TurbineFlow, 3, format!("^{flow}_?3$")),
+        (Channel::TurbineFlow, 7, format!("(^|_){flow}_?(t|turb|turbine|abgas|exh|exhaust|gas)(_|$)")),
+        (Channel::TurbineFlow, 7, format!("(turb|turbine|abgas|exh|exhaust|hotgas|hot_gas)_?{flow}(_|$)")),
+        (
+            Channel::ValveCommand,
+            6,
+            "(valve|ventil|klappe|drossel|bpv|opening|backpressure|back_pressure)".to_owned(),
+        ),
+    ] {
+        add(channel, weight, &pattern);
+    }
+    rows
+}
+
+static SET: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    Regex::new("(^|_)(soll\\w*|set|setpoint|sp|cmd|command|demand|dem|target|w)(_|$)|sollwert").ok()
+});
+static DERIVED: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    Regex::new(
+        // A static temperature cannot be measured.
+        "(^|_)(cor|corr|korr|calc|ber|berechnet|model|sim|est|std|stdev|sigma|dev|min|max|raw|roh)(_|$)|(^|_)t_?[0-9]?_?(stat|static)(_|$)",
+    )
+    .ok()
+});
+static OTHER: LazyLock<Option<Regex>> = LazyLock::new(|| {
+    Regex::new("fuel|kraftstoff|egr|agr|(^|_)(engine|motor|crank|erpm|torque|drehmoment|cool\\w*|kuehl\\w*|water|wasser|vgt|vtg)(_|$)|(^|_)p_?b").ok()
+});
+
+fn says(pattern: &LazyLock<Option<Regex>>, text: &str) -> bool {
+    pattern.as_ref().is_some_and(|pattern| pattern.is_match(text))
+}
+
+/// Whether a name speaks of what was asked for, not of what was measured.
+pub(crate) fn is_set_value(name: &str) -> bool {
+    says(&SET, name)
+}
+
+/// Whether a name speaks of what was computed from others.
+pub(crate) fn is_derived(name: &str) -> bool {
+    says(&DERIVED, name)
+}
+
+/// Whether a name speaks of something else on an engine.
+fn is_other(name: &str) -> bool {
+    says(&OTHER, name)
+}
+
+/// Whether a name speaks of the ambient pressure.
+pub(crate) fn is_ambient(name: &str) -> bool {
+    ["amb", "baro", "umg", "atm", "luftdruck"].iter().any(|word| name.contains(word))
+}
+
+static OF_KIND: LazyLock<Vec<(Kind, Regex)>> = LazyLock::new(|| {
+    let patterns = [
+        (Kind::Pressure, "press|druck|presion|(^|_)p(_|[0-9])|baro"),
+        (Kind::Temperature, "temp|(^|_)t(_|[0-9])"),
+        (Kind::Speed, "speed|drehzahl|rpm|(^|_)n(_|[0-9])"),
+    ];
+    patterns.into_iter().filter_map(|(kind, pattern)| Some((kind, Regex::new(pattern).ok()?))).collect()
+});
+
+/// The one kind of quantity that a name speaks of; `None` without one and with several.
+fn kind_of_name(name: &str) -> Option<Kind> {
+    let mut kinds = OF_KIND.iter().filter(|(_, pattern)| pattern.is_match(name)).map(|(kind, _)| *kind);
+    let kind = kinds.next()?;
+    kinds.next().is_none().then_some(kind)
+}
+
+/// The channels that a column may be, by its name, its group and its further description, with their weights.
+pub(crate) fn channels_of(
+    name: &str,
+    group: &str,
+    about: &str,
+    kind: Option<Kind>,
+) -> Vec<(Channel, Weight)> {
+    let (name, group) = (plain(name), plain(group));
+    let about = plain(&format!("{group} {about} {name}"));
+    if is_other(&name) {
+        return Vec::new();
+    }
+    let kind = kind.or_else(|| kind_of_name(&name));
+    let set = is_set_value(&name) || is_set_value(&group);
+    let mut found: Vec<(Channel, Weight)> = Vec::new();
+    for row in ROWS.iter() {
+        let fits_kind = kind.is_none_or(|kind| kind == kind_of(row.channel));
+        let speaks = kind.is_some()
+            || !matches!(kind_of(row.channel), Kind::Fraction)
+            || row.channel == Channel::ValveCommand;
+        let named = row.pattern.is_match(&name);
+        let described = !about.is_empty() && row.pattern.is_match(&about);
+        if !fits_kind || !speaks || !(named || described) {
+            continue;
+        }
+        let channel = if set { commanded(row.channel) } else { Some(row.channel) };
+        let Some(channel) = channel else { continue };
+        let weight = 10 * row.weight * u32::from(named) + 9 * row.weight * u32::from(described && !named);
+        match found.iter_mut().find(|(other, _)| *other == channel) {
+            Some((_, best)) => *best = (*best).max(weight),
+            None => found.push((channel, weight)),
+        }
+    }
+    found.sort_by_key(|(_, weight)| std::cmp::Reverse(*weight));
+    found
+}
+
+/// The command of a measured channel.
+fn commanded(channel: Channel) -> Option<Channel> {
+    let symbol = format!("{}_command", channel.symbol());
+    let row = CHANNELS.iter().find(|row| row.symbol == symbol);
+    row.map(|row| row.channel).or((channel == Channel::ValveCommand).then_some(channel))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pattern_compiles() {
+        let places: usize = PLACES
+            .iter()
+            .map(|place| {
+                place.patterns.len()
+                    * (usize::from(place.temperature.is_some()) + usize::from(place.pressure.is_some()))
+            })
+            .sum();
+        assert_eq!(ROWS.len(), places + 13);
+        assert!(SET.is_some() && DERIVED.is_some() && OTHER.is_some() && OF_KIND.len() == 3);
+    }
+
+    #[test]
+    fn names_of_test_stands_in_english_and_german() {
+        let (t, p, n, m) =
+            (Some(Kind::Temperature), Some(Kind::Pressure), Some(Kind::Speed), Some(Kind::MassFlow));
+        for (name, about, kind, symbol) in [
+            ("T2", "", t, "T2"),
+            ("T_C_out", "", t, "T2"),
+            ("p2_stat", "", p, "P2"),
+            ("n_TC", "", n, "N"),
+            ("Turbocharger speed", "", n, "N"),
+            ("Drehzahl ATL", "", n, "N"),
+            ("Temperatur nach Verdichter", "", t, "T2"),
+            ("Druck vor Verdichter", "", p, "P1"),
+            ("Druck vor Turbine", "", p, "P3"),
+            ("P1C_H", "P1C", p, "P1"),
+            ("P1T_H", "P1T", p, "P3"),
+            ("T2C_H", "", t, "T2"),
+            ("CAF", "AirFlow", m, "m_c"),
+            ("Massenstrom Verdichter", "", m, "m_c"),
+            ("mdot_T", "", m, "m_t"),
+            ("T_OIL_H", "", t, "T_oil"),
+            ("Öltemperatur Ein", "", t, "T_oil"),
+            ("Tc", "", t, "Tc"),
+            ("T_Gehäuse_V", "", t, "Tc"),
+            ("compressor housing temperature", "", t, "Tc"),
+            ("Turbinengehäuse", "", t, "Tt"),
+            ("outlet_temperature", "compressor outlet_temperature", t, "T2"),
+            ("inlet_pressure", "turbine inlet_pressure", p, "P3"),
+            ("T_amb", "", t, "T_amb"),
+            ("Umgebungstemperatur", "", t, "T_amb"),
+            ("p3_soll", "", p, "P3_command"),
+            ("Stellung Drosselklappe", "", None, "valve_command"),
+            ("Température sortie compresseur", "", t, "T2"),
+            ("Pression avant turbine", "", p, "P3"),
+            ("Régime turbo", "", n, "N"),
+            ("Débit air", "", m, "m_c"),
+            ("Temperatura entrada compresor", "", t, "T1"),
+            ("Presión salida del compresor", "", p, "P2"),
+            ("COT", "", t, "T2"),
+            ("TIP", "", p, "P3"),
+            ("T1tot", "", t, "T1"),
+            ("M1", "", m, "m_c"),
+            ("p_21", "", p, "P1"),
+            ("T_41", "", t, "T4"),
+        ] {
+            let found = channels_of(name, "", about, kind);
+            assert_eq!(found.first().map(|(channel, _)| channel.symbol()), Some(symbol), "{name}: {found:?}");
+        }
+        for (name, kind) in [
+            ("FEF", m),
+            ("Fuel flow", m),
+            ("Pbc in", p),
+            ("engine speed", n),
+            ("Status", None),
+            ("Kühlwasser ein", t),
+        ] {
+            assert_eq!(channels_of(name, "", "", kind), [], "{name}");
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! What the proposed channels say of each other: a compressor raises pressure and temperature, and flow follows speed.
+
+use super::names::plain;
+use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
+use crate::logs::units::{kind_of, unit};
+use crate::logs::{Layout, Survey};
+use mapper_core::Channel;
+
+/// Share of the samples that must agree.
+const AGREEMENT: f64 = 0.9;
+
+/// Correlation below which flow does not follow speed. Along a line of constant speed flow moves alone.
+const FOLLOWS: f64 = 0.3;
+
+/// Speed that engines of road vehicles hardly exceed, rpm; the largest turbochargers, on ships, reach some 9000.
+const FASTEST_ENGINE_RPM: f64 = 8e3;
+
+/// Channels whose names are station numbers in most logs.
+const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::T3, Channel::P4, Channel::T4];
+
+/// Gas turbines and some engine programs number the compressor 2 and 3, the turbine 4 and 5.
+const ENGINE_NUMBERS: &str = "its stations may be numbered as in a gas turbine: 2 before and 3 behind the compressor, 4 before and 5 behind the turbine";
+
+/// Judges the proposal and remarks what it found.
+pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+    let course = |proposal: &Proposal, channel: Channel| Course::of(proposal, channel, layout, survey);
+    let running: Option<Course> = course(proposal, Channel::ShaftSpeed);
+    let raised = [
+        (Channel::P2, Channel::P1, "P2 is above P1"),
+        (Channel::T2, Channel::T1, "T2 is above T1"),
+        (Channel::P3, Channel::P4, "P3 is above P4"),
+        (Channel::T3, Channel::T4, "T3 is above T4"),
+    ];
+    for (higher, lower, words) in raised {
+        let (Some(high), Some(low)) = (course(proposal, higher), course(proposal, lower)) else { continue };
+        let turning =
+            |t_s: f64| running.as_ref().is_none_or(|speed| speed.at(t_s).is_none_or(|rpm| rpm > 2000.0));
+        let pairs: Vec<(f64, f64)> = high
+            .samples()
+            .filter(|(t_s, _)| turning(*t_s))
+            .filter_map(|(t_s, value)| Some((value, low.at(t_s)?)))
+            .collect();
+        if pairs.is_empty() {
+            continue;
+        }
+        let share = pairs.iter().filter(|(high, low)| high >= low).count() as f64 / pairs.len() as f64;
+        if share >= AGREEMENT {
+            proposal.remarks.push(format!(
+                "{words} in {:.0} % of the time that the shaft turns, as it must be",
+                100.0 * share
+            ));
+        } else {
+            let message = format!("{words} in only {:.0} % of the time that the shaft turns", 100.0 * share);
+            doubt(proposal, &[higher, lower], &message);
+            if higher == Channel::T3 {
+                doubt(proposal, &NUMBERED, ENGINE_NUMBERS);
+            }
+        }
+    }
+    doubt_bare_housings(proposal, layout);
+    let fastest_rpm = running.as_ref().map(|speed| speed.samples().map(|(_, rpm)| rpm).fold(0.0, f64::max));
+    if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < FASTEST_ENGINE_RPM) {
+        let message = format!("at most {rpm:.0} rpm: this may be the speed of the engine");
+        doubt(proposal, &[Channel::ShaftSpeed], &message);
+    }
+    if let (Some(speed), Some(flow)) = (running, course(proposal, Channel::CompressorFlow)) {
+        let pairs: Vec<(f64, f64)> =
+            speed.samples().filter_map(|(t_s, rpm)| Some((rpm, flow.at(t_s)?))).collect();
+        match correlation(&pairs) {
+            Some(r) if r >= FOLLOWS => {
+                proposal.remarks.push(format!("flow follows speed (correlation {r:.2})"))
+            }
+            Some(r) => {
+                let message = format!("flow does not follow speed (correlation {r:.2})");
+                for proposed in proposal
+                    .channels
+                    .iter_mut()
+                    .filter(|p| [Channel::ShaftSpeed, Channel::CompressorFlow].contains(&p.channel))
+                {
+                    proposed.certainty = proposed.certainty.min(Certainty::Likely);
+                    proposed.remarks.push(message.clone());
+                }
+            }
+            None => {}
+        }
+    }
+}
+
+/// `T_c` and `T_t` are housings here, and gas behind compressor and turbine elsewhere: without a column for the gas they may be it.
+fn doubt_bare_housings(proposal: &mut Proposal, layout: &Layout) {
+    for (housing, gas, place) in
+        [(Channel::Tc, Channel::T2, "compressor"), (Channel::Tt, Channel::T4, "turbine")]
+    {
+        let bare = |proposed: &ProposedChannel| {
+            let column = layout.columns.get(proposed.column);
+            column.is_some_and(|column| {
+                column.description.is_empty() && plain(&column.name).len() <= "temp_c".len()
+            })
+        };
+        let gas_is_known = proposal.of(gas).is_some_and(|gas| gas.certainty > Certainty::Unsure);
+        if !gas_is_known && proposal.of(housing).is_some_and(bare) {
+            let message = format!("it may be the gas behind the {place}, for which there is no other column");
+            doubt(proposal, &[housing], &message);
+        }
+    }
+}
+
+fn doubt(proposal: &mut Proposal, channels: &[Channel], message: &str) {
+    for proposed in proposal.channels.iter_mut().filter(|proposed| channels.contains(&proposed.channel)) {
+        proposed.certainty = Certainty::Unsure;
+        proposed.remarks.push(message.to_owned());
+    }
+}
+
+/// The course of a channel in the unit used inside, absolute.
+struct Course {
+    t_s: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Course {
+    fn of(proposal: &Proposal, channel: Channel, layout: &Layout, survey: &Survey) -> Option<Course> {
+        let proposed = proposal.of(channel)?;
+        let unit = unit(kind_of(channel), proposed.unit?).ok()?;
+        let data = survey.columns.get(proposed.column)?;
+        let group = survey.groups.get(layout.columns.get(proposed.column)?.group)?;
+        let ambient_pa = match (&proposal.ambient, proposed.gauge) {
+            (_, false) | (None, _) => 0.0,
+            (Some(Ambient::Assumed), _) => STANDARD_ATMOSPHERE_PA,
+            (Some(Ambient::Column { column, unit }), _) => {
+                crate::logs::units::unit(mapper_yaml::units::Kind::Pressure, unit)
+                    .ok()?
+                    .to_inside(survey.columns.get(*column)?.quantile(0.5))
+            }
+        };
+        let values = data.trace.means().into_iter().map(|value| unit.to_inside(value) + ambient_pa).collect();
+        Some(Course { t_s: group.trace.means(), values })
+    }
+
+    fn samples(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.t_s
+            .iter()
+            .copied()
+            .zip(self.values.iter().copied())
+            .filter(|(t_s, value)| t_s.is_finite() && value.is_finite())
+    }
+
+    /// The mean around a time.
+    fn at(&self, t_s: f64) -> Option<f64> {
+        let after = self.t_s.partition_point(|t| *t < t_s).min(self.t_s.len().checked_sub(1)?);
+        self.values.get(after).copied().filter(|value| value.is_finite())
+    }
+}
+
+/// Correlation of pairs; `None` if one of the two does not move.
+fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
+    let count = pairs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+    let (x0, y0) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        xx += (x - x0) * (x - x0);
+        yy += (y - y0) * (y - y0);
+        xy += (x - x0) * (y - y0);
+    }
+    let scale = (xx * yy).sqrt();
+    (pairs.len() > 2 && scale > 0.0 && scale.is_finite()).then(|| xy / scale)
+}

@@ -1,0 +1,129 @@
+//! Units of a log that gives none: columns of one kind share a unit, and physics settles the rest.
+
+use super::proposed::{Certainty, Proposal, ProposedChannel};
+use crate::logs::plausible::{OUTER, STANDARD_ATMOSPHERE_PA, fitting_units};
+use crate::logs::units::kind_of;
+use crate::logs::{Layout, Survey};
+use mapper_core::Channel;
+use mapper_yaml::units::{Kind, Unit};
+use std::f64::consts::PI;
+
+/// Largest ratio of pressures: one stage of a turbocharger reaches 6, where the tip speed of aluminium wheels ends; a third more is margin for
+/// an inlet below the atmosphere.
+const LARGEST_RATIO: f64 = 8.0;
+
+/// Looks for one unit that fits all channels of a kind without a unit.
+pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+    for kind in [Kind::Temperature, Kind::Pressure, Kind::Speed] {
+        let bare = |proposed: &ProposedChannel| {
+            kind_of(proposed.channel) == kind
+                && layout.columns.get(proposed.column).is_some_and(|column| column.unit.is_none())
+        };
+        let channels: Vec<(Channel, f64, f64)> = proposal
+            .channels
+            .iter()
+            .filter(|proposed| bare(proposed))
+            .filter_map(|proposed| {
+                let data = survey.columns.get(proposed.column)?;
+                Some((proposed.channel, data.quantile(OUTER), data.quantile(1.0 - OUTER)))
+            })
+            .collect();
+        // Where another column of the kind has a unit, that is the stand's.
+        let written = proposal.channels.iter().filter(|other| kind_of(other.channel) == kind && !bare(other));
+        let written: Vec<&str> = written.filter_map(|other| other.unit).collect();
+        let fits_all = |unit: &&'static Unit| {
+            let fits = |(channel, low, high): &(Channel, f64, f64)| {
+                fitting_units(*channel, *low, *high, 0.0).iter().any(|other| other.symbol() == unit.symbol())
+            };
+            channels.iter().all(fits) && (kind != Kind::Pressure || ratios_are_possible(&channels, unit))
+        };
+        let mut common: Vec<&'static Unit> = kind.units().iter().filter(fits_all).collect();
+        if common.iter().any(|unit| written.contains(&unit.symbol())) {
+            common.retain(|unit| written.contains(&unit.symbol()));
+        }
+        let [unit] = common.as_slice() else { continue };
+        let count = channels.len();
+        for proposed in proposal.channels.iter_mut().filter(|proposed| bare(proposed)) {
+            proposed.unit = Some(unit.symbol());
+            proposed.certainty = Certainty::Likely;
+            proposed.remarks.retain(|_| false);
+            proposed.remarks.push(match count {
+                1 => format!("the log gives no unit; {} is the one that is plausible", unit.symbol()),
+                _ => format!(
+                    "the log gives no unit; {} is the one in which all {count} columns of the kind are plausible",
+                    unit.symbol()
+                ),
+            });
+        }
+    }
+}
+
+/// Isentropic head over the square of the tip speed: radial wheels take up 0.6 to 0.9 of it by slip and backsweep, and turn 0.5 to
+/// 0.8 of that into head.
+const HEAD_COEFFICIENT: f64 = 0.45;
+/// Flow over density, tip speed and disc area: wheels from 0.01 to 0.15 are radial.
+const FLOW_COEFFICIENT: f64 = 0.06;
+
+/// A flow may be this many times as large or small: both ranges together, from 0.1 to 4 times the middle, and a margin. If units that
+/// differ by less (g/s and kg/h: 3.6) are plausible too, nothing is settled.
+const FLOW_FACTOR: f64 = 8.0;
+
+/// Dry air at room temperature: specific heat at constant pressure, J/(kg K), (gamma - 1) / gamma, and density at the inlet, kg/m3,
+/// each within some per cent, which the factor above makes little of.
+const CP: f64 = 1005.0;
+const EXPONENT: f64 = 0.2857;
+const DENSITY: f64 = 1.15;
+const INLET_K: f64 = 298.0;
+
+/// Looks for the unit of a flow without one: pressure ratio and speed give the size of the wheel, and that the flow.
+pub(super) fn settle_flow(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+    let top = |channel: Channel, share: f64| -> Option<f64> {
+        let proposed = proposal.of(channel).filter(|proposed| proposed.certainty > Certainty::Unsure)?;
+        let unit = crate::logs::units::unit(kind_of(channel), proposed.unit?).ok()?;
+        let over_pa = if proposed.gauge { STANDARD_ATMOSPHERE_PA } else { 0.0 };
+        Some(unit.to_inside(survey.columns.get(proposed.column)?.quantile(share)) + over_pa)
+    };
+    let (Some(speed_rpm), Some(outlet_pa)) =
+        (top(Channel::ShaftSpeed, 1.0 - OUTER), top(Channel::P2, 1.0 - OUTER))
+    else {
+        return;
+    };
+    let ratio = outlet_pa / top(Channel::P1, OUTER).unwrap_or(STANDARD_ATMOSPHERE_PA);
+    let head_j_kg = CP * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
+    let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
+    let diameter_m = 60.0 * tip_m_s / (PI * speed_rpm.max(1.0));
+    let flow_kg_s = FLOW_COEFFICIENT * DENSITY * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
+    for channel in [Channel::CompressorFlow, Channel::TurbineFlow] {
+        let Some(proposed) = proposal.channels.iter_mut().find(|proposed| proposed.channel == channel) else {
+            continue;
+        };
+        let bare = layout.columns.get(proposed.column).is_some_and(|column| column.unit.is_none());
+        let Some(data) = survey.columns.get(proposed.column).filter(|_| bare) else { continue };
+        let (low, high) = (data.quantile(OUTER), data.quantile(1.0 - OUTER));
+        let fitting = fitting_units(channel, low, high, 0.0);
+        if !fitting.iter().any(|unit| Some(unit.symbol()) == proposed.unit) || fitting.len() < 2 {
+            continue;
+        }
+        let near = |unit: &&&'static Unit| {
+            let share = unit.to_inside(high) / flow_kg_s;
+            (1.0 / FLOW_FACTOR..=FLOW_FACTOR).contains(&share)
+        };
+        let near: Vec<&&'static Unit> = fitting.iter().filter(near).collect();
+        if let [unit] = near.as_slice() {
+            proposed.unit = Some(unit.symbol());
+            proposed.certainty = Certainty::Likely;
+            proposed.remarks = vec![format!(
+                "the log gives no unit; {} fits speed and pressure ratio (a wheel of about {:.0} mm)",
+                unit.symbol(),
+                1e3 * diameter_m
+            )];
+        }
+    }
+}
+
+/// Whether no pressure exceeds the inlet's by more than a compressor can make of it.
+fn ratios_are_possible(channels: &[(Channel, f64, f64)], unit: &Unit) -> bool {
+    let inlet = channels.iter().find(|(channel, ..)| *channel == Channel::P1);
+    let inlet_pa = inlet.map_or(STANDARD_ATMOSPHERE_PA, |(_, low, _)| unit.to_inside(*low));
+    channels.iter().all(|(_, _, high)| unit.to_inside(*high) <= LARGEST_RATIO * inlet_pa)
+}

@@ -1,0 +1,41 @@
+//! Verdict and the most important actions.
+
+use crate::page::advice::{first_things, is_clean};
+use crate::page::prose::sentence;
+use crate::page::run_page::RunPage;
+use crate::{key_figures, verdict_sentence};
+use maud::{Markup, html};
+
+pub(crate) fn head(page: &RunPage<'_>) -> Markup {
+    let report = page.report;
+    let (clean, things) = (is_clean(page), first_things(report));
+    let serial = report.campaign.and_then(|campaign| campaign.machine.serial_number.clone());
+    html! {
+        header {
+            h1 { "Compressor map of " (report.machine) }
+            p.under {
+                @if let Some(serial) = serial { "Serial number " (serial) ". " }
+                @if let Some(when) = report.tested_at { "Tested " (when) ". " }
+                @if report.score.is_some() { strong { "Simulated rig: nothing was measured on a real machine." } " " }
+                "Efficiency is isentropic, total to total (" (report.efficiency.description()) "); corrected to " (report.reference) "; method " (report.method) "."
+            }
+            section.verdict.clean[clean] aria-labelledby="verdict" {
+                h2 #verdict { (verdict_sentence(report.points.iter().map(|scored| &scored.point))) }
+                @if let Some(words) = key_figures(report.map, report.points, report.campaign, report.plan) { p { (words) } }
+                @if things.is_empty() && clean {
+                    p { "Nothing needs attention before the map is used." }
+                }
+                @if !things.is_empty() {
+                    p { "First:" }
+                    ul { @for thing in &things { li { (sentence(thing)) } } }
+                }
+            }
+            nav aria-label="Sections" {
+                @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("conditions", "Conditions and instruments"), ("points", "Points"), ("plan", "Executed plan"),
+                    ("gap", "Gap"), ("notes", "Notes"), ("provenance", "Provenance")] {
+                    @if to != "gap" || page.gap.is_some() { a href=(format!("#{to}")) { (name) } }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The interactive map.
+
+use crate::page::run_page::RunPage;
+use mapper_core::Verdict;
+use maud::{Markup, html};
+
+/// Layers that can be switched: name in the script, label, whether it is on at first.
+const LAYERS: [(&str, &str, bool); 6] = [
+    ("lines", "speed lines", true),
+    ("contours", "efficiency contours", true),
+    ("extrapolated", "extrapolation", false),
+    ("intervals", "95 % intervals", true),
+    ("repeats", "repeats", false),
+    ("dynamic", "two-parameter method", false),
+];
+
+pub(crate) fn map(page: &RunPage<'_>) -> Markup {
+    let units = page.report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
+    let has_dynamic = !page.report.two_parameter.is_empty();
+    html! {
+        section #map aria-labelledby="map-head" {
+            h2 #map-head { "Map" }
+            fieldset.layers.screen {
+                legend { "Show" }
+                @for (name, words, on) in LAYERS.into_iter().filter(|(name, ..)| *name != "dynamic" || has_dynamic) {
+                    label { input type="checkbox" name="layer" value=(name) checked[on]; " " (words) }
+                }
+                @for (index, other) in page.others.iter().enumerate() {
+                    label { input type="checkbox" name="layer" value=(format!("other{index}")) checked; " " (other.name) }
+                }
+                button type="button" id="whole" { "whole map" }
+            }
+            (legend(page))
+            div.plots {
+                figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Numbers: at lines corrected speed, " (units.speed) "; on contours efficiency, %." span.screen { " Ctrl and the wheel zoom, dragging moves; a click on a point shows its transient." } } }
+                figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals; numbers at lines: corrected speed, " (units.speed) "." } }
+            }
+            noscript { p { "The drawings need the page's own script; the same map is next to this file as map.svg." } }
+        }
+    }
+}
+
+/// Legend of the symbols that are present.
+fn legend(page: &RunPage<'_>) -> Markup {
+    let map = page.report.map;
+    let has = |verdict| page.report.points.iter().any(|scored| scored.point.verdict == verdict);
+    let is_fitted = map.is_some_and(|map| map.fitted.is_some());
+    let is_sought = map.is_some_and(|map| !map.surge.is_empty());
+    html! {
+        ul.signs aria-label="Signs" {
+            @if has(Verdict::Good) { li { svg aria-hidden="true" viewBox="0 0 12 12" { circle cx="6" cy="6" r="4" {} } "good point" } }
+            @if has(Verdict::Doubtful) { li { svg aria-hidden="true" viewBox="0 0 12 12" { path d="M6 1 10 6 6 11 2 6Z" {} } "doubtful point" } }
+            @if has(Verdict::Unusable) {
+                li { svg aria-hidden="true" viewBox="0 0 12 12" { path.hollow d="M6 1 10 6 6 11 2 6Z" {} } "no usable efficiency" }
+            }
+            @if is_sought { li { svg.bad aria-hidden="true" viewBox="0 0 12 12" { rect x="2" y="2" width="8" height="8" {} } "surge, sought, with its 95 % interval" } }
+            @if is_fitted {
+                li {
+                    svg.bad aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="6 3" {} }
+                    @if is_sought { "surge line" } @else { "end of the lines towards surge; surge itself was not sought" }
+                }
+                li { svg.doubt aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="2 3" {} } "choke, fitted" }
+            }
+            li.screen { svg.ring aria-hidden="true" viewBox="0 0 12 12" { circle cx="6" cy="6" r="4.5" {} } "the point whose transient is shown below" }
+        }
+    }
+}

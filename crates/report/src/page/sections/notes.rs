@@ -1,0 +1,67 @@
+//! Everything except the map: zero, drift, surge, sensors, events, doubts.
+
+use crate::page::prose::{prose, sentence};
+use crate::page::run_page::RunPage;
+use crate::page::table::{Cell, Row, data_table, words_table};
+use mapper_campaign::campaign::DisplayUnits;
+use crate::{
+    Display, SurgeReport, ZERO_HEADS, doubts, repeated_jumps_text, score_text, surge_heads, surge_remarks,
+    surge_rows, zero_rows, zero_words,
+};
+use maud::{Markup, html};
+
+pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
+    let report = page.report;
+    let display = Display::new(units);
+    let zero = zero_rows(report.zero, &display);
+    let warnings = doubts(report.points.iter().map(|scored| &scored.point));
+    html! {
+        section #notes aria-labelledby="notes-head" {
+            h2 #notes-head { "Notes" }
+            h3 { "Outcome" }
+            p { (prose(&report.origin.sentence())) }
+            @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (prose(remark)) } } } }
+            @if let Some(score) = report.score {
+                h3 { "Against the simulator's truth" }
+                (sentences(&score_text(score)))
+            }
+            @if let Some(words) = zero_words(report.zero) {
+                h3 { "Isothermal zero" }
+                p { (prose(&words)) }
+                @if !zero.is_empty() { (words_table("Offsets subtracted", &ZERO_HEADS, &zero)) }
+            }
+            @if !report.repeats.is_empty() {
+                h3 { "Drift" }
+                p { "Repeats are kept out of the map. Fixed offsets cancel in what changes between them." }
+                (sentences(&repeated_jumps_text(report.repeats, &display)))
+            }
+            @if let Some(surge) = report.surge {
+                h3 { "Surge" }
+                (surge_part(&surge, &display))
+            }
+            @if !report.sensors.is_empty() {
+                h3 { "Several sensors" }
+                ul { @for fused in report.sensors { li { (fused) } } }
+            }
+            h3 { "Doubts and remarks" }
+            @if warnings.is_empty() { p { "None." } }
+            @else { ul { @for doubt in &warnings { li { (doubt.steps()) " (" (doubt.code) "): " (sentence(&doubt.message)) } } } }
+            h3 { "Events" }
+            @if report.events.is_empty() { p { "None." } }
+            @else { ul { @for event in report.events { li { (format!("{:.1} s", event.t_s)) ": " (prose(&event.message)) } } } }
+        }
+    }
+}
+
+fn surge_part(surge: &SurgeReport<'_>, display: &Display) -> Markup {
+    let cells = |row: Vec<String>| Row { step: None, cells: row.into_iter().map(Cell::text).collect() };
+    let rows: Vec<Row> = surge_rows(surge.marks, display).into_iter().map(cells).collect();
+    html! {
+        (data_table("Surge-side ends that were sought", &surge_heads(surge.marks, display), &rows))
+        @for remark in surge_remarks(surge.remarks, surge.surges) { p { (remark) } }
+    }
+}
+
+fn sentences(text: &str) -> Markup {
+    html! { ul { @for line in text.lines().filter(|line| !line.trim().is_empty()) { li { (prose(line)) } } } }
+}

@@ -1,0 +1,29 @@
+//! The transient of one point.
+
+use crate::page::run_page::RunPage;
+use mapper_core::step_number;
+use crate::{Display, opening, step_name};
+use maud::{Markup, html};
+
+pub(crate) fn step(page: &RunPage<'_>) -> Markup {
+    let display =
+        Display::new(&page.report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default());
+    html! {
+        section #step aria-labelledby="step-head" {
+            h2 #step-head { "A point's transient" }
+            p.screen {
+                label for="step-choice" { "Step " }
+                select #step-choice {
+                    @for point in page.report.points.iter().map(|scored| &scored.point) {
+                        option value=(step_number(point.step)) {
+                            (step_name(point)) " · " (display.speed(point.speed_rpm)) " " (display.units().speed)
+                            @if point.valve_opening_ratio.is_finite() { " · opening " (opening(point.valve_opening_ratio)) }
+                        }
+                    }
+                }
+            }
+            div #step-words aria-live="polite" {}
+            div.plots #step-plots {}
+        }
+    }
+}

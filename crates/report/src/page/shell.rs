@@ -1,0 +1,126 @@
+//! The frame of a page: content policy, style, scripts, data.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde::Serialize;
+
+const STYLE: &str = include_str!("../../assets/page.css");
+/// d3 7.9.2 and Observable Plot 0.6.17 (ISC), unchanged from their npm packages: `assets/SHA256SUMS`.
+const D3: &str = include_str!("../../assets/d3.min.js");
+const PLOT: &str = include_str!("../../assets/plot.umd.min.js");
+const COMMON: &str = include_str!("../../assets/common.js");
+const MAP: &str = include_str!("../../assets/map.js");
+const STEPS: &str = include_str!("../../assets/steps.js");
+const TABLES: &str = include_str!("../../assets/tables.js");
+const LIVE: &str = include_str!("../../assets/live.js");
+
+/// Purpose of a page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// To keep: it works from disk and makes no requests.
+    Kept,
+    /// To watch a run: it makes requests only to the program that served it.
+    Live,
+}
+
+impl Purpose {
+    /// Parts of the page's own script, in order.
+    fn scripts(self) -> &'static [&'static str] {
+        match self {
+            Purpose::Kept => &[COMMON, MAP, STEPS, TABLES],
+            Purpose::Live => &[COMMON, MAP, LIVE],
+        }
+    }
+
+    fn policy(self) -> String {
+        match self {
+            Purpose::Kept => POLICY.to_owned(),
+            Purpose::Live => format!("{POLICY}; connect-src 'self'"),
+        }
+    }
+}
+
+/// No requests in or out.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; \
+                      base-uri 'none'; form-action 'none'";
+
+/// The complete page; `footer` is printed on each sheet, `data` is the input of its script.
+pub(crate) fn shell(
+    title: &str,
+    footer: &str,
+    purpose: Purpose,
+    data: &impl Serialize,
+    body: &Markup,
+) -> Result<String, serde_json::Error> {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(purpose.policy());
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(STYLE)) (PreEscaped(footer_style(footer))) }
+            }
+            body {
+                (body)
+                script type="application/json" id="data" { (PreEscaped(json_in_html(data)?)) }
+                @for script in [D3, PLOT].iter().chain(purpose.scripts()) {
+                    script { (PreEscaped(script)) }
+                }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// The footer of each printed sheet, with the sheet's number and the total.
+fn footer_style(footer: &str) -> String {
+    // Escaped as numbers, so that no letter of a name can end a string or an element.
+    let text: String = footer
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("\\{:x} ", u32::from(c)) })
+        .collect();
+    format!(
+        "@media print{{@page{{@bottom-left{{content:\"{text}\"}}@bottom-right{{content:\"sheet \" counter(page) \" of \" \
+         counter(pages)}}}}}}"
+    )
+}
+
+/// JSON in which no string can end the element.
+fn json_in_html(data: &impl Serialize) -> Result<String, serde_json::Error> {
+    Ok(serde_json::to_string(data)?
+        .replace('<', "\\u003c")
+        .replace('\u{2028}', "\\u2028")
+        .replace('\u{2029}', "\\u2029"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sha2::{Digest, Sha256};
+
+    /// The libraries match their recorded hashes byte for byte.
+    #[test]
+    fn libraries_are_as_their_sums_say() {
+        let sums = include_str!("../../assets/SHA256SUMS");
+        for (name, text) in [("d3.min.js", D3), ("plot.umd.min.js", PLOT)] {
+            let sum: String =
+                Sha256::digest(text.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect();
+            assert!(sums.contains(&format!("{sum}  {name}")), "{name}: {sum}");
+            // They must not contain the end of their element.
+            assert!(!text.contains("</script"), "{name}");
+        }
+    }
+
+    #[test]
+    fn hostile_names_stay_text() {
+        let hostile = "</script><script>alert(1)</script>";
+        let page = shell(hostile, hostile, Purpose::Kept, &[hostile], &html! { h1 { (hostile) } }).unwrap();
+        assert!(!page.contains("<script>alert"), "markup of a name got into the page");
+        let style = page.split("<style>").nth(1).unwrap().split("</style>").next().unwrap();
+        assert!(style.contains("sheet \" counter(page)"), "the name ends the style");
+        let data = page.split("id=\"data\">").nth(1).unwrap().split("</script>").next().unwrap();
+        assert_eq!(serde_json::from_str::<Vec<String>>(data).unwrap(), [hostile]);
+    }
+}

@@ -1,0 +1,100 @@
+//! What can go wrong with blind cases.
+
+use mapper_campaign::NominalTableError;
+use mapper_physics::effect::EffectError;
+use mapper_physics::steady::SteadyError;
+use mapper_recording::RecordError;
+use mapper_runner::RunError;
+use std::path::PathBuf;
+
+/// Why cases cannot be made or scored.
+#[derive(Debug, thiserror::Error)]
+pub enum BlindError {
+    /// A file or directory cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file does not hold what it should.
+    #[error("{} does not hold {what}: {source}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What it should hold.
+        what: &'static str,
+        /// Why it does not.
+        source: serde_json::Error,
+    },
+    /// A file is larger than any of its kind.
+    #[error("{} has more than the {limit} bytes that are read", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Largest size read, bytes.
+        limit: u64,
+    },
+    /// The answers are not those that were sealed.
+    #[error(
+        "{} has SHA-256 {found}, but {expected} was printed when the cases were made: the answers have been changed",
+        path.display()
+    )]
+    Seal {
+        /// The file of answers.
+        path: PathBuf,
+        /// Its hash.
+        found: String,
+        /// The hash it had.
+        expected: String,
+    },
+    /// The lab stopped, or what it gave cannot be kept.
+    #[error("case {name}: {source}")]
+    Run {
+        /// The case.
+        name: String,
+        /// Why.
+        source: RunError,
+    },
+    /// A point of the campaign that the nominal model cannot hold.
+    #[error(transparent)]
+    Point(#[from] SteadyError),
+    /// An effect that cannot be put in; a fault of the draw.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// A recording cannot be written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The campaign's map makes no nominal model.
+    #[error(transparent)]
+    NominalModel(#[from] NominalTableError),
+    /// No channel of the campaign's recording can be compared with the model.
+    #[error("the campaign records nothing to measure signatures by; declare sensors of speed, P2, T2 or Tc")]
+    NothingRecorded,
+    /// The diagnosis that measures signatures, or its calibration, failed.
+    #[error("failed to measure signatures: {source}")]
+    Signatures {
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// More cases than anyone needs.
+    #[error("{cases} cases were asked for; between 1 and {most} can be made")]
+    Cases {
+        /// Number asked for.
+        cases: usize,
+        /// Maximum that can be made at once.
+        most: usize,
+    },
+}
+
+impl BlindError {
+    pub(crate) fn signatures(source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        BlindError::Signatures { source: Box::new(source) }
+    }
+
+    pub(crate) fn file(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| BlindError::File { path, source }
+    }
+}

@@ -1,0 +1,90 @@
+//! Answers under seal: a hash printed before anything is diagnosed.
+
+use crate::blind::error::BlindError;
+use crate::blind::laboratory::Laboratory;
+use crate::blind::truth::Truth;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::io::Read;
+use std::path::Path;
+
+/// File of the answers, within the directory of the cases.
+pub const ANSWERS_NAME: &str = "answers.json";
+/// File that describes the content of the directory.
+pub const MANIFEST_NAME: &str = "manifest.json";
+
+/// Description of a directory of cases; of the answers it contains only the hash.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Name of the campaign.
+    pub campaign: String,
+    /// What the cases ran on.
+    #[serde(default)]
+    pub laboratory: Laboratory,
+    /// Whether each rig was also recorded on a night without its causes, as NAME.healthy.mcap.
+    #[serde(default)]
+    pub healthy: bool,
+    /// Names of the cases; each has a recording NAME.mcap.
+    pub cases: Vec<String>,
+    /// SHA-256 of the file of answers.
+    pub answers_sha256: String,
+}
+
+impl Manifest {
+    /// Heading that distinguishes its score from those of other cases.
+    pub fn title(&self) -> String {
+        let recording = if self.healthy { ", with a healthy recording" } else { "" };
+        format!("{}{recording}", self.laboratory.name())
+    }
+
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    /// [`BlindError`] where there is none.
+    pub fn read(path: &Path) -> Result<Manifest, BlindError> {
+        read_json(path, "manifest of blind cases")
+    }
+}
+
+/// Largest file that is read, bytes: far more than any number of answers.
+const LARGEST_BYTES: u64 = 256 << 20;
+
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Reads a JSON file.
+pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<T, BlindError> {
+    let bytes = read(path)?;
+    serde_json::from_slice(&bytes).map_err(|source| BlindError::Content {
+        path: path.to_owned(),
+        what,
+        source,
+    })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, BlindError> {
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(BlindError::file(path))?;
+    file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes).map_err(BlindError::file(path))?;
+    if bytes.len() as u64 > LARGEST_BYTES {
+        return Err(BlindError::TooLarge { path: path.to_owned(), limit: LARGEST_BYTES });
+    }
+    Ok(bytes)
+}
+
+/// Opens the seal: the answers, if they are still those that were made.
+///
+/// # Errors
+/// [`BlindError::Seal`] where they are not.
+pub(crate) fn open(directory: &Path, manifest: &Manifest) -> Result<Vec<Truth>, BlindError> {
+    let path = directory.join(ANSWERS_NAME);
+    let bytes = read(&path)?;
+    let found = sha256(&bytes);
+    if found != manifest.answers_sha256 {
+        return Err(BlindError::Seal { path, found, expected: manifest.answers_sha256.clone() });
+    }
+    serde_json::from_slice(&bytes).map_err(|source| BlindError::Content { path, what: "answers", source })
+}

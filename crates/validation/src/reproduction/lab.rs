@@ -1,0 +1,122 @@
+//! The paper's virtual experiment: jumps of P3 between held speeds (table 1, fig. 2), recorded without noise.
+
+use crate::reproduction::ReproduceError;
+use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
+use mapper_physics::model::Model;
+use mapper_physics::params::BoundaryConditions;
+use mapper_physics::simulate::{Simulator, Watch};
+use mapper_physics::steady::hold_speed;
+
+/// Table 1: from and to, rpm.
+pub(crate) const JUMPS: [(f64, f64); 4] = [(110e3, 50e3), (50e3, 110e3), (150e3, 90e3), (90e3, 150e3)];
+/// Valve openings of each jump, relative to the nominal area: from near surge to near choke.
+pub(crate) const OPENINGS: [f64; 5] = [0.5, 0.7, 1.0, 1.4, 2.0];
+/// Samples per second.
+const RATE_HZ: f64 = 10.0;
+/// Local error of the integration, relative: the flow near surge amplifies it up to 300 times.
+const RELATIVE_TOLERANCE: f64 = 1e-8;
+
+/// One jump of P3.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Jump {
+    pub(crate) from_rpm: f64,
+    pub(crate) to_rpm: f64,
+    pub(crate) opening: f64,
+}
+
+impl Jump {
+    /// `110 to 50 krpm`.
+    pub(crate) fn name(&self) -> String {
+        format!("{:.0} to {:.0} krpm", self.from_rpm / 1e3, self.to_rpm / 1e3)
+    }
+}
+
+/// All jumps of table 1 at all openings, jump by jump.
+pub(crate) fn table_1() -> Vec<Jump> {
+    JUMPS
+        .into_iter()
+        .flat_map(|(from_rpm, to_rpm)| OPENINGS.map(|opening| Jump { from_rpm, to_rpm, opening }))
+        .collect()
+}
+
+/// What the model alone knows, sample by sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Truth {
+    pub(crate) t_s: f64,
+    pub(crate) eta: f64,
+    pub(crate) h_w_m2k: f64,
+    pub(crate) t2_k: f64,
+    pub(crate) speed_rpm: f64,
+    pub(crate) flow_kg_s: f64,
+    pub(crate) pressure_ratio: f64,
+    pub(crate) probe_time_constant_s: f64,
+}
+
+/// A jump as recorded, with its truth.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Run {
+    pub(crate) jump: Jump,
+    pub(crate) recording: Recording,
+    pub(crate) truth: Vec<Truth>,
+}
+
+/// Runs a jump for `seconds`: from the machine's own steady state at the from-speed, to the P3 that holds the
+/// to-speed on the nominal machine.
+pub(crate) fn run(machine: &Model, jump: Jump, seconds: f64) -> Result<Run, ReproduceError> {
+    let at_opening =
+        BoundaryConditions { valve_opening_ratio: jump.opening, ..BoundaryConditions::default() };
+    let start = hold_speed(machine, jump.from_rpm, &at_opening)?;
+    let boundary = hold_speed(&Model::nominal(), jump.to_rpm, &at_opening)?.boundary;
+    let mut simulator = Simulator::new(machine, 0.0, start.state, RELATIVE_TOLERANCE, Watch::default());
+    let mut recording = Recording::default();
+    let mut truth = Vec::new();
+    let count = (seconds * RATE_HZ).round() as u32;
+    simulator.run_to(
+        seconds,
+        &boundary,
+        (0..=count).map(|i| f64::from(i) / RATE_HZ),
+        |t_s, state, outputs| {
+            for (channel, value) in [
+                (Channel::ShaftSpeed, state.shaft_speed_rpm()),
+                (Channel::CompressorFlow, outputs.flow_kg_s),
+                (Channel::P1, boundary.p1_pa),
+                (Channel::T1, boundary.t1_k),
+                (Channel::P2, state.p2_pa),
+                (Channel::T2, outputs.t2_probe_k),
+                (Channel::Tc, state.tc_k),
+            ] {
+                let series = recording.series.entry(channel).or_default();
+                series.t_s.push(t_s);
+                series.values.push(value);
+            }
+            truth.push(Truth {
+                t_s,
+                eta: outputs.efficiency,
+                h_w_m2k: outputs.h_w_m2k,
+                t2_k: outputs.t2_k,
+                speed_rpm: state.shaft_speed_rpm(),
+                flow_kg_s: outputs.flow_kg_s,
+                pressure_ratio: outputs.pressure_ratio,
+                probe_time_constant_s: outputs.t2_probe_time_constant_s,
+            });
+        },
+        |_| {},
+    )?;
+    let place = |speed_rpm| OperatingPoint { speed_rpm, valve_opening_ratio: jump.opening };
+    recording.steps.push(StepMarker {
+        index: 0,
+        kind: StepKind::Point,
+        start_s: 0.0,
+        end_s: seconds,
+        from: Some(place(jump.from_rpm)),
+        to: Some(place(jump.to_rpm)),
+        p3_pa: boundary.p3_pa,
+        valve_opening_ratio: jump.opening,
+    });
+    Ok(Run { jump, recording, truth })
+}
+
+/// Runs all jumps of table 1.
+pub(crate) fn run_all(machine: &Model, seconds: f64) -> Result<Vec<Run>, ReproduceError> {
+    table_1().into_iter().map(|jump| run(machine, jump, seconds)).collect()
+}

@@ -1,0 +1,89 @@
+//! What the pictures have in common.
+
+use crate::reproduction::lab::JUMPS;
+use crate::reproduction::outcome::Outcome;
+use mapper_chart::{Axis, Colour, Dash, Line, Marker, Panel, Scatter, palette};
+
+/// Colour of a target speed: ordered, slow to fast.
+pub(crate) fn speed_colour(speed_rpm: f64) -> Colour {
+    palette::sequential((speed_rpm - 50e3) / 100e3)
+}
+
+/// `110 krpm`.
+pub(crate) fn krpm(speed_rpm: f64) -> String {
+    format!("{:.0} krpm", speed_rpm / 1e3)
+}
+
+/// Target speeds of table 1, slow to fast.
+pub(crate) fn target_speeds_rpm() -> [f64; 4] {
+    let mut speeds = JUMPS.map(|(_, to_rpm)| to_rpm);
+    speeds.sort_by(f64::total_cmp);
+    speeds
+}
+
+/// Points (model, identified) with colour, shape, whether hollow, and legend text.
+pub(crate) type Series = (Vec<(f64, f64)>, Colour, Marker, bool, String);
+
+/// Identified against model values with the line of equality and, if given, a band of error around it.
+pub(crate) fn equality_panel(
+    title: &str,
+    axis: (&str, &str),
+    band: Option<(f64, &str)>,
+    series: Vec<Series>,
+) -> Panel {
+    let all = series.iter().flat_map(|(points, ..)| points.iter().copied());
+    let (low, high) =
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (x, _)| (low.min(x), high.max(x)));
+    let margin = 0.06 * (high - low);
+    let ends = [low - margin, high + margin];
+    let mut panel = Panel::new(Axis::new(axis.0), Axis::new(axis.1)).title(title);
+    panel.add(Line::new(ends.map(|x| (x, x)).to_vec(), palette::INK).width_px(1.0).label("equal"));
+    if let Some((by, label)) = band {
+        for by in [-by, by] {
+            let line = Line::new(ends.map(|x| (x, x + by)).to_vec(), palette::GREY);
+            panel.add(line.width_px(1.0).dash(Dash::Dashed).label(label));
+        }
+    }
+    for (points, colour, marker, hollow, label) in series {
+        let scatter = Scatter::new(points, colour).marker(marker).label(label);
+        panel.add(if hollow { scatter.hollow() } else { scatter });
+    }
+    panel
+}
+
+/// Efficiency in %: model (mean in the window) and identified, where it is.
+pub(crate) fn efficiency_pair(outcome: &Outcome) -> Option<(f64, f64)> {
+    Some((100.0 * outcome.eta_mean, 100.0 * outcome.point.eta?))
+}
+
+/// h in W/(m2 K): model (mean in the window) and identified, where it is.
+pub(crate) fn h_pair(outcome: &Outcome) -> Option<(f64, f64)> {
+    Some((outcome.h_mean_w_m2k, outcome.point.h_w_m2k?))
+}
+
+/// Efficiency in %, one point of error marked.
+pub(crate) fn efficiency_panel(series: Vec<Series>) -> Panel {
+    let axis = ("model efficiency, %", "identified efficiency, %");
+    equality_panel("(a) efficiency", axis, Some((1.0, "1 point off")), series)
+}
+
+/// h in W/(m2 K).
+pub(crate) fn h_panel(series: Vec<Series>) -> Panel {
+    let axis = ("model h, W/(m2 K)", "identified h, W/(m2 K)");
+    equality_panel("(b) heat-transfer coefficient", axis, None, series)
+}
+
+/// Identified against model efficiency (mean in the window) of the outcomes that have one.
+pub(crate) fn eta_pairs<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Vec<(f64, f64)> {
+    outcomes.into_iter().filter_map(|o| Some((o.eta_mean, o.point.eta?))).collect()
+}
+
+/// Identified against model h (mean in the window) of the outcomes that have one.
+pub(crate) fn h_pairs<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> Vec<(f64, f64)> {
+    outcomes.into_iter().filter_map(|o| Some((o.h_mean_w_m2k, o.point.h_w_m2k?))).collect()
+}
+
+/// The outcomes at one target speed.
+pub(crate) fn at_speed(outcomes: &[Outcome], speed_rpm: f64) -> impl Iterator<Item = &Outcome> {
+    outcomes.iter().filter(move |o| o.jump.to_rpm == speed_rpm)
+}

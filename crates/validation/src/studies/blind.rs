@@ -1,0 +1,153 @@
+//! `study: blind`: cases drawn, recorded and diagnosed, the causes known to the score alone.
+
+use crate::studies::error::StudyError;
+use crate::studies::source::CampaignSource;
+use crate::blind::score::score;
+use crate::blind::{
+    CaseKind, Draw, Laboratory, OutsideUse, SIGMA_RANGE, StoredCase, Truth, drawn, record, seal,
+};
+use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
+use mapper_recording::ChannelMap;
+use mapper_session::{Recorded, Registry, Session, json_text};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Blind cases.
+pub struct Blind<'a>(pub &'a Registry);
+
+/// Cases with withheld causes, drawn as `mapper gap blind make` draws them.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct BlindStudy {
+    /// Name of the study.
+    #[serde(rename = "fleet")]
+    #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"check")]
+    _fleet: String,
+    /// Kind of the study.
+    #[serde(rename = "study")]
+    #[schemars(example = &"blind")]
+    _study: String,
+    /// Campaign with machine, schedule, declared uncertainties and tolerances, from this file.
+    #[schemars(length(min = 1), example = &"../gap_rig.yaml")]
+    campaign: PathBuf,
+    /// Seed of all random draws.
+    #[schemars(example = 424242)]
+    seed: u64,
+    /// Number of cases.
+    #[schemars(range(min = 1), example = 100)]
+    cases: usize,
+    /// Kinds of cases (none, single, pair, outside, triple); the usual four if it is left out.
+    #[schemars(with = "Option<Vec<String>>", extend("examples" = [["single", "pair"]]))]
+    kinds: Option<Vec<CaseKind>>,
+    /// Simulator that makes the recordings: virtual_lab (if it is left out) or other_lab, whose equations are not the model's.
+    #[serde(default)]
+    #[schemars(with = "Option<String>", example = &"other_lab")]
+    laboratory: Laboratory,
+    /// Minimum and maximum signature of a cause, in sigmas.
+    #[schemars(extend("examples" = [[12, 400]]))]
+    sigmas: Option<[f64; 2]>,
+}
+
+/// One case.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BlindItem {
+    campaign: CampaignSource,
+    case: StoredCase,
+    laboratory: Laboratory,
+}
+
+/// What became of it.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BlindPart {
+    truth: Truth,
+    diagnosis: Value,
+}
+
+impl Kind for Blind<'_> {
+    fn name(&self) -> &'static str {
+        "blind"
+    }
+
+    fn summary(&self) -> &'static str {
+        "cases with withheld causes, recorded, diagnosed and scored"
+    }
+
+    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+        let file: BlindStudy = study.read()?;
+        let (campaign, nominal) = CampaignSource::read(&study.beside(&file.campaign), self.0)?;
+        let sigma_range = file.sigmas.unwrap_or(SIGMA_RANGE);
+        if !(0.0 < sigma_range[0] && sigma_range[0] <= sigma_range[1] && sigma_range[1].is_finite()) {
+            let message = format!("{} to {} is not a range of lengths", sigma_range[0], sigma_range[1]);
+            return Err(study
+                .mistake("sigmas", message, "write the minimum and the maximum, e.g. [12, 400]")
+                .into());
+        }
+        let draw = Draw {
+            kinds: file.kinds.unwrap_or_default(),
+            sigma_range,
+            laboratory: file.laboratory,
+            ..Draw::new(file.seed, file.cases, OutsideUse::Check)
+        };
+        let cases = drawn(&nominal, &self.0.effects, &draw).map_err(FleetError::kind)?;
+        let item = |case: &crate::blind::Case| Draft {
+            name: case.name.clone(),
+            payload: json!(BlindItem {
+                campaign: campaign.clone(),
+                case: StoredCase::from(case),
+                laboratory: file.laboratory
+            }),
+        };
+        Ok(Drafts {
+            items: cases.iter().map(item).collect(),
+            settings: json!({ "campaign": nominal.name, "laboratory": file.laboratory }),
+        })
+    }
+
+    fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError> {
+        let BlindItem { campaign, case, laboratory } = BlindItem::deserialize(payload)?;
+        let campaign = campaign.campaign()?;
+        let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;
+        let file = at.scratch.join("case.mcap");
+        let truth = record(&campaign, &case, laboratory, &file)?;
+        // As a user would diagnose it: from the file alone, which has no truth.
+        let recorded = Recorded::read(self.0, &file, &ChannelMap::native(), Some(&campaign))?;
+        let session = Session { stop: at.stop, ..Session::new(self.0) };
+        let gap = session.diagnose_gap(
+            &recorded,
+            &campaign,
+            &ChannelMap::native(),
+            self.0.effects.clone(),
+            None,
+        )?;
+        Ok(serde_json::to_string(&BlindPart { truth, diagnosis: gap.json()? })?)
+    }
+
+    fn merge(&self, settings: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError> {
+        let mut truths = Vec::new();
+        for (name, body) in parts {
+            let Ok(body) = body else { continue };
+            let spoilt = |source| StudyError::Content { name: name.clone(), source };
+            let BlindPart { truth, diagnosis } = serde_json::from_str(&body).map_err(spoilt)?;
+            // It names a file: only as cases are named.
+            if truth.name != name || !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_') {
+                return Err(spoilt(serde::de::Error::custom("it is another case")).into());
+            }
+            let text = json_text(&diagnosis).map_err(FleetError::kind)?;
+            out.write(&format!("{name}.diagnosis.json"), text.as_bytes())?;
+            truths.push(truth);
+        }
+        let campaign = settings["campaign"].as_str().unwrap_or_default();
+        let laboratory = Laboratory::deserialize(&settings["laboratory"]).unwrap_or_default();
+        seal(campaign, laboratory, false, &truths, out.directory()).map_err(FleetError::kind)?;
+        let scored = score(out.directory()).map_err(FleetError::kind)?;
+        out.write("score.json", json_text(&scored).map_err(FleetError::kind)?.as_bytes())?;
+        Ok(format!(
+            "{} cases with their diagnoses and score.json; `mapper gap blind score` shows it",
+            truths.len()
+        ))
+    }
+}

@@ -1,0 +1,131 @@
+//! `study: calibration`: the cases that turn scores into probabilities, as `mapper gap blind calibrate` draws them.
+
+use crate::studies::error::StudyError;
+use crate::studies::reliability_picture::reliability_svg;
+use crate::studies::source::CampaignSource;
+use crate::blind::calibrate::{Calibrated, Observed, Plan, cases, fitted};
+use crate::blind::reliability::{reliabilities, reliability_text};
+use crate::blind::{Case, StoredCase};
+use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
+use mapper_session::{Registry, json_text};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Calibration of the diagnosis.
+pub struct Calibration<'a>(pub &'a Registry);
+
+/// Cases that calibrate the diagnosis, with outside causes that the check does not use.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct CalibrationStudy {
+    /// Name of the study.
+    #[serde(rename = "fleet")]
+    #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"calibration")]
+    _fleet: String,
+    /// Kind of the study.
+    #[serde(rename = "study")]
+    #[schemars(example = &"calibration")]
+    _study: String,
+    /// Campaign with machine, schedule, declared uncertainties and tolerances, from this file.
+    #[schemars(length(min = 1), example = &"../gap_rig.yaml")]
+    campaign: PathBuf,
+    /// Seed of all random draws.
+    #[schemars(example = 77001)]
+    seed: u64,
+    /// Number of cases without a cause, which set the threshold.
+    #[schemars(range(max = 100_000), example = 1500)]
+    nulls: usize,
+    /// Number of cases of the other kinds.
+    #[schemars(range(max = 100_000), example = 500)]
+    cases: usize,
+}
+
+/// One case.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CalibrationItem {
+    campaign: CampaignSource,
+    case: StoredCase,
+}
+
+impl Kind for Calibration<'_> {
+    fn name(&self) -> &'static str {
+        "calibration"
+    }
+
+    fn summary(&self) -> &'static str {
+        "the calibration of the diagnosis"
+    }
+
+    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+        let file: CalibrationStudy = study.read()?;
+        let path = study.beside(&file.campaign);
+        let (campaign, nominal) = CampaignSource::read(&path, self.0)?;
+        let plan = Plan { seed: file.seed, nulls: file.nulls, others: file.cases };
+        let drawn = cases(&nominal, &self.0.effects, &plan).map_err(FleetError::kind)?;
+        // Cases of both draws are counted from 0: distinguished by their place.
+        let item = |(place, case): (usize, &Case)| Draft {
+            name: format!("{place:05} {}", case.kind.name()),
+            payload: json!(CalibrationItem { campaign: campaign.clone(), case: StoredCase::from(case) }),
+        };
+        let items = drawn.iter().enumerate().map(item).collect();
+        let settings = json!({ "made_by": plan.command(&path) });
+        Ok(Drafts { items, settings })
+    }
+
+    fn work(&self, payload: &Value, _: At<'_>) -> Result<String, WorkError> {
+        let CalibrationItem { campaign, case } = CalibrationItem::deserialize(payload)?;
+        let campaign = campaign.campaign()?;
+        let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;
+        let observed = Calibrated::new(&campaign, &self.0.effects)?.observe(&case)?;
+        Ok(serde_json::to_string(&observed)?)
+    }
+
+    fn merge(&self, settings: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError> {
+        let mut observed: Vec<Observed> = Vec::new();
+        for (name, body) in parts {
+            let Ok(body) = body else { continue };
+            let found: Option<Observed> =
+                serde_json::from_str(&body).map_err(|source| StudyError::Content { name, source })?;
+            // What cannot be diagnosed is left out.
+            observed.extend(found);
+        }
+        let made_by = settings["made_by"].as_str().unwrap_or_default().to_owned();
+        let made = calibrated(&observed, made_by)?;
+        for (name, text) in made.files {
+            out.write(name, text.as_bytes())?;
+        }
+        out.write("observed.json", json_text(&observed).map_err(FleetError::kind)?.as_bytes())?;
+        Ok(made.summary)
+    }
+}
+
+/// What is made of the diagnoses of a study.
+pub struct Fitted {
+    /// Files by name: calibration, reliability and its picture.
+    pub files: Vec<(&'static str, String)>,
+    /// Their description.
+    pub summary: String,
+}
+
+/// Fits the calibration to diagnoses, and says whether its probabilities hold.
+///
+/// # Errors
+/// [`FleetError::Kind`] if the calibration that ships was spoilt.
+pub fn calibrated(observed: &[Observed], made_by: String) -> Result<Fitted, FleetError> {
+    let calibration = fitted(observed, made_by).map_err(FleetError::kind)?;
+    let reliabilities = reliabilities(observed).map_err(FleetError::kind)?;
+    let files = vec![
+        ("calibration.json", json_text(&calibration).map_err(FleetError::kind)?),
+        ("reliability.json", json_text(&reliabilities).map_err(FleetError::kind)?),
+        ("reliability.svg", reliability_svg(&reliabilities)),
+    ];
+    let description = format!(
+        "calibration.json from {} diagnoses in observed.json; reliability.svg\n{}",
+        observed.len(),
+        reliability_text(&reliabilities).trim_end()
+    );
+    Ok(Fitted { files, summary: description })
+}

@@ -1,0 +1,109 @@
+//! `study: maps`: campaigns by seeds, each identified by methods and kept with all its points: coverage of intervals, tables
+//! over seeds, scatter compared with the prediction of the planner.
+
+use crate::studies::error::StudyError;
+use crate::studies::source::CampaignSource;
+use mapper_core::Method;
+use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
+use mapper_session::{ErrorKind, NightlyRun, Registry, Session, SessionError, nominal_model};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use std::path::PathBuf;
+
+/// Scored maps.
+pub struct Maps<'a>(pub &'a Registry);
+
+/// Maps of campaigns, each with seeds, each recording identified by methods.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MapsStudy {
+    /// Name of the study.
+    #[serde(rename = "fleet")]
+    #[schemars(regex(pattern = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$"), example = &"coverage")]
+    _fleet: String,
+    /// Kind of the study.
+    #[serde(rename = "study")]
+    #[schemars(example = &"maps")]
+    _study: String,
+    /// The campaigns, from this file.
+    #[schemars(length(min = 1), extend("examples" = [["../turbo_a.yaml"]]))]
+    campaigns: Vec<PathBuf>,
+    /// Seeds, whole numbers from 0; each campaign's own if they are left out.
+    #[schemars(extend("uniqueItems" = true, "examples" = [[1, 2, 3]]))]
+    seeds: Option<Vec<u64>>,
+    /// Methods by which each recording is identified; each campaign's own if they are left out.
+    #[schemars(with = "Option<Vec<String>>", extend("uniqueItems" = true, "examples" = [["joint", "dynamic"]]))]
+    methods: Option<Vec<Method>>,
+}
+
+/// One recording.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MapsItem {
+    campaign: CampaignSource,
+    seed: u64,
+    methods: Vec<Method>,
+}
+
+/// File of all points.
+const POINTS: &str = "points.json";
+
+impl Kind for Maps<'_> {
+    fn name(&self) -> &'static str {
+        "maps"
+    }
+
+    fn summary(&self) -> &'static str {
+        "campaigns by seeds and methods, with all points"
+    }
+
+    fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
+        let file: MapsStudy = study.read()?;
+        let mut items = Vec::new();
+        for path in &file.campaigns {
+            let (source, campaign) = CampaignSource::read(&study.beside(path), self.0)?;
+            let own = campaign.identification.method;
+            for seed in file.seeds.clone().unwrap_or_else(|| vec![campaign.seed]) {
+                let methods = file.methods.clone().unwrap_or_else(|| vec![own]);
+                let payload = json!(MapsItem { campaign: source.clone(), seed, methods });
+                items.push(Draft { name: format!("{} seed {seed}", campaign.name), payload });
+            }
+        }
+        Ok(Drafts { items, settings: Value::Null })
+    }
+
+    fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError> {
+        let MapsItem { campaign, seed, methods } = MapsItem::deserialize(payload)?;
+        let campaign = campaign.campaign()?;
+        let model = nominal_model(&campaign)?;
+        let name = campaign.name.clone();
+        let method = campaign.identification.method;
+        let run = NightlyRun::new(campaign, model, method, seed, None).map_err(SessionError::from)?;
+        let session = Session { stop: at.stop, ..Session::new(self.0) };
+        let points = run.points(&session, at.scratch, &methods).map_err(|error| match error.kind() {
+            ErrorKind::Interrupted => WorkError::Interrupted,
+            _ => WorkError::from(error),
+        })?;
+        let points = points.map_err(WorkError::Failed)?;
+        let by_method: Map<String, Value> = methods.iter().map(ToString::to_string).zip(points).collect();
+        Ok(json!({ "campaign": name, "seed": seed, "points": by_method }).to_string())
+    }
+
+    fn merge(&self, _: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError> {
+        // As text: points of ten thousand maps need not be in memory as values.
+        let mut text = String::from("[\n");
+        let mut maps = 0;
+        for (name, body) in parts {
+            let Ok(body) = body else { continue };
+            serde_json::from_str::<serde::de::IgnoredAny>(&body)
+                .map_err(|source| StudyError::Content { name, source })?;
+            text += if maps == 0 { "" } else { ",\n" };
+            text += &body;
+            maps += 1;
+        }
+        text += "\n]\n";
+        out.write(POINTS, text.as_bytes())?;
+        Ok(format!("the points of {maps} maps in {POINTS}"))
+    }
+}

@@ -1,0 +1,62 @@
+//! A campaign as an item carries it: its text, and those of the files that it names.
+
+use crate::studies::error::StudyError;
+use mapper_campaign::{Campaign, CampaignError, check_with, load, read_named_file, read_text};
+use mapper_fleet::FleetError;
+use mapper_session::Registry;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::{Error, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// Everything that a campaign is read from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CampaignSource {
+    /// The file.
+    text: String,
+    /// Files that it names, from its folder.
+    files: BTreeMap<PathBuf, String>,
+}
+
+impl CampaignSource {
+    /// Reads a campaign, and keeps what was read.
+    ///
+    /// # Errors
+    /// [`FleetError::Kind`] with all mistakes of the campaign, or that its rig is not simulated.
+    pub fn read(path: &Path, registry: &Registry) -> Result<(CampaignSource, Campaign), FleetError> {
+        // All mistakes, in the words of every other command.
+        let campaign = load(path).map_err(FleetError::kind)?;
+        let backend = &campaign.backend.name;
+        if !registry.backends.iter().any(|plugin| plugin.name == backend) {
+            return Err(StudyError::Rig { campaign: path.to_owned(), backend: backend.clone() }.into());
+        }
+        let unread = |source| FleetError::kind(CampaignError::Read { path: path.to_owned(), source });
+        let text = read_text(path).map_err(unread)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let files = Mutex::new(BTreeMap::new());
+        let keep = |file: &Path| {
+            let text = read_named_file(file)?;
+            let name = file.strip_prefix(folder).unwrap_or(file).to_owned();
+            files.lock().unwrap_or_else(PoisonError::into_inner).insert(name, text.clone());
+            Ok(text)
+        };
+        check_with(&text, path, &keep, &|_| Vec::new()).map_err(FleetError::kind)?;
+        let files = files.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok((CampaignSource { text, files }, campaign))
+    }
+
+    /// The campaign. It was checked when the study was made; its points are not judged again.
+    ///
+    /// # Errors
+    /// [`StudyError::Campaign`].
+    pub fn campaign(&self) -> Result<Campaign, StudyError> {
+        let files = |file: &Path| {
+            let missing = || Error::new(ErrorKind::NotFound, StudyError::File(file.display().to_string()));
+            self.files.get(file).cloned().ok_or_else(missing)
+        };
+        check_with(&self.text, Path::new("campaign.yaml"), &files, &|_| Vec::new())
+            .map_err(|findings| StudyError::Campaign(findings.to_string()))
+    }
+}

@@ -55,7 +55,7 @@ def main():
     bins, out = arguments.bin.resolve(), arguments.out or pathlib.Path(tempfile.mkdtemp())
     out.mkdir(parents=True, exist_ok=True)
     python = pathlib.Path(arguments.python).absolute()
-    path = os.pathsep.join(map(str, [python.parent, ROOT / "drivers/python", os.environ["PATH"]]))
+    path = os.pathsep.join(map(str, [python.parent, ROOT / "plugins/drivers/python", os.environ["PATH"]]))
     environment = {**os.environ, "PATH": path, "MAPPER_STATE_DIR": str(out / "state"), "PLC_USER": "lab", "PLC_PASSWORD": "hunter2"}
 
     def call(program, *words, check=True):

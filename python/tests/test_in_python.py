@@ -19,7 +19,7 @@ import pytest
 import scipy.io
 
 ROOT = Path(__file__).parents[2]
-DRIVERS = ROOT / "drivers/python"
+DRIVERS = ROOT / "plugins/drivers/python"
 
 
 def python_rig() -> Any:

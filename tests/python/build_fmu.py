@@ -1,4 +1,4 @@
-"""Builds an FMI 2.0 co-simulation FMU with pythonfmu: the small rig of drivers/python as a model, with names of its own.
+"""Builds an FMI 2.0 co-simulation FMU with pythonfmu: the small rig of plugins/drivers/python as a model, with names of its own.
 
 Usage: build_fmu.py FILE. Variables: shaft.n, comp.m_flow, ... (see OUTPUTS), inputs p3_set (kPa), t3_set (degC), valve_set, oil_set (K), air.
 Prints the settings of mapper-backend-fmu for it, as JSON.
@@ -77,7 +77,7 @@ def settings(path):
 
 def main():
     path = pathlib.Path(sys.argv[1]).resolve()
-    drivers = pathlib.Path(__file__).resolve().parents[2] / "drivers/python"
+    drivers = pathlib.Path(__file__).resolve().parents[2] / "plugins/drivers/python"
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
         shutil.copy(drivers / "mapper-backend-python_rig", scratch / "small_rig.py")

@@ -1,4 +1,4 @@
-"""What drivers/python/mapper_driver.py does when the host is gone or the rig does not obey: time is an argument, no clock is read, except for a full real pipe.
+"""What plugins/drivers/python/mapper_driver.py does when the host is gone or the rig does not obey: time is an argument, no clock is read, except for a full real pipe.
 
 Prints {"held": [...]}, the facts that held; fails with the first that does not.
 """
@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "drivers/python"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "plugins/drivers/python"))
 import mapper_driver  # noqa: E402
 from mapper_driver import Refused, Server, description, read_frame  # noqa: E402
 

@@ -1,4 +1,4 @@
-"""The small rig of drivers/python in real time behind pymodbus, a Modbus server that shares no code with the driver.
+"""The small rig of plugins/drivers/python in real time behind pymodbus, a Modbus server that shares no code with the driver.
 
 Usage: modbus_rig.py [PORT]. Prints the port, then serves until standard input is closed. Holding registers: readings from 0 as singles (two
 registers each, in the order of CHANNELS), setpoints from 100, air 110, heartbeat 111, tripped 112. As a PLC has to, it cuts the air by
@@ -29,8 +29,8 @@ MISDEED = 150
 MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, DEVICE_FAILURE, CLOSES = range(6)
 
 root = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(root / "drivers/python"))
-loader = importlib.machinery.SourceFileLoader("rig", str(root / "drivers/python/mapper-backend-python_rig"))
+sys.path.insert(0, str(root / "plugins/drivers/python"))
+loader = importlib.machinery.SourceFileLoader("rig", str(root / "plugins/drivers/python/mapper-backend-python_rig"))
 rig_module = importlib.util.module_from_spec(importlib.util.spec_from_loader("rig", loader))
 loader.exec_module(rig_module)
 

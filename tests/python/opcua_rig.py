@@ -1,4 +1,4 @@
-"""The small rig of drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
+"""The small rig of plugins/drivers/python in real time behind asyncua, an OPC UA server that shares no code with the driver.
 
 Usage: opcua_rig.py [PORT] [--secure DIRECTORY [--user NAME] [--password WORD] [--days N]] [--seed N] [--stamps] [--sessions N] [--misdeed KIND] [--answers CODE]. Prints the port, then serves until standard input is closed. Nodes: ns=2;s=NAME for each
 reading and setpoint (p3, t3, valve, oil_temperature), air (Boolean), heartbeat (UInt32), tripped (Boolean); text, flag, table, whole (of other types). As a PLC has to, it cuts the
@@ -41,8 +41,8 @@ NAMESPACE = "urn:mapper:tests:stand"
 APPLICATION = "urn:mapper:tests:server"
 
 root = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(root / "drivers/python"))
-loader = importlib.machinery.SourceFileLoader("rig", str(root / "drivers/python/mapper-backend-python_rig"))
+sys.path.insert(0, str(root / "plugins/drivers/python"))
+loader = importlib.machinery.SourceFileLoader("rig", str(root / "plugins/drivers/python/mapper-backend-python_rig"))
 rig_module = importlib.util.module_from_spec(importlib.util.spec_from_loader("rig", loader))
 loader.exec_module(rig_module)
 

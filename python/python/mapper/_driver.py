@@ -1,1 +1,1 @@
-../../../drivers/python/mapper_driver.py
+../../../plugins/drivers/python/mapper_driver.py

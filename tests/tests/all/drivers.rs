@@ -31,7 +31,7 @@ pub(crate) fn with_drivers(arguments: &[&std::ffi::OsStr]) -> Command {
     build_drivers();
     let mut command = mapper_command(arguments.iter().copied());
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let places = [repository().join("drivers/python")].into_iter().chain(std::env::split_paths(&path));
+    let places = [repository().join("plugins/drivers/python")].into_iter().chain(std::env::split_paths(&path));
     // Drivers in Python find the packages of the tests.
     let python = option_env!("MAPPER_TEST_PYTHON").and_then(|python| Path::new(python).parent());
     let places = python.map(Path::to_path_buf).into_iter().chain(places);
@@ -171,7 +171,7 @@ fn drivers_are_listed_with_where_they_are_or_the_line_that_builds_them() {
     };
     assert!(of("virtual_lab")["program"].is_null());
     assert!(of("lab")["program"].as_str().unwrap().ends_with("mapper-backend-lab"));
-    assert!(of("python_rig")["program"].as_str().unwrap().contains("drivers/python"));
+    assert!(of("python_rig")["program"].as_str().unwrap().contains("plugins/drivers/python"));
     // Alone in a directory, with nothing on the path.
     let alone = mapper_tests::scratch();
     let program = alone.path().join("mapper");
@@ -271,7 +271,7 @@ fn a_runner_that_stood_still_records_what_it_missed() {
     let report = read_recording(&recording, &ChannelMap::native(), &ReadOptions::default()).unwrap();
     let events: Vec<_> = report.recording.events.iter().map(|event| (event.kind, &*event.message)).collect();
     // On a computer that is so busy that the driver filled neither queue nor pipe nothing is missing: the next set-point is refused then. That
-    // missing samples are reported holds in any case: drivers/lab/tests/unread.rs.
+    // missing samples are reported holds in any case: plugins/drivers/lab/tests/unread.rs.
     let says_why = |words: &str| words.contains("are missing") || words.contains("the lease had ended");
     let missing = events.iter().position(|(_, words)| words.contains("the rig was lost") && says_why(words));
     let safe = events.iter().position(|(kind, _)| *kind == EventKind::SafeState);

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 const PASSWORD: &str = "hunter2";
 
 fn repository() -> &'static Path {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))
 }
 
 /// A stand behind a server, which ends with the test.

@@ -54,7 +54,7 @@ impl Scratch {
     }
 
     fn settings(&self, file: &str) -> Value {
-        let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/turbo_a.yaml");
+        let campaign = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../campaigns/turbo_a.yaml");
         json!({"campaign": campaign, "real_time": true, "told": self.file(file)})
     }
 }

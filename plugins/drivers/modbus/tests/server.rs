@@ -26,7 +26,7 @@ impl Drop for Stand {
 impl Stand {
     /// On this port, or on a free one; the server is ready when this returns.
     fn new(port: &str) -> Stand {
-        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/python/modbus_rig.py");
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/python/modbus_rig.py");
         let mut server = Command::new(option_env!("MAPPER_TEST_PYTHON").unwrap_or("python3"))
             .args([script, port])
             .env("PYTHONDONTWRITEBYTECODE", "1")

@@ -207,7 +207,7 @@ mod tests {
     use mapper_session::{Registry, nominal_model};
 
     fn stand() -> Stand {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/turbo_a.yaml");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../campaigns/turbo_a.yaml");
         let campaign = mapper_campaign::load(path.as_ref()).unwrap();
         let registry = Registry { backends: BACKENDS.to_vec(), ..Registry::default() };
         let lab = registry.make_backend(&campaign, &nominal_model(&campaign).unwrap()).unwrap();

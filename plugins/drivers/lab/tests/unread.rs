@@ -42,7 +42,7 @@ struct Lab {
 impl Lab {
     fn new() -> Lab {
         let scratch = tempfile::tempdir().unwrap();
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/turbo_a.yaml");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../campaigns/turbo_a.yaml");
         let text = std::fs::read_to_string(shipped).unwrap();
         assert_eq!(text.matches("virtual_lab: {}").count(), 1);
         let campaign = scratch.path().join("fast.yaml");

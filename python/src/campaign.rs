@@ -6,7 +6,7 @@ use crate::registry::registry;
 use mapper_campaign::Campaign as Checked;
 use mapper_campaign::CampaignError;
 use mapper_core::{BackendError, NAMED_REFERENCES};
-use mapper_physics::model::Model;
+use mapper_physics::simulation::model::Model;
 use mapper_session::{
     FirstCampaignRequest, FirstRig, PlanInputs, Rehearsal, Session, SessionError, first_campaign,
     nominal_model, plan_of, rehearse,

@@ -3,9 +3,9 @@
 use crate::attended::compute;
 use crate::error::Fault;
 use crate::registry::registry;
-use mapper_maps::{MapFitOptions, fit_map};
 use mapper_core::CompressorMap;
 use mapper_formats::{FORMATS, parse_reference};
+use mapper_maps::{MapFitOptions, fit_map};
 use mapper_session::{Existing, SessionError, write_map_fitted_if_needed};
 use pyo3::prelude::*;
 use std::path::PathBuf;

@@ -3,10 +3,10 @@
 use crate::frame::log_formats;
 use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
+use mapper_driver_host::{Driver, PATIENCE, Places};
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
-use mapper_driver_host::{Driver, PATIENCE, Places};
-use mapper_physics::effect::Effect;
+use mapper_physics::rig::effect::Effect;
 use mapper_session::{Registry, SessionError};
 use serde_json::Value;
 use std::cell::RefCell;

@@ -1,21 +1,11 @@
 //! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `python`, `wheel` and `performance`.
 
+mod checks;
+mod commands;
 mod constants;
-mod docs;
+mod environment;
 mod error;
-mod fleet_test;
-mod formatting;
-mod lints;
-mod machine;
-mod offered;
-mod performance;
-mod python_env;
-mod python_package;
-mod quick;
 mod step;
-mod tally;
-mod test;
-mod test_programs;
 mod workspace;
 
 use std::process::ExitCode;
@@ -39,15 +29,15 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let done = match arguments.as_slice() {
-        ["quick"] => quick::quick(),
-        ["test"] => test::test(),
-        ["fleet-test"] => fleet_test::fleet_test(),
-        ["fmt"] => formatting::formatting(formatting::Mode::Write),
-        ["docs"] => docs::docs(docs::Mode::Write),
-        ["docs", "--check"] => docs::docs(docs::Mode::Check),
-        ["python"] => test::python(),
-        ["wheel"] => python_package::wheel(),
-        ["performance"] => performance::performance(),
+        ["quick"] => commands::quick::quick(),
+        ["test"] => commands::test::test(),
+        ["fleet-test"] => commands::fleet_test::fleet_test(),
+        ["fmt"] => checks::formatting::formatting(checks::formatting::Mode::Write),
+        ["docs"] => commands::docs::docs(commands::docs::Mode::Write),
+        ["docs", "--check"] => commands::docs::docs(commands::docs::Mode::Check),
+        ["python"] => commands::test::python(),
+        ["wheel"] => checks::python_package::wheel(),
+        ["performance"] => commands::performance::performance(),
         ["--help" | "-h" | "help"] => {
             step::say(USAGE);
             return ExitCode::SUCCESS;

@@ -1,33 +1,33 @@
 //! The complete campaign: the form of the file, and the result with units resolved and defaults filled in. Its
 //! elements are in `elements`, one file each.
 
-use crate::elements::backend::backend;
-use crate::elements::boundary::BoundaryFile;
-use crate::elements::drift::DriftFile;
-use crate::elements::efficiency::EfficiencyFile;
-use crate::elements::grid::GridFile;
-use crate::elements::guards::{GuardedBy, GuardsFile};
-use crate::elements::identification::IdentificationFile;
-use crate::elements::limits::LimitsFile;
-use crate::elements::machine::MachineFile;
-use crate::elements::readers::{ReaderFile, readers};
-use crate::elements::reference::ReferenceFile;
-use crate::elements::repeats::{RepeatsFile, repeats};
-use crate::elements::safe_state::SafeStateFile;
-use crate::elements::sensors::SensorsFile;
-use crate::elements::sequence::sequence;
-use crate::elements::speed_control::{SpeedControlFile, speed_control};
-use crate::elements::surge_search::SurgeSearchFile;
-use crate::elements::timing::TimingFile;
-use crate::elements::tolerances::TolerancesElement;
-use crate::elements::zero::ZeroFile;
+use crate::elements::evaluation::drift::DriftFile;
+use crate::elements::evaluation::identification::IdentificationFile;
+use crate::elements::evaluation::tolerances::TolerancesElement;
+use crate::elements::points::grid::GridFile;
+use crate::elements::points::repeats::{RepeatsFile, repeats};
+use crate::elements::points::sequence::sequence;
+use crate::elements::points::surge_search::SurgeSearchFile;
+use crate::elements::points::timing::TimingFile;
+use crate::elements::points::zero::ZeroFile;
+use crate::elements::rig::backend::backend;
+use crate::elements::rig::boundary::BoundaryFile;
+use crate::elements::rig::guards::{GuardedBy, GuardsFile};
+use crate::elements::rig::limits::LimitsFile;
+use crate::elements::rig::readers::{ReaderFile, readers};
+use crate::elements::rig::safe_state::SafeStateFile;
+use crate::elements::rig::sensors::SensorsFile;
+use crate::elements::rig::speed_control::{SpeedControlFile, speed_control};
+use crate::elements::turbocharger::efficiency::EfficiencyFile;
+use crate::elements::turbocharger::machine::MachineFile;
+use crate::elements::turbocharger::reference::ReferenceFile;
 use mapper_core::{
     Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint,
     ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
 };
-use mapper_physics::follow_outlet::FollowOutlet;
-use mapper_physics::line_points::LineRequest;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+use mapper_physics::operating_point::line_points::LineRequest;
 use mapper_yaml::Step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,15 +35,15 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-pub use crate::elements::backend::BackendChoice;
-pub use crate::elements::display::DisplayUnits;
-pub use crate::elements::identification::Identification;
-pub use crate::elements::machine::{DescriptionSource, Machine, MapSource};
-pub use crate::elements::outputs::{FormatName, Outputs};
-pub use crate::elements::readers::ReaderChoice;
-pub use crate::elements::report::Report;
-pub use crate::elements::sequence::SequenceSource;
-pub use crate::elements::several_sensors::SensorDeclaration;
+pub use crate::elements::evaluation::identification::Identification;
+pub use crate::elements::output::display::DisplayUnits;
+pub use crate::elements::output::outputs::{FormatName, Outputs};
+pub use crate::elements::output::report::Report;
+pub use crate::elements::points::sequence::SequenceSource;
+pub use crate::elements::rig::backend::BackendChoice;
+pub use crate::elements::rig::readers::ReaderChoice;
+pub use crate::elements::rig::several_sensors::SensorDeclaration;
+pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, MapSource};
 
 /// Everything that a run needs. All mistakes that can be found in advance have been excluded.
 ///

@@ -8,31 +8,26 @@
 
 pub mod campaign;
 mod checking;
-mod concern;
-mod consistency;
+mod checks;
 mod elements;
-mod load;
+mod files;
 mod machine_sizes;
-mod nightly;
 mod nominal_table;
-mod prospects;
-mod reach;
 mod resolved;
-mod schema;
-mod si;
+mod si_values;
 #[cfg(test)]
 mod testing;
 
 pub use campaign::Campaign;
-pub use concern::Concern;
-pub use load::{
+pub use checks::concern::Concern;
+pub use checks::reachable_points::{Unreachable, nominal_model, unreachable_points};
+pub use files::load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
     read_named_file, read_text, warnings,
 };
+pub use files::nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
+pub use files::schema::json_schema;
 pub use machine_sizes::{AssumedSize, similar_machine, similar_sizes};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
-pub use nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use nominal_table::{NominalTableError, nominal_table};
-pub use reach::{Unreachable, nominal_model, unreachable_points};
 pub use resolved::{ResolvedLine, ResolvedPoint, resolved_lines};
-pub use schema::json_schema;

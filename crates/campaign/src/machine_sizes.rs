@@ -4,7 +4,7 @@
 //! cube, the inertia with the fifth power. Materials and the dimensionless Nusselt laws stay. The reference is the machine of Burke et
 //! al., Appendix A, whose wheel has 52 mm.
 
-use mapper_physics::params::Params;
+use mapper_physics::machine::params::Params;
 use mapper_yaml::{Step, Tree};
 use serde::Serialize;
 

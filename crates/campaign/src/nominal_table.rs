@@ -2,7 +2,7 @@
 
 use mapper_core::{IdentifiedPoint, ImportError, MapDescription};
 use mapper_maps::table::read_any_text;
-use mapper_physics::tabulated_map::{MapError, MapRow, TabulatedMap};
+use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
 
 /// Why a file is not a nominal map.
 #[derive(Debug, thiserror::Error)]
@@ -51,7 +51,7 @@ pub fn nominal_table(
 mod tests {
     use super::*;
     use mapper_core::ReferenceState;
-    use mapper_physics::characteristic::CompressorCharacteristic;
+    use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
     use proptest::prelude::*;
 
     const SAMPLE: &str = "RPM,WC,PRC,ETAC\n50000,0.04,1.31,0.58\n50000,0.06,1.30,0.63\n50000,0.08,1.2,0.6\n\

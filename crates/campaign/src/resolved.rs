@@ -1,12 +1,12 @@
 //! Speed lines of a campaign: their points on its nominal machine, and their display form.
 
 use crate::campaign::Campaign;
-use crate::concern::Concern;
+use crate::checks::concern::Concern;
 use mapper_core::OperatingPoint;
-use mapper_physics::follow_outlet::hold_speed;
-use mapper_physics::line_points::{LineRequest, Spread, line_points};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::hold_speed;
+use mapper_physics::operating_point::line_points::{LineRequest, Spread, line_points};
+use mapper_physics::simulation::model::Model;
 use mapper_yaml::{Step, steps};
 use serde::Serialize;
 

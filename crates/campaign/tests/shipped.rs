@@ -5,7 +5,7 @@
 use mapper_campaign::campaign::MapSource;
 use mapper_campaign::{CampaignError, load};
 use mapper_core::{Channel, Dwell, EfficiencyDefinition, ReferenceState, VisitOrder, WindowRule};
-use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_physics::machine::params::{BoundaryConditions, Params};
 use std::path::{Path, PathBuf};
 
 fn directory() -> PathBuf {

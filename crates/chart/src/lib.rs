@@ -20,38 +20,24 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod axis;
-mod bands;
-mod clip;
-mod contour_item;
-mod contour_label;
-mod draw;
+mod contours;
 mod drawing;
-mod figure;
-mod frame;
-mod glyphs;
-mod grid;
+mod figure_layout;
 mod items;
-mod layout;
-mod legend;
-mod marching;
 mod markers;
 pub mod palette;
-mod png;
-mod point_labels;
-mod svg;
+mod rendering;
 mod text;
-mod ticks;
 
-pub use axis::Axis;
-pub use contour_item::{ContourLevel, Contours};
-pub use figure::{Figure, LegendPlace, Panel};
-pub use grid::{GridError, StructuredGrid};
+pub use contours::contour_item::{ContourLevel, Contours};
+pub use contours::grid::{GridError, StructuredGrid};
+pub use contours::marching::contour_lines;
+pub use figure_layout::axis::Axis;
+pub use figure_layout::figure::{Figure, LegendPlace, Panel};
+pub use figure_layout::ticks::nice_ticks;
 pub use items::{
     Annotation, Dash, EndLabel, Item, Line, LineEnd, Marker, Note, PointLabels, Polygon, Rule, RuleAt,
     Scatter, ScatterPoint, Space, TextAnchor,
 };
-pub use marching::contour_lines;
 pub use palette::Colour;
-pub use png::PngError;
-pub use ticks::nice_ticks;
+pub use rendering::png::PngError;

@@ -1,8 +1,8 @@
 //! A fleet directory opened, and what works in it: this machine.
 
-use crate::failure::Failure;
-use crate::wall::SystemWall;
-use crate::{interrupt, output_options, registry};
+use crate::output::failure::Failure;
+use crate::wall_clock::SystemWall;
+use crate::{interrupt, output::output_options, registry};
 use mapper_core::Wall;
 use mapper_fleet::{Engine, Fleet, FleetError, Kind, Machine};
 use mapper_session::Registry;

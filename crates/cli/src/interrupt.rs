@@ -1,8 +1,8 @@
 //! Ctrl-C and its like: to stop in good order.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::output;
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::output::standard_output;
 use mapper_session::{RunStop, Signalled};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +24,7 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
 fn obey(stop: &RunStop, gentle: bool) {
     match stop.signalled(gentle) {
         Signalled::Raised => {}
-        Signalled::Answered => output::warn(
+        Signalled::Answered => standard_output::warn(
             "The rig is safe and the recording is whole; its results are being written. Ask again to end without them: `mapper \
              identify` makes them from the run's directory.\n",
         ),

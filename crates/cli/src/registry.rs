@@ -5,7 +5,7 @@ use mapper_backends::BACKENDS;
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
 use mapper_log_formats::LOG_FORMATS;
-use mapper_physics::effect::Effect;
+use mapper_physics::rig::effect::Effect;
 use mapper_session::{Registry, SessionError};
 use std::path::Path;
 use std::sync::Arc;

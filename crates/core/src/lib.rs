@@ -9,118 +9,75 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod backend;
-mod channel;
-mod clock;
-mod common_errors;
-mod declared_uncertainty;
-mod efficiency_definition;
-mod event;
-mod fitted_map;
-mod guard;
-mod held_point;
-mod identified;
-mod imported_map;
-mod inlet_convection;
-mod joined;
-mod joint_settings;
-mod jump;
-mod limits;
-mod map;
-mod map_columns;
-mod map_description;
-mod map_format;
-mod map_format_error;
-mod model_tolerances;
-mod on_drift;
-mod one_line;
-mod operating_point;
-mod plan;
-mod plausible;
-mod recording;
-mod redundant;
-mod reference_state;
-mod run_down;
-mod run_ending;
-mod sample;
+mod identification;
+mod maps;
+mod measurement;
+mod rig;
 mod schema;
-mod settle_bands;
-mod soak;
-mod speed_response;
-mod step_marker;
-pub mod step_number;
-mod surge;
-mod terminal_text;
-mod thermal_model;
-mod timing;
-mod turbine_map;
-mod uncertainty_budget;
-mod verdict_forecast;
-mod visit_order;
-mod window_rule;
-mod with_unit;
+pub mod test_plan;
+mod text;
 
-pub use backend::{
-    Backend, BackendCause, BackendError, RigDescription, RigMode, SetpointRange, SetpointRanges, Setpoints,
-};
-pub use channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
-pub use clock::{Clock, PacedClock, UnpacedClock, Wall};
-pub use common_errors::CommonErrors;
-pub use declared_uncertainty::{DeclaredUncertainty, NoiseColour};
-pub use efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
-pub use event::{Event, EventKind};
-pub use fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
-pub use guard::{
-    GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand, SurgeVariation,
-};
-pub use held_point::{HeldPoint, JUMPS, VALVE_JUMP_RATIO};
-pub use identified::{
+pub use identification::common_errors::CommonErrors;
+pub use identification::identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
     half_width_95, standard_error_of,
 };
-pub use imported_map::{ImportRemark, ImportedColumn, ImportedMap};
-pub use inlet_convection::InletConvection;
-pub use joined::{StepOrigin, joined};
-pub use joint_settings::{
+pub use identification::inlet_convection::InletConvection;
+pub use identification::joint_settings::{
     ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,
 };
-pub use jump::{Jump, Repeats};
-pub use limits::{Limits, SURGE_ALLOWED_S};
-pub use map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
-pub use map_columns::MAP_COLUMNS;
-pub use map_description::{DescribedColumn, DesignPoint, MapDescription, StaticTaps};
-pub use map_format::{
+pub use identification::model_tolerances::ModelTolerances;
+pub use identification::settle_bands::SettleBands;
+pub use identification::thermal_model::{
+    ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
+};
+pub use identification::uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
+pub use identification::window_rule::WindowRule;
+pub use maps::efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
+pub use maps::fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
+pub use maps::imported_map::{ImportRemark, ImportedColumn, ImportedMap};
+pub use maps::map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
+pub use maps::map_columns::MAP_COLUMNS;
+pub use maps::map_description::{DescribedColumn, DesignPoint, MapDescription, StaticTaps};
+pub use maps::map_format::{
     DrawMap, MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, MapUnits, ReadMap, ReadTurbine, TurbineFormat,
     WriteMap, WriteTurbine,
 };
-pub use map_format_error::{ExportError, ImportError};
-pub use model_tolerances::ModelTolerances;
-pub use on_drift::OnDrift;
-pub use one_line::one_line;
-pub use operating_point::OperatingPoint;
-pub use plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
-pub use plausible::{Plausible, measurable, plausible};
-pub use recording::{ReadingOrigin, Recording, RecordingError, Series};
-pub use redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
-pub use reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState, usual_references};
-pub use run_ending::RunEnding;
-pub use sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
-pub use settle_bands::SettleBands;
-pub use soak::Soak;
-pub use speed_response::{SpeedControlSettings, SpeedResponse};
-pub use step_marker::StepMarker;
-pub use step_number::step_number;
-pub use surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
-pub use terminal_text::terminal_text;
-pub use thermal_model::{
-    ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
-};
-pub use timing::{Dwell, Timing};
-pub use turbine_map::{
+pub use maps::map_format_error::{ExportError, ImportError};
+pub use maps::reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState, usual_references};
+pub use maps::turbine_map::{
     FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportedTurbine, TurbineMap, TurbineMapPoint,
 };
-pub use uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
-pub use verdict_forecast::{Advice, CampaignChange, VerdictForecast};
-pub use visit_order::VisitOrder;
-pub use window_rule::WindowRule;
-pub use with_unit::{readable, temperature, with_unit};
+pub use measurement::channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
+pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour};
+pub use measurement::event::{Event, EventKind};
+pub use measurement::held_point::{HeldPoint, JUMPS, VALVE_JUMP_RATIO};
+pub use measurement::joined_recordings::{StepOrigin, joined};
+pub use measurement::plausible::{Plausible, measurable, plausible};
+pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Series};
+pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
+pub use measurement::sample::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
+pub use measurement::step_marker::StepMarker;
+pub use rig::backend::{
+    Backend, BackendCause, BackendError, RigDescription, RigMode, SetpointRange, SetpointRanges, Setpoints,
+};
+pub use rig::clock::{Clock, PacedClock, UnpacedClock, Wall};
+pub use rig::guard::{
+    GuardName, GuardSet, LargestChange, Reaction, SafeTrajectory, SignalGuard, SpeedBand, SurgeVariation,
+};
+pub use rig::limits::{Limits, SURGE_ALLOWED_S};
+pub use rig::on_drift::OnDrift;
+pub use rig::run_ending::RunEnding;
+pub use rig::soak::Soak;
+pub use rig::speed_response::{SpeedControlSettings, SpeedResponse};
+pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
+pub use test_plan::jump::{Jump, Repeats};
+pub use test_plan::operating_point::OperatingPoint;
+pub use test_plan::plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
+pub use test_plan::step_number::step_number;
+pub use test_plan::timing::{Dwell, Timing};
+pub use test_plan::verdict_forecast::{Advice, CampaignChange, VerdictForecast};
+pub use test_plan::visit_order::VisitOrder;
+pub use text::one_line::one_line;
+pub use text::terminal_text::terminal_text;
+pub use text::with_unit::{readable, temperature, with_unit};

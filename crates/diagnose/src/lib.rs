@@ -2,7 +2,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-pub mod gap;
 pub mod drift;
-pub mod missing_terms;
 pub mod driven;
+pub mod gap;
+pub mod missing_terms;

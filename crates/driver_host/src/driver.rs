@@ -5,13 +5,13 @@ use crate::find::{At, PREFIX, Places, file_name};
 use crate::lease::Lease;
 use crate::link::Link;
 use crate::pending::{Pending, ROUNDING_S};
-use crate::secrets::Secrets;
-use mapper_core::{
-    Backend, BackendError, RigDescription, SampleBatch, SetpointRange, SetpointRanges, Setpoints,
-};
 use crate::protocol::{
     Code, Configure, Described, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
     description, rig_error, setpoints_on_the_wire,
+};
+use crate::secrets::Secrets;
+use mapper_core::{
+    Backend, BackendError, RigDescription, SampleBatch, SetpointRange, SetpointRanges, Setpoints,
 };
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -1,8 +1,8 @@
 //! The lease: the host sends an armed driver a message twice a second, otherwise the driver executes its safe trajectory.
 
 use crate::link::Outlet;
-use mapper_core::BackendError;
 use crate::protocol::{Message, RENEW_S};
+use mapper_core::BackendError;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};

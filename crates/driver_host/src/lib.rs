@@ -3,7 +3,6 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-pub mod protocol;
 pub mod conformance;
 mod driver;
 mod error;
@@ -12,6 +11,7 @@ mod known;
 mod lease;
 mod link;
 mod pending;
+pub mod protocol;
 mod secrets;
 
 pub use driver::{Driver, PATIENCE, Patience};

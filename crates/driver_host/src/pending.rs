@@ -1,9 +1,9 @@
 //! Queue of samples that have arrived but have not been polled.
 
+use crate::protocol::Unusable;
 use mapper_core::{
     Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality, SampleBatch, TruthColumn,
 };
-use crate::protocol::Unusable;
 use std::collections::VecDeque;
 
 /// Maximum number of queued values over all columns, at 8 bytes each, including names and texts: three hours of 19 channels at 10 Hz, 32 MB.

@@ -1,6 +1,6 @@
 //! Cost of a study, extrapolated from the finished items.
 
-use crate::place::Machine;
+use crate::directory::shared_files::Machine;
 use crate::{Engine, Fleet, FleetError, Kind, Status, Which};
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! Merges parts into the result, which is the same for any number of machines and any order of work.
 
-use crate::place::{Machine, make_directory};
+use crate::directory::shared_files::{Machine, make_directory};
 use crate::status::{Lacking, Status};
 use crate::{Fleet, FleetError, Kind, Outcome, Output, PartRefusal};
 use std::cell::RefCell;

@@ -1,7 +1,7 @@
 //! Interface to a cluster's queue: a template with a shell script that submits, and one line in it that queries the state.
 
 use crate::FleetError;
-use crate::place::read_at_most;
+use crate::directory::shared_files::read_at_most;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};

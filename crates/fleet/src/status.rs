@@ -1,7 +1,7 @@
 //! Progress of a study, from its parts alone.
 
-use crate::fleet::part_name;
-use crate::part::Outcome;
+use crate::directory::fleet::part_name;
+use crate::directory::part::Outcome;
 use crate::{Fleet, Hash, Listed, Part};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -88,7 +88,7 @@ impl Fleet {
     }
 
     fn who_began(&self, item: &Listed) -> Option<String> {
-        let who = crate::place::read_at_most(&self.begun(&item.hash), 256).ok()?;
+        let who = crate::directory::shared_files::read_at_most(&self.begun(&item.hash), 256).ok()?;
         Some(String::from_utf8_lossy(&who).into_owned())
     }
 

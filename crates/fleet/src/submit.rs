@@ -1,7 +1,7 @@
 //! Submits a study to a queue: few tasks of many items each, sized by the cost of items, within the limits.
 
-use crate::fleet::LOGS;
-use crate::place::{Durability, Machine, make_directory, read_at_most, write_whole};
+use crate::directory::fleet::LOGS;
+use crate::directory::shared_files::{Durability, Machine, make_directory, read_at_most, write_whole};
 use crate::queue::{Template, quoted, running, submitted};
 use crate::{Cost, Fleet, FleetError, Shard, Status};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! Does items: each leaves one part, even if a process is killed.
 
-use crate::part::{Outcome, Part};
-use crate::place::Machine;
+use crate::directory::part::{Outcome, Part};
+use crate::directory::shared_files::Machine;
 use crate::{At, Engine, Fleet, FleetError, Hash, Item, Kind, Listed, Shard, WorkError};
 use mapper_numerics::parallel;
 use std::panic::{AssertUnwindSafe, catch_unwind};

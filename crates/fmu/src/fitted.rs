@@ -1,7 +1,7 @@
 //! A fitted map as the speed lines that an FMU holds.
 
 use mapper_core::{FittedMap, FittedNode, ReferenceState};
-use mapper_physics::tabulated_map::{MapError, MapRow, TabulatedMap};
+use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
 
 /// Lowest efficiency that an FMU's map holds: below it the fit has no compressor any more, and the model's floor is above it.
 const LOWEST_EFFICIENCY: f64 = 0.05;

@@ -4,9 +4,13 @@ use crate::c_text::{array, identifier, number, numbers};
 use crate::machine::{FmuError, FmuMachine, FmuMap};
 use crate::variable::{Causality, Switch, Variable};
 use mapper_core::ReferenceState;
-use mapper_physics::characteristic::CompressorCharacteristic;
-use mapper_physics::tabulated_map::{Line, Node, TabulatedMap};
-use mapper_physics::{air, housing, nusselt, rodas5p};
+use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
+use mapper_physics::compressor_map::tabulated_map::{Line, Node, TabulatedMap};
+use mapper_physics::{
+    gas::air,
+    laws::{housing, nusselt},
+    simulation::rodas5p,
+};
 use std::fmt::Write;
 
 /// Tolerance if the importer names none, relative to each state.

@@ -1,9 +1,9 @@
 //! The exported machine with its map and its initial state.
 
-use mapper_physics::closed_form_map::ClosedFormMap;
-use mapper_physics::params::{BoundaryConditions, Params};
-use mapper_physics::state::State;
-use mapper_physics::tabulated_map::TabulatedMap;
+use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use mapper_physics::compressor_map::tabulated_map::TabulatedMap;
+use mapper_physics::machine::params::{BoundaryConditions, Params};
+use mapper_physics::machine::state::State;
 
 /// The compressor map of an FMU.
 #[derive(Debug, Clone)]

@@ -3,12 +3,12 @@
 
 use mapper_core::{EfficiencyDefinition, InletConvection, ReferenceState};
 use mapper_fmu::{FmuMachine, FmuMap, files};
-use mapper_physics::characteristic::CompressorCharacteristic;
-use mapper_physics::closed_form_map::ClosedFormMap;
-use mapper_physics::model::{Model, Outputs, State, rad_s_of_rpm};
-use mapper_physics::params::{BoundaryConditions, Params};
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::tabulated_map::{MapRow, TabulatedMap};
+use mapper_physics::compressor_map::characteristic::CompressorCharacteristic;
+use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use mapper_physics::compressor_map::tabulated_map::{MapRow, TabulatedMap};
+use mapper_physics::machine::params::{BoundaryConditions, Params};
+use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
+use mapper_physics::simulation::simulate::{Simulator, Watch};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;

@@ -3,7 +3,7 @@
 use mapper_core::{Channel, InletConvection, JointSettings, Method, ReferenceState, SettleBands, WindowRule};
 pub use mapper_core::{DeclaredUncertainty, NoiseColour};
 use mapper_numerics::coloured_noise::ColouredNoise;
-use mapper_physics::air::Air;
+use mapper_physics::gas::air::Air;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -1,16 +1,19 @@
 //! From a recording to points: one for each step.
 
-use crate::dynamic::Estimate;
-use crate::end_state::{EndState, end_state};
-use crate::faults::efficiency::FittedEfficiencies;
-use crate::faults::found::{FoundFault, Suspect};
-use crate::findings::{Findings, code};
+use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::needs::missing;
 use crate::nominal_rig::NominalRig;
 use crate::objections::objection::Objection;
 use crate::objections::objections;
-use crate::two_parameter::TwoParameter;
-use crate::{IdentifyConfig, IdentifyError, PressureTap, StepError, budgets, dynamic, faults, joint, steady};
+use crate::single_step::dynamic::Estimate;
+use crate::step_data::end_state::{EndState, end_state};
+use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::two_parameter::TwoParameter;
+use crate::{
+    IdentifyConfig, IdentifyError, PressureTap, StepError, faults, joint,
+    single_step::{budgets, dynamic, steady},
+};
 use mapper_core::{
     Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, Method, PointBudgets,
     Recording, StepMarker, ThermalModel, WindowRule, confidence_interval_95,

@@ -1,10 +1,10 @@
 //! Predictions of the declared map for a measured point: the speed at its flow and pressure ratio, and the efficiency there.
 
-use crate::faults::readings::Readings;
+use crate::faults::end_readings::Readings;
 use mapper_core::{Channel, ModelTolerances};
 use mapper_numerics::polyline::NearestOnPolyline;
 use mapper_numerics::root::bisect;
-use mapper_physics::model::Model;
+use mapper_physics::simulation::model::Model;
 use std::collections::BTreeMap;
 
 /// The declared rig of a campaign with its tolerances.

@@ -1,12 +1,12 @@
 //! A single least-squares fit of all steps, for timing comparisons with another program.
 
-use crate::dynamic::Estimate;
-use crate::end_state::end_state;
-use crate::findings::Findings;
-use crate::joint::input_noise_spline::Explained;
-use crate::joint::parameters::{ALPHA, ETA, LN_DEVIATION, PROBE_MM2};
-use crate::joint::solve::{FULLY, Problem};
-use crate::joint::start;
+use crate::joint::fit::input_noise_spline::Explained;
+use crate::joint::fit::solve::{FULLY, Problem};
+use crate::joint::fit::start;
+use crate::joint::step_model::parameters::{ALPHA, ETA, LN_DEVIATION, PROBE_MM2};
+use crate::single_step::dynamic::Estimate;
+use crate::step_data::end_state::end_state;
+use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, identify};
 use mapper_core::Recording;
 

@@ -21,8 +21,8 @@ use mapper_core::{
 };
 use mapper_identify::{IdentifyConfig, NominalRig, identify_beside};
 use mapper_numerics::parallel;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

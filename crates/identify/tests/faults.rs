@@ -9,8 +9,8 @@
 use crate::lab::{Machine as LabMachine, campaign, measured};
 use mapper_core::{Channel, Method, ModelTolerances, Recording, Verdict};
 use mapper_identify::{Identified, IdentifyConfig, Machine, NominalRig, Suspect, identify_beside};
-use mapper_physics::model::Model;
-use mapper_physics::sensor_fault::additive;
+use mapper_physics::rig::sensor_fault::additive;
+use mapper_physics::simulation::model::Model;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

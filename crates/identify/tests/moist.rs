@@ -4,7 +4,7 @@
 use crate::lab::{Machine, campaign, eighteen, measured};
 use mapper_core::Method;
 use mapper_identify::{IdentifyConfig, identify};
-use mapper_physics::air::Air;
+use mapper_physics::gas::air::Air;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 

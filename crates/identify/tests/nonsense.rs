@@ -15,7 +15,7 @@ use mapper_identify::{
     Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds, code,
     identify_beside, identify_each,
 };
-use mapper_physics::model::Model;
+use mapper_physics::simulation::model::Model;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use std::collections::BTreeMap;

@@ -6,7 +6,7 @@ use mapper_core::{Channel, EstimateUncertainty, Event, EventKind, Method, Operat
 use mapper_identify::{
     DeclaredUncertainty, IdentifyConfig, IdentifyError, PressureTap, WindowRule, code, identify,
 };
-use mapper_physics::pressure_tap::total_to_static_pa;
+use mapper_physics::gas::pressure_tap::total_to_static_pa;
 use proptest::prelude::*;
 
 fn config(alpha_area_ratio: f64) -> IdentifyConfig {

@@ -5,7 +5,7 @@
 use crate::lab::{Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, StepKind, Verdict};
 use mapper_identify::{IdentifyConfig, NominalRig, code, identify, identify_beside};
-use mapper_physics::model::Model;
+use mapper_physics::simulation::model::Model;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;

@@ -7,8 +7,8 @@ use crate::state::{
 };
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
-use mapper_report::page::{LiveMap, live_map, live_point, planned};
 use mapper_report::Display;
+use mapper_report::page::{LiveMap, live_map, live_point, planned};
 use mapper_session::{Operator, SessionEvent, soak_s};
 use serde_json::{Value, json};
 use std::collections::VecDeque;

@@ -6,25 +6,20 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod access;
-mod connections;
 mod feed;
-mod hub;
 mod live;
 mod live_error;
 mod live_run;
 mod observers;
 mod operator_commands;
-mod request;
-mod server;
 mod state;
-mod tls;
 #[cfg(feature = "foxglove")]
 mod viewers;
+mod web_server;
 
 pub use live_error::LiveError;
 pub use live_run::LiveRun;
 pub use observers::{Asked, Observers};
-pub use tls::{TlsError, TlsFiles};
 #[cfg(feature = "foxglove")]
 pub use viewers::{Viewers, ViewersError};
+pub use web_server::tls::{TlsError, TlsFiles};

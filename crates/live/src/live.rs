@@ -1,13 +1,13 @@
 //! The live page of a run: opened before the run, updated during it, closed after it.
 
-use crate::access::Access;
 use crate::feed::Feed;
-use crate::hub::Hub;
 use crate::live_error::LiveError;
 use crate::live_run::LiveRun;
 use crate::operator_commands::Pressed;
-use crate::server::{Served, serve};
-use crate::tls::{Tls, TlsFiles, read};
+use crate::web_server::access::Access;
+use crate::web_server::hub::Hub;
+use crate::web_server::server::{Served, serve};
+use crate::web_server::tls::{Tls, TlsFiles, read};
 use mapper_report::page::live_page;
 use mapper_session::SessionEvent;
 use std::net::{SocketAddr, TcpListener};

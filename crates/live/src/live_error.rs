@@ -1,6 +1,6 @@
 //! Errors of the live page.
 
-use crate::tls::TlsError;
+use crate::web_server::tls::TlsError;
 use std::net::SocketAddr;
 
 /// Why the live page cannot be served.

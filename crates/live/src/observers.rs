@@ -3,9 +3,9 @@
 use crate::live::Live;
 use crate::live_error::LiveError;
 use crate::live_run::LiveRun;
-use crate::tls::TlsFiles;
 #[cfg(feature = "foxglove")]
 use crate::viewers::Viewers;
+use crate::web_server::tls::TlsFiles;
 use mapper_session::SessionEvent;
 use std::path::Path;
 #[cfg(feature = "foxglove")]

@@ -6,7 +6,7 @@ use crate::{AssembleError, Grouping};
 use mapper_core::{
     CompressorMap, IdentifiedPoint, MapPoint, Method, ReferenceState, SpeedLine, SpeedShift, Verdict,
 };
-use mapper_physics::similarity::at_speed;
+use mapper_physics::compressor_map::similarity::at_speed;
 
 /// Makes a map of identified points.
 ///

@@ -1,6 +1,6 @@
 //! Differences between two maps, in units and in their uncertainty.
 
-use crate::efficiency::convert_efficiency;
+use crate::efficiency_definition::convert_efficiency;
 use crate::map_fit::{MapFit, MapFitError, MapFitOptions};
 use mapper_core::{CompressorMap, FittedLine, FittedNode, confidence_interval_95};
 use mapper_numerics::polyline::NearestOnPolyline;

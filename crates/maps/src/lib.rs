@@ -7,29 +7,27 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-pub mod table;
-pub mod mesh;
 mod assemble;
 mod compare;
-mod efficiency;
+mod efficiency_definition;
 mod error;
 mod grouping;
 mod heat_correction;
 mod map_fit;
+pub mod mesh;
 mod repeated_jumps;
 mod repeats;
-mod turbine_compare;
-mod turbine_fit;
-mod turbine_surface;
+pub mod table;
+mod turbine;
 
 pub use assemble::assemble;
 pub use compare::{ComparedLine, ComparedPlace, MapComparison, compare};
-pub use efficiency::convert_efficiency;
+pub use efficiency_definition::convert_efficiency;
 pub use error::AssembleError;
 pub use grouping::Grouping;
 pub use heat_correction::{CorrectedLine, HeatCorrection, HeatCorrectionError, correct_for_heat};
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
 pub use repeated_jumps::{RepeatedJump, repeated_jumps};
 pub use repeats::points_for_map;
-pub use turbine_compare::{ComparedTurbinePoint, TurbineComparison, compare_turbines};
-pub use turbine_fit::{TurbineFit, TurbineFitError, fit_turbine};
+pub use turbine::turbine_compare::{ComparedTurbinePoint, TurbineComparison, compare_turbines};
+pub use turbine::turbine_fit::{TurbineFit, TurbineFitError, fit_turbine};

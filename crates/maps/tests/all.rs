@@ -6,5 +6,5 @@ mod efficiency;
 mod heat_correction;
 mod map_fit;
 mod support;
-mod turbine;
 mod table;
+mod turbine;

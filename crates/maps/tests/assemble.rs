@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_maps::{AssembleError, Grouping, assemble};
 use mapper_core::{CommonErrors, IdentifiedPoint, Method, OperatingPoint, ReferenceState, StepKind, Verdict};
+use mapper_maps::{AssembleError, Grouping, assemble};
 use proptest::prelude::*;
 
 fn point(

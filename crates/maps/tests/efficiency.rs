@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::support::map_of;
-use mapper_maps::{compare, convert_efficiency};
 use mapper_core::EfficiencyDefinition::{ConstantGamma, Enthalpy, KappaOfT1};
+use mapper_maps::{compare, convert_efficiency};
 
 /// Air compressed from 298 K and 100 kPa with an efficiency of 72 % by enthalpy (CoolProp 6, air as a real gas): pressure
 /// ratio, and the efficiency that gamma = 1.4 gives from its T2.

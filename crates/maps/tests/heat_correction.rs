@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::support::{Row, map_of};
+use mapper_core::Method;
 #[allow(dead_code, reason = "shared with other tests, which use more of it")]
 use mapper_maps::{HeatCorrectionError, correct_for_heat};
-use mapper_core::Method;
 use proptest::prelude::*;
 
 const CP: f64 = 1005.0;

@@ -1,7 +1,7 @@
 //! The fit of turbine maps, on a made-up turbine: a nozzle whose throat depends on vanes, and a parabola over the blade-speed ratio.
 
-use mapper_maps::{TurbineFit, TurbineFitError, compare_turbines, fit_turbine};
 use mapper_core::{TurbineMap, TurbineMapPoint};
+use mapper_maps::{TurbineFit, TurbineFitError, compare_turbines, fit_turbine};
 
 /// Flow parameter and efficiency.
 fn truth(vane: f64, speed: f64, ratio: f64) -> (f64, f64) {

@@ -1,7 +1,7 @@
 //! Channels that drive the model, and channels that are compared with it.
 
 use mapper_core::Channel;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
 
 /// Outputs of the model that a sensor measures. P3 is a boundary condition and is compared only if its lag matters.
 pub const OUTPUTS: [Channel; 8] = [

@@ -1,7 +1,7 @@
 //! Declared uncertainty of rig and model: noise, offsets, gains, tolerances. A deviation within it is not a finding.
 
 use mapper_core::{Channel, DeclaredUncertainty, Dimension, ModelTolerances, NoiseColour};
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

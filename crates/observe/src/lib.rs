@@ -5,27 +5,17 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-pub mod averaged_inputs;
-pub mod block;
+pub mod averages;
 pub mod channels;
 pub mod declared;
-mod element_blocks;
-pub mod element_fault;
-mod element_judge;
-pub mod fuse;
-pub mod lagged_command;
-pub mod mean;
+pub mod initial_state;
+pub mod model_inputs;
 pub mod perturbation;
 pub mod plausible;
+pub mod redundant_sensors;
 pub mod same_machine;
-pub mod schedule;
-pub mod smoothed_inputs;
-pub mod smoother;
-pub mod start;
-pub mod step_timing;
-pub mod table;
 
 pub use declared::{Declared, declared_uncertainties};
-pub use element_fault::{Contradiction, Fault, FaultyElement, FusedChannel};
-pub use fuse::{fuse, judge_elements};
+pub use redundant_sensors::element_fault::{Contradiction, Fault, FaultyElement, FusedChannel};
+pub use redundant_sensors::fuse::{fuse, judge_elements};
 pub use same_machine::{OtherMachine, same_machine};

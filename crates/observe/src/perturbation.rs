@@ -2,9 +2,9 @@
 
 use crate::channels::boundary_condition;
 use mapper_core::{Channel, ModelTolerances};
-use mapper_physics::inputs::Inputs;
-use mapper_physics::model::State;
-use mapper_physics::params::{BoundaryConditions, Params};
+use mapper_physics::machine::params::{BoundaryConditions, Params};
+use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::model::State;
 
 /// Factor on the standard deviation of a value that carries no information.
 pub const UNINFORMATIVE: f64 = 1e4;

@@ -3,10 +3,10 @@
 //! `cargo run --release -p mapper-physics --example transients -- REPEATS [RTOL]`, for comparison with a peer.
 #![allow(clippy::print_stdout)]
 
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
-use mapper_physics::steady::{self, SteadyError, SteadyState};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
+use mapper_physics::simulation::steady::{self, SteadyError, SteadyState};
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

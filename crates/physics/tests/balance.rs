@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::InletConvection;
-use mapper_physics::housing;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady;
+use mapper_physics::laws::housing;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady;
 use proptest::prelude::*;
 
 proptest! {

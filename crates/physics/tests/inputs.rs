@@ -1,11 +1,11 @@
 //! Boundary conditions that vary in time: interpolated tables, and events on the way.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_physics::inputs::{InputsError, InterpolatedInputs};
-use mapper_physics::model::{Model, State};
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Crossing, ModelEvent, Simulator, Watch};
-use mapper_physics::steady;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::inputs::{InputsError, InterpolatedInputs};
+use mapper_physics::simulation::model::{Model, State};
+use mapper_physics::simulation::simulate::{Crossing, ModelEvent, Simulator, Watch};
+use mapper_physics::simulation::steady;
 
 fn held(speed_rpm: f64, valve_opening_ratio: f64) -> steady::SteadyState {
     let boundary = BoundaryConditions { valve_opening_ratio, ..Default::default() };

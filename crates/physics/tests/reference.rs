@@ -1,10 +1,10 @@
 //! Agreement with an independent implementation, every column of every reference table.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_physics::model::{Model, Outputs, State, rad_s_of_rpm};
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::steady::{self, SteadyState};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady::{self, SteadyState};
 use std::collections::HashMap;
 
 type Row = HashMap<String, f64>;

@@ -6,9 +6,9 @@
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
 use mapper_core::{Dwell, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
-use mapper_physics::follow_outlet::FollowOutlet;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan};
 use std::time::Instant;
 

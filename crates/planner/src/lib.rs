@@ -6,37 +6,22 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod assignment;
-mod auction;
-mod bound;
-mod candidates;
-pub mod chain;
-mod comparison;
-mod exact;
-mod figures;
-mod fingerprint;
-mod forecast;
-mod graph;
-mod housing;
+mod jumps;
 mod method;
-mod objective;
-mod order;
-mod plan;
-mod plan_builder;
-mod relaxation;
+mod ordering;
+mod plans;
 mod request;
-mod search;
 mod targets;
-mod visits;
-mod walk;
+pub mod thermal_memory;
+mod upper_bound;
 
-pub use comparison::other_orders;
-pub use fingerprint::{made_from, sha256_hex};
-pub use graph::{JumpForecast, Rejection, explain_jump, jump_graph};
+pub use jumps::graph::{JumpForecast, Rejection, explain_jump, jump_graph};
+pub use jumps::walk::STABLE_DRIFT_K_MIN;
 pub use method::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
-pub use objective::Objective;
-pub use plan::make_plan;
-pub use plan_builder::max_steps;
+pub use ordering::objective::Objective;
+pub use ordering::search::{Effort, search, search_worst};
+pub use plans::comparison::other_orders;
+pub use plans::fingerprint::{made_from, sha256_hex};
+pub use plans::plan::make_plan;
+pub use plans::plan_builder::max_steps;
 pub use request::{PlanError, PlanRequest, UnreachablePoint};
-pub use search::{Effort, search, search_worst};
-pub use walk::STABLE_DRIFT_K_MIN;

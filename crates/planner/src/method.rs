@@ -2,7 +2,7 @@
 //!
 //! The planner does not depend on identification; whoever asks for a plan passes the method in use.
 
-pub use mapper_physics::forecast::ForecastRow;
+pub use mapper_physics::operating_point::forecast::ForecastRow;
 
 /// What the method is expected to find in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]

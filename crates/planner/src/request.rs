@@ -2,10 +2,10 @@
 
 use crate::method::PredictedMethod;
 use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
-use mapper_physics::follow_outlet::FollowOutlet;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::SimulationError;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::SimulationError;
 
 /// Everything a plan depends on.
 #[derive(Debug, Clone)]

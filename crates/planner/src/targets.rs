@@ -2,8 +2,8 @@
 
 use crate::request::{PlanError, PlanRequest, UnreachablePoint};
 use mapper_core::OperatingPoint;
-use mapper_physics::reach::{clause, reach};
-use mapper_physics::steady::SteadyState;
+use mapper_physics::operating_point::reach::{clause, reach};
+use mapper_physics::simulation::steady::SteadyState;
 
 /// Steady states of `points`, or all that cannot be measured, each with all limits in its way.
 pub(crate) fn reachable(

@@ -6,8 +6,8 @@ mod common;
 
 use common::{SimpleHousing, grid, request};
 use mapper_core::{Dwell, Jump, OperatingPoint, Repeats, StepKind, VisitOrder};
-use mapper_physics::model::Model;
-use mapper_planner::chain::gradients_k;
+use mapper_physics::simulation::model::Model;
+use mapper_planner::thermal_memory::chain::gradients_k;
 use mapper_planner::{
     Effort, Objective, PlanError, PlanRequest, Rejection, explain_jump, jump_graph, make_plan, max_steps,
     search, search_worst,

@@ -8,55 +8,33 @@
 //! are returned together with a list of [`ReadWarning`]s.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-pub mod logs;
-mod batch;
-mod channel_map;
-mod channel_map_schema;
-mod channel_map_yaml;
-mod chunk;
-mod clock_steps;
-mod complaints;
-mod continuity;
-mod definitions;
+mod channel_mapping;
 mod error;
 mod format;
-mod framing;
-mod log_blocks;
-mod log_clock;
-mod log_read;
-mod measured_valve;
-mod message;
-mod plausibility;
-mod provenance;
-mod read;
-mod read_options;
-mod recording_file;
-mod records;
-mod rig_sink;
-mod scan;
-mod schema;
+pub mod logs;
+mod mcap;
+mod reading;
+mod samples;
 pub mod score;
-mod series_builder;
-mod sink;
-mod steps;
-mod steps_found;
-mod topics;
+mod step_detection;
 mod truth;
 mod warning;
-mod writer;
+mod writing;
 
-pub use channel_map::{
+pub use channel_mapping::channel_map::{
     AmbientPressure, Barometer, ChannelMap, ChannelSource, MachineConstants, WindowLimits,
 };
-pub use channel_map_yaml::ChannelMapError;
-pub use chunk::ChunkError;
+pub use channel_mapping::channel_map_yaml::ChannelMapError;
 pub use error::{BadBatch, RecordError};
 pub use format::FormatVersion;
 pub use mapper_yaml::Findings;
 pub use mapper_yaml::units::{Kind, Unit, UnitError};
-pub use read::{ReadReport, read_marks, read_recording, read_recording_from, read_steps};
-pub use read_options::ReadOptions;
-pub use recording_file::RecordingHeader;
-pub use topics::{StepPhase, Topic, event_message, readings_message, step_message};
+pub use mcap::chunk::ChunkError;
+pub use reading::read_options::ReadOptions;
+pub use reading::recording_reader::{
+    ReadReport, read_marks, read_recording, read_recording_from, read_steps,
+};
 pub use warning::{DamagedPart, ReadWarning};
-pub use writer::RecordingWriter;
+pub use writing::recording_file::RecordingHeader;
+pub use writing::topics::{StepPhase, Topic, event_message, readings_message, step_message};
+pub use writing::writer::RecordingWriter;

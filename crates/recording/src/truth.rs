@@ -1,16 +1,16 @@
 //! The simulator's truth, for scoring only.
 
 use crate::format::{METADATA_NAME, START_KEY, TRUTH_TOPIC};
-use crate::log_read::is_mcap;
-use crate::message::{FieldValue, read_fields};
-use crate::read::open;
-use crate::records::ChannelDefinition;
-use crate::scan::scan;
-use crate::series_builder::run_time_s;
-use crate::sink::Sink;
+use crate::logs::LogFile;
+use crate::mcap::message::{FieldValue, read_fields};
+use crate::mcap::records::ChannelDefinition;
+use crate::mcap::sink::Sink;
+use crate::reading::log_read::is_mcap;
+use crate::reading::recording_reader::open;
+use crate::reading::scan::scan;
+use crate::samples::series_builder::run_time_s;
 use crate::{ReadOptions, ReadWarning, RecordError};
 use mapper_core::TruthColumn;
-use crate::logs::LogFile;
 use std::collections::BTreeMap;
 use std::path::Path;
 

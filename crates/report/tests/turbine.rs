@@ -7,7 +7,7 @@
 mod support;
 
 use mapper_core::{Channel, IdentifiedPoint, OperatingPoint, Recording, Series, StepKind, StepMarker};
-use mapper_physics::air::Air;
+use mapper_physics::gas::air::Air;
 use mapper_report::{turbine_points, turbine_text};
 
 /// Steady states of the nominal model at openings 0.5 and 1 (docs/reference/model.md; T1 298.15 K, P1 100 kPa, T3 773.15 K, P4

@@ -4,8 +4,8 @@
 #[path = "../tests/faults/behind.rs"]
 mod behind;
 
-use mapper_driver_host::conformance::Misbehaving;
 use mapper_core::{Backend, BackendError};
+use mapper_driver_host::conformance::Misbehaving;
 
 fn main() -> std::process::ExitCode {
     mapper_driver::serve("faulty", env!("CARGO_PKG_VERSION"), |settings| {

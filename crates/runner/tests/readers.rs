@@ -6,8 +6,8 @@ use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, RigDescription, RigMode, SafeTrajectory, SampleBatch,
     Setpoints,
 };
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
 use mapper_runner::{Reader, RigWithInstruments};
 use std::time::Duration;
 

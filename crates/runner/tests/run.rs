@@ -10,8 +10,8 @@ use mapper_core::{
     PlanFigures, PlanStep, Predicted, Quality, Reaction, RigDescription, SampleBatch, Setpoints, SignalGuard,
     StepKind, StepMarker, UnpacedClock, Wall,
 };
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
 use mapper_runner::{
     Guard, ObserverError, Operator, PlanSteps, Protection, RunEnd, RunError, RunObserver, Runner,
     SignalWatch, StepSource, StepSourceError,

@@ -2,11 +2,11 @@
 
 use crate::request::SequenceRequest;
 use mapper_core::Predicted;
-use mapper_physics::forecast::{forecast_step, hold, warmed_up};
-use mapper_physics::model::State;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::SimulationError;
-use mapper_physics::steady::SteadyState;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::forecast::{forecast_step, hold, warmed_up};
+use mapper_physics::simulation::model::State;
+use mapper_physics::simulation::simulate::SimulationError;
+use mapper_physics::simulation::steady::SteadyState;
 
 /// A step whose duration is within this of the planned one ends in the planned state, s: one forecast interval.
 const AS_PLANNED_S: f64 = 0.5;

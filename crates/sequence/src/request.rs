@@ -1,11 +1,11 @@
 //! The inputs of a sequence: the campaign's points, times and limits, and the nominal machine that checks points.
 
 use mapper_core::{Limits, OperatingPoint, SettleBands, Timing, WindowRule};
-use mapper_physics::follow_outlet::FollowOutlet;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::reach::{clause, reach};
-use mapper_physics::steady::SteadyState;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+use mapper_physics::operating_point::reach::{clause, reach};
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady::SteadyState;
 
 /// Requests the planner's order of a set of points; the error is a readable sentence.
 pub type OrderPoints = Box<dyn Fn(&[OperatingPoint]) -> Result<Vec<OperatingPoint>, String> + Send>;

@@ -95,7 +95,10 @@ impl Session {
         CHECK_LIMIT + CHECKS_OF_POINT * self.request.points.len()
     }
 
-    fn check(&mut self, point: OperatingPoint) -> Result<mapper_physics::steady::SteadyState, Thrown> {
+    fn check(
+        &mut self,
+        point: OperatingPoint,
+    ) -> Result<mapper_physics::simulation::steady::SteadyState, Thrown> {
         let limit = self.check_limit();
         if self.checks >= limit {
             let message = format!("the script has checked {limit} points without going there");

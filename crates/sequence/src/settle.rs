@@ -2,7 +2,7 @@
 
 use mapper_core::{Channel, SampleBatch, SettleBands};
 use mapper_numerics::statistics::median;
-use mapper_physics::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
+use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 use std::collections::VecDeque;
 
 /// Time over which drifts are judged, s.
@@ -21,7 +21,7 @@ pub struct SettleRule {
 
 /// Watches the samples of one step.
 ///
-/// A point has settled if its operating point has settled ([`mapper_physics::settled`]) for the last 30 s, and if the least-squares
+/// A point has settled if its operating point has settled ([`mapper_physics::operating_point::settled`]) for the last 30 s, and if the least-squares
 /// slopes of T2 and Tc over this time are within the rate. Channels that a rig does not measure are ignored, except T2: without T2
 /// no point settles.
 #[derive(Debug, Clone)]

@@ -5,8 +5,8 @@ use mapper_core::{
     CommonErrors, Dwell, IdentifiedPoint, Limits, Method, OperatingPoint, SettleBands, StepKind, Timing,
     Verdict, WindowRule,
 };
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
 use mapper_sequence::{
     Hold, Script, ScriptError, SequenceError, SequenceRequest, SequenceRunner, SequenceStep, StepResult,
 };
@@ -24,7 +24,7 @@ fn request() -> SequenceRequest {
         settle_bands: SettleBands::default(),
         model: Model::nominal(),
         boundary: BoundaryConditions::default(),
-        follow_outlet: mapper_physics::follow_outlet::FollowOutlet::default(),
+        follow_outlet: mapper_physics::operating_point::follow_outlet::FollowOutlet::default(),
         limits: Limits {
             speed_max_rpm: 180e3,
             p3_min_pa: 120e3,
@@ -383,7 +383,7 @@ fn t3_and_oil_hold_from_where_they_are_set() {
     assert_eq!(set, [(own.t3_k, own.oil_temperature_k), (own.t3_k, oil_k), (t3_k, oil_k)]);
     // Speed is held: a colder turbine needs more pressure for the same power.
     let boundary = BoundaryConditions { t3_k, oil_temperature_k: oil_k, valve_opening_ratio: 1.0, ..own };
-    let held = mapper_physics::steady::hold_speed(&Model::nominal(), 110e3, &boundary).unwrap();
+    let held = mapper_physics::simulation::steady::hold_speed(&Model::nominal(), 110e3, &boundary).unwrap();
     assert!((steps[2].p3_pa / held.boundary.p3_pa - 1.0).abs() < 1e-9 && steps[2].p3_pa > steps[1].p3_pa);
     let limits = Limits { t3_max_k: Some(own.t3_k + 10.0), ..request().limits };
     let message = run("t3(\"550 degC\"); jump(point(\"110 krpm\", 1.0));", limits).unwrap_err();

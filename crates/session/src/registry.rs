@@ -4,11 +4,11 @@ use crate::SessionError;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::BackendChoice;
 use mapper_core::{Backend, BackendError, MapFormats, SetpointRanges};
+use mapper_physics::rig::backend_plugin::BackendPlugin;
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::rig::nominal_rig::NominalRig;
+use mapper_physics::simulation::model::Model;
 use mapper_recording::logs::LogFormats;
-use mapper_physics::backend_plugin::BackendPlugin;
-use mapper_physics::effect::Effect;
-use mapper_physics::model::Model;
-use mapper_physics::nominal_rig::NominalRig;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -3,5 +3,5 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod blind;
-pub mod studies;
 pub mod reproduction;
+pub mod studies;

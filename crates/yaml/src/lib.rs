@@ -8,29 +8,17 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod check;
-mod complaint;
-mod file;
-mod finding;
-mod findings;
-mod notes;
-mod path;
-mod places;
-mod quantity_check;
-mod render;
-mod rules;
-mod schema;
-mod source;
-mod suggestion;
-mod tree;
+mod document;
+mod mistakes;
+mod schema_check;
 pub mod units;
 
-pub use file::{open, open_file, read_limited};
-pub use finding::{Finding, FindingKind};
-pub use findings::Findings;
-pub use notes::Notes;
-pub use path::{Step, path_text};
-pub use schema::{Schema, json_schema_of};
-pub use source::{Document, Source};
-pub use suggestion::closest;
-pub use tree::{Tree, read};
+pub use document::file::{open, open_file, read_limited};
+pub use document::path::{Step, path_text};
+pub use document::tree::{Tree, read};
+pub use mistakes::finding::{Finding, FindingKind};
+pub use mistakes::findings::Findings;
+pub use mistakes::notes::Notes;
+pub use mistakes::source::{Document, Source};
+pub use schema_check::schema::{Schema, json_schema_of};
+pub use schema_check::suggestion::closest;

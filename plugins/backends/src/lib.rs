@@ -5,7 +5,7 @@
 
 mod setpoint_limits;
 
-use mapper_physics::backend_plugin::BackendPlugin;
+use mapper_physics::rig::backend_plugin::BackendPlugin;
 
 /// Declares the backends' modules and the list of them.
 macro_rules! backends {

@@ -4,10 +4,10 @@
 use mapper_backends::other_lab::{OtherStructure, turn_into};
 use mapper_backends::virtual_lab::{LabSettings, Structure, VirtualLab};
 use mapper_core::{Backend, CHANNELS, Channel, RigMode, SampleBatch, Setpoints};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::Watch;
-use mapper_physics::steady;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::Watch;
+use mapper_physics::simulation::steady;
 
 const OPENING: f64 = 0.7;
 
@@ -88,7 +88,7 @@ fn at_rest_the_energy_closes() {
     let mut machine = structure.settled(&model, 0.0, &boundary, Watch::default()).unwrap();
     let mut checked = 0;
     let inputs = mapper_backends::virtual_lab::LabInputs::held(&boundary);
-    let mut on_sample = |_: f64, _: &_, outputs: &mapper_physics::model::Outputs| {
+    let mut on_sample = |_: f64, _: &_, outputs: &mapper_physics::simulation::model::Outputs| {
         let to_metal_w = outputs.compressor_heat_w + outputs.turbine.heat_w;
         let to_oil_w =
             model.params.bearing.oil_conductance_w_k * (outputs.bearing_k - boundary.oil_temperature_k);

@@ -8,9 +8,9 @@ use mapper_core::{
     Backend, BackendError, Channel, DeclaredUncertainty, EventKind, RedundantSensors, RigMode, SampleBatch,
     Setpoints,
 };
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady;
 
 fn ideal() -> LabSettings {
     LabSettings::ideal(Model::nominal(), BoundaryConditions::default())
@@ -219,7 +219,8 @@ fn static_taps_read_less_by_the_dynamic_pressure() {
     {
         let (flow_kg_s, t_k) = (last(&tapped, Channel::CompressorFlow), last(&tapped, temperature));
         let read_pa = last(&tapped, channel);
-        let total_pa = mapper_physics::pressure_tap::static_to_total_pa(read_pa, flow_kg_s, t_k, diameter_m);
+        let total_pa =
+            mapper_physics::gas::pressure_tap::static_to_total_pa(read_pa, flow_kg_s, t_k, diameter_m);
         assert!(read_pa < last(&total, channel) - 500.0, "{channel}: {read_pa}");
         assert!((total_pa / last(&total, channel) - 1.0).abs() < 1e-9);
     }

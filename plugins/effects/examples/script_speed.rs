@@ -3,11 +3,11 @@
 #![allow(clippy::print_stdout)]
 
 use mapper_effects::ScriptEffect;
-use mapper_physics::effect::{self, Effect, Rig};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
-use mapper_physics::steady;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::effect::{self, Effect, Rig};
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
+use mapper_physics::simulation::steady;
 use std::path::Path;
 use std::time::Instant;
 

@@ -1,9 +1,9 @@
 //! The compressor delivers more or less flow.
 
-use mapper_physics::effect::{Rig, Submodel};
-use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
-use mapper_physics::hooks::TooManyExtraStates;
+use mapper_physics::machine::hooks::TooManyExtraStates;
 
 effect_parameters! {
     /// The compressor delivers more or less flow.
@@ -36,8 +36,8 @@ mod tests {
     use super::*;
     use crate::testing::Instant;
     use mapper_core::ReferenceState;
-    use mapper_physics::characteristic::{CharacteristicPoint, CompressorCharacteristic};
-    use mapper_physics::closed_form_map::ClosedFormMap;
+    use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+    use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 
     /// At 110 krpm the flow of best efficiency is below the flow of the point: more flow is less efficient, by the closed form's own
     /// parabola. A map with only speed lines gives the same to first order.

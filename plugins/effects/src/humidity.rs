@@ -1,9 +1,9 @@
 //! The compressor takes in moist air.
 
-use mapper_physics::effect::{Rig, Submodel};
-use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
-use mapper_physics::hooks::TooManyExtraStates;
+use mapper_physics::machine::hooks::TooManyExtraStates;
 
 effect_parameters! {
     /// The compressor takes in moist air.
@@ -35,7 +35,7 @@ impl EffectKind for Humidity {
 mod tests {
     use super::*;
     use crate::testing::{CP1_J_KGK, Instant, T1_K};
-    use mapper_physics::model::Outputs;
+    use mapper_physics::simulation::model::Outputs;
 
     /// The mixture rules themselves, with R = 461.5 and cp = 1870 J/(kg K) of vapour at 320 K (IAPWS-95, ideal gas), per kg of moist air. The
     /// vapour's cp changes by 1 % over the compression, which is 1e-4 of the mixture's.

@@ -1,9 +1,9 @@
 //! The inner wall of the compressor housing has its own temperature.
 
-use mapper_physics::effect::{Rig, Submodel};
-use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
-use mapper_physics::hooks::TooManyExtraStates;
+use mapper_physics::machine::hooks::TooManyExtraStates;
 
 effect_parameters! {
     /// The inner wall of the compressor housing has its own temperature.
@@ -43,7 +43,7 @@ impl EffectKind for InnerNode {
 mod tests {
     use super::*;
     use crate::testing::Instant;
-    use mapper_physics::steady;
+    use mapper_physics::simulation::steady;
 
     #[test]
     fn at_rest_the_wall_passes_what_the_gas_gives_whatever_its_share_of_the_mass() {

@@ -1,7 +1,7 @@
 //! The effect library: deviations of a rig from the nominal model, one file each.
 //!
 //! To add one, write its file (a struct of its parameters, its description, its changes to the model), and its line below. Faults of sensors
-//! are rows of [`mapper_physics::sensor_fault`].
+//! are rows of [`mapper_physics::rig::sensor_fault`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -11,9 +11,9 @@ mod testing;
 
 pub use script::{HOOK_NAMES, ScriptEffect, ScriptEffectError};
 
-use mapper_physics::effect::Effect;
-use mapper_physics::effect_kind::effect_of;
-use mapper_physics::sensor_fault;
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::rig::effect_kind::effect_of;
+use mapper_physics::rig::sensor_fault;
 use std::sync::Arc;
 
 /// Declares the effects' modules and the list of them.

@@ -16,7 +16,7 @@ use engine::Program;
 use header::Header;
 use hooks::ScriptHooks;
 use mapper_core::Channel;
-use mapper_physics::effect::{Effect, EffectError, EffectInfo, NamedValues, Rig};
+use mapper_physics::rig::effect::{Effect, EffectError, EffectInfo, NamedValues, Rig};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -1,9 +1,9 @@
 //! One instant of the machine with an effect, for tests with known results.
 
-use mapper_physics::effect::Rig;
-use mapper_physics::effect_kind::EffectKind;
-use mapper_physics::model::{Model, Outputs, State, rad_s_of_rpm};
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::effect_kind::EffectKind;
+use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
 
 /// Inlet temperature of the instant, K.
 pub(crate) const T1_K: f64 = 298.15;

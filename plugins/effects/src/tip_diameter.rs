@@ -1,9 +1,9 @@
 //! The tip of the T2 probe has its own thermal mass.
 
-use mapper_physics::effect::{Rig, Submodel};
-use mapper_physics::effect_kind::{About, EffectKind};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
-use mapper_physics::hooks::TooManyExtraStates;
+use mapper_physics::machine::hooks::TooManyExtraStates;
 
 effect_parameters! {
     /// The tip of the T2 probe has its own thermal mass.
@@ -35,9 +35,9 @@ impl EffectKind for TipDiameter {
 mod tests {
     use super::*;
     use crate::testing::Instant;
-    use mapper_physics::model::State;
-    use mapper_physics::simulate::{Simulator, Watch};
-    use mapper_physics::steady;
+    use mapper_physics::simulation::model::State;
+    use mapper_physics::simulation::simulate::{Simulator, Watch};
+    use mapper_physics::simulation::steady;
 
     /// A deviation of the tip by 10 K is 10/e K after its own time constant: nothing in the machine depends on it.
     #[test]

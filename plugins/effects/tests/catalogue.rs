@@ -2,12 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{CHANNELS, Channel};
-use mapper_physics::effect::{self, Effect, EffectError, Rig};
-use mapper_physics::instruments::{ChannelFollower, true_value};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::steady;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::effect::{self, Effect, EffectError, Rig};
+use mapper_physics::rig::instruments::{ChannelFollower, true_value};
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady;
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ fn readings(rig: &Rig) -> Vec<f64> {
                 * if t_s == 0.0 { 1.0 } else { (-t_s / rig.instruments.p3_lag_s.max(1e-9)).exp() }
     };
     let rows = times.iter().map(|t_s| BoundaryConditions { p3_pa: p3_pa(*t_s), ..to }).collect();
-    let inputs = mapper_physics::inputs::InterpolatedInputs::new(times, rows).unwrap();
+    let inputs = mapper_physics::simulation::inputs::InterpolatedInputs::new(times, rows).unwrap();
     let measured: Vec<Channel> = CHANNELS[..15].iter().map(|row| row.channel).collect();
     let mut followers: Vec<ChannelFollower> =
         measured.iter().map(|channel| ChannelFollower::new(*rig.instruments.path(*channel))).collect();
@@ -46,7 +46,7 @@ fn readings(rig: &Rig) -> Vec<f64> {
             &inputs,
             (0..=60).map(f64::from),
             |t_s, state, outputs| {
-                use mapper_physics::inputs::Inputs;
+                use mapper_physics::simulation::inputs::Inputs;
                 let boundary = inputs.at(t_s);
                 let prepared = rig.model.prepare(&boundary);
                 for (channel, follower) in measured.iter().zip(&mut followers) {

@@ -3,12 +3,12 @@
 
 use mapper_core::Channel;
 use mapper_effects::ScriptEffect;
-use mapper_physics::effect::{self, Effect, Rig};
-use mapper_physics::instruments::true_value;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::steady;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::effect::{self, Effect, Rig};
+use mapper_physics::rig::instruments::true_value;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady;
 use std::path::Path;
 
 fn script(text: &str) -> Result<ScriptEffect, String> {

@@ -12,8 +12,8 @@ mod simulation_table;
 mod turbine;
 
 pub use map_picture::map_figure;
-pub use mapper_maps::table::{POINT_LIMIT, parse_reference};
 pub use mapper_maps::mesh::efficiency_surface;
+pub use mapper_maps::table::{POINT_LIMIT, parse_reference};
 
 use mapper_core::MapFormats;
 

@@ -1,6 +1,6 @@
 //! Arrow's files and streams (Feather, version 2).
 
-use crate::record_batches::{Batches, open_log};
+use crate::tables::record_batches::{Batches, open_log};
 use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_schema::{ArrowError, Schema};
 use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};

@@ -5,27 +5,10 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod cells;
-mod clock;
-mod clock_choice;
-#[cfg(any(feature = "parquet", feature = "tdms"))]
-mod column_rows;
-mod counter;
-mod encoding;
-mod instant;
-mod long_table;
+mod columns;
 mod mdf_source;
-mod number;
-mod parts;
-#[cfg(feature = "parquet")]
-mod record_batches;
-mod row_sorter;
-mod row_stream;
-mod sample;
-mod separator;
-mod table_head;
-mod table_log;
-mod value;
+mod notation;
+mod tables;
 
 use mapper_recording::logs::LogFormats;
 

@@ -1,6 +1,6 @@
 //! Parquet.
 
-use crate::record_batches::{Batches, open_log};
+use crate::tables::record_batches::{Batches, open_log};
 use arrow_schema::Schema;
 use mapper_recording::logs::limits::unpacked_max;
 use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};

@@ -2,14 +2,14 @@
 
 mod check;
 
-use crate::cells::{Cells, Rows};
-use crate::instant::{Instant, NS_PER_DAY};
-use crate::parts::{Part, side_by_side};
-use crate::table_head::COLUMN_LIMIT;
-use crate::number::number_in;
-use crate::separator::decimal;
-use crate::table_log::{Origin, Table};
-use crate::value::Value;
+use crate::notation::table_row::{Cells, Rows};
+use crate::notation::instant::{Instant, NS_PER_DAY};
+use crate::tables::several_tables::{Part, side_by_side};
+use crate::columns::table_head::COLUMN_LIMIT;
+use crate::notation::number::number_in;
+use crate::notation::separator::decimal;
+use crate::tables::table_log::{Origin, Table};
+use crate::notation::typed_cell::Value;
 use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
 use mapper_recording::logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 

@@ -14,10 +14,10 @@ pub struct Package {
     pub files: Vec<PathBuf>,
 }
 
-/// All packages in `crates`, `plugins` and `drivers`, by folder, sorted.
+/// All packages in `crates`, `plugins` and `plugins/drivers`, by folder, sorted.
 pub fn packages() -> Vec<Package> {
     let mut packages = Vec::new();
-    for group in ["crates", "plugins", "drivers"] {
+    for group in ["crates", "plugins", "plugins/drivers"] {
         for folder in sorted(&repository().join(group)) {
             let src = folder.join("src");
             if !folder.join("Cargo.toml").is_file() {

@@ -1,7 +1,9 @@
 //! Recordings that cannot show whether anything drifted: a clear reason and no verdict, whatever is wrong with them.
 
 use mapper_core::{Channel, ChannelColumn, Recording, SampleBatch};
-use mapper_recording::{ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, StepPhase, read_recording};
+use mapper_recording::{
+    ChannelMap, ReadOptions, RecordingHeader, RecordingWriter, StepPhase, read_recording,
+};
 use mapper_tests::{DriftCampaign, Finished, mapper, scratch};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -31,7 +31,8 @@ pub(crate) fn with_drivers(arguments: &[&std::ffi::OsStr]) -> Command {
     build_drivers();
     let mut command = mapper_command(arguments.iter().copied());
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let places = [repository().join("plugins/drivers/python")].into_iter().chain(std::env::split_paths(&path));
+    let places =
+        [repository().join("plugins/drivers/python")].into_iter().chain(std::env::split_paths(&path));
     // Drivers in Python find the packages of the tests.
     let python = option_env!("MAPPER_TEST_PYTHON").and_then(|python| Path::new(python).parent());
     let places = python.map(Path::to_path_buf).into_iter().chain(places);

@@ -1,8 +1,8 @@
 //! `mapper backend`.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{drivers, output, registry, rig_states};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::{drivers, output::standard_output, registry, rig_states};
 use clap::{Args, Subcommand};
 use mapper_driver_host::conformance::{Candidate, judge};
 use mapper_core::{RigMode, Setpoints};
@@ -67,7 +67,7 @@ impl Backend {
             )
             .collect();
         if self.json {
-            return output::print_json(&json!({ "backends": all }));
+            return standard_output::print_json(&json!({ "backends": all }));
         }
         let line = |one: &Value| {
             let word = |key: &str| one[key].as_str();
@@ -83,7 +83,7 @@ impl Backend {
                 word("summary").unwrap_or_default()
             )
         };
-        output::print(&all.iter().map(line).collect::<String>())
+        standard_output::print(&all.iter().map(line).collect::<String>())
     }
 
     fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {
@@ -140,13 +140,13 @@ impl Backend {
             let rules = found.iter().map(
                 |(rule, kept)| json!({"rule": rule, "kept": kept.is_ok(), "found": kept.as_ref().err()}),
             );
-            output::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
+            standard_output::print_json(&json!({"backend": name, "rules": rules.collect::<Vec<_>>()}))?;
         } else {
             let lines = found.iter().map(|(rule, kept)| match kept {
                 Ok(()) => format!("kept    {rule}\n"),
                 Err(found) => format!("BROKEN  {rule}: {found}\n"),
             });
-            output::print(&lines.collect::<String>())?;
+            standard_output::print(&lines.collect::<String>())?;
         }
         match broken {
             0 => Ok(()),

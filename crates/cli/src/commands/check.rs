@@ -1,8 +1,8 @@
 //! `mapper check`.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{interrupt, output, output_options, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::{interrupt, output::{output_options, standard_output}, registry};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_report::{assumed_text, declared_sensors_text, duration, lines_text, verdict_forecast_text};
@@ -29,7 +29,7 @@ impl Check {
                 let omitted = findings.omitted;
                 let mut mistakes = Failure::of_campaign(CampaignError::Mistakes(findings)).json();
                 (mistakes["campaign"], mistakes["omitted"]) = (json!(null), json!(omitted));
-                output::print_json(&mistakes)?;
+                standard_output::print_json(&mistakes)?;
                 return Err(Failure::printed(Code::BadInput));
             }
             Err(error) => return Err(Failure::of_campaign(error)),
@@ -52,7 +52,7 @@ impl Check {
         let (steps, duration_s) = (prospects.steps, prospects.duration_s);
         let lines = mapper_campaign::resolved_lines(&campaign, &model);
         if self.json {
-            return output::print_json(&json!({
+            return standard_output::print_json(&json!({
                 "campaign": campaign.name,
                 "points": campaign.points.len(),
                 "lines": lines,
@@ -68,7 +68,7 @@ impl Check {
             }));
         }
         if warnings.count() > 0 {
-            output::warn(&warnings.render(output_options::warns_in_colour()));
+            standard_output::warn(&warnings.render(output_options::warns_in_colour()));
         }
         let forecast = match &campaign.sequence {
             Some(_) => " by its script on the nominal machine",
@@ -80,7 +80,7 @@ impl Check {
             1 => ", 1 warning".to_owned(),
             count => format!(", {count} warnings"),
         };
-        output::print(&format!(
+        standard_output::print(&format!(
             "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}{}{}",
             self.campaign.display(),
             campaign.points.len(),

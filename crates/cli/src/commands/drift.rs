@@ -1,10 +1,10 @@
 //! `mapper drift`: whether the rig stayed the same while a map was made.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::given::{channel_map, given_campaign};
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_report::{corrected_csv, drift_text, sensors_text, zero_text};
@@ -65,12 +65,12 @@ impl Drift {
                 value["sensors"] = json!(drift.sensors);
             }
             value["recording_warnings"] = json!(warnings);
-            return output::print_json(&value);
+            return standard_output::print_json(&value);
         }
         let mut text =
             [drift_text(&drift.report), sensors_text(&drift.sensors), zero_text(&drift.zero)].concat();
         text.extend(warnings.iter().map(|warning| format!("recording: {warning}\n")));
-        output::print(&text)
+        standard_output::print(&text)
     }
 
     /// Recordings, and the campaign if one is given.

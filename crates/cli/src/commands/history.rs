@@ -1,9 +1,9 @@
 //! `mapper history`: what the nights gave.
 
-use crate::failure::Failure;
-use crate::output;
-use crate::output::Replace;
-use crate::subcommands::subcommands;
+use crate::output::failure::Failure;
+use crate::output::standard_output;
+use crate::output::standard_output::Replace;
+use crate::command_line::subcommands::subcommands;
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{groups_text, history_svg, runs_text};
@@ -109,8 +109,8 @@ impl History {
         }
         if self.json {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
-            return output::print_json(&json!({"history": self.chosen.db, "runs": runs}));
+            return standard_output::print_json(&json!({"history": self.chosen.db, "runs": runs}));
         }
-        output::print(&if self.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
+        standard_output::print(&if self.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
     }
 }

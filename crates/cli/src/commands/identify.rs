@@ -1,9 +1,9 @@
 //! `mapper identify`: from recordings to points and a map, without a rig.
 
-use crate::failure::Failure;
-use crate::given::{channel_map, given_campaign};
-use crate::shown::ShownArguments;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::detail_options::ShownArguments;
+use crate::{output::standard_output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
 use mapper_session::{Recorded, Session};
@@ -57,15 +57,15 @@ impl Identify {
         if let Some(directory) = &self.out {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
-                true => output::print_json(&results),
-                false => output::print(&results_text(&display, &results, MORE, self.shown.shown())),
+                true => standard_output::print_json(&results),
+                false => standard_output::print(&results_text(&display, &results, MORE, self.shown.shown())),
             };
         }
         let found = session.identify(recorded, &map, method)?;
         found.has_points(&warnings)?;
         match self.json {
-            true => output::print_json(&found.json(path.as_deref(), &warnings)),
-            false => output::print(&identified_text(&display, &found, MORE, &warnings, self.shown.shown())),
+            true => standard_output::print_json(&found.json(path.as_deref(), &warnings)),
+            false => standard_output::print(&identified_text(&display, &found, MORE, &warnings, self.shown.shown())),
         }
     }
 }

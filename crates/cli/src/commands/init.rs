@@ -1,8 +1,8 @@
 //! `mapper init`.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{output, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::{output::standard_output, registry};
 use clap::{Args, ValueEnum};
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{NAMED_REFERENCES, NamedReference};
@@ -99,8 +99,8 @@ impl Init {
         };
         let written = first_campaign(&registry::registry(), &request)?;
         match self.json {
-            true => output::print_json(&written),
-            false => output::print(&first_campaign_text(
+            true => standard_output::print_json(&written),
+            false => standard_output::print(&first_campaign_text(
                 &written.campaign,
                 &written.map,
                 written.channels.as_deref(),
@@ -117,7 +117,7 @@ fn asked_wheel_m() -> Result<f64, Failure> {
     if !std::io::stdin().is_terminal() {
         return Err(missing("the diameter of the compressor's wheel is needed"));
     }
-    output::warn("Diameter of the compressor's wheel at its exit, e.g. 60mm: ");
+    standard_output::warn("Diameter of the compressor's wheel at its exit, e.g. 60mm: ");
     let mut line = String::new();
     // A diameter has a few characters; a terminal that sends more sends no diameter.
     let read = std::io::stdin().lock().take(64).read_line(&mut line);

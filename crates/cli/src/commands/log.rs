@@ -1,7 +1,7 @@
 //! `mapper log`.
 
-use crate::failure::Failure;
-use crate::subcommands::subcommands;
+use crate::output::failure::Failure;
+use crate::command_line::subcommands::subcommands;
 use clap::Args;
 
 /// Look into the log of a test stand

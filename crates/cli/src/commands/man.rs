@@ -1,8 +1,8 @@
 //! `mapper man`.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{output, output_options};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -25,8 +25,8 @@ impl Man {
         std::fs::create_dir_all(&self.out).map_err(failed)?;
         clap_mangen::generate_to(output_options::commands(), &self.out).map_err(failed)?;
         match self.json {
-            true => output::print_json(&json!({ "directory": self.out })),
-            false => output::print(&format!("manual pages in {}\n", self.out.display())),
+            true => standard_output::print_json(&json!({ "directory": self.out })),
+            false => standard_output::print(&format!("manual pages in {}\n", self.out.display())),
         }
     }
 }

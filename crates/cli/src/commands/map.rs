@@ -1,7 +1,7 @@
 //! `mapper map`.
 
-use crate::failure::Failure;
-use crate::subcommands::subcommands;
+use crate::output::failure::Failure;
+use crate::command_line::subcommands::subcommands;
 use clap::Args;
 
 /// Fit, convert and compare compressor maps

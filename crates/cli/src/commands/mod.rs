@@ -1,7 +1,7 @@
 //! One file a command: its options, its call, its words. To add one, write its file, and its line below.
 
-use crate::failure::Failure;
-use crate::subcommands::subcommands;
+use crate::command_line::subcommands::subcommands;
+use crate::output::failure::Failure;
 
 subcommands! { Command:
     init::Init,

@@ -1,8 +1,8 @@
 //! `mapper nightly`: full maps on the simulated rig, kept in a history and compared with the nights before.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{interrupt, output, output_options, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::{interrupt, output::{output_options, standard_output}, registry};
 use clap::Args;
 use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
@@ -73,7 +73,7 @@ impl Nightly {
         let comparison = history.append(&mut night, nightly.nights).map_err(SessionError::from)?;
         keep_night_report(&path, &night, &comparison)?;
         if self.json {
-            output::print_json(&json!({
+            standard_output::print_json(&json!({
                 "history": path,
                 "report": night_report_path(&path, night.started_ms),
                 "night": night,
@@ -81,7 +81,7 @@ impl Nightly {
                 "quiet": comparison.is_quiet(),
             }))?;
         } else {
-            output::print(&night_text(&night, &comparison, &path))?;
+            standard_output::print(&night_text(&night, &comparison, &path))?;
         }
         if comparison.is_quiet() || (self.accept && comparison.failed.is_empty()) {
             return Ok(());

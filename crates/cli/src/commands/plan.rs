@@ -1,15 +1,15 @@
 //! `mapper plan`.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::output::Replace;
-use crate::{interrupt, output, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::output::standard_output::Replace;
+use crate::{interrupt, output::standard_output, registry};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
-use mapper_physics::model::Model;
+use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan, other_orders};
 use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
 use mapper_session::{
@@ -75,8 +75,8 @@ impl Plan {
         if let [from, to] = self.why.as_slice() {
             let jump = mapper_planner::explain_jump(&request, *from, *to).map_err(SessionError::from)?;
             return match self.json {
-                true => output::print_json(&jump_json(&jump)),
-                false => output::print(&jump_text(&campaign, &jump)),
+                true => standard_output::print_json(&jump_json(&jump)),
+                false => standard_output::print(&jump_text(&campaign, &jump)),
             };
         }
         let appended = match self.append.as_slice() {
@@ -104,13 +104,13 @@ impl Plan {
             if let Some(zero) = campaign.zero {
                 value["soak_s"] = zero.duration_s.into();
             }
-            return output::print_json(&value);
+            return standard_output::print_json(&value);
         }
         let mut text = plan_text(&campaign, &plan);
         if let Some(others) = &others {
             text.push_str(&comparison_text(&plan, others));
         }
-        output::print(&text)
+        standard_output::print(&text)
     }
 
     /// Rehearses a script and prints the forecast plan.
@@ -130,10 +130,10 @@ impl Plan {
             if let Some(zero) = campaign.zero {
                 value["soak_s"] = zero.duration_s.into();
             }
-            return output::print_json(&value);
+            return standard_output::print_json(&value);
         }
         let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
-        output::print(&format!(
+        standard_output::print(&format!(
             "{}{notes}Forecast: the script {} was rehearsed on the nominal machine; what it measures on the rig may lead it \
              another way.\n",
             plan_text(campaign, &plan),

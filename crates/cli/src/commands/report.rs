@@ -1,9 +1,9 @@
 //! `mapper report`: the page of a run, with other runs for comparison.
 
-use crate::failure::Failure;
-use crate::given::{channel_map, given_campaign};
-use crate::output::Replace;
-use crate::{output, output_options, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::standard_output::Replace;
+use crate::{output::{output_options, standard_output}, registry};
 use clap::Args;
 use mapper_recording::ChannelMap;
 use mapper_session::{Gap, Recorded, Registry, Session, SessionError};
@@ -56,8 +56,8 @@ impl Report {
         let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
         Replace { force: self.replace.force || is_own }.write(&out, page.as_bytes())?;
         match self.json {
-            true => output::print_json(&json!({ "page": out })),
-            false => output::print(&format!("page       {}\n", out.display())),
+            true => standard_output::print_json(&json!({ "page": out })),
+            false => standard_output::print(&format!("page       {}\n", out.display())),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! `mapper reproduce`: the paper's figures on the nominal model.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{output, output_options};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_validation::reproduction::{FIGURES, picture_path};
 use serde_json::json;
@@ -38,7 +38,7 @@ impl Reproduce {
         write(&page, mapper_validation::reproduction::reproduction_page(&results).as_bytes())?;
         if self.json {
             let figures: Vec<serde_json::Value> = results.iter().map(mapper_validation::reproduction::figure_json).collect();
-            return output::print_json(&json!({"page": page, "figures": figures}));
+            return standard_output::print_json(&json!({"page": page, "figures": figures}));
         }
         let mut text = String::new();
         for result in &results {
@@ -52,7 +52,7 @@ impl Reproduce {
                 ));
             }
         }
-        output::print(&format!("{text}\n{}\n", page.display()))
+        standard_output::print(&format!("{text}\n{}\n", page.display()))
     }
 }
 

@@ -1,7 +1,7 @@
 //! `mapper rig`.
 
-use crate::failure::Failure;
-use crate::{output, rig_states};
+use crate::output::failure::Failure;
+use crate::{output::standard_output, rig_states};
 use clap::{Args, Subcommand};
 use mapper_session::{RigStates, RigStatus};
 use std::path::PathBuf;
@@ -45,25 +45,25 @@ impl Rig {
             RigCommand::Acknowledge { rig } => (states.acknowledge(rig)?, true),
         };
         if self.json {
-            return output::print_json(&status);
+            return standard_output::print_json(&status);
         }
         let text = text(&status, cleared);
         if status.owner.is_some() || status.latch.is_some() {
-            return output::print(&text);
+            return standard_output::print(&text);
         }
         // A name that is not quite the rig's would say that all is well.
         let known: Vec<String> = states.known().into_iter().map(|status| status.rig).collect();
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-        output::print(&format!("{text}rigs that runs have had from here: {known}\n"))
+        standard_output::print(&format!("{text}rigs that runs have had from here: {known}\n"))
     }
 
     fn tell_all(&self, known: &[RigStatus]) -> Result<(), Failure> {
         if self.json {
-            return output::print_json(&serde_json::json!({"rigs": known}));
+            return standard_output::print_json(&serde_json::json!({"rigs": known}));
         }
         let lines: String = known.iter().map(|status| text(status, false)).collect();
         let none = "no run has had a rig from here\n";
-        output::print(if lines.is_empty() { none } else { &lines })
+        standard_output::print(if lines.is_empty() { none } else { &lines })
     }
 }
 

@@ -1,19 +1,16 @@
 //! `mapper run`: the whole way from a campaign to a map.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::shown::ShownArguments;
-use crate::wall::SystemWall;
-use crate::{interrupt, output, output_options, registry, rig_states};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::output::detail_options::ShownArguments;
+use crate::wall_clock::SystemWall;
+use crate::{interrupt, output::{output_options, standard_output}, registry, rig_states};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
 use mapper_live::{Asked, LiveError, LiveRun, Observers, TlsFiles};
 use mapper_report::plan_text;
-use mapper_session::{
-    BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
-    SessionEvent, run_directory, soak_s, start_time_ns,
-};
+use mapper_session::{BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError, SessionEvent, recording::run_directory, soak_s, start_time_ns};
 use crate::terminal::results_text;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -125,7 +122,7 @@ impl Run {
             now: stop.now.clone(),
         };
         for line in onlookers.begin(&looked_at).map_err(Failure::of_live)? {
-            output::warn(&format!("{line}\n"));
+            standard_output::warn(&format!("{line}\n"));
         }
         let outcome = match pace {
             Some(pace) => {
@@ -184,7 +181,7 @@ impl Run {
             (Err(error), None) => return Err(error.into()),
             (Ok(results), _) if !self.json => {
                 let more = format!("`mapper identify {} --full`", results.run.display());
-                output::print(&results_text(&campaign.display, &results, &more, self.shown.shown()))?;
+                standard_output::print(&results_text(&campaign.display, &results, &more, self.shown.shown()))?;
             }
             // Stopped before there was anything to identify: why it was stopped is what counts.
             (Err(_), Some(_)) if !self.json => {}
@@ -196,7 +193,7 @@ impl Run {
                 if let Some(failure) = failure {
                     value["failure"] = failure.json();
                 }
-                output::print_json(&value)?;
+                standard_output::print_json(&value)?;
             }
         }
         failure.map_or(Ok(()), Err)
@@ -206,7 +203,7 @@ impl Run {
         let (rig, plan) = (prepared.rig(), prepared.plan());
         let would_write = parent.join(format!("{}-<time>", campaign.name));
         if self.json {
-            return output::print_json(&json!({
+            return standard_output::print_json(&json!({
                 "dry_run": true,
                 "rig": rig,
                 "would_write": would_write,
@@ -215,7 +212,7 @@ impl Run {
             }));
         }
         let samples = (soak_s(campaign) + plan.duration_s()) * rig.sample_rate_hz;
-        output::print(&format!(
+        standard_output::print(&format!(
             "{}Dry run: nothing was touched. The rig would be `{}` {}, {} channels at {} Hz ({samples:.0} samples), the \
              results would go to {}.\n",
             plan_text(campaign, plan),

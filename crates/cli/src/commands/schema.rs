@@ -1,7 +1,7 @@
 //! `mapper schema`.
 
-use crate::failure::Failure;
-use crate::output;
+use crate::output::failure::Failure;
+use crate::output::standard_output;
 use clap::Args;
 
 /// Print the JSON schema of campaign files, for editors
@@ -11,6 +11,6 @@ pub struct Schema {}
 impl Schema {
     /// Prints the schema.
     pub fn run(&self) -> Result<(), Failure> {
-        output::print_json(&mapper_campaign::json_schema())
+        standard_output::print_json(&mapper_campaign::json_schema())
     }
 }

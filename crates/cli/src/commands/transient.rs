@@ -1,9 +1,9 @@
 //! `mapper transient`: a log in which nothing rests.
 
-use crate::failure::Failure;
-use crate::given::{channel_map, given_campaign};
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_session::{Recorded, Session, Which, write_transient};
 use std::path::PathBuf;
@@ -60,11 +60,11 @@ impl Transient {
             None => Vec::new(),
         };
         if self.json {
-            return output::print_json(&found);
+            return standard_output::print_json(&found);
         }
         let mut text = found.text();
         text.extend(recorded.read.warnings.iter().map(|warning| format!("recording: {warning}\n")));
         text.extend(files.iter().map(|file| format!("{}\n", file.display())));
-        output::print(&text)
+        standard_output::print(&text)
     }
 }

@@ -1,9 +1,9 @@
 //! Results of a run or an identification, for a terminal.
 
-use mapper_maps::RepeatedJump;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{CompressorMap, ThermalModel, Verdict};
 use mapper_identify::{TwoParameter, ZeroOutcome};
+use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
 use mapper_report::{
     Display, Paint, ScoredPoint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text,

@@ -1,14 +1,14 @@
 //! The report as text and numbers.
 
-use crate::drift::cause::{Cause, CauseKind};
-use crate::drift::corrected::{corrected_points, identified};
-use crate::drift::decide::{Decision, FoundDrifts};
-use crate::drift::fit::Fit;
-use crate::drift::refine::Refined;
+use crate::drift::causes::cause::{Cause, CauseKind};
+use crate::drift::causes::time_history::CourseKind;
+use crate::drift::correction::corrected::{corrected_points, identified};
+use crate::drift::correction::visits::group;
+use crate::drift::likelihood::decide::{Decision, FoundDrifts};
+use crate::drift::likelihood::fit::Fit;
+use crate::drift::likelihood::refine::Refined;
 use crate::drift::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
-use crate::drift::request::DriftRequest;
-use crate::drift::time_history::CourseKind;
-use crate::drift::visits::group;
+use crate::drift::runs::request::DriftRequest;
 use mapper_core::{IdentifiedPoint, Recording};
 
 pub(crate) fn conclude(

@@ -1,14 +1,14 @@
 //! Diagnoses drift from recordings.
 
-use crate::drift::blocks::{self, Block, CampaignStep, mean_variance_ratio};
 use crate::drift::conclude::conclude;
-use crate::drift::drive::{Drive, predict};
-use crate::drift::readings::Readings;
-use crate::drift::refine::Refined;
-use crate::drift::repeats;
+use crate::drift::likelihood::refine::Refined;
 use crate::drift::report::DriftReport;
-use crate::drift::request::{DriftError, DriftRequest, Unsolvable};
-use crate::drift::usable::usable;
+use crate::drift::runs::repeats;
+use crate::drift::runs::request::{DriftError, DriftRequest, Unsolvable};
+use crate::drift::runs::time_axis::{self, Block, CampaignStep, mean_variance_ratio};
+use crate::drift::runs::usable::usable;
+use crate::drift::sensitivity::drive::{Drive, predict};
+use crate::drift::sensitivity::readings::Readings;
 use mapper_core::{Channel, Recording};
 use mapper_observe::channels::{DRIVERS, OUTPUTS};
 use mapper_observe::declared::Declared;
@@ -32,7 +32,7 @@ pub fn diagnose(request: &DriftRequest<'_>) -> Result<DriftReport, DriftError> {
         return Err(DriftError::NoRun);
     }
     let recordings: Vec<&Recording> = request.runs.iter().map(|run| run.recording).collect();
-    let steps = blocks::steps(&recordings);
+    let steps = time_axis::steps(&recordings);
     let groups = repeats::groups(&steps);
     if let Some(reason) = repeats::refusal(request.runs, &steps, &groups) {
         return Ok(DriftReport::without_verdict(reason));
@@ -56,7 +56,7 @@ fn read<'a>(
     let columns: Vec<usize> = (0..OUTPUTS.len())
         .filter(|output| recordings.iter().all(|recording| recording.require(OUTPUTS[*output]).is_ok()))
         .collect();
-    let all_blocks = blocks::blocks(&steps);
+    let all_blocks = time_axis::blocks(&steps);
     let mut drives: Vec<Drive<'a>> = recordings
         .iter()
         .enumerate()
@@ -70,7 +70,7 @@ fn read<'a>(
         .zip(&base.means)
         .map(|(block, model)| {
             let recording = recordings[steps[block.step].run];
-            (*block, OUTPUTS.map(|channel| blocks::mean(recording, channel, block)), *model)
+            (*block, OUTPUTS.map(|channel| time_axis::mean(recording, channel, block)), *model)
         })
         .collect();
     let kept: Vec<usize> = (0..all.len())

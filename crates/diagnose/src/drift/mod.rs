@@ -5,39 +5,21 @@
 //! a time history ([`mapper_inference::hypotheses`]), explains the rest. Only repeats give evidence against the constants. docs/how-to/drift.md has
 //! the method with its measured error rates.
 
-mod blocks;
-mod candidates;
-mod cause;
+mod causes;
 mod conclude;
-mod constant;
-mod corrected;
-mod decide;
+mod correction;
 mod diagnose;
-mod drive;
-mod fit;
-mod knobs;
-mod low_rank;
-mod nuisance;
-mod planted;
-mod prediction;
-mod readings;
-mod refine;
-mod repeats;
+mod likelihood;
 mod report;
-mod request;
-mod residuals;
-mod segment;
-mod subtract_drift;
-mod time_history;
-mod usable;
-mod visits;
+mod runs;
+mod sensitivity;
 
-pub use cause::{Cause, CauseKind};
+pub use causes::cause::{Cause, CauseKind};
+pub use causes::time_history::{Course, CourseKind};
+pub use correction::subtract_drift::without_drift;
 pub use diagnose::diagnose;
 pub use report::{
     Alternative, CorrectedPoint, DetectionLimit, DriftReport, DriftVerdict, FoundDrift, RateOrStep,
     RepeatGroup, Visit, VisitChannel,
 };
-pub use request::{DriftError, DriftRequest, RecordedRun, Unsolvable};
-pub use subtract_drift::without_drift;
-pub use time_history::{Course, CourseKind};
+pub use runs::request::{DriftError, DriftRequest, RecordedRun, Unsolvable};

@@ -1,7 +1,7 @@
 //! The report, printed and written as JSON.
 
-use crate::drift::cause::Cause;
-use crate::drift::time_history::{Course, CourseKind};
+use crate::drift::causes::cause::Cause;
+use crate::drift::causes::time_history::{Course, CourseKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -70,7 +70,7 @@ pub struct Visit {
     /// Which recording, from 0.
     pub run: usize,
     /// Position of the step in the recording, from 0; files have its number, from 1.
-    #[serde(serialize_with = "mapper_core::step_number::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     pub step: usize,
     /// Start of the step, campaign time, s.
     pub t_s: f64,
@@ -107,7 +107,7 @@ pub struct CorrectedPoint {
     /// Which recording, from 0.
     pub run: usize,
     /// Position of the step in the recording, from 0; files have its number, from 1.
-    #[serde(serialize_with = "mapper_core::step_number::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     pub step: usize,
     /// Measured shaft speed at the end of the step, rpm.
     pub speed_rpm: f64,

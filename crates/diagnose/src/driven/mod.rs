@@ -7,18 +7,18 @@
 //! The result is a posterior sample within the priors ([`PARAMETERS`]), not a best fit: a log of 13 s cannot distinguish a slow probe from
 //! a warm housing, and the result must show this.
 
+pub mod cause_search;
+mod compressor_side;
 mod density;
 mod ensemble;
 mod error;
+mod log_rows;
 mod outcome;
 mod parameters;
 mod readings;
-mod rows;
-mod side;
-pub mod why;
 
+pub use compressor_side::{Declared, Predicted, predict};
 pub use error::DrivenError;
 pub use outcome::{DrivenOutcome, FoundParameter, Judged, Moves, Trace, identify};
 pub use parameters::{PARAMETERS, Parameter, Values};
 pub use readings::Readings;
-pub use side::{Declared, Predicted, predict};

@@ -6,9 +6,9 @@ use crate::driven::parameters::{COUNT, PARAMETERS, Parameter};
 use crate::driven::{Declared, DrivenError, Predicted, Readings, Values, predict};
 use mapper_inference::interval::IDENTIFIED_RATIO;
 use mapper_numerics::statistics::{mean, quantile, rms};
-use mapper_physics::air::Air;
-use mapper_physics::compression::apparent_efficiency;
-use mapper_physics::params::Params;
+use mapper_physics::gas::air::Air;
+use mapper_physics::laws::compression::apparent_efficiency;
+use mapper_physics::machine::params::Params;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -170,7 +170,8 @@ fn with_noise(sample: &[Values], predicted: &[Predicted], rows: &Readings, seed:
             let mut noise_k: Option<(f64, f64)> = None;
             let noisy = predicted.t2_k.iter().zip(&rows.t_s).map(|(t2_k, t_s)| {
                 let z: f64 = StandardNormal.sample(&mut random);
-                let keep = noise_k.map_or(0.0, |(at_s, _)| (-(t_s - at_s) / crate::driven::density::ALIKE_S).exp());
+                let keep =
+                    noise_k.map_or(0.0, |(at_s, _)| (-(t_s - at_s) / crate::driven::density::ALIKE_S).exp());
                 let before_k = noise_k.map_or(0.0, |(_, noise_k)| noise_k);
                 let now_k = keep * before_k + sigma_k * (1.0 - keep * keep).sqrt() * z;
                 noise_k = Some((*t_s, now_k));

@@ -1,7 +1,7 @@
 //! Driving and judged channels of the compressor side, one row per sample.
 
 use crate::driven::DrivenError;
-use crate::driven::rows::{Rows, Wanted};
+use crate::driven::log_rows::{Rows, Wanted};
 use mapper_core::{Channel, Recording};
 
 /// Pressure ratio below which a compressor or turbine does hardly any work, so that its temperatures do not show its efficiency.

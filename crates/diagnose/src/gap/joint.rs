@@ -4,15 +4,15 @@
 //! mode `x_i` and a precision `P_i` with nuisance priors `D`, starts integrated out. The joint solution is `P = sum (P_i - D) + D`, `P x =
 //! sum P_i x_i`, so shared information is counted once.
 
-use crate::gap::calibration::Calibration;
-use crate::gap::coordinate::{Coordinate, coordinates, parameters};
+use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters};
+use crate::gap::best_fit::first_step::is_start;
+use crate::gap::best_fit::fit::{Effort, Fit, fit};
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::causes::calibration::Calibration;
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::first_step::is_start;
-use crate::gap::fit::{Effort, Fit, fit};
-use crate::gap::in_words;
-use crate::gap::report::Verdict;
-use crate::gap::selection::Selection;
-use crate::gap::study::{EffectValues, Hypothesis, Study};
+use crate::gap::findings::in_words;
+use crate::gap::findings::report::Verdict;
+use crate::gap::residuals::study::{EffectValues, Hypothesis, Study};
 use mapper_core::confidence_interval_95;
 use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_numerics::parallel;

@@ -1,13 +1,13 @@
 //! Calibrated model: machine, effects and tolerances from a diagnosis, its forecasts, and their verification.
 
-use crate::gap::coordinate::coordinates;
+use crate::gap::best_fit::coordinate::coordinates;
+use crate::gap::best_fit::fit::{Fit, changes_near, effect_changes};
 use crate::gap::diagnose::Diagnosed;
-use crate::gap::fit::{Fit, changes_near, effect_changes};
-use crate::gap::nuisance::{OFFSET_PREFIX, OUTPUTS};
-use crate::gap::outlook::{Alike, COARSE_S, imagined_steps};
-use crate::gap::report::Verdict;
-use crate::gap::study::{Hypothesis, Study};
-use crate::gap::whiten::{Linearised, dot};
+use crate::gap::findings::report::Verdict;
+use crate::gap::next_experiment::outlook::{Alike, COARSE_S, imagined_steps};
+use crate::gap::residuals::nuisance::{OFFSET_PREFIX, OUTPUTS};
+use crate::gap::residuals::study::{Hypothesis, Study};
+use crate::gap::residuals::whiten::{Linearised, dot};
 use mapper_core::{Channel, StepMarker, half_width_95};
 use mapper_inference::descent::FINE;
 use nalgebra::{DMatrix, DVector};
@@ -77,7 +77,7 @@ pub enum TwinError {
     Covariance(usize),
     /// The model cannot follow the recording.
     #[error(transparent)]
-    Predict(#[from] crate::gap::study::PredictError),
+    Predict(#[from] crate::gap::residuals::study::PredictError),
 }
 
 fn is_start(name: &str) -> bool {
@@ -94,11 +94,12 @@ impl Found {
 
     fn of_fit(study: &Study, fit: &Fit) -> Option<Found> {
         let covariance = fit.precision.clone().cholesky()?.inverse();
-        let tolerance = |(nuisance, sigmas): (&crate::gap::nuisance::Nuisance, &f64)| FoundTolerance {
-            name: nuisance.kind.to_string(),
-            value: nuisance.value(*sigmas),
-            sigma: nuisance.sigma,
-        };
+        let tolerance =
+            |(nuisance, sigmas): (&crate::gap::residuals::nuisance::Nuisance, &f64)| FoundTolerance {
+                name: nuisance.kind.to_string(),
+                value: nuisance.value(*sigmas),
+                sigma: nuisance.sigma,
+            };
         Some(Found {
             effects: fit
                 .hypothesis
@@ -230,7 +231,7 @@ pub fn hold(study: &Study, found: &Found) -> Result<Held, TwinError> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
     /// Index of the step, from 0; files use its number, from 1.
-    #[serde(with = "mapper_core::step_number")]
+    #[serde(with = "mapper_core::test_plan::step_number")]
     pub step: usize,
     /// Each channel: value and half the width of its 95 % band, in the channel's unit.
     pub channels: BTreeMap<String, [f64; 2]>,

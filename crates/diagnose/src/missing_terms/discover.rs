@@ -1,27 +1,27 @@
 //! Searches for laws that explain the residual of a diagnosis, and locates their source terms.
 
-use crate::missing_terms::balance::Balance;
-use crate::missing_terms::candidate::{Bench, Candidate, keep_determined, worth};
-use crate::missing_terms::columns::{Base, Products};
-use crate::missing_terms::force::{Force, forces};
-use crate::missing_terms::held_out::shrink;
-use crate::missing_terms::library::library;
-use crate::missing_terms::onset::begun;
-use crate::missing_terms::script::script;
-use crate::missing_terms::select::{Choice, choices};
-use crate::missing_terms::sentence::{LawDescription, tell};
-use crate::gap::additions::additions;
-use crate::gap::adequacy::adequacy;
-use crate::gap::calibration::Calibration;
+use crate::gap::best_fit::adequacy::adequacy;
+use crate::gap::best_fit::first_step::with_start_read;
+use crate::gap::best_fit::fit::{Effort, Fit, fit};
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::causes::additions::additions;
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
+use crate::gap::causes::weigh::{ALIKE, MAX_EQUIVALENT, weight};
 use crate::gap::diagnose::{Diagnosed, MIN_SHRINK};
-use crate::gap::first_step::with_start_read;
-use crate::gap::fit::{Effort, Fit, fit};
-use crate::gap::how_far::channels_on;
-use crate::gap::place::{BEND, Explanation, Gain, Part, RARITY, of_fits, places_of, signature};
-use crate::gap::report::{Law, MissingForce, Place, Verdict};
-use crate::gap::selection::Selection;
-use crate::gap::study::{Study, members};
-use crate::gap::weigh::{ALIKE, MAX_EQUIVALENT, weight};
+use crate::gap::findings::report::{Law, MissingForce, Place, Verdict};
+use crate::gap::gap_reduction::how_far::channels_on;
+use crate::gap::residuals::study::{Study, members};
+use crate::missing_terms::laws::candidate::{Bench, Candidate, keep_determined, worth};
+use crate::missing_terms::laws::held_out::shrink;
+use crate::missing_terms::laws::script::script;
+use crate::missing_terms::laws::sentence::{LawDescription, tell};
+use crate::missing_terms::search::columns::{Base, Products};
+use crate::missing_terms::search::onset::begun;
+use crate::missing_terms::search::residual_source::{Force, forces};
+use crate::missing_terms::search::select::{Choice, choices};
+use crate::missing_terms::terms::balance::Balance;
+use crate::missing_terms::terms::library::library;
 
 /// Results outside the effect library.
 #[derive(Debug, Default)]

@@ -5,11 +5,11 @@
 
 use mapper_core::{Channel, Recording, Series};
 use mapper_diagnose::driven::{DrivenError, DrivenOutcome, Readings, identify};
-use mapper_physics::driven::{FrozenGrid, drive};
-use mapper_physics::inputs::{Inputs, InterpolatedInputs};
-use mapper_physics::model::Model;
-use mapper_physics::params::{BoundaryConditions, Params};
-use mapper_physics::steady::hold_speed;
+use mapper_physics::machine::params::{BoundaryConditions, Params};
+use mapper_physics::simulation::driven::{FrozenGrid, drive};
+use mapper_physics::simulation::inputs::{Inputs, InterpolatedInputs};
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady::hold_speed;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;

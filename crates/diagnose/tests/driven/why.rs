@@ -5,12 +5,12 @@
 use crate::driven::common::{self, Course, ELEMENT_LAG, declared, engine, healthy};
 use mapper_core::{Channel, Recording};
 use mapper_diagnose::driven::DrivenError;
-use mapper_diagnose::driven::why::{Ask, Diagnosis, Which, Word, diagnose};
+use mapper_diagnose::driven::cause_search::{Ask, Diagnosis, Which, Word, diagnose};
+use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_effects::catalogue;
-use mapper_diagnose::gap::calibration::Calibration;
-use mapper_physics::effect::Rig;
-use mapper_physics::model::Model;
-use mapper_physics::sensor_fault::log_effects;
+use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::sensor_fault::log_effects;
+use mapper_physics::simulation::model::Model;
 
 fn diagnosis(recording: &Recording, side: Which, fit_until_s: f64) -> Diagnosis {
     let ask = Ask {

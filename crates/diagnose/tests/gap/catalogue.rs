@@ -4,16 +4,16 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::gap::common::{self, Visits, declared};
-use mapper_diagnose::gap::additions::additions;
-use mapper_diagnose::gap::fit::{Effort, fit};
-use mapper_diagnose::gap::selection::Selection;
-use mapper_diagnose::gap::signature::lengths;
-use mapper_diagnose::gap::study::{EffectValues, Hypothesis, Study};
-use mapper_diagnose::gap::whiten::Linearised;
+use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
+use mapper_diagnose::gap::best_fit::selection::Selection;
+use mapper_diagnose::gap::best_fit::signature::lengths;
+use mapper_diagnose::gap::causes::additions::additions;
+use mapper_diagnose::gap::residuals::study::{EffectValues, Hypothesis, Study};
+use mapper_diagnose::gap::residuals::whiten::Linearised;
 use mapper_numerics::parallel;
-use mapper_observe::table::Table;
-use mapper_physics::effect::{Effect, EffectParameter, Rig, add};
-use mapper_physics::model::Model;
+use mapper_observe::averages::time_table::Table;
+use mapper_physics::rig::effect::{Effect, EffectParameter, Rig, add};
+use mapper_physics::simulation::model::Model;
 
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3], dwell_s: 40.0 };
 

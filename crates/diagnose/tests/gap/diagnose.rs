@@ -4,21 +4,21 @@
 
 use crate::gap::common::{self, Visits, boundary, declared};
 use mapper_core::{Channel, Dimension, OperatingPoint, Recording, Series};
-use mapper_diagnose::gap::calibration::Calibration;
+use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
-use mapper_diagnose::gap::experiment::{AllowedJump, Experiment};
+use mapper_diagnose::gap::findings::experiment::{AllowedJump, Experiment};
+use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::joint::{Fate, Value, over_recordings};
-use mapper_diagnose::gap::nuisance::NuisanceKind;
-use mapper_diagnose::gap::outlook::{apart, apart_at_first_sight};
-use mapper_diagnose::gap::report::Verdict;
-use mapper_diagnose::gap::study::Study;
+use mapper_diagnose::gap::next_experiment::outlook::{apart, apart_at_first_sight};
+use mapper_diagnose::gap::preconditions::usable::usable;
+use mapper_diagnose::gap::residuals::nuisance::NuisanceKind;
+use mapper_diagnose::gap::residuals::study::Study;
 use mapper_diagnose::gap::twin::{Found, hold};
-use mapper_diagnose::gap::usable::usable;
+use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::CommonOffset;
-use mapper_observe::table::Table;
-use mapper_physics::effect::{Effect, Rig, add};
-use mapper_physics::model::Model;
-use mapper_physics::steady::hold_speed;
+use mapper_physics::rig::effect::{Effect, Rig, add};
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady::hold_speed;
 use std::sync::Arc;
 
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3, 80e3], dwell_s: 60.0 };
@@ -200,10 +200,16 @@ fn two_effects_are_both_named_and_each_takes_off_the_square_of_its_signature() {
     // Gain of both compared with the meter alone and with none.
     let meter = 3;
     let study = &diagnosed.study;
-    let alone =
-        mapper_diagnose::gap::signature::lengths(study, &diagnosed.linearised, &vec![(meter, vec![1.02])]).unwrap();
+    let alone = mapper_diagnose::gap::best_fit::signature::lengths(
+        study,
+        &diagnosed.linearised,
+        &vec![(meter, vec![1.02])],
+    )
+    .unwrap();
     let fits = |wanted: &[usize]| {
-        let named = |f: &&mapper_diagnose::gap::fit::Fit| mapper_diagnose::gap::study::members(&f.hypothesis) == wanted;
+        let named = |f: &&mapper_diagnose::gap::best_fit::fit::Fit| {
+            mapper_diagnose::gap::residuals::study::members(&f.hypothesis) == wanted
+        };
         diagnosed.fits.iter().find(named).map(|f| f.cost)
     };
     let (both, stem) = (fits(&[1, meter]).unwrap(), fits(&[1]).unwrap());

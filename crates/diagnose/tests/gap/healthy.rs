@@ -4,13 +4,13 @@
 
 use crate::gap::common::{Visits, declared, record_another_night, record_of};
 use mapper_core::{Channel, Recording};
-use mapper_diagnose::gap::calibration::Calibration;
+use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
-use mapper_diagnose::gap::healthy::Healthy;
-use mapper_diagnose::gap::problem::Problem;
-use mapper_diagnose::gap::report::Verdict;
-use mapper_physics::effect::{Rig, add};
-use mapper_physics::model::Model;
+use mapper_diagnose::gap::findings::report::Verdict;
+use mapper_diagnose::gap::preconditions::problem::Problem;
+use mapper_diagnose::gap::reference::healthy::Healthy;
+use mapper_physics::rig::effect::{Rig, add};
+use mapper_physics::simulation::model::Model;
 
 const VISITS: Visits = Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3], dwell_s: 60.0 };
 

@@ -4,22 +4,22 @@
 
 use crate::gap::common::{channels, declared};
 use mapper_core::{Channel, Recording, Series, StepKind, StepMarker};
-use mapper_diagnose::gap::actuators::Actuators;
-use mapper_diagnose::gap::additions::additions;
-use mapper_diagnose::gap::adequacy::adequacy;
-use mapper_diagnose::gap::calibration::Calibration;
-use mapper_diagnose::gap::fit::{Effort, fit};
-use mapper_diagnose::gap::selection::Selection;
-use mapper_diagnose::gap::study::Study;
-use mapper_diagnose::gap::whiten::Linearised;
-use mapper_observe::lagged_command::{LaggedCommand, Level, Response};
-use mapper_observe::table::Table;
-use mapper_physics::inputs::Inputs;
-use mapper_physics::instruments::true_value;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::steady::hold_speed;
+use mapper_diagnose::gap::best_fit::adequacy::adequacy;
+use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
+use mapper_diagnose::gap::best_fit::selection::Selection;
+use mapper_diagnose::gap::causes::additions::additions;
+use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_diagnose::gap::residuals::actuators::Actuators;
+use mapper_diagnose::gap::residuals::study::Study;
+use mapper_diagnose::gap::residuals::whiten::Linearised;
+use mapper_observe::averages::time_table::Table;
+use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Level, Response};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::instruments::true_value;
+use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady::hold_speed;
 use std::collections::BTreeMap;
 
 const SPEEDS_RPM: [f64; 6] = [110e3, 50e3, 150e3, 70e3, 130e3, 90e3];

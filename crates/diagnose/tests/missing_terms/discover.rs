@@ -3,27 +3,27 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::gap::common::{Visits, declared};
-use mapper_diagnose::missing_terms::balance::Balance;
-use mapper_diagnose::missing_terms::columns::Base;
-use mapper_diagnose::missing_terms::discover::discover;
-use mapper_diagnose::missing_terms::expression::Expression;
-use mapper_diagnose::missing_terms::force::forces;
-use mapper_diagnose::missing_terms::law_effect::LawEffect;
-use mapper_diagnose::missing_terms::library::library;
-use mapper_diagnose::missing_terms::script::script_of;
-use mapper_diagnose::missing_terms::sentence::{LawDescription, sink};
-use mapper_diagnose::missing_terms::term::{Role, Term};
-use mapper_diagnose::missing_terms::time_history::{Course, Shape};
-use mapper_effects::ScriptEffect;
-use mapper_diagnose::gap::calibration::Calibration;
+use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, Question, diagnose};
-use mapper_diagnose::gap::report::Verdict;
-use mapper_diagnose::gap::study::{Hypothesis, Study};
-use mapper_diagnose::gap::whiten::Linearised;
+use mapper_diagnose::gap::findings::report::Verdict;
+use mapper_diagnose::gap::residuals::study::{Hypothesis, Study};
+use mapper_diagnose::gap::residuals::whiten::Linearised;
+use mapper_diagnose::missing_terms::discover::discover;
+use mapper_diagnose::missing_terms::laws::script::script_of;
+use mapper_diagnose::missing_terms::laws::sentence::{LawDescription, sink};
+use mapper_diagnose::missing_terms::search::columns::Base;
+use mapper_diagnose::missing_terms::search::residual_source::forces;
+use mapper_diagnose::missing_terms::terms::balance::Balance;
+use mapper_diagnose::missing_terms::terms::expression::Expression;
+use mapper_diagnose::missing_terms::terms::law_effect::LawEffect;
+use mapper_diagnose::missing_terms::terms::library::library;
+use mapper_diagnose::missing_terms::terms::term::{Role, Term};
+use mapper_diagnose::missing_terms::terms::time_history::{Course, Shape};
+use mapper_effects::ScriptEffect;
 use mapper_numerics::parallel;
-use mapper_observe::table::Table;
-use mapper_physics::effect::{Effect, Rig, add};
-use mapper_physics::model::Model;
+use mapper_observe::averages::time_table::Table;
+use mapper_physics::rig::effect::{Effect, Rig, add};
+use mapper_physics::simulation::model::Model;
 use std::path::Path;
 use std::sync::Arc;
 

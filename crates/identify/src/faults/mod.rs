@@ -2,33 +2,28 @@
 //!
 //! Each balance is a law with a declared uncertainty: one opening of the valve has one area, and heads go with the speed squared. The housing
 //! stores the heat from the gas, and efficiency is a smooth function of the map position. The hypotheses are the catalogue of sensor faults
-//! ([`mapper_physics::sensor_fault`]) and a machine of another scale. [`mapper_inference::hypotheses`] finds the most probable set of them.
+//! ([`mapper_physics::rig::sensor_fault`]) and a machine of another scale. [`mapper_inference::hypotheses`] finds the most probable set of them.
 
-mod conditions;
-mod convection;
-pub(crate) mod efficiency;
-pub(crate) mod found;
-mod head;
-mod housing;
+pub(crate) mod balance_rows;
+pub(crate) mod balances;
+pub(crate) mod end_readings;
+pub(crate) mod found_fault;
 mod places;
 pub(crate) mod possible;
-pub(crate) mod readings;
-pub(crate) mod rows;
 mod smooth;
-mod valve;
 
 use crate::IdentifyConfig;
-use crate::faults::efficiency::FittedEfficiencies;
-use crate::faults::found::{FoundFault, Suspect};
-use crate::faults::readings::{CHANNELS, Readings, span_s};
-use crate::faults::rows::{MACHINE, Machine, Rows};
-use crate::findings::code;
+use crate::faults::balance_rows::{MACHINE, Machine, Rows};
+use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::faults::end_readings::{CHANNELS, Readings, span_s};
+use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::nominal_rig::NominalRig;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_core::{Channel, Method, Recording};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
-use mapper_physics::sensor_fault::additive;
+use mapper_physics::rig::sensor_fault::additive;
 
 /// Prior probability of a fault: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
 const EXPECTED_FAULTS: f64 = 0.1;
@@ -156,16 +151,20 @@ fn balances(
     let used = ends.iter().zip(&all).filter_map(|(end, readings)| Some((end.as_ref()?, (*readings)?)));
     let opened: Vec<(f64, Readings)> =
         used.map(|(end, readings)| (end.valve_opening_ratio, readings)).collect();
-    let noise = readings::noise(config, recording);
+    let noise = end_readings::noise(config, recording);
     let reference = config.reference;
     let mut balances: Vec<Rows> = Vec::new();
-    balances.extend(valve::rows(&opened, &noise, nominal));
-    balances.extend(head::rows(&readings, &noise, reference, nominal));
-    balances.extend(housing::rows(recording, config, &all.iter().map(Option::is_some).collect::<Vec<_>>()));
-    balances.extend(fitted.and_then(|fitted| efficiency::rows(fitted, &all, reference, nominal)));
+    balances.extend(balances::valve::rows(&opened, &noise, nominal));
+    balances.extend(balances::head::rows(&readings, &noise, reference, nominal));
+    balances.extend(balances::housing::rows(
+        recording,
+        config,
+        &all.iter().map(Option::is_some).collect::<Vec<_>>(),
+    ));
+    balances.extend(fitted.and_then(|fitted| balances::efficiency::rows(fitted, &all, reference, nominal)));
     if let Some(nominal) = nominal {
-        balances.extend(fitted.and_then(|fitted| convection::rows(fitted, &all, config, nominal)));
-        balances.extend(conditions::rows(recording, &all, config, nominal));
+        balances.extend(fitted.and_then(|fitted| balances::convection::rows(fitted, &all, config, nominal)));
+        balances.extend(balances::conditions::rows(recording, &all, config, nominal));
     }
     Some(balances)
 }

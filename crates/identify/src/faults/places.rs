@@ -4,12 +4,12 @@
 //! head coefficient orders them at both ends. The efficiencies of a public measured map of 93 points (TurboTools) are a smooth function of it
 //! to 0.3 points, and of the flow to 1.
 
-use crate::faults::readings::Readings;
+use crate::faults::end_readings::Readings;
 use crate::faults::smooth::At;
-use crate::joint::surface::middle_and_half_range;
+use crate::joint::step_model::surface::middle_and_half_range;
 use mapper_core::ReferenceState;
 use mapper_numerics::statistics::median;
-use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// Scales of the coordinates, taken from the points of a recording.
 #[derive(Debug, Clone, Copy)]

@@ -5,13 +5,17 @@
 //! machine they determine few, and the intervals are valid for sensors as declared.
 
 use crate::IdentifyConfig;
-use crate::budgets::own_row;
-use crate::dynamic::Estimate;
-use crate::faults::efficiency::FittedEfficiencies;
-use crate::faults::found::Suspect;
-use crate::faults::readings::Readings;
-use crate::faults::rows::Rows;
-use crate::faults::{EXCLUDED, convection, efficiency, suspect};
+use crate::faults::balance_rows::Rows;
+use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::faults::end_readings::Readings;
+use crate::faults::found_fault::Suspect;
+use crate::faults::{
+    EXCLUDED,
+    balances::{convection, efficiency},
+    suspect,
+};
+use crate::single_step::budgets::own_row;
+use crate::single_step::dynamic::Estimate;
 use mapper_core::{EstimateUncertainty, half_width_95, standard_error_of};
 use mapper_inference::hypotheses::{Likelihood, Priors};
 use mapper_inference::singles::Single;

@@ -5,12 +5,12 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
-use crate::dynamic::Estimate;
-use crate::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
-use crate::joint::rows::{Row, StepRows, block_s_after, place};
-use crate::joint::solve::ROUGHLY;
-use crate::joint::start::{self, START_S};
-use crate::joint::{refinements, smoothness};
+use crate::joint::fit::solve::ROUGHLY;
+use crate::joint::fit::start::{self, START_S};
+use crate::joint::step_model::rows::{Row, StepRows, block_s_after, place};
+use crate::joint::{fit::refinements, uncertainty::smoothness};
+use crate::single_step::dynamic::Estimate;
+use crate::single_step::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
 use mapper_numerics::coloured_noise::BlockNoise;
 
 /// Minimum number of rows of a step.

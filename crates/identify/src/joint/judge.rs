@@ -1,12 +1,14 @@
 //! Checks of a joint fit: of each step, and of the model as a whole.
 
 use crate::IdentifyConfig;
-use crate::findings::{Findings, code};
-use crate::joint::parameters::{ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2};
-use crate::joint::refinements::Refinements;
-use crate::joint::smoothness::{Judged, Smoothed};
-use crate::joint::solve::{Covariance, Member, Problem, ROUGHLY};
-use crate::width;
+use crate::joint::fit::refinements::Refinements;
+use crate::joint::fit::solve::{Covariance, Member, Problem, ROUGHLY};
+use crate::joint::step_model::parameters::{
+    ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2,
+};
+use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
+use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::interval_width;
 use mapper_core::EstimateUncertainty;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, mean, median, rms};
 
@@ -85,7 +87,7 @@ pub(crate) fn judge_step(
         findings.refuse(code::POOR_FIT, message);
     }
     if eta_error.combined_standard_error() > config.thresholds.sigma_eta {
-        width::judge(eta_error, dt2_k.unwrap_or(0.0), " and what is shared", config, findings);
+        interval_width::judge(eta_error, dt2_k.unwrap_or(0.0), " and what is shared", config, findings);
     }
     let declared = !config.declared.is_empty();
     let square = mean_square(problem, member);
@@ -217,7 +219,7 @@ fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Opti
         (difference.abs() > EXCLUDE_SIGMAS * sigma).then(|| {
             format!(
                 "steps with rising T2 and steps with falling T2 disagree on the {}: {:.3} and {:.3}, {:.1} standard errors apart",
-                crate::joint::parameters::symbol(index),
+                crate::joint::step_model::parameters::symbol(index),
                 up[index],
                 down[index],
                 difference.abs() / sigma

@@ -4,37 +4,24 @@
 //! wheel, the probe's lag, the effect of a hotter wall, the sensors' offsets, and how efficiency varies over the map. See
 //! `docs/explanation/identification.md` for the reasons, assumptions and limits.
 
-pub(crate) mod budget;
-pub(crate) mod common_part;
 pub(crate) mod expected;
-pub(crate) mod inlet;
-pub(crate) mod input_noise;
-pub(crate) mod input_noise_spline;
+pub(crate) mod fit;
 pub(crate) mod judge;
-pub(crate) mod model;
-pub(crate) mod parameters;
-pub(crate) mod profile;
-pub(crate) mod quantity;
-pub(crate) mod refinements;
 pub(crate) mod regions;
-pub(crate) mod rows;
-pub(crate) mod shared;
-pub(crate) mod smoothing;
-pub(crate) mod smoothness;
-pub(crate) mod solve;
-pub(crate) mod start;
-pub(crate) mod surface;
+pub(crate) mod step_model;
+pub(crate) mod thermal_model;
+pub(crate) mod uncertainty;
 
-use crate::dynamic::Estimate;
-use crate::end_state::EndState;
-use crate::faults::efficiency::FittedEfficiencies;
-use crate::findings::{Findings, code};
-use crate::joint::parameters::{FLOW_GAIN, INLET, OFFSETS, PROBE_MM2, SHARED};
-use crate::joint::refinements::{Gain, Refinements};
-use crate::joint::smoothness::{Judged, Smoothed};
-use crate::joint::solve::{Covariance, FULLY, Problem, ROUGHLY};
-use crate::two_parameter::TwoParameter;
-use crate::{IdentifyConfig, commands};
+use crate::faults::balances::efficiency::FittedEfficiencies;
+use crate::joint::fit::refinements::{Gain, Refinements};
+use crate::joint::fit::solve::{Covariance, FULLY, Problem, ROUGHLY};
+use crate::joint::step_model::parameters::{FLOW_GAIN, INLET, OFFSETS, PROBE_MM2, SHARED};
+use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
+use crate::single_step::dynamic::Estimate;
+use crate::step_data::end_state::EndState;
+use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::two_parameter::TwoParameter;
+use crate::{IdentifyConfig, step_data::commands};
 use mapper_core::{
     Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Verdict, Window,
     confidence_interval_95,
@@ -85,9 +72,10 @@ pub(crate) fn estimate(
         findings.iter_mut().zip(own_findings).for_each(|(findings, own)| findings.take(own));
         return Joint { estimates: alone, thermal: None, two_parameter: Vec::new(), fitted: None };
     }
-    let steps = start::steps(recording, end_states, config, findings);
+    let steps = fit::start::steps(recording, end_states, config, findings);
     let careful = carefully(config);
-    let late: Vec<rows::StepRows> = steps.iter().map(rows::StepRows::settled).collect();
+    let late: Vec<step_model::rows::StepRows> =
+        steps.iter().map(step_model::rows::StepRows::settled).collect();
     let attempt = match Attempt::new(&steps, &alone, config, &[]) {
         Some(attempt) if condemned || attempt.thermal.doubts.is_empty() => Some(attempt),
         first => match first.as_ref().and_then(|first| first.without_a_region(&steps, &alone, config)) {
@@ -111,7 +99,7 @@ pub(crate) fn estimate(
         }
         return Joint { estimates, thermal: None, two_parameter, fitted: None };
     };
-    let fitted = smoothness::as_measured(&attempt.problem, &steps);
+    let fitted = uncertainty::smoothness::as_measured(&attempt.problem, &steps);
     let Attempt { problem, smoothed, thermal, resting, left_out, .. } = attempt;
     let mut estimates = vec![Estimate::default(); recording.steps.len()];
     for (i, (member, step)) in problem.members.iter().zip(&steps).enumerate() {
@@ -130,15 +118,17 @@ pub(crate) fn estimate(
             continue;
         }
         let (first, last) = (step.rows.first(), step.rows.last());
-        let change =
-            |read: fn(&rows::Row) -> f64| first.zip(last).map(|(first, last)| read(last) - read(first));
+        let change = |read: fn(&step_model::rows::Row) -> f64| {
+            first.zip(last).map(|(first, last)| read(last) - read(first))
+        };
         let prediction =
             problem.setting.predict(&member.course, &problem.shared, &member.local, &[false; SHARED], false);
         let residual =
             member.measured_k.iter().zip(&prediction.t2_k).map(|(measured, found)| measured - found);
         let [eta_rows, ln_h_rows] = smoothed.budgets[i].clone();
-        let eta_rows = eta_rows.into_iter().map(|row| budget::in_unit(row, 1.0, "1")).collect();
-        let h_rows = ln_h_rows.into_iter().map(|row| budget::in_unit(row, h_w_m2k, "W/(m2 K)")).collect();
+        let eta_rows = eta_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, 1.0, "1")).collect();
+        let h_rows =
+            ln_h_rows.into_iter().map(|row| uncertainty::budget::in_unit(row, h_w_m2k, "W/(m2 K)")).collect();
         estimates[step.position] = Estimate {
             budgets: [eta_rows, h_rows],
             eta: Some((eta, Some(eta_error))),
@@ -198,12 +188,12 @@ struct Attempt<'a> {
 impl<'a> Attempt<'a> {
     /// `barred`: indices of steps excluded from the shared parameters.
     fn new(
-        steps: &'a [rows::StepRows],
+        steps: &'a [step_model::rows::StepRows],
         alone: &[Estimate],
         config: &IdentifyConfig,
         barred: &[usize],
     ) -> Option<Self> {
-        let mut problem = start::problem(steps, alone, config)?;
+        let mut problem = fit::start::problem(steps, alone, config)?;
         for index in barred {
             let member = problem.members.get_mut(*index)?;
             (member.shares, member.barred) = (false, true);
@@ -212,7 +202,7 @@ impl<'a> Attempt<'a> {
         let smoothed =
             |problem: &Problem<'_>, covariance: &Covariance, refined: &Option<(Refinements, Gain)>| {
                 let refined = refined.as_ref().map(|(refinements, gain)| (refinements, gain));
-                smoothness::smoothed(problem, covariance, refined, steps, config.reference)
+                uncertainty::smoothness::smoothed(problem, covariance, refined, steps, config.reference)
             };
         let mut found = smoothed(&problem, &covariance, &refined);
         if found.strain > DOUBT_SIGMAS {
@@ -227,14 +217,14 @@ impl<'a> Attempt<'a> {
             found.strain = strain;
         }
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
-        let thermal = shared::thermal_model(&problem, &covariance, &found, refinements, steps, config);
+        let thermal = thermal_model::thermal_model(&problem, &covariance, &found, refinements, steps, config);
         Some(Attempt { problem, covariance, smoothed: found, thermal, resting, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if any.
     fn without_a_region(
         &self,
-        steps: &'a [rows::StepRows],
+        steps: &'a [step_model::rows::StepRows],
         alone: &[Estimate],
         config: &IdentifyConfig,
     ) -> Option<Self> {
@@ -301,22 +291,28 @@ struct Fitted {
 }
 
 /// Fits, estimates noise and spreads from the fit, excludes steps that fit far worse, fits again, and evaluates the parameters with a prior.
-fn fitted(problem: &mut Problem<'_>, steps: &[rows::StepRows], config: &IdentifyConfig) -> Option<Fitted> {
+fn fitted(
+    problem: &mut Problem<'_>,
+    steps: &[step_model::rows::StepRows],
+    config: &IdentifyConfig,
+) -> Option<Fitted> {
     for _ in 0..ROUNDS {
         problem.minimise(ROUGHLY)?;
-        start::refine(problem, steps, config)?;
-        problem.explained = input_noise::explained(problem, steps, config);
+        fit::start::refine(problem, steps, config)?;
+        problem.explained = fit::input_noise::explained(problem, steps, config);
         judge::exclude(problem);
         // A probe on its bound may leave it with better weights.
         problem.active[PROBE_MM2] = problem.probe_fitted;
     }
     problem.minimise(FULLY)?;
-    let inlet_sigma = inlet::settle(problem)?;
+    let inlet_sigma = fit::inlet::settle(problem)?;
     let open = problem.clone();
-    let refinements = refinements::settle(problem)?;
+    let refinements = fit::refinements::settle(problem)?;
     let (covariance, gain) = covariance(problem, refinements.as_ref(), inlet_sigma)?;
     let resting = match &refinements {
-        Some(found) => refinements::resting_on_declaration(&open, |index| found.probability(index) < 0.5)?,
+        Some(found) => {
+            fit::refinements::resting_on_declaration(&open, |index| found.probability(index) < 0.5)?
+        }
         None => 0.0,
     };
     Some(Fitted { covariance, refined: refinements.zip(gain), inlet_sigma, resting })
@@ -336,7 +332,7 @@ fn covariance(
         None => None,
     };
     if let Some(sigma) = inlet_sigma {
-        covariance = inlet::carry(problem, sigma, &covariance)?;
+        covariance = fit::inlet::carry(problem, sigma, &covariance)?;
         let row = covariance.row_of(INLET)?;
         gain = gain.map(|gain| gain.with_row(row));
     }

@@ -5,10 +5,10 @@
 //! the remaining steps only carry less information: the variance of the difference is then the difference of the variances (Hausman,
 //! Econometrica 46, 1978, eq. 2.10).
 
-use crate::joint::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_DIRECTION, Place};
-use crate::joint::rows::StepRows;
-use crate::joint::solve::{Covariance, Problem};
-use crate::joint::surface::SurfaceScale;
+use crate::joint::fit::solve::{Covariance, Problem};
+use crate::joint::step_model::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_DIRECTION, Place};
+use crate::joint::step_model::rows::StepRows;
+use crate::joint::step_model::surface::SurfaceScale;
 use mapper_core::ReferenceState;
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 

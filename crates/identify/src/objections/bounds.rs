@@ -5,9 +5,9 @@
 //! exchanges at most half of the capacity flow times its distance). Hot turbine inlet gas read as T2 is beyond that; a turbine may be driven
 //! by cold gas.
 
-use crate::findings::code;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_numerics::statistics::median;
 
 /// Isentropic rise above which heat no longer hides the work, K.
@@ -81,7 +81,7 @@ mod tests {
     /// Five ends of an efficiency of 0.7 at a pressure ratio of 2, with this gas before the turbine.
     fn ends_with(t3_k: f64, t2_read_k: Option<f64>) -> Vec<Option<Ends>> {
         let end = Ends {
-            air: mapper_physics::air::Air::PAPER,
+            air: mapper_physics::gas::air::Air::PAPER,
             position: 0,
             end_s: 0.0,
             valve_opening_ratio: 1.0,

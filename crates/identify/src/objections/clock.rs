@@ -4,9 +4,9 @@
 //! jumps of a recording the moment of the largest change is known to a second or two. Two loggers with separate clocks, a filter, or a slow
 //! fieldbus client make a channel late.
 
-use crate::commands::begins_with_jump;
-use crate::findings::code;
 use crate::objections::objection::Objection;
+use crate::step_data::commands::begins_with_jump;
+use crate::step_outcome::findings::code;
 use mapper_core::{Channel, Recording, Series};
 use mapper_numerics::statistics::{mean, median};
 

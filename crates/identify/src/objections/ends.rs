@@ -1,11 +1,11 @@
 //! The readings at the end of each step, when everything but the housing has settled.
 
-use crate::{IdentifyConfig, taps};
+use crate::{IdentifyConfig, step_data::taps};
 use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::is_reading;
-use mapper_physics::air::Air;
-use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::gas::air::Air;
+use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// Last part of a step, s.
 pub(crate) const LAST_S: f64 = 10.0;

@@ -4,12 +4,12 @@
 //! the time. Such a channel counts as frozen only if it stays constant over a jump that should move it.
 
 use crate::IdentifyConfig;
-use crate::findings::code;
 use crate::needs::needs;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_core::{Channel, Recording, Series, with_unit};
-use mapper_physics::sensor_fault::repeats_s;
+use mapper_physics::rig::sensor_fault::repeats_s;
 
 /// Minimum number of equal samples.
 const MIN: usize = 8;

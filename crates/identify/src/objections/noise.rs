@@ -4,9 +4,9 @@
 //! A channel with several times that noise makes the intervals too narrow.
 
 use crate::IdentifyConfig;
-use crate::findings::code;
 use crate::needs::needs;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_core::{Recording, with_unit};
 use mapper_numerics::statistics::robust_sigma;
 

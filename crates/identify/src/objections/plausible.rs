@@ -3,9 +3,9 @@
 //! The ranges are those of [`mapper_observe::plausible`], wide enough for every turbocharger on a gas stand.
 
 use crate::IdentifyConfig;
-use crate::findings::code;
 use crate::needs::needs;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_core::Recording;
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;

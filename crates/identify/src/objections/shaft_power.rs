@@ -4,13 +4,13 @@
 //! to 40 % of it. A single point may exceed it for a while, if a hot compressor housing heats the air or the shaft slows down. The median of a
 //! campaign may not.
 
-use crate::findings::code;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_core::Channel;
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
-use mapper_physics::air;
+use mapper_physics::gas::air;
 
 /// Limits for the ratio of compressor to turbine power of the median point: upper, and lower. A turbine housing that loses as much as it
 /// delivers is far below every gas stand.

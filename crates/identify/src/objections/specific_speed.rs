@@ -3,9 +3,9 @@
 //!
 //! A wrong unit changes it far more than machines differ: 1/s for rpm by 60, kg/h for kg/s by 60.
 
-use crate::findings::code;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_numerics::statistics::median;
 
 /// Limits for the median of a campaign's points, with a wide margin about real machines.

@@ -1,7 +1,7 @@
 //! Detects impossible steps: a rig is at one operating point at a time, and a number identifies one step.
 
-use crate::findings::code;
 use crate::objections::objection::Objection;
+use crate::step_outcome::findings::code;
 use mapper_core::{Recording, step_number};
 
 /// Overlap that rounded times of other loggers explain, s.

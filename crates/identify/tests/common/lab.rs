@@ -4,12 +4,12 @@
 use super::common::add_noise;
 use mapper_core::{Channel, InletConvection, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_identify::DeclaredUncertainty;
-use mapper_physics::air::Air;
-use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_ratio};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::steady;
+use mapper_physics::gas::air::Air;
+use mapper_physics::laws::compression::{CompressionInputs, compress, isentropic_rise_ratio};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::BTreeMap;
@@ -148,7 +148,7 @@ fn directional(
     machine: Machine,
     boundary: &BoundaryConditions,
     tc_k: f64,
-    outputs: &mapper_physics::model::Outputs,
+    outputs: &mapper_physics::simulation::model::Outputs,
 ) -> f64 {
     let rise = isentropic_rise_ratio(outputs.pressure_ratio, boundary.t1_k, Air::PAPER);
     let bulk_k = boundary.t1_k * (1.0 + rise / outputs.efficiency);

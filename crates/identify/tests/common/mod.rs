@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use mapper_core::{Channel, Recording, Series, StepKind, StepMarker};
-use mapper_physics::air::Air;
-use mapper_physics::compression::{CompressionInputs, compress, isentropic_rise_ratio};
+use mapper_physics::gas::air::Air;
+use mapper_physics::laws::compression::{CompressionInputs, compress, isentropic_rise_ratio};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 

@@ -1,8 +1,8 @@
 //! Work and flow coefficients of a map's points, with the apparent work.
 
 use mapper_core::{CompressorMap, ReferenceState};
-use mapper_physics::air::{self, Air};
-use mapper_physics::compression::isentropic_rise_ratio;
+use mapper_physics::gas::air::{self, Air};
+use mapper_physics::laws::compression::isentropic_rise_ratio;
 
 /// Speed by which coefficients are made: it scales them and drops out, as the wheel's diameter does, rpm.
 const UNIT_SPEED_RPM: f64 = 100_000.0;

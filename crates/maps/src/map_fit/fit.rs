@@ -1,13 +1,13 @@
 //! The fit of a surface to a map, stiff enough that no lines cross.
 
 use super::MapFitError;
-use super::crossing::crossings;
-use super::ends::End;
-use super::observations::Observations;
-use super::solution::Solution;
-use super::solve::solve;
-use super::surface::MapFit;
-use super::table::{MapFitOptions, table};
+use crate::map_fit::fitted_surface::surface::MapFit;
+use crate::map_fit::fitted_surface::table::{MapFitOptions, table};
+use crate::map_fit::least_squares::observations::Observations;
+use crate::map_fit::least_squares::solution::Solution;
+use crate::map_fit::least_squares::solve::solve;
+use crate::map_fit::speed_lines::crossing::crossings;
+use crate::map_fit::speed_lines::ends::End;
 use mapper_core::{CompressorMap, FittedLine};
 
 /// Factors on the smallest penalty that are tried until no lines cross.

@@ -1,31 +1,16 @@
 //! A smooth surface through all speed lines together.
 
-mod beyond;
-mod common_errors;
-mod crossing;
-mod ends;
 mod error;
 mod fit;
-mod leave_out;
-mod line_errors;
-mod line_shape;
-mod miss;
-mod nearest;
-mod observations;
-mod precisions;
-mod problem;
-mod solution;
-mod solve;
-mod speed_spline;
-mod splines;
-mod surface;
-mod table;
-mod variances;
+mod fitted_surface;
+mod least_squares;
+mod prediction_errors;
+mod speed_lines;
 
 pub use error::MapFitError;
-pub use leave_out::leave_out;
-pub use surface::{MapFit, NearestPlace};
-pub use table::MapFitOptions;
+pub use fitted_surface::surface::{MapFit, NearestPlace};
+pub use fitted_surface::table::MapFitOptions;
+pub use prediction_errors::leave_out::leave_out;
 
 use mapper_core::{CompressorMap, FittedMap};
 
@@ -35,7 +20,7 @@ impl MapFit {
     /// # Errors
     /// [`MapFitError::Speed`] for a further speed below a tenth of the slowest or above 1.3 times the fastest line.
     pub fn table(&self, options: &MapFitOptions) -> Result<FittedMap, MapFitError> {
-        let mut table = table::table(self, options)?;
+        let mut table = fitted_surface::table::table(self, options)?;
         if options.leave_one_out {
             table.left_out = leave_out(self);
         }

@@ -1,24 +1,24 @@
 //! Reads a table of points as engineers have it: headings of several languages in any order, units in the heading or below it, a preamble,
 //! a speed only in the first row of its line, one block per speed or side by side, measured points that are not corrected yet.
 
-use crate::table::beta_tables::{read_arrays, read_modelica, read_nested};
-use crate::table::column::Machine;
-use crate::table::design::{MapDesign, scale_to_design};
+use crate::table::columns::column::Machine;
+use crate::table::columns::described_columns::Given;
+use crate::table::columns::quantity::Quantity;
 use crate::table::efficiency_comment::efficiency_in_comment;
-use crate::table::given::Given;
-use crate::table::grid::{Grid, text_of};
-use crate::table::layout::{self, Layout};
-use crate::table::lines::{Row, map_of_rows};
-use crate::table::points::{Point, columns, efficiency_in_percent, points};
-use crate::table::quantity::Quantity;
+use crate::table::gas_turbine::beta_tables::{read_arrays, read_modelica, read_nested};
+use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
 use crate::table::reference;
+use crate::table::rows_to_lines::{Row, map_of_rows};
+use crate::table::sheet::grid::{Grid, text_of};
+use crate::table::sheet::layout::{self, Layout};
+use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
 use mapper_core::{
     CompressorMap, EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription,
     ReferenceState, StaticTaps,
 };
-use mapper_physics::air::Air;
-use mapper_physics::compression::apparent_efficiency;
-use mapper_physics::pressure_tap::static_to_total_pa;
+use mapper_physics::gas::air::Air;
+use mapper_physics::gas::pressure_tap::static_to_total_pa;
+use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_yaml::units::{Kind, header_unit};
 
 /// The map of a text.

@@ -1,13 +1,13 @@
 //! Reads a turbine map from a table of points, in all layouts of compressor maps.
 
-use crate::table::column::{Column, Machine};
-use crate::table::given::Given;
-use crate::table::grid::Grid;
-use crate::table::layout;
-use crate::table::points::{Point, columns, efficiency_in_percent, points};
-use crate::table::quantity::Quantity;
+use crate::table::columns::column::{Column, Machine};
+use crate::table::columns::described_columns::Given;
+use crate::table::columns::quantity::Quantity;
 use crate::table::read::notes;
 use crate::table::reference;
+use crate::table::sheet::grid::Grid;
+use crate::table::sheet::layout;
+use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
 use mapper_core::{
     ImportError, ImportRemark, ImportedTurbine, MapDescription, ReferenceState, TurbineMap, TurbineMapPoint,
 };

@@ -2,11 +2,11 @@
 #![allow(dead_code, reason = "each user takes its own part")]
 
 use mapper_core::{Channel, DeclaredUncertainty, Element, Recording, RedundantSensors, Series};
-use mapper_physics::inputs::Inputs;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::{steady, thermocouple};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::{laws::thermocouple, simulation::steady};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

@@ -1,9 +1,9 @@
 //! The verdict of a run in a sentence, and the most important actions.
 
 use crate::page::run_page::RunPage;
+use crate::{RunReport, disagreement_text, doubts, zero_words};
 use mapper_core::Verdict;
 use mapper_identify::ZeroOutcome;
-use crate::{RunReport, disagreement_text, doubts, zero_words};
 
 /// Whether the map can be used as it is.
 pub(crate) fn is_clean(page: &RunPage<'_>) -> bool {

@@ -1,10 +1,10 @@
 //! Lines, contours and ends of the map in the form that the script draws.
 
+use crate::Display;
 use mapper_campaign::units::Kind;
 use mapper_chart::{StructuredGrid, contour_lines};
 use mapper_core::{CompressorMap, FittedNode, half_width_95};
 use mapper_maps::mesh::{contour_levels, efficiency_surface, fitted_surface, speed_curve};
-use crate::Display;
 use serde::Serialize;
 
 /// The map without its points.

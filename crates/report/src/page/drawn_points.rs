@@ -1,10 +1,10 @@
 //! Points in the form that the script draws, in display units.
 
 use crate::page::run_page::RunPage;
+use crate::{Display, at_end, step_name, verdict_word};
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, IdentifiedPoint, half_width_95, standard_error_of};
 use mapper_identify::TwoParameter;
-use crate::{Display, at_end, step_name, verdict_word};
 use serde::Serialize;
 
 /// Channels whose readings are shown with a point.
@@ -23,7 +23,7 @@ const RAW: [Channel; 9] = [
 /// One point. Efficiencies in %, half widths of 95 % intervals in points.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct DrawnPoint {
-    #[serde(serialize_with = "mapper_core::step_number::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     step: usize,
     name: String,
     /// Corrected speed of its line, as text.

@@ -1,12 +1,12 @@
 //! Readings of each step, thinned for drawing.
 
+use crate::Display;
 use crate::page::drawn_map::rounded;
 use crate::page::run_page::RunPage;
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_identify::T2Course;
 use mapper_numerics::statistics::{mean, rms};
-use crate::Display;
 use serde::Serialize;
 
 /// Rows drawn per step: as many as a small plot has pixels.
@@ -27,7 +27,7 @@ const CHANNELS: [(Channel, &str); 8] = [
 /// One step; times are seconds after its change of setpoints.
 #[derive(Serialize)]
 pub(crate) struct DrawnStep {
-    #[serde(serialize_with = "mapper_core::step_number::serialize")]
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
     step: usize,
     t: Vec<f64>,
     channels: Vec<DrawnChannel>,

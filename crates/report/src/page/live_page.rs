@@ -1,14 +1,14 @@
 //! The page of a run in progress: the same map, updated by the program during the run.
 
+use crate::Display;
 use crate::page::drawn_map::{DrawnMap, drawn_map};
 use crate::page::drawn_points::{DrawnPoint, drawn_point};
 use crate::page::sections::live;
 use crate::page::shell::{Purpose, shell};
-use mapper_maps::{Grouping, assemble};
 use mapper_campaign::Campaign;
 use mapper_campaign::units::Kind;
 use mapper_core::{IdentifiedPoint, Plan};
-use crate::Display;
+use mapper_maps::{Grouping, assemble};
 use serde::Serialize;
 
 /// Initial data of the script.

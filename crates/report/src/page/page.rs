@@ -1,12 +1,12 @@
 //! The page as HTML.
 
+use crate::Display;
 use crate::page::drawn_map::{DrawnMap, drawn_map};
 use crate::page::drawn_points::{DrawnPoint, drawn_points};
 use crate::page::drawn_steps::{DrawnStep, drawn_steps};
 use crate::page::run_page::RunPage;
 use crate::page::sections;
 use crate::page::shell::{Purpose, shell};
-use crate::Display;
 use maud::html;
 use serde::Serialize;
 

@@ -1,8 +1,8 @@
 //! Input of the page of a run or of identified recordings.
 
+use crate::RunReport;
 use mapper_core::CompressorMap;
 use mapper_identify::T2Course;
-use crate::RunReport;
 use maud::Markup;
 
 /// The content of the page.

@@ -1,7 +1,7 @@
 //! Estimates the surge flow from the readings so far.
 
 use crate::surge::growth_law::{GrowthLaw, Read, excess, log_likelihood};
-use crate::surge::smooth::Smoothed;
+use crate::surge::smoothed_flow::Smoothed;
 use crate::surge::surge_reading::{LOOKED_AT, SurgeReading};
 use mapper_numerics::statistics::mean;
 

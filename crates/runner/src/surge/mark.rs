@@ -139,8 +139,11 @@ fn pressure_ratio_at(looks: &[SurgeReading], last: &SurgeReading, flow_kg_s: f64
     let taken = &looks[looks.len().saturating_sub(TAKEN)..];
     let point = |look: &SurgeReading| {
         let factor = last.speed_corrected_rpm / look.speed_corrected_rpm;
-        let (flow, ratio) =
-            mapper_physics::similarity::at_speed(look.flow_corrected_kg_s, look.pressure_ratio, factor);
+        let (flow, ratio) = mapper_physics::compressor_map::similarity::at_speed(
+            look.flow_corrected_kg_s,
+            look.pressure_ratio,
+            factor,
+        );
         (flow, ratio)
     };
     let points: Vec<(f64, f64)> = taken.iter().map(point).collect();

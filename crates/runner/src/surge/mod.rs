@@ -8,7 +8,7 @@ mod estimate;
 mod growth_law;
 mod mark;
 mod next_move;
-mod smooth;
+mod smoothed_flow;
 mod surge_reading;
 mod variation;
 

@@ -2,10 +2,10 @@
 //! by its index.
 
 use mapper_backends::virtual_lab::{LabSettings, SensorErrors, VirtualLab};
-use mapper_driver_host::conformance::Fault;
 use mapper_core::Channel::{self, P2, P3, ShaftSpeed, T2};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_driver_host::conformance::Fault;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
 
 /// Start of a fault in the middle of the second step, s.
 pub(crate) const FAULT_S: f64 = 70.0;

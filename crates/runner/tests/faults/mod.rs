@@ -8,11 +8,11 @@ mod over_protocol;
 use super::{Notebook, Recorded, plan};
 use behind::{FAULT_S, lab};
 use mapper_backends::virtual_lab::VirtualLab;
-use mapper_driver_host::conformance::{Fault, Misbehaving};
 use mapper_core::{
     Backend, Channel, EventKind, GuardName, GuardSet, Plan, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
     SurgeVariation, UnpacedClock,
 };
+use mapper_driver_host::conformance::{Fault, Misbehaving};
 use mapper_runner::{
     BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunEnd, RunError, Runner, SignalWatch,
     SurgeWatch,

@@ -1,8 +1,8 @@
 //! What can go wrong with blind cases.
 
 use mapper_campaign::NominalTableError;
-use mapper_physics::effect::EffectError;
-use mapper_physics::steady::SteadyError;
+use mapper_physics::rig::effect::EffectError;
+use mapper_physics::simulation::steady::SteadyError;
 use mapper_recording::RecordError;
 use mapper_runner::RunError;
 use std::path::PathBuf;

@@ -14,8 +14,8 @@ mod slow_housing_probe;
 mod slow_pressure_line;
 mod speed_gain;
 
-use mapper_physics::effect::Effect;
-use mapper_physics::effect_kind::effect_of;
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::rig::effect_kind::effect_of;
 use std::sync::Arc;
 
 /// What an outside cause is for.

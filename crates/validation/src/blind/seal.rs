@@ -1,8 +1,8 @@
 //! Answers under seal: a hash printed before anything is diagnosed.
 
+use crate::blind::cases::equations::Laboratory;
+use crate::blind::cases::truth::Truth;
 use crate::blind::error::BlindError;
-use crate::blind::laboratory::Laboratory;
-use crate::blind::truth::Truth;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

@@ -1,8 +1,8 @@
 //! What can stop the reproduction.
 
 use mapper_identify::{IdentifyError, StepError};
-use mapper_physics::simulate::SimulationError;
-use mapper_physics::steady::SteadyError;
+use mapper_physics::simulation::simulate::SimulationError;
+use mapper_physics::simulation::steady::SteadyError;
 
 /// Why a figure could not be redone.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

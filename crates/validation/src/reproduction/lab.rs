@@ -2,10 +2,10 @@
 
 use crate::reproduction::ReproduceError;
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::steady::hold_speed;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady::hold_speed;
 
 /// Table 1: from and to, rpm.
 pub(crate) const JUMPS: [(f64, f64); 4] = [(110e3, 50e3), (50e3, 110e3), (150e3, 90e3), (90e3, 150e3)];

@@ -4,24 +4,18 @@
 //! the same program gives the same bytes.
 
 mod error;
-mod figure_10;
-mod figure_12;
-mod figure_5;
-mod figure_6;
-mod figure_7;
-mod figure_8;
-mod figure_9;
-mod format;
+mod figure_data;
+mod figures;
 mod lab;
 mod model_table;
+mod number_text;
 mod outcome;
 mod page;
 mod picture;
-mod result;
 
 pub use error::ReproduceError;
+pub use figure_data::{FigureResult, Statement, Table, Verdict, picture_path};
 pub use page::{figure_json, reproduction_page};
-pub use result::{FigureResult, Statement, Table, Verdict, picture_path};
 
 /// Numbers of the figures that [`reproduce`] redoes, in its order.
 pub const FIGURES: [&str; 7] = ["5", "6", "7", "8", "9", "10", "12"];
@@ -31,18 +25,18 @@ pub const FIGURES: [&str; 7] = ["5", "6", "7", "8", "9", "10", "12"];
 /// # Errors
 /// [`ReproduceError`] if the model cannot be run or a recording cannot be identified.
 pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, ReproduceError> {
-    let model = mapper_physics::model::Model::nominal();
+    let model = mapper_physics::simulation::model::Model::nominal();
     let mut results = Vec::with_capacity(FIGURES.len());
     for number in FIGURES {
         progress(number);
         results.push(match number {
-            "5" => figure_5::figure()?,
-            "6" => figure_6::figure(&lab::run_all(&model, outcome::RUN_S)?)?,
-            "7" => figure_7::figure(&lab::run_all(&model, figure_7::RUN_S)?)?,
-            "8" => figure_8::figure()?,
-            "9" => figure_9::figure()?,
-            "10" => figure_10::figure()?,
-            _ => figure_12::figure()?,
+            "5" => figures::figure_5::figure()?,
+            "6" => figures::figure_6::figure(&lab::run_all(&model, outcome::RUN_S)?)?,
+            "7" => figures::figure_7::figure(&lab::run_all(&model, figures::figure_7::RUN_S)?)?,
+            "8" => figures::figure_8::figure()?,
+            "9" => figures::figure_9::figure()?,
+            "10" => figures::figure_10::figure()?,
+            _ => figures::figure_12::figure()?,
         });
     }
     Ok(results)

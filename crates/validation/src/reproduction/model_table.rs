@@ -4,12 +4,12 @@
 
 #![cfg(test)]
 
-use crate::reproduction::figure_5::apparent_eta;
+use crate::reproduction::figures::figure_5::apparent_eta;
 use crate::reproduction::lab::{Run, run_all};
 use crate::reproduction::outcome::{Outcome, RUN_S, WINDOW, assuming, extremes, in_window, outcomes, worst};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::steady::hold_speed;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady::hold_speed;
 
 fn runs(machine: &Model) -> Vec<Run> {
     let runs = run_all(machine, RUN_S).unwrap();

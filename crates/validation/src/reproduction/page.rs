@@ -1,7 +1,7 @@
 //! The reproduction of the paper's figures as a page.
 
 use crate::reproduction::{FigureResult, picture_path};
-use mapper_report::markdown::{Align, table};
+use mapper_report::formatting::markdown::{Align, table};
 
 /// The page, Markdown; it links pictures by [`picture_path`], relative to the page. The same results give the same bytes.
 pub fn reproduction_page(results: &[FigureResult]) -> String {

@@ -1,11 +1,11 @@
 //! `study: blind`: cases drawn, recorded and diagnosed, the causes known to the score alone.
 
-use crate::studies::error::StudyError;
-use crate::studies::source::CampaignSource;
-use crate::blind::score::score;
+use crate::blind::scoring::score::score;
 use crate::blind::{
     CaseKind, Draw, Laboratory, OutsideUse, SIGMA_RANGE, StoredCase, Truth, drawn, record, seal,
 };
+use crate::studies::error::StudyError;
+use crate::studies::source::CampaignSource;
 use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
 use mapper_recording::ChannelMap;
 use mapper_session::{Recorded, Registry, Session, json_text};

@@ -1,11 +1,11 @@
 //! `study: calibration`: the cases that turn scores into probabilities, as `mapper gap blind calibrate` draws them.
 
+use crate::blind::calibration::calibrate::{Calibrated, Observed, Plan, cases, fitted};
+use crate::blind::scoring::reliability::{reliabilities, reliability_text};
+use crate::blind::{Case, StoredCase};
 use crate::studies::error::StudyError;
 use crate::studies::reliability_picture::reliability_svg;
 use crate::studies::source::CampaignSource;
-use crate::blind::calibrate::{Calibrated, Observed, Plan, cases, fitted};
-use crate::blind::reliability::{reliabilities, reliability_text};
-use crate::blind::{Case, StoredCase};
 use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
 use mapper_session::{Registry, json_text};
 use schemars::JsonSchema;

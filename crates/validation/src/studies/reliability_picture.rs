@@ -1,6 +1,6 @@
 //! The reliability of the diagnosis' first answer as a picture.
 
-use crate::blind::reliability::{Bin, Reliability};
+use crate::blind::scoring::reliability::{Bin, Reliability};
 use mapper_chart::{Axis, Dash, Figure, Line, Panel, Scatter, ScatterPoint, palette};
 
 /// A panel for each calibration: how often the first answer is right over the probability that it was given, in %.

@@ -1,10 +1,12 @@
 //! Blind cases from end to end: made, sealed, scored without diagnoses and with those of an oracle.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_validation::blind::{ANSWERS_NAME, BlindError, Draw, Made, OutsideUse, Share, Truth, make, score};
 use mapper_campaign::Campaign;
 use mapper_core::Channel;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
+use mapper_validation::blind::{
+    ANSWERS_NAME, BlindError, Draw, Made, OutsideUse, Share, Truth, make, scoring::score,
+};
 use serde_json::json;
 use std::path::Path;
 

@@ -1,14 +1,14 @@
 //! On a rig of other equations: everything is outside the catalogue, until a healthy recording shows the rig's behaviour.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_validation::blind::{CaseKind, Draw, Laboratory, OutsideUse, make, study_without_causes};
 use mapper_core::Recording;
-use mapper_diagnose::gap::calibration::Calibration;
+use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Question, diagnose};
-use mapper_diagnose::gap::healthy::Healthy;
-use mapper_diagnose::gap::report::{Diagnosis, Verdict};
-use mapper_physics::effect::Effect;
+use mapper_diagnose::gap::findings::report::{Diagnosis, Verdict};
+use mapper_diagnose::gap::reference::healthy::Healthy;
+use mapper_physics::rig::effect::Effect;
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
+use mapper_validation::blind::{CaseKind, Draw, Laboratory, OutsideUse, make, study_without_causes};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -3,10 +3,10 @@
 use super::motion::Motion;
 use super::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, RunningMachine, SecondOrder, Structure, StructureError};
-use mapper_physics::model::{Model, State};
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::Watch;
-use mapper_physics::steady;
+use mapper_physics::simulation::model::{Model, State};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::simulate::Watch;
+use mapper_physics::simulation::steady;
 use std::sync::Arc;
 
 /// Replaces equations and sensors of a virtual lab by those of this one.

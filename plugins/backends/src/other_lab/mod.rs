@@ -14,8 +14,8 @@ pub use structure::{NAME, OtherStructure};
 
 use crate::virtual_lab::VirtualLab;
 use mapper_core::{Backend, BackendError};
-use mapper_physics::backend_plugin::BackendPlugin;
-use mapper_physics::nominal_rig::NominalRig;
+use mapper_physics::rig::backend_plugin::BackendPlugin;
+use mapper_physics::rig::nominal_rig::NominalRig;
 
 /// The lab as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin =

@@ -1,7 +1,7 @@
 //! The gas along the four nodes of the compressor housing.
 
 use super::structure::OtherStructure;
-use mapper_physics::compression::after_wheel;
+use mapper_physics::laws::compression::after_wheel;
 
 /// Nodes of the housing: shroud, diffuser, scroll, outlet flange.
 pub(super) const NODES: usize = 4;

@@ -5,7 +5,7 @@ use super::equations::turn_into;
 use super::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, SettingProblem, read_settings, within};
 use mapper_core::BackendError;
-use mapper_physics::nominal_rig::NominalRig;
+use mapper_physics::rig::nominal_rig::NominalRig;
 use mapper_yaml::units::{Conductance, Fraction, Length, Quantity};
 use serde::Deserialize;
 

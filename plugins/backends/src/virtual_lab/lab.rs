@@ -1,25 +1,25 @@
 //! The virtual gas stand: the lumped model behind actuators and sensors, in simulated time.
 
-use super::actuator::Actuator;
-use super::drift::{self, LabDrift};
-use super::elements::ElementBank;
-use super::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
-use super::precursor::Resonator;
-use super::running::RunningMachine;
+use crate::virtual_lab::rig::actuator::Actuator;
+use crate::virtual_lab::rig::drift::{self, LabDrift};
+use crate::virtual_lab::sensors::elements::ElementBank;
+use crate::virtual_lab::rig::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
+use crate::virtual_lab::rig::precursor::Resonator;
+use crate::virtual_lab::rig::running::RunningMachine;
 use super::samples::{Instant, Readers, SampleCollector};
-use super::second_order::SecondOrderFollower;
-use super::sensor::Sensor;
+use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
+use crate::virtual_lab::sensors::sensor::Sensor;
 use super::settings::{LabSettings, Start};
 use crate::setpoint_limits;
 use mapper_core::{
     Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, RigDescription, RigMode,
     SafeTrajectory, SampleBatch, Setpoints,
 };
-use mapper_physics::inputs::Inputs;
-use mapper_physics::instruments::ChannelFollower;
-use mapper_physics::model::{State, rad_s_of_rpm};
-use mapper_physics::simulate::{Crossing, ModelEvent, SimulationError, Watch};
-use mapper_physics::standstill::{self, StandstillState};
+use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::rig::instruments::ChannelFollower;
+use mapper_physics::simulation::model::{State, rad_s_of_rpm};
+use mapper_physics::simulation::simulate::{Crossing, ModelEvent, SimulationError, Watch};
+use mapper_physics::laws::standstill::{self, StandstillState};
 
 /// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;

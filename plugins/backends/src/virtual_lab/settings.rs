@@ -1,18 +1,18 @@
 //! Settings of the virtual lab, in SI units. They are the truth: only the lab reads them.
 
-use super::actuator::ActuatorDynamics;
-use super::boundary_wander::Weather;
-use super::drift::LabDrift;
-use super::elements::LabElements;
-use super::precursor::SurgePrecursor;
-use super::running::{Lumped, Structure};
-use super::second_order::SecondOrder;
-use super::sensor::SensorErrors;
+use crate::virtual_lab::rig::actuator::ActuatorDynamics;
+use crate::virtual_lab::rig::boundary_wander::Weather;
+use crate::virtual_lab::rig::drift::LabDrift;
+use crate::virtual_lab::sensors::elements::LabElements;
+use crate::virtual_lab::rig::precursor::SurgePrecursor;
+use crate::virtual_lab::rig::running::{Lumped, Structure};
+use crate::virtual_lab::sensors::second_order::SecondOrder;
+use crate::virtual_lab::sensors::sensor::SensorErrors;
 use mapper_core::Channel;
-use mapper_physics::effect::Rig;
-use mapper_physics::instruments::Instruments;
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::instruments::Instruments;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::machine::params::BoundaryConditions;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -77,7 +77,7 @@ pub struct LabSettings {
 impl LabSettings {
     /// Takes machine and instruments from a rig; additional lag of its P3 goes to the actuator.
     pub fn take(&mut self, rig: Rig) {
-        let slower_s = rig.instruments.p3_lag_s - mapper_physics::instruments::NOMINAL_P3_LAG_S;
+        let slower_s = rig.instruments.p3_lag_s - mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
         self.p3_actuator.lag_s = (self.p3_actuator.lag_s + slower_s).max(0.0);
         self.model = rig.model;
         self.instruments = rig.instruments;

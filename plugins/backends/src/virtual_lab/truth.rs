@@ -1,7 +1,7 @@
 //! True values known only to the simulator, sample by sample; recorded under /truth and read by scoring alone.
 
 use mapper_core::TruthColumn;
-use mapper_physics::model::Outputs;
+use mapper_physics::simulation::model::Outputs;
 
 type Reader = fn(&Outputs) -> f64;
 

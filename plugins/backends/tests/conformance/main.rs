@@ -4,10 +4,10 @@
 use mapper_backends::other_lab::{self, OtherStructure};
 use mapper_backends::replay::{self, ReplayBackend};
 use mapper_backends::virtual_lab::{self, ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab};
-use mapper_driver_host::conformance::{Candidate, RULES};
 use mapper_core::{Backend, BackendError, Channel, Recording, RigMode, Series, Setpoints};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
+use mapper_driver_host::conformance::{Candidate, RULES};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::Model;
 
 /// All backends, in their practical configuration.
 fn candidates() -> [Candidate<'static>; 5] {

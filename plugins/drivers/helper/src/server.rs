@@ -98,7 +98,8 @@ impl Server {
             return Err(refused(Code::Refused, message));
         }
         self.greeted = true;
-        self.frame_limit_bytes = theirs.frame_limit_bytes.max(mapper_driver_host::protocol::FIRST_FRAME_LIMIT_BYTES);
+        self.frame_limit_bytes =
+            theirs.frame_limit_bytes.max(mapper_driver_host::protocol::FIRST_FRAME_LIMIT_BYTES);
         let hello = Hello {
             magic: MAGIC.to_owned(),
             protocol: VERSION,

@@ -4,11 +4,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, BackendError, RigMode, Setpoints};
-use mapper_driver_host::{Driver, PATIENCE, Patience};
 use mapper_driver_host::protocol::{
     Encoding, FRAME_LIMIT_BYTES, LEASE_S, MAGIC, Message, VERSION, decode, encode, read_frame,
     setpoints_on_the_wire, write_frame,
 };
+use mapper_driver_host::{Driver, PATIENCE, Patience};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

@@ -3,8 +3,8 @@
 use super::header::Mistake;
 use super::hook_names::HOOK_NAMES;
 use mapper_core::Channel;
-use mapper_physics::effect::{EffectError, NamedValues};
-use mapper_physics::hooks::Site;
+use mapper_physics::machine::hooks::Site;
+use mapper_physics::rig::effect::{EffectError, NamedValues};
 use rhai::packages::{ArithmeticPackage, BasicMathPackage, LogicPackage, Package};
 use rhai::{AST, CallFnOptions, Dynamic, Engine, FuncArgs, ParseError, Position, Scope};
 use std::cell::RefCell;

@@ -1,7 +1,7 @@
 //! The header of a script: lines `//! key: value` that describe the effect.
 
 use mapper_core::Channel;
-use mapper_physics::effect::{EffectInfo, EffectParameter, Submodel};
+use mapper_physics::rig::effect::{EffectInfo, EffectParameter, Submodel};
 use std::borrow::Cow;
 
 /// A line, from 1, if known, and the error.

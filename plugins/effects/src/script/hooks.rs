@@ -3,7 +3,7 @@
 use super::engine::{At, Numbers, Program};
 use super::hook_names::HOOK_NAMES;
 use mapper_core::{CHANNELS, Channel};
-use mapper_physics::hooks::{Hooks, Site};
+use mapper_physics::machine::hooks::{Hooks, Site};
 use std::sync::{Arc, OnceLock};
 
 /// A program with the values of its parameters.

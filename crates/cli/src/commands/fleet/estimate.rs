@@ -1,8 +1,8 @@
 //! `mapper fleet estimate`: what a study costs, before it is run.
 
-use crate::failure::Failure;
+use crate::output::failure::Failure;
 use crate::fleet_place::in_fleet;
-use crate::output;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::cost_text;
 use std::path::PathBuf;
@@ -26,6 +26,6 @@ impl Estimate {
         let tried = in_fleet(&self.directory, None, |fleet, kind, engine, machine| {
             fleet.tried(kind, self.tries.into(), engine, machine)
         })?;
-        if self.json { output::print_json(&tried.cost) } else { output::print(&cost_text(&tried.cost)) }
+        if self.json { standard_output::print_json(&tried.cost) } else { standard_output::print(&cost_text(&tried.cost)) }
     }
 }

@@ -1,8 +1,8 @@
 //! `mapper fleet make`: a study becomes items.
 
-use crate::failure::Failure;
+use crate::output::failure::Failure;
 use crate::fleet_place::on_this_machine;
-use crate::{output, output_options};
+use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_fleet::{Made, kind_of, open_study};
 use mapper_validation::studies::program;
@@ -36,7 +36,7 @@ impl Make {
             let items = made.fleet.study.items.len();
             if self.json {
                 let (new, gone) = (made.new, made.gone);
-                return output::print_json(
+                return standard_output::print_json(
                     &json!({ "directory": self.out, "items": items, "new": new, "gone": gone }),
                 );
             }
@@ -45,7 +45,7 @@ impl Make {
             } else {
                 format!(", {} of them new; {} are gone", made.new, made.gone)
             };
-            output::print(&format!(
+            standard_output::print(&format!(
                 "{items} items in {dir}{changed}\nWhat they cost: mapper fleet estimate {dir}\n",
                 dir = self.out.display()
             ))

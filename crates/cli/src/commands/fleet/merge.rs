@@ -1,9 +1,9 @@
 //! `mapper fleet merge`: from parts to the result.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
 use crate::fleet_place::in_fleet;
-use crate::output;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::merged_text;
 use serde_json::json;
@@ -30,9 +30,9 @@ impl Merge {
         })?;
         let result = merged.result.as_ref().map(|(path, _)| path);
         if self.json {
-            output::print_json(&json!({ "status": merged.status, "result": result }))?;
+            standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
         } else {
-            output::print(&merged_text(&merged))?;
+            standard_output::print(&merged_text(&merged))?;
         }
         if merged.status.lacking() == 0 {
             return Ok(());

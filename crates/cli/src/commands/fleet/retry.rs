@@ -1,8 +1,8 @@
 //! `mapper fleet retry`: what is missing, once more.
 
-use crate::failure::Failure;
+use crate::output::failure::Failure;
 use crate::fleet_place::in_fleet;
-use crate::output;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_report::submission_text;
 use std::path::PathBuf;
@@ -21,6 +21,6 @@ impl Retry {
     /// Submits.
     pub fn run(&self) -> Result<(), Failure> {
         let submission = in_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
-        if self.json { output::print_json(&submission) } else { output::print(&submission_text(&submission)) }
+        if self.json { standard_output::print_json(&submission) } else { standard_output::print(&submission_text(&submission)) }
     }
 }

@@ -1,9 +1,9 @@
 //! `mapper fleet run`: all of a study on this machine.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
 use crate::fleet_place::in_fleet;
-use crate::output;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::Which;
 use mapper_report::merged_text;
@@ -36,9 +36,9 @@ impl Run {
             })?;
         let result = merged.result.as_ref().map(|(path, _)| path);
         if self.json {
-            output::print_json(&json!({ "status": merged.status, "result": result }))?;
+            standard_output::print_json(&json!({ "status": merged.status, "result": result }))?;
         } else {
-            output::print(&merged_text(&merged))?;
+            standard_output::print(&merged_text(&merged))?;
         }
         if result.is_some() {
             return Ok(());

@@ -1,8 +1,8 @@
 //! `mapper fleet status`: how far a study is.
 
-use crate::failure::Failure;
+use crate::output::failure::Failure;
 use crate::fleet_place::on_this_machine;
-use crate::output;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::{Fleet, Template, running};
 use mapper_report::status_text;
@@ -30,10 +30,10 @@ impl Status {
             let fleet = Fleet::open(&self.directory, &program(registry))?;
             if self.items {
                 if self.json {
-                    return output::print_json(&json!({ "items": fleet.study.items }));
+                    return standard_output::print_json(&json!({ "items": fleet.study.items }));
                 }
                 let line = |item: &mapper_fleet::Listed| format!("{}  {}\n", item.hash, item.name);
-                return output::print(&fleet.study.items.iter().map(line).collect::<String>());
+                return standard_output::print(&fleet.study.items.iter().map(line).collect::<String>());
             }
             let status = fleet.status();
             // Asked only if something may be under way, and never waited for.
@@ -43,11 +43,11 @@ impl Status {
             });
             if self.json {
                 let left_s = status.left_s();
-                return output::print_json(
+                return standard_output::print_json(
                     &json!({ "study": fleet.study.name, "status": status, "core_s_left": left_s, "queue": states }),
                 );
             }
-            output::print(&status_text(&fleet.study.name, &status, states.as_ref()))
+            standard_output::print(&status_text(&fleet.study.name, &status, states.as_ref()))
         })
     }
 }

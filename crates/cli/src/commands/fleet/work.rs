@@ -1,9 +1,9 @@
 //! `mapper fleet work`: a share of the items.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
 use crate::fleet_place::in_fleet;
-use crate::output;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::{Hash, Shard, Which};
 use serde_json::json;
@@ -45,13 +45,13 @@ impl Work {
                 fleet.work(kind, which, self.again, engine, machine)
             })?;
         if self.json {
-            output::print_json(
+            standard_output::print_json(
                 &json!({ "done": worked.done, "there": worked.there, "failed": worked.failed }),
             )?;
         } else {
             let failed = worked.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
             let failed: String = failed.collect();
-            output::print(&format!("{failed}{} done, {} were there\n", worked.done, worked.there))?;
+            standard_output::print(&format!("{failed}{} done, {} were there\n", worked.done, worked.there))?;
         }
         if worked.failed.is_empty() {
             return Ok(());

@@ -1,8 +1,8 @@
 //! `mapper gap apply`: the machine that a diagnosis found, as the virtual lab of a campaign.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{output, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_session::{Twin, found_in, twin_campaign, write_new};
 use std::path::PathBuf;
@@ -32,6 +32,6 @@ impl Apply {
         let written = twin_campaign(&text, &twin, &registry::registry().effects)?;
         write_new(&self.out, written.as_bytes())?;
         mapper_campaign::load(&self.out).map_err(Failure::of_campaign)?;
-        output::print(&format!("campaign with the machine as found in {}\n", self.out.display()))
+        standard_output::print(&format!("campaign with the machine as found in {}\n", self.out.display()))
     }
 }

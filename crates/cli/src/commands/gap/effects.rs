@@ -1,11 +1,11 @@
 //! `mapper gap effects`.
 
-use crate::failure::Failure;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_validation::blind::study_without_causes;
-use mapper_diagnose::missing_terms::signatures::signatures;
-use mapper_physics::effect::Effect;
+use mapper_diagnose::missing_terms::imitations::signatures;
+use mapper_physics::rig::effect::Effect;
 use mapper_report::with_heads;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ impl Effects {
         }
         if self.json {
             let list: Vec<_> = effects.iter().map(|effect| effect.info().clone()).collect();
-            return output::print_json(&json!({ "effects": list }));
+            return standard_output::print_json(&json!({ "effects": list }));
         }
         let heads = ["effect", "where", "parameter", "unit", "neutral", "range"];
         let mut table = with_heads(&heads.map(str::to_owned));
@@ -53,7 +53,7 @@ impl Effects {
                 ]);
             }
         }
-        output::print(&format!("{table}\n\n{legend}"))
+        standard_output::print(&format!("{table}\n\n{legend}"))
     }
 
     /// The matrix of effects against balances on a recording of the campaign without causes.
@@ -72,7 +72,7 @@ impl Effects {
                     json!({ "effect": id, "sigma": sigma, "shares": of })
                 })
                 .collect();
-            return output::print_json(&json!({ "signatures": rows }));
+            return standard_output::print_json(&json!({ "signatures": rows }));
         }
         let letters: Vec<String> = (0..names.len()).map(|place| (place + 1).to_string()).collect();
         let heads: Vec<String> = ["effect", "sigma"].map(str::to_owned).into_iter().chain(letters).collect();
@@ -83,7 +83,7 @@ impl Effects {
         }
         let legend: Vec<String> =
             names.iter().enumerate().map(|(place, name)| format!("{:>4}  {name}", place + 1)).collect();
-        output::print(&format!(
+        standard_output::print(&format!(
             "{table}\n% of each effect's signature (one typical step) for which a force missing in one balance could stand in:\n{}\n",
             legend.join("\n")
         ))

@@ -1,8 +1,8 @@
 //! `mapper gap predict`: forecasts the next recording under seal, and says afterwards how that came out.
 
-use crate::failure::Failure;
-use crate::given::channel_map;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::channel_map;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_report::held_text;
 use mapper_session::{Recorded, SealedForecast, Session, found_in};
@@ -51,11 +51,11 @@ impl Predict {
             let forecast = SealedForecast { campaign: campaign.name.clone(), found, steps };
             let (seal, steps) = (forecast.write(&self.forecast)?, forecast.steps.len());
             if self.json {
-                return output::print_json(
+                return standard_output::print_json(
                     &json!({ "forecast": self.forecast, "steps": steps, "sha256": seal }),
                 );
             }
-            return output::print(&format!(
+            return standard_output::print(&format!(
                 "forecast of {steps} steps in {}\nSHA-256: {seal}\n",
                 self.forecast.display()
             ));
@@ -66,8 +66,8 @@ impl Predict {
         let recorded = Recorded::read(&registry, recording, &map, Some(&campaign))?;
         let held = session.hold_twin(&recorded, &campaign, &map, effects, &forecast.found)?;
         if self.json {
-            return output::print_json(&json!({ "sha256": seal, "held": held }));
+            return standard_output::print_json(&json!({ "sha256": seal, "held": held }));
         }
-        output::print(&held_text(&held, &seal))
+        standard_output::print(&held_text(&held, &seal))
     }
 }

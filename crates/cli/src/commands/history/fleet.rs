@@ -1,8 +1,8 @@
 //! `mapper history fleet`: what the machines of a production have in common.
 
 use crate::commands::history::{Chosen, opened};
-use crate::failure::Failure;
-use crate::output;
+use crate::output::failure::Failure;
+use crate::output::standard_output;
 use clap::Args;
 use mapper_history::productions;
 use mapper_report::production_text;
@@ -26,8 +26,8 @@ impl Fleet {
             opened(&self.chosen)?.points(&self.chosen.filter()).map_err(SessionError::from)?;
         let productions = productions(&nights, &points);
         if self.json {
-            return output::print_json(&json!({"history": self.chosen.db, "productions": productions}));
+            return standard_output::print_json(&json!({"history": self.chosen.db, "productions": productions}));
         }
-        output::print(&production_text(&productions))
+        standard_output::print(&production_text(&productions))
     }
 }

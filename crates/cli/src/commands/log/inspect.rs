@@ -1,9 +1,9 @@
 //! `mapper log inspect`: what a log holds, and the channel map that it suggests.
 
-use crate::failure::Failure;
-use crate::given::key_and_value;
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::key_and_value;
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_report::log_text;
 use mapper_session::inspect_log;
@@ -36,13 +36,13 @@ impl Inspect {
             self.replace.write(file, found.channel_map().as_bytes())?;
         }
         if self.json {
-            return output::print_json(&found.json());
+            return standard_output::print_json(&found.json());
         }
         let mut text = log_text(found.format, &found.layout, &found.survey, &found.proposal);
         match &self.write_channels {
             Some(file) => text.push_str(&format!("\nThe channel map is in {}.\n", file.display())),
             None => text.push_str("\nKeep it with `--write-channels FILE`.\n"),
         }
-        output::print(&text)
+        standard_output::print(&text)
     }
 }

@@ -1,9 +1,9 @@
 //! `mapper map compare`: differences between two maps.
 
-use crate::failure::Failure;
-use crate::given::MapReading;
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::MapReading;
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -44,6 +44,6 @@ impl Compare {
         let picture = self.picture.as_deref().map(|path| (path, self.replace.existing()));
         let maps = [(self.first.as_path(), &first), (self.second.as_path(), &second)];
         let work = registry::registry().compare_map_files(maps, picture)?;
-        output::print_map_work(&work, self.json)
+        standard_output::print_map_work(&work, self.json)
     }
 }

@@ -1,9 +1,9 @@
 //! `mapper map convert`: a map in another format, at another reference state.
 
-use crate::failure::Failure;
-use crate::given::{MapReading, reference};
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::{MapReading, reference};
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_core::EfficiencyDefinition;
 use std::path::PathBuf;
@@ -45,6 +45,6 @@ impl Convert {
         let given = self.reading.description()?;
         let work =
             registry::registry().convert_map_file(&self.map, &given, out, to_reference, efficiencies)?;
-        output::print_map_work(&work, self.json)
+        standard_output::print_map_work(&work, self.json)
     }
 }

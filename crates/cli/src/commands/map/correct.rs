@@ -1,10 +1,10 @@
 //! `mapper map correct`: a hot map without the heat that it shows.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::given::MapReading;
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::MapReading;
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_maps::correct_for_heat;
 use mapper_report::heat_correction_text;
@@ -48,12 +48,12 @@ impl Correct {
             write_map_fitted_if_needed(path, format, map, self.replace.existing())?;
         }
         if self.json {
-            return output::print_json(&json!({"map": self.map, "correction": correction, "file": self.out}));
+            return standard_output::print_json(&json!({"map": self.map, "correction": correction, "file": self.out}));
         }
         let mut text = heat_correction_text(&correction);
         if let Some(path) = &self.out {
             text.push_str(&format!("map        {}\n", path.display()));
         }
-        output::print(&text)
+        standard_output::print(&text)
     }
 }

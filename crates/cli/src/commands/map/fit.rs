@@ -1,9 +1,9 @@
 //! `mapper map fit`: all speed lines together, with the error at lines that are left out.
 
-use crate::failure::Failure;
-use crate::given::MapReading;
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::MapReading;
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_maps::MapFitOptions;
 use std::path::PathBuf;
@@ -48,6 +48,6 @@ impl Fit {
         let out = self.out.as_deref().map(|path| self.replace.map(path, self.to.as_deref()));
         let given = self.reading.description()?;
         let work = registry::registry().fit_map_file(&self.map, &given, &options, out)?;
-        output::print_map_work(&work, self.json)
+        standard_output::print_map_work(&work, self.json)
     }
 }

@@ -1,9 +1,9 @@
 //! `mapper map fmu`: the machine as an FMU.
 
-use crate::failure::Failure;
-use crate::given::{channel_map, given_campaign};
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_session::{Recorded, Session};
 use std::path::PathBuf;
@@ -48,10 +48,10 @@ impl Fmu {
             session.identified_fmu(recorded, &map, self.compile, &self.out, existing)?
         };
         if self.json {
-            return output::print_json(&written);
+            return standard_output::print_json(&written);
         }
         let library = written.binary.as_deref().unwrap_or("none; the importer compiles the sources");
-        output::print(&format!(
+        standard_output::print(&format!(
             "{}\norigin     {}\nstart      {:.0} rpm\nlibrary    {library}\n",
             written.file.display(),
             written.origin,

@@ -1,9 +1,9 @@
 //! `mapper map inspect`: how a map file is understood.
 
-use crate::failure::Failure;
-use crate::given::MapReading;
-use crate::output::Replace;
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::MapReading;
+use crate::output::standard_output::Replace;
+use crate::{output::standard_output, registry};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -30,6 +30,6 @@ impl Inspect {
         let description = self.write_description.as_deref().map(|file| (file, self.replace.existing()));
         let work =
             registry::registry().inspect_map_file(&self.map, &self.reading.description()?, description)?;
-        output::print_map_work(&work, self.json)
+        standard_output::print_map_work(&work, self.json)
     }
 }

@@ -1,8 +1,8 @@
 //! `mapper map rig`: results of a run in addition to the compressor's map.
 
-use crate::failure::Failure;
-use crate::given::{channel_map, given_campaign};
-use crate::{output, registry};
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_session::{Recorded, Session};
 use std::path::PathBuf;
@@ -35,9 +35,9 @@ impl Rig {
         let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
         let written = Session::new(&registry).rig_files(recorded, &map, &self.out)?;
         if self.json {
-            return output::print_json(&written);
+            return standard_output::print_json(&written);
         }
         let lines: String = written.files.iter().map(|path| format!("{}\n", path.display())).collect();
-        output::print(&lines)
+        standard_output::print(&lines)
     }
 }

@@ -5,13 +5,13 @@ use mapper_core::{
     Channel, DeclaredUncertainty, ModelTolerances, NoiseColour, Recording, Series, StepKind, StepMarker,
 };
 use mapper_observe::declared::{Declared, declared_uncertainties};
-use mapper_physics::effect::Rig;
-use mapper_physics::inputs::InterpolatedInputs;
-use mapper_physics::instruments::{ChannelFollower, true_value};
-use mapper_physics::model::Model;
-use mapper_physics::params::BoundaryConditions;
-use mapper_physics::simulate::{Simulator, Watch};
-use mapper_physics::steady::hold_speed;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::instruments::{ChannelFollower, true_value};
+use mapper_physics::simulation::inputs::InterpolatedInputs;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::simulate::{Simulator, Watch};
+use mapper_physics::simulation::steady::hold_speed;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
@@ -100,7 +100,7 @@ fn recorded(
     let inputs = InterpolatedInputs::new(fine_s, rows).unwrap();
     let at_rest = BoundaryConditions { p3_pa: p3_pa[0], ..boundary() };
     let guess = hold_speed(&nominal, speeds_rpm[0], &boundary()).unwrap().state;
-    let start = mapper_physics::driven::settle(&rig.model, &at_rest, guess).unwrap();
+    let start = mapper_physics::simulation::driven::settle(&rig.model, &at_rest, guess).unwrap();
     let mut random = Pcg64::seed_from_u64(seed);
     let offsets: Vec<f64> =
         SENSORS.iter().map(|(_, _, offset)| offset * random.sample::<f64, _>(StandardNormal)).collect();
@@ -114,16 +114,17 @@ fn recorded(
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); SENSORS.len()];
     let decay = (-0.1f64 / 2.0).exp();
     let mut simulator = Simulator::new(&rig.model, 0.0, start, 1e-6, Watch::default());
-    let sample =
-        |t_s: f64, state: &mapper_physics::model::State, outputs: &mapper_physics::model::Outputs| {
-            let at = mapper_physics::inputs::Inputs::at(&inputs, t_s);
-            let prepared = rig.model.prepare(&at);
-            for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
-                let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
-                slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
-                values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
-            }
-        };
+    let sample = |t_s: f64,
+                  state: &mapper_physics::simulation::model::State,
+                  outputs: &mapper_physics::simulation::model::Outputs| {
+        let at = mapper_physics::simulation::inputs::Inputs::at(&inputs, t_s);
+        let prepared = rig.model.prepare(&at);
+        for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
+            let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
+            slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
+            values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
+        }
+    };
     let mut off = Pcg64::seed_from_u64(!seed);
     let mut taken_s = |t_s: &f64| {
         let off: f64 = off.sample(StandardNormal);

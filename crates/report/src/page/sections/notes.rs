@@ -3,11 +3,11 @@
 use crate::page::prose::{prose, sentence};
 use crate::page::run_page::RunPage;
 use crate::page::table::{Cell, Row, data_table, words_table};
-use mapper_campaign::campaign::DisplayUnits;
 use crate::{
     Display, SurgeReport, ZERO_HEADS, doubts, repeated_jumps_text, score_text, surge_heads, surge_remarks,
     surge_rows, zero_rows, zero_words,
 };
+use mapper_campaign::campaign::DisplayUnits;
 use maud::{Markup, html};
 
 pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {

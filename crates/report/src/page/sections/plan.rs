@@ -2,8 +2,8 @@
 
 use crate::page::run_page::RunPage;
 use crate::page::table::{Cell, Row, data_table};
-use mapper_core::{PlanStep, standard_error_of, step_number};
 use crate::{Display, duration, number, percent};
+use mapper_core::{PlanStep, standard_error_of, step_number};
 use maud::{Markup, html};
 
 pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {

@@ -2,8 +2,8 @@
 
 use crate::page::run_page::RunPage;
 use crate::page::table::{Cell, Row, data_table};
-use mapper_core::{IdentifiedPoint, Verdict};
 use crate::{Display, END_S, PointCell, point_cells, point_groups, point_heads, shared_errors_text};
+use mapper_core::{IdentifiedPoint, Verdict};
 use maud::{Markup, html};
 
 pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {

@@ -1,8 +1,8 @@
 //! The transient of one point.
 
 use crate::page::run_page::RunPage;
-use mapper_core::step_number;
 use crate::{Display, opening, step_name};
+use mapper_core::step_number;
 use maud::{Markup, html};
 
 pub(crate) fn step(page: &RunPage<'_>) -> Markup {

@@ -1,11 +1,11 @@
 //! Heat goes from the bearing housing through the back plate into the compressed gas.
 
 use super::WITHHELD;
-use mapper_physics::air;
-use mapper_physics::effect::{Rig, Submodel};
-use mapper_physics::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
-use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::gas::air;
+use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 
 effect_parameters! {
     /// Heat goes from the bearing housing through the back plate into the compressed gas.

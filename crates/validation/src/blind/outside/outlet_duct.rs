@@ -1,11 +1,11 @@
 //! The duct between compressor and T2 probe has its own mass.
 
 use super::WITHHELD;
-use mapper_physics::air;
-use mapper_physics::effect::{Rig, Submodel};
-use mapper_physics::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
-use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::gas::air;
+use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 
 /// Heat capacity of the duct, J/K.
 const DUCT_J_K: f64 = 250.0;

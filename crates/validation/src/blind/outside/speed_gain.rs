@@ -2,10 +2,10 @@
 
 use super::WITHHELD;
 use mapper_core::Channel;
-use mapper_physics::effect::{Rig, Submodel};
-use mapper_physics::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
-use mapper_physics::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::machine::hooks::{Hooks, Site, TooManyExtraStates};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 
 effect_parameters! {
     /// The speed pick-up reads high or low.

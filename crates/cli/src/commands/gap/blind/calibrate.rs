@@ -1,12 +1,12 @@
 //! `mapper gap blind calibrate`.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::output::Replace;
-use crate::{interrupt, output, output_options, registry};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::output::standard_output::Replace;
+use crate::{interrupt, output::{output_options, standard_output}, registry};
 use clap::Args;
-use mapper_validation::blind::calibrate::{Plan, calibrate};
-use mapper_validation::blind::reliability::{calibrated_text, reliabilities};
+use mapper_validation::blind::calibration::calibrate::{Plan, calibrate};
+use mapper_validation::blind::scoring::reliability::{calibrated_text, reliabilities};
 use mapper_fleet::Engine;
 use mapper_session::json_text;
 use serde_json::json;
@@ -63,9 +63,9 @@ impl Calibrate {
         let (found, made) = (reliabilities(&observed)?, observed.len());
         match self.json {
             true => {
-                output::print_json(&json!({"calibration": self.out, "diagnoses": made, "reliability": found}))
+                standard_output::print_json(&json!({"calibration": self.out, "diagnoses": made, "reliability": found}))
             }
-            false => output::print(&calibrated_text(made, &self.out, &found)),
+            false => standard_output::print(&calibrated_text(made, &self.out, &found)),
         }
     }
 }

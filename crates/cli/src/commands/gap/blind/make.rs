@@ -1,7 +1,7 @@
 //! `mapper gap blind make`.
 
-use crate::failure::Failure;
-use crate::{output, output_options, registry};
+use crate::output::failure::Failure;
+use crate::{output::{output_options, standard_output}, registry};
 use clap::Args;
 use mapper_validation::blind::{CaseKind, Draw, Laboratory, OutsideUse};
 use serde_json::json;
@@ -64,13 +64,13 @@ impl Make {
         progress.clear();
         let made = made?;
         if self.json {
-            return output::print_json(&json!({
+            return standard_output::print_json(&json!({
                 "directory": self.out,
                 "cases": made.manifest.cases,
                 "answers_sha256": made.manifest.answers_sha256,
             }));
         }
-        output::print(&format!(
+        standard_output::print(&format!(
             "{} cases in {}\nSHA-256 of the answers: {}\n",
             made.manifest.cases.len(),
             self.out.display(),

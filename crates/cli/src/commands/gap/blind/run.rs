@@ -1,8 +1,8 @@
 //! `mapper gap blind run`.
 
-use crate::exit_code::Code;
-use crate::failure::Failure;
-use crate::{interrupt, output, output_options};
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::{interrupt, output::{output_options, standard_output}};
 use clap::Args;
 use mapper_validation::blind::{MANIFEST_NAME, Manifest};
 use mapper_fleet::{Engine, cores};
@@ -48,10 +48,10 @@ impl Run {
         let failed: Vec<String> = diagnosed.into_iter().filter_map(Result::err).collect();
         if failed.is_empty() {
             if self.json {
-                return output::print_json(&json!({ "cases": manifest.cases, "directory": self.directory }));
+                return standard_output::print_json(&json!({ "cases": manifest.cases, "directory": self.directory }));
             }
             let (cases, directory) = (manifest.cases.len(), self.directory.display());
-            return output::print(&format!("{cases} diagnoses in {directory}\n"));
+            return standard_output::print(&format!("{cases} diagnoses in {directory}\n"));
         }
         Err(failure(format!("{} recordings were not diagnosed:\n{}", failed.len(), failed.join("\n"))))
     }

@@ -1,9 +1,9 @@
 //! `mapper gap blind score`.
 
-use crate::failure::Failure;
-use crate::output;
+use crate::output::failure::Failure;
+use crate::output::standard_output;
 use clap::Args;
-use mapper_validation::blind::score::{open_answers, score};
+use mapper_validation::blind::scoring::score::{open_answers, score};
 use mapper_validation::blind::{MANIFEST_NAME, Manifest};
 use mapper_report::with_heads;
 use std::path::{Path, PathBuf};
@@ -32,12 +32,12 @@ impl Score {
             open_answers(&self.directory)?;
         }
         if self.json {
-            return output::print_json(&scored);
+            return standard_output::print_json(&scored);
         }
         if let Some(other) = &self.beside {
             let title = |of: &Path| Manifest::read(&of.join(MANIFEST_NAME)).map(|it| it.title());
             let (this, that) = (title(&self.directory)?, title(other)?);
-            return output::print(&scored.beside([&this, &that], &score(other)?));
+            return standard_output::print(&scored.beside([&this, &that], &score(other)?));
         }
         let mut text = scored.case_lines() + "\n";
         for (label, value) in scored.rows() {
@@ -49,6 +49,6 @@ impl Score {
         for row in rows {
             table.add_row(row);
         }
-        output::print(&format!("{text}\n{table}\nBrackets are exact 95 % intervals of the share.\n"))
+        standard_output::print(&format!("{text}\n{table}\nBrackets are exact 95 % intervals of the share.\n"))
     }
 }

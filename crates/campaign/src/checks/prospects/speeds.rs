@@ -1,0 +1,95 @@
+//! Checks speeds against the strength of the wheel and the range of the nominal map.
+
+use crate::campaign::{Campaign, MapSource};
+use crate::checks::concern::{Concern, mm};
+use mapper_core::OperatingPoint;
+use mapper_yaml::{Step, steps};
+use std::f64::consts::PI;
+
+/// Tip speed above which no wheel of any material holds together, m/s.
+const BURST_M_S: f64 = 700.0;
+/// Tip speed that milled aluminium reaches, m/s; titanium wheels reach some 600.
+const USUAL_M_S: f64 = 600.0;
+/// Extrapolation of a map beyond its outermost speed lines that only produces a warning, as a share of their speed.
+const BEYOND_RATIO: f64 = 0.1;
+/// Extrapolation without a warning: corrected speeds of a map's lines are rounded, and ambient temperature varies.
+const ROUNDING_RATIO: f64 = 0.01;
+
+pub(crate) fn concerns(campaign: &Campaign, places: &[Vec<Step>]) -> Vec<Concern> {
+    let by_speed =
+        |a: &(usize, &OperatingPoint), b: &(usize, &OperatingPoint)| a.1.speed_rpm.total_cmp(&b.1.speed_rpm);
+    let points = || campaign.points.iter().enumerate();
+    let (Some(slowest), Some(fastest)) = (points().min_by(by_speed), points().max_by(by_speed)) else {
+        return Vec::new();
+    };
+    let place = |index: usize| places.get(index).cloned().unwrap_or_else(|| steps!["grid"].to_vec());
+    let mut concerns = tips(campaign, fastest.1.speed_rpm);
+    if concerns.iter().all(|concern| !concern.grave) {
+        concerns.extend(table(
+            campaign,
+            [(slowest.1.speed_rpm, place(slowest.0)), (fastest.1.speed_rpm, place(fastest.0))],
+        ));
+    }
+    concerns
+}
+
+fn tips(campaign: &Campaign, speed_rpm: f64) -> Vec<Concern> {
+    let params = &campaign.machine.params;
+    let wheels = [
+        ("compressor", "wheel_diameter", params.compressor.wheel_diameter_m),
+        ("turbine", "wheel_radius", 2.0 * params.turbine.wheel_radius_m),
+    ];
+    let one = |(side, key, diameter_m): (&'static str, &'static str, f64)| {
+        let tip_m_s = PI * diameter_m * speed_rpm / 60.0;
+        // A wheel that is scaled from the other one repeats its mistake.
+        let is_assumed = campaign.machine.assumed.iter().any(|size| size.key == format!("{side}.{key}"));
+        (tip_m_s > USUAL_M_S && !is_assumed).then(|| Concern {
+            grave: tip_m_s > BURST_M_S,
+            at: steps!["machine", "geometry", side, key].to_vec(),
+            message: format!(
+                "the {side}'s wheel of {} mm has a tip speed of {tip_m_s:.0} m/s at the grid's highest speed, {:.1} krpm; {}",
+                mm(diameter_m),
+                speed_rpm / 1e3,
+                if tip_m_s > BURST_M_S {
+                    format!("wheels of any material burst before {BURST_M_S:.0} m/s")
+                } else {
+                    format!("few wheels stand more than {USUAL_M_S:.0} m/s")
+                }
+            ),
+            remedy: "correct the wheel's size, or lower the highest speed of the grid".to_owned(),
+        })
+    };
+    wheels.into_iter().filter_map(one).collect()
+}
+
+/// The grid's speeds and those of the nominal table.
+fn table(campaign: &Campaign, [slowest, fastest]: [(f64, Vec<Step>); 2]) -> Vec<Concern> {
+    let MapSource::Table { named, reference, .. } = &campaign.machine.map else { return Vec::new() };
+    let Some(Ok(map)) = campaign.machine.map.table() else { return Vec::new() };
+    let lines_rpm = map.speeds_corrected_rpm();
+    let (Some(&low_rpm), Some(&high_rpm)) = (lines_rpm.first(), lines_rpm.last()) else { return Vec::new() };
+    let correction = (reference.t_ref_k / campaign.boundary.t1_k).sqrt();
+    let one = |(rpm, at): (f64, Vec<Step>), edge_rpm: f64, verb: &str, beyond: f64| {
+        let corrected_rpm = rpm * correction;
+        (beyond > ROUNDING_RATIO).then(|| Concern {
+            // The ends of `lines` are taken from the map itself.
+            grave: beyond > BEYOND_RATIO || !campaign.lines.is_empty(),
+            at,
+            message: format!(
+                "the grid goes to {:.1} krpm ({:.1} krpm corrected), the nominal map `{named}` {verb} at {:.1} krpm: \
+                 forecast and plan would rest on nothing there",
+                rpm / 1e3,
+                corrected_rpm / 1e3,
+                edge_rpm / 1e3
+            ),
+            remedy: "leave such speeds out, or give a map that holds them (`map: closed_form` where there is none)"
+                .to_owned(),
+        })
+    };
+    let below = 1.0 - slowest.0 * correction / low_rpm;
+    let above = fastest.0 * correction / high_rpm - 1.0;
+    [one(slowest, low_rpm, "begins", below), one(fastest, high_rpm, "ends", above)]
+        .into_iter()
+        .flatten()
+        .collect()
+}

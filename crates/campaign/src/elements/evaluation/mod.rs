@@ -1,0 +1,7 @@
+//! Campaign keys for the evaluation of steps: identification method, window, settle bands, tolerances, and drift.
+
+pub(crate) mod drift;
+pub(crate) mod identification;
+pub(crate) mod settle_bands;
+pub(crate) mod tolerances;
+pub(crate) mod window;

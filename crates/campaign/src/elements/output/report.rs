@@ -1,0 +1,153 @@
+//! `report:`
+
+use crate::checking::Check;
+use crate::elements::rig::sensors::CALIBRATED;
+use crate::si_values::si_if_given;
+use crate::units::{Fraction, Pressure, Quantity, Temperature};
+use mapper_core::Channel;
+use mapper_physics::gas::air::Air;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Information for the test report that no sensor measures.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Report {
+    /// Operator of the test.
+    pub operator: Option<String>,
+    /// Place of the test.
+    pub test_cell: Option<String>,
+    /// Day of the last calibration of each sensor, by its symbol, e.g. `T2: 2026-09-01`.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<SensorSymbol, Date>")]
+    pub calibration: BTreeMap<Channel, String>,
+    /// Barometric pressure in the cell.
+    #[serde(rename(deserialize = "barometer"), default, deserialize_with = "si_if_given::<Pressure, _>")]
+    #[schemars(with = "Option<Quantity<Pressure>>", extend("x-min" = "50 kPa", "x-max" = "120 kPa"))]
+    pub barometer_pa: Option<f64>,
+    /// Relative humidity in the cell, whose air the compressor takes in. The air is dry if none is given.
+    #[serde(rename(deserialize = "humidity"), default, deserialize_with = "si_if_given::<Fraction, _>")]
+    #[schemars(with = "Option<Quantity<Fraction>>", extend("x-min" = "0 %", "x-max" = "100 %"), example = &"50 %")]
+    pub humidity_ratio: Option<f64>,
+    /// Temperature in the cell, if it differs from `boundary.ambient_temperature`.
+    #[serde(
+        rename(deserialize = "cell_temperature"),
+        default,
+        deserialize_with = "si_if_given::<Temperature, _>"
+    )]
+    #[schemars(with = "Option<Quantity<Temperature>>", extend("x-min" = "200 K", "x-max" = "400 K"))]
+    pub cell_temperature_k: Option<f64>,
+}
+
+impl Report {
+    /// Air of a relative humidity in the cell.
+    fn air_of(&self, relative_ratio: f64, boundary: &BoundaryConditions) -> Air {
+        let temperature_k = self.cell_temperature_k.unwrap_or(boundary.ambient_temperature_k);
+        let pressure_pa = self.barometer_pa.unwrap_or(boundary.p1_pa);
+        Air::of_relative_humidity(relative_ratio, temperature_k, pressure_pa)
+    }
+
+    /// The air that the compressor takes in: from the humidity in the cell, dry if none is given.
+    pub(crate) fn air(&self, boundary: &BoundaryConditions) -> Air {
+        self.humidity_ratio.map_or(Air::DRY, |ratio| self.air_of(ratio, boundary))
+    }
+
+    /// One standard deviation of its humidity, kg/kg. If no humidity is given, it lies anywhere between dry and saturated.
+    pub fn humidity_sigma_kg_kg(&self, boundary: &BoundaryConditions) -> f64 {
+        let saturated_kg_kg = self.air_of(1.0, boundary).humidity_kg_kg;
+        saturated_kg_kg * if self.humidity_ratio.is_some() { HYGROMETER_RATIO } else { ANYWHERE_RATIO }
+    }
+}
+
+/// Standard uncertainty of a relative humidity read off a hygrometer. Judgement: capacitive ones are sold with 2 to 3 %.
+const HYGROMETER_RATIO: f64 = 0.03;
+/// Root mean square of a humidity that is uniform between 0 and saturation, over saturation.
+const ANYWHERE_RATIO: f64 = 0.577_350_269_189_625_8;
+
+/// A channel that has a sensor, by its symbol.
+struct SensorSymbol;
+
+impl JsonSchema for SensorSymbol {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "SensorSymbol".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({"type": "string", "enum": CALIBRATED})
+    }
+}
+
+/// A day, written year-month-day, e.g. `2026-09-01`.
+#[derive(JsonSchema)]
+#[serde(transparent)]
+#[expect(dead_code, reason = "stands for its schema alone")]
+struct Date(
+    #[schemars(regex(pattern = r"^[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])$"), example = &"2026-09-01")]
+     String,
+);
+
+/// Checks that days of calibration exist in the calendar. The schema checks their form.
+pub(crate) fn check(check: &mut Check<'_>) {
+    let tree = check.tree;
+    for channel in tree.keys(&steps!["report", "calibration"]) {
+        let steps = steps!["report", "calibration", channel];
+        if let Some(text) = check.text(&steps)
+            && let Some((year, month, day)) = date(text)
+            && (1..=12).contains(&month)
+            && (29..=31).contains(&day)
+            && day > days_of(year, month)
+        {
+            let message = format!("`{text}` is not a calendar date");
+            let remedy = "write year-month-day, e.g. `2026-09-01`";
+            check.note(FindingKind::WrongValue, &steps, message, remedy);
+        }
+    }
+}
+
+fn date(text: &str) -> Option<(u32, u32, u32)> {
+    let mut parts = text.splitn(3, '-').map(|part| part.parse().ok());
+    Some((parts.next()??, parts.next()??, parts.next()??))
+}
+
+fn days_of(year: u32, month: u32) -> u32 {
+    match month {
+        4 | 6 | 9 | 11 => 30,
+        2 if year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400)) => 29,
+        2 => 28,
+        _ => 31,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In the calendar 1900 was not a leap year; 2000 and 2024 were.
+    #[test]
+    fn months_have_their_days() {
+        for (year, month, days) in
+            [(2026, 2, 28), (2024, 2, 29), (1900, 2, 28), (2000, 2, 29), (2026, 4, 30), (2026, 12, 31)]
+        {
+            assert_eq!(days_of(year, month), days, "{year}-{month}");
+        }
+    }
+
+    #[test]
+    fn written_with_units_kept_in_si() {
+        let report: Report =
+            crate::testing::any("{barometer: 990 mbar, humidity: 45 %, calibration: {T2: 2026-09-01}}")
+                .unwrap();
+        assert!((report.barometer_pa.unwrap() - 99e3).abs() < 1e-6);
+        assert_eq!((report.humidity_ratio, report.cell_temperature_k), (Some(0.45), None));
+        assert_eq!(report.calibration[&Channel::T2], "2026-09-01");
+        assert!(serde_json::to_value(&report).unwrap().get("barometer_pa").is_some(), "SI names in SI files");
+    }
+}

@@ -1,0 +1,68 @@
+//! `boundary:`
+
+use crate::si_values::or;
+use crate::units::{Pressure, Quantity, Temperature};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::FollowOutlet;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// Conditions that the rig and the cell hold constant.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct BoundaryFile {
+    /// Compressor inlet total temperature, T1.
+    #[schemars(extend("x-min" = "200 K", "x-max" = "400 K"))]
+    inlet_temperature: Quantity<Temperature>,
+    /// Compressor inlet total pressure, P1.
+    #[schemars(extend("x-min" = "20 kPa", "x-max" = "400 kPa"))]
+    inlet_pressure: Quantity<Pressure>,
+    /// Temperature around the housings; `inlet_temperature` if none is given.
+    #[schemars(extend("x-min" = "200 K", "x-max" = "400 K"))]
+    ambient_temperature: Option<Quantity<Temperature>>,
+    /// Turbine inlet total temperature, T3.
+    #[schemars(extend("x-min" = "250 K", "x-max" = "1400 K"), example = &"500 degC")]
+    turbine_inlet_temperature: Quantity<Temperature>,
+    /// Turbine outlet pressure, P4.
+    #[schemars(extend("x-min" = "20 kPa", "x-max" = "400 kPa"), example = &"110 kPa")]
+    turbine_outlet_pressure: Quantity<Pressure>,
+    /// Oil inlet temperature.
+    #[schemars(extend("x-min" = "230 K", "x-max" = "450 K"), example = &"50 degC")]
+    oil_temperature: Quantity<Temperature>,
+    /// Conditions that follow the compressor's outlet temperature instead, at each point that of the nominal machine in steady state: `[turbine_inlet_temperature, oil_temperature]` for adiabatic mapping. None if it is left out.
+    #[serde(default)]
+    #[schemars(extend("uniqueItems" = true, "examples" = [["turbine_inlet_temperature", "oil_temperature"]]))]
+    follow_outlet: Vec<FollowerName>,
+}
+
+/// What may follow the compressor's outlet temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum FollowerName {
+    TurbineInletTemperature,
+    OilTemperature,
+}
+
+impl BoundaryFile {
+    /// The boundary conditions; P3 and valve come from the plan, and are set to no flow and to 1 until then.
+    pub(crate) fn conditions(&self) -> BoundaryConditions {
+        BoundaryConditions {
+            t1_k: self.inlet_temperature.inside,
+            p1_pa: self.inlet_pressure.inside,
+            p3_pa: self.turbine_outlet_pressure.inside,
+            t3_k: self.turbine_inlet_temperature.inside,
+            p4_pa: self.turbine_outlet_pressure.inside,
+            oil_temperature_k: self.oil_temperature.inside,
+            ambient_temperature_k: or(self.ambient_temperature, self.inlet_temperature.inside),
+            valve_opening_ratio: 1.0,
+        }
+    }
+
+    /// Conditions that follow the outlet temperature instead.
+    pub(crate) fn follow_outlet(&self) -> FollowOutlet {
+        FollowOutlet {
+            turbine_inlet: self.follow_outlet.contains(&FollowerName::TurbineInletTemperature),
+            oil: self.follow_outlet.contains(&FollowerName::OilTemperature),
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! `safe_state:`
+
+use crate::units::{Duration, PressureRate, Quantity};
+use mapper_core::SafeTrajectory;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// The safe shutdown, in place of the rig's own: the valve opens and the heater goes off at once, P3 goes down, then the air is cut.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SafeStateFile {
+    /// Rate at which P3 goes down.
+    #[schemars(extend("x-min" = "1 kPa/s", "x-max" = "10000 kPa/s"), example = &"100 kPa/s")]
+    pressure_slew: Quantity<PressureRate>,
+    /// Opening of the back-pressure valve during the shutdown; 1 if none is given. A step with a larger opening keeps it.
+    #[schemars(range(min = 0.5, max = 2.5), example = 1.0)]
+    opening: Option<f64>,
+    /// Longest time of the shutdown: the air is cut then, whatever P3 is; 20 s if none is given.
+    #[schemars(extend("x-min" = "1 s", "x-max" = "2 min"), example = &"20 s")]
+    within: Option<Quantity<Duration>>,
+}
+
+impl SafeStateFile {
+    /// The shutdown, with defaults filled in.
+    pub(crate) fn trajectory(self) -> SafeTrajectory {
+        let usual = SafeTrajectory::default();
+        SafeTrajectory {
+            p3_slew_pa_s: Some(self.pressure_slew.inside),
+            valve_opening_ratio: self.opening.unwrap_or(usual.valve_opening_ratio),
+            within_s: crate::si_values::or(self.within, usual.within_s),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_out_has_its_default() {
+        let read = |text| crate::testing::any::<SafeStateFile>(text).unwrap().trajectory();
+        let expected = SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 };
+        assert_eq!(read("{pressure_slew: 50 kPa/s}"), expected);
+        let written = read("{pressure_slew: 50 kPa/s, opening: 2, within: 8 s}");
+        assert_eq!((written.valve_opening_ratio, written.within_s), (2.0, 8.0));
+        assert!(crate::testing::any::<SafeStateFile>("{opening: 2}").is_err());
+    }
+}

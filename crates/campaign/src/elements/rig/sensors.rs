@@ -1,0 +1,408 @@
+//! `sensors:`
+
+use crate::checking::Check;
+use crate::elements::rig::several_sensors::{
+    Sensor, SensorDeclaration, Sensors, Several, check_several, each_place,
+};
+use crate::si_values::or;
+use crate::units::{
+    Dimension, Fraction, Length, MassFlow, PressureDifference, Quantity, Speed, TemperatureDifference,
+};
+use mapper_core::{Channel, DeclaredUncertainty};
+use mapper_yaml::FindingKind;
+use mapper_yaml::steps;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// Declared uncertainty of each measured channel, by its symbol; one standard deviation throughout.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SensorsFile {
+    /// Shaft speed.
+    #[serde(rename = "N")]
+    n: Sensors<SpeedSensor>,
+    /// Compressor mass flow.
+    m_c: Sensors<FlowSensor>,
+    /// Compressor inlet pressure.
+    #[serde(rename = "P1")]
+    p1: Sensors<PressureSensor>,
+    /// Compressor inlet total temperature.
+    #[serde(rename = "T1")]
+    t1: Sensors<TemperatureSensor>,
+    /// Compressor outlet pressure.
+    #[serde(rename = "P2")]
+    p2: Sensors<PressureSensor>,
+    /// Compressor outlet total temperature.
+    #[serde(rename = "T2")]
+    t2: Sensors<ProbeSensor>,
+    /// Compressor housing temperature.
+    #[serde(rename = "Tc")]
+    tc: Sensors<TemperatureSensor>,
+    /// Turbine mass flow.
+    m_t: Option<Sensors<FlowSensor>>,
+    /// Turbine inlet pressure.
+    #[serde(rename = "P3")]
+    p3: Option<Sensors<PressureSensor>>,
+    /// Turbine inlet total temperature.
+    #[serde(rename = "T3")]
+    t3: Option<Sensors<TemperatureSensor>>,
+    /// Turbine outlet pressure.
+    #[serde(rename = "P4")]
+    p4: Option<Sensors<PressureSensor>>,
+    /// Turbine outlet total temperature.
+    #[serde(rename = "T4")]
+    t4: Option<Sensors<TemperatureSensor>>,
+    /// Turbine housing temperature.
+    #[serde(rename = "Tt")]
+    tt: Option<Sensors<TemperatureSensor>>,
+    /// Oil inlet temperature.
+    #[serde(rename = "T_oil")]
+    t_oil: Option<Sensors<TemperatureSensor>>,
+    /// Ambient temperature.
+    #[serde(rename = "T_amb")]
+    t_amb: Option<Sensors<TemperatureSensor>>,
+}
+
+impl SensorsFile {
+    /// The declared uncertainties of each channel that has a sensor.
+    pub(crate) fn declarations(&self) -> BTreeMap<Channel, SensorDeclaration> {
+        use Channel as C;
+        let mut all = BTreeMap::new();
+        let mut put = |channel: Channel, sensors: Option<SensorDeclaration>| {
+            all.extend(sensors.map(|sensors| (channel, sensors)));
+        };
+        put(C::ShaftSpeed, Some(self.n.declaration(C::ShaftSpeed)));
+        put(C::CompressorFlow, Some(self.m_c.declaration(C::CompressorFlow)));
+        put(C::P1, Some(self.p1.declaration(C::P1)));
+        put(C::T1, Some(self.t1.declaration(C::T1)));
+        put(C::P2, Some(self.p2.declaration(C::P2)));
+        put(C::T2, Some(self.t2.declaration(C::T2)));
+        put(C::Tc, Some(self.tc.declaration(C::Tc)));
+        put(C::TurbineFlow, self.m_t.as_ref().map(|s| s.declaration(C::TurbineFlow)));
+        put(C::P3, self.p3.as_ref().map(|s| s.declaration(C::P3)));
+        put(C::T3, self.t3.as_ref().map(|s| s.declaration(C::T3)));
+        put(C::P4, self.p4.as_ref().map(|s| s.declaration(C::P4)));
+        put(C::T4, self.t4.as_ref().map(|s| s.declaration(C::T4)));
+        put(C::Tt, self.tt.as_ref().map(|s| s.declaration(C::Tt)));
+        put(C::TOil, self.t_oil.as_ref().map(|s| s.declaration(C::TOil)));
+        put(C::TAmb, self.t_amb.as_ref().map(|s| s.declaration(C::TAmb)));
+        all
+    }
+}
+
+fn declaration<D: Dimension>(
+    noise: Quantity<D>,
+    offset: Option<Quantity<D>>,
+    gain: Option<Quantity<Fraction>>,
+) -> SensorDeclaration {
+    SensorDeclaration {
+        declared: DeclaredUncertainty {
+            noise_sigma: noise.inside,
+            offset_sigma: or(offset, 0.0),
+            gain_sigma_ratio: or(gain, 0.0),
+        },
+        gain_is_declared: gain.is_some(),
+        static_tap_pipe_diameter_m: None,
+        probe_diameter_m: 0.0,
+        redundant: None,
+    }
+}
+
+/// Symbols of all channels that have a sensor.
+pub(crate) const CALIBRATED: [&str; 15] =
+    ["N", "m_c", "P1", "T1", "P2", "T2", "Tc", "m_t", "P3", "T3", "P4", "T4", "Tt", "T_oil", "T_amb"];
+
+/// Speed sensor.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SpeedSensor {
+    /// Noise of one sample.
+    #[schemars(extend("x-min" = "0 rpm"), example = &"30 rpm")]
+    noise: Quantity<Speed>,
+    /// Fixed offset left after calibration; 0 if none is given.
+    #[schemars(extend("x-min" = "0 rpm"), example = &"0 rpm")]
+    offset: Option<Quantity<Speed>>,
+    /// Fixed error of the gain; 0 if none is given.
+    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
+    gain: Option<Quantity<Fraction>>,
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 rpm"))]
+    common_offset: Option<Quantity<Speed>>,
+}
+
+impl Sensor for SpeedSensor {
+    fn declaration(&self) -> SensorDeclaration {
+        declaration(self.noise, self.offset, self.gain)
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
+    }
+}
+
+/// Flow meter.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FlowSensor {
+    /// Noise of one sample.
+    #[schemars(extend("x-min" = "0 kg/s"))]
+    noise: Quantity<MassFlow>,
+    /// Fixed offset left after calibration; 0 if none is given.
+    #[schemars(extend("x-min" = "0 kg/s"), example = &"0 kg/s")]
+    offset: Option<Quantity<MassFlow>>,
+    /// Fixed error of the gain; 0 if none is given.
+    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
+    gain: Option<Quantity<Fraction>>,
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 kg/s"))]
+    common_offset: Option<Quantity<MassFlow>>,
+}
+
+impl Sensor for FlowSensor {
+    fn declaration(&self) -> SensorDeclaration {
+        declaration(self.noise, self.offset, self.gain)
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
+    }
+}
+
+/// Pressure sensor.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PressureSensor {
+    /// Noise of one sample.
+    #[schemars(extend("x-min" = "0 Pa"), example = &"20 Pa")]
+    noise: Quantity<PressureDifference>,
+    /// Fixed offset left after calibration; 0 if none is given.
+    #[schemars(extend("x-min" = "0 Pa"))]
+    offset: Option<Quantity<PressureDifference>>,
+    /// Fixed error of the gain; if none is given, identification takes 0.058 % (accuracy class 0.1).
+    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
+    gain: Option<Quantity<Fraction>>,
+    /// What the tap measures: `total` (the default), or `static`, converted with `pipe_diameter`.
+    tap: Option<TapName>,
+    /// Inner diameter of the pipe at the tap; needed for a static tap.
+    #[schemars(extend("x-above" = "0 mm", "x-max" = "1 m"), example = &"40 mm")]
+    pipe_diameter: Option<Quantity<Length>>,
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 Pa"))]
+    common_offset: Option<Quantity<PressureDifference>>,
+}
+
+impl Sensor for PressureSensor {
+    fn declaration(&self) -> SensorDeclaration {
+        let diameter = self.pipe_diameter.map(|diameter| diameter.inside);
+        let static_tap_pipe_diameter_m = diameter.filter(|_| self.tap == Some(TapName::Static));
+        SensorDeclaration { static_tap_pipe_diameter_m, ..declaration(self.noise, self.offset, self.gain) }
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum TapName {
+    Total,
+    Static,
+}
+
+/// Temperature sensor.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TemperatureSensor {
+    /// Noise of one sample.
+    #[schemars(extend("x-min" = "0 K"), example = &"0.1 K")]
+    noise: Quantity<TemperatureDifference>,
+    /// Fixed offset left after calibration; 0 if none is given.
+    #[schemars(extend("x-min" = "0 K"))]
+    offset: Option<Quantity<TemperatureDifference>>,
+    /// Fixed error of the gain; 0 if none is given.
+    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
+    gain: Option<Quantity<Fraction>>,
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 K"))]
+    common_offset: Option<Quantity<TemperatureDifference>>,
+}
+
+impl Sensor for TemperatureSensor {
+    fn declaration(&self) -> SensorDeclaration {
+        declaration(self.noise, self.offset, self.gain)
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
+    }
+}
+
+/// Temperature probe with its own inertia.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ProbeSensor {
+    /// Noise of one sample.
+    #[schemars(extend("x-min" = "0 K"), example = &"0.1 K")]
+    noise: Quantity<TemperatureDifference>,
+    /// Fixed offset left after calibration; 0 if none is given.
+    #[schemars(extend("x-min" = "0 K"))]
+    offset: Option<Quantity<TemperatureDifference>>,
+    /// Fixed error of the gain; 0 if none is given.
+    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
+    gain: Option<Quantity<Fraction>>,
+    /// Diameter of the probe's tip; 0 mm, the default, is a probe without inertia.
+    #[schemars(extend("x-min" = "0 mm", "x-max" = "20 mm"), example = &"1.5 mm")]
+    probe_diameter: Option<Quantity<Length>>,
+    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
+    #[schemars(range(min = 1, max = 16), example = 4)]
+    count: Option<usize>,
+    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
+    #[schemars(regex(pattern = r"^.{1,40}$"))]
+    name: Option<String>,
+    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+    #[schemars(extend("x-min" = "0 K"))]
+    common_offset: Option<Quantity<TemperatureDifference>>,
+}
+
+impl Sensor for ProbeSensor {
+    fn declaration(&self) -> SensorDeclaration {
+        SensorDeclaration {
+            probe_diameter_m: or(self.probe_diameter, 0.0),
+            ..declaration(self.noise, self.offset, self.gain)
+        }
+    }
+
+    fn several(&self) -> Several<'_> {
+        Several {
+            count: self.count.unwrap_or(1),
+            name: self.name.as_deref(),
+            common_offset: or(self.common_offset, 0.0),
+        }
+    }
+}
+
+/// Checks that a static tap has the diameter of its pipe.
+pub(crate) fn check(check: &mut Check<'_>) {
+    for symbol in ["P1", "P2", "P3", "P4"] {
+        for sensor in each_place(check, symbol) {
+            let of = |key: &str| [sensor.as_slice(), &steps![key]].concat();
+            let has_diameter = check.get(&of("pipe_diameter")).is_some();
+            if check.text(&of("tap")) == Some("static") && !has_diameter {
+                let message =
+                    "a static tap needs the pipe's inner diameter to become a total pressure".to_owned();
+                check.note(FindingKind::MissingKey, &of("tap"), message, "add e.g. `pipe_diameter: 40 mm`");
+            }
+        }
+    }
+    for symbol in CALIBRATED {
+        check_several(check, symbol);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_static_tap_keeps_its_pipe_and_a_total_one_has_none() {
+        for (tap, diameter_m) in [("static", Some(0.04)), ("total", None)] {
+            let text = format!("{{noise: 20 Pa, tap: {tap}, pipe_diameter: 40 mm}}");
+            let sensor: PressureSensor = crate::testing::any(&text).unwrap();
+            assert_eq!(sensor.declaration().static_tap_pipe_diameter_m, diameter_m, "{tap}");
+        }
+    }
+
+    #[test]
+    fn the_symbols_are_those_of_the_channels_with_a_key() {
+        let schema = serde_json::to_value(schemars::schema_for!(SensorsFile)).unwrap();
+        let keys: Vec<&String> = schema["properties"].as_object().unwrap().keys().collect();
+        assert_eq!(keys.len(), CALIBRATED.len());
+        for symbol in CALIBRATED {
+            assert!(keys.iter().any(|key| *key == symbol), "{symbol}");
+            serde_json::from_value::<Channel>(symbol.into()).unwrap();
+        }
+    }
+
+    fn several(text: &str) -> SensorDeclaration {
+        crate::testing::any::<Sensors<ProbeSensor>>(text).unwrap().declaration(Channel::T2)
+    }
+
+    #[test]
+    fn a_count_and_a_list_of_equal_sensors_are_the_same_and_one_is_none_of_several() {
+        let one = "{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm}";
+        let alike = several("{noise: 0.1 K, offset: 0.24 K, probe_diameter: 1 mm, count: 4}");
+        assert_eq!(alike, several(&format!("[{one}, {one}, {one}, {one}]")));
+        // A quarter of the variance each.
+        assert!((alike.declared.noise_sigma - 0.05).abs() < 1e-12);
+        assert!((alike.declared.offset_sigma - 0.12).abs() < 1e-12);
+        assert!((alike.probe_diameter_m - 1e-3).abs() < 1e-12);
+        let names: Vec<String> = alike.redundant.unwrap().elements.into_iter().map(|e| e.name).collect();
+        assert_eq!(names, ["T2/1", "T2/2", "T2/3", "T2/4"]);
+        let single = several(one);
+        assert_eq!((single.redundant.clone(), single.declared.offset_sigma), (None, 0.24));
+        assert_eq!(single, several(&format!("[{one}]")));
+    }
+
+    #[test]
+    fn a_common_offset_does_not_average_out() {
+        let four = several("{noise: 0.1 K, offset: 0.24 K, common_offset: 0.16 K, count: 4}");
+        // 0.12 and 0.16 in quadrature; for a single sensor 0.24 and 0.07.
+        assert!((four.declared.offset_sigma - 0.2).abs() < 1e-12);
+        let one = several("{noise: 0.1 K, offset: 0.24 K, common_offset: 0.07 K}");
+        assert!((one.declared.offset_sigma - 0.25).abs() < 1e-12);
+        let named = several("[{noise: 0.1 K, name: TC_21}, {noise: 0.1 K, common_offset: 0.16 K}]");
+        let redundant = named.redundant.unwrap();
+        assert_eq!(redundant.elements[0].name, "TC_21");
+        assert!((redundant.common_offset_sigma - 0.16).abs() < 1e-12);
+    }
+
+    /// Plans carry the hash of the campaign's JSON: a campaign without several sensors must not mention them.
+    #[test]
+    fn the_json_of_a_single_sensor_has_no_word_of_several() {
+        let single = serde_json::to_value(several("{noise: 0.1 K, offset: 0.25 K}")).unwrap();
+        let keys: Vec<&String> = single.as_object().unwrap().keys().collect();
+        assert_eq!(keys, ["declared", "probe_diameter_m", "static_tap_pipe_diameter_m"]);
+    }
+}

@@ -1,0 +1,6 @@
+//! Campaign keys that describe the tested turbocharger: machine, geometry, reference state, and efficiency definition.
+
+pub(crate) mod efficiency;
+pub(crate) mod geometry;
+pub(crate) mod machine;
+pub(crate) mod reference;

@@ -1,0 +1,264 @@
+//! Reads a campaign from a text or a file, or returns all its mistakes.
+
+use crate::campaign::{Campaign, CampaignFile};
+use crate::checks::concern::Concern;
+use crate::checks::consistency;
+use crate::checks::prospects;
+use crate::checks::reachable_points::{self, Unreachable};
+use crate::files::schema::SCHEMA;
+use crate::machine_sizes;
+use crate::resolved;
+use mapper_maps::table::file_text;
+use mapper_yaml::{Document, FindingKind, Findings, Notes, Source, Step, Tree, steps};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Name of a campaign file in messages.
+pub(crate) static DOCUMENT: Document = Document { name: "campaign", example: "campaigns/turbo_a.yaml" };
+
+/// Largest campaign file that is read, bytes.
+pub const FILE_SIZE_LIMIT: usize = 1 << 20;
+
+/// Largest map file that is read, bytes.
+pub const MAP_SIZE_LIMIT: usize = 16 << 20;
+
+/// Errors of loading a campaign.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// The file cannot be read.
+    #[error("failed to read the campaign {}: {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file has mistakes.
+    #[error("{0}")]
+    Mistakes(Box<Findings>),
+}
+
+/// Reads and checks a campaign file and the files it names.
+///
+/// # Errors
+/// [`CampaignError::Read`] if the file cannot be read, [`CampaignError::Mistakes`] with all its mistakes.
+pub fn load(path: &Path) -> Result<Campaign, CampaignError> {
+    let mistakes = |findings| CampaignError::Mistakes(Box::new(findings));
+    let text = mapper_yaml::open(&DOCUMENT, path, FILE_SIZE_LIMIT)
+        .map_err(|source| CampaignError::Read { path: path.to_owned(), source })?
+        .map_err(mistakes)?;
+    check(&text, path, &read_named_file).map_err(mistakes)
+}
+
+/// Checks a campaign's text. `origin` names it in messages and is the base of relative paths; `files` reads the
+/// files it names.
+///
+/// The steady states of the nominal model determine which points can be reached; see [`check_with`] for another criterion.
+///
+/// # Errors
+/// All mistakes of the text together.
+pub fn check(
+    text: &str,
+    origin: &Path,
+    files: &dyn Fn(&Path) -> io::Result<String>,
+) -> Result<Campaign, Findings> {
+    check_with(text, origin, files, &|campaign| {
+        // A map that cannot be read is a finding already.
+        reachable_points::nominal_model(campaign)
+            .map(|model| reachable_points::unreachable_points(campaign, &model))
+            .unwrap_or_default()
+    })
+}
+
+/// As [`check`], with the caller's own criterion for reachable points.
+///
+/// # Errors
+/// All mistakes of the text together; points are checked only if nothing else is wrong.
+pub fn check_with(
+    text: &str,
+    origin: &Path,
+    files: &dyn Fn(&Path) -> io::Result<String>,
+    unreachable: &dyn Fn(&Campaign) -> Vec<Unreachable>,
+) -> Result<Campaign, Findings> {
+    if text.len() > FILE_SIZE_LIMIT {
+        let source = Source::new(&DOCUMENT, origin, "");
+        let message =
+            format!("the file has {} bytes, more than the {FILE_SIZE_LIMIT} that are read", text.len());
+        let remedy = "a campaign needs a few thousand; is this the right file?".to_owned();
+        return Err(Findings::single(source, FindingKind::TooLarge, 0, message, remedy));
+    }
+    let (tree, mut notes) = read(text, origin)?;
+    if let Some(concern) = other_file(&tree) {
+        note(&tree, &mut notes, FindingKind::WrongValue, concern);
+        return Err(tree.findings(notes));
+    }
+    SCHEMA.check(&tree, &mut notes);
+    if !notes.is_full() {
+        consistency::check(&tree, files, &mut notes);
+    }
+    let campaign = notes.is_empty().then(|| finish(&tree, files, unreachable, &mut notes)).flatten();
+    campaign.ok_or_else(|| tree.findings(notes))
+}
+
+fn read(text: &str, origin: &Path) -> Result<(Tree, Notes), Findings> {
+    mapper_yaml::read(Source::new(&DOCUMENT, origin, text))
+}
+
+/// Reports a mistake in the settings of a backend, which only the backend can judge, at its place in the campaign's text.
+///
+/// `at`: keys down to the backend's name, e.g. `backend.virtual_lab`; `setting`: the path below it, e.g. `machine.alpha_area`. A
+/// path that the text does not have points at its nearest existing parent. A `hidden` value is shown as asterisks: terminals are logged.
+pub fn backend_mistake(
+    text: &str,
+    origin: &Path,
+    at: &str,
+    setting: &str,
+    message: &str,
+    hidden: bool,
+) -> Findings {
+    let keys = at.split('.').chain(setting.split('.'));
+    let steps: Vec<Step> = keys.filter(|key| !key.is_empty()).map(Step::from).collect();
+    let (mut tree, mut notes) = match read(text, origin) {
+        Ok(read) => read,
+        Err(findings) => return findings,
+    };
+    if hidden {
+        tree.hide(&steps);
+    }
+    let remedy = "the settings of each backend are listed in docs/tutorials/first_map.md";
+    notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
+    tree.findings(notes)
+}
+
+/// An unknown format of the map, at its place in the campaign's text. `known`: the supported names.
+pub fn format_mistake(text: &str, origin: &Path, format: &str, known: &[&str]) -> Findings {
+    let (tree, mut notes) = match read(text, origin) {
+        Ok(read) => read,
+        Err(findings) => return findings,
+    };
+    let mut steps = steps!["outputs", "formats"].to_vec();
+    let index = tree.items(&steps).iter().position(|written| written == format);
+    steps.extend(index.map(Step::from));
+    let message = format!("`{format}` is not a format that a map can be written in");
+    let remedy = format!("choose from {}", known.join(", "));
+    notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
+    tree.findings(notes)
+}
+
+/// Unusual settings in a campaign without mistakes, each at its place in the text. `more`: findings of other crates.
+pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concern>) -> Findings {
+    let (tree, mut notes) = match read(text, origin) {
+        Ok(read) => read,
+        Err(findings) => return findings,
+    };
+    let paths = match campaign.lines.as_slice() {
+        [] => tree.deserialise().map(|file: CampaignFile| file.grid.points(&[], 0.0).1).unwrap_or_default(),
+        _ => resolved::places(campaign),
+    };
+    let own = prospects::concerns(campaign, &paths).into_iter().filter(|concern| !concern.grave);
+    for concern in own.chain(more) {
+        note(&tree, &mut notes, FindingKind::Unusual, concern);
+    }
+    tree.findings(notes)
+}
+
+/// Files of other commands, by a key that only they have.
+const OTHER_FILES: [(&str, &str, &str); 2] = [
+    ("nightly", "this file describes nightly runs, not a campaign", "use `mapper nightly FILE`"),
+    (
+        "channels",
+        "this file maps the channels of a log, it is not a campaign",
+        "use `mapper identify LOG --channels FILE`",
+    ),
+];
+
+/// A file of another command: one mistake in place of one for each of its keys.
+fn other_file(tree: &Tree) -> Option<Concern> {
+    if tree.get(&steps!["campaign"]).is_some() {
+        return None;
+    }
+    let (key, message, remedy) = OTHER_FILES.iter().find(|(key, ..)| tree.get(&steps![*key]).is_some())?;
+    Some(Concern {
+        grave: true,
+        at: vec![Step::from(*key)],
+        message: (*message).to_owned(),
+        remedy: (*remedy).to_owned(),
+    })
+}
+
+fn note(tree: &Tree, notes: &mut Notes, kind: FindingKind, concern: Concern) {
+    let Concern { at, message, remedy, .. } = concern;
+    notes.push(tree.finding(kind, &at, message, remedy));
+}
+
+/// Deserialises a text without known mistakes. `None` with at least one finding.
+fn finish(
+    tree: &Tree,
+    files: &dyn Fn(&Path) -> io::Result<String>,
+    unreachable: &dyn Fn(&Campaign) -> Vec<Unreachable>,
+    notes: &mut Notes,
+) -> Option<Campaign> {
+    let file: CampaignFile = tree.deserialise().map_err(|finding| notes.push(finding)).ok()?;
+    let (mut campaign, mut point_paths) = match file.campaign(&tree.source().origin, files) {
+        Ok(built) => built,
+        Err(error) => {
+            // Both were present a moment ago; the map is the default one.
+            let map = steps!["machine", "map", "file"];
+            let sequence = steps!["sequence"];
+            let steps: &[Step] = if tree.get(&map).is_some() { &map } else { &sequence };
+            let message = format!("a file of the campaign can no longer be read: {error}");
+            let remedy = "write its path relative to the campaign file";
+            notes.push(tree.finding(FindingKind::MissingFile, steps, message, remedy));
+            return None;
+        }
+    };
+    campaign.machine.assumed = machine_sizes::assumed(tree, &campaign.machine.params);
+    let wheel = steps!["machine", "geometry", "compressor", "wheel_diameter"];
+    campaign.machine.wheel_is_declared = tree.get(&wheel).is_some();
+    for concern in prospects::concerns(&campaign, &point_paths).into_iter().filter(|concern| concern.grave) {
+        note(tree, notes, FindingKind::Implausible, concern);
+    }
+    if notes.is_empty()
+        && !campaign.lines.is_empty()
+        && let Ok(model) = reachable_points::nominal_model(&campaign)
+    {
+        match resolved::resolve(&mut campaign, &model) {
+            Ok(()) => point_paths = resolved::places(&campaign),
+            Err(concerns) => {
+                for concern in concerns {
+                    note(tree, notes, FindingKind::Unreachable, concern);
+                }
+            }
+        }
+    }
+    if !notes.is_empty() {
+        return None;
+    }
+    for Unreachable { point, reason, remedy } in unreachable(&campaign) {
+        let steps = point_paths.get(point).map(Vec::as_slice).unwrap_or_default();
+        notes.push(tree.finding(FindingKind::Unreachable, steps, reason, remedy));
+    }
+    notes.is_empty().then_some(campaign)
+}
+
+/// A file that a campaign names, as text: of a workbook its first visible sheet with numbers, of a compressed file its content.
+///
+/// # Errors
+/// The system's error; [`io::ErrorKind::InvalidData`] for a file that is neither.
+pub fn read_named_file(path: &Path) -> io::Result<String> {
+    match String::from_utf8(mapper_yaml::read_limited(path, MAP_SIZE_LIMIT)?) {
+        Ok(text) => Ok(text),
+        Err(error) => file_text(error.as_bytes())
+            .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.to_string())),
+    }
+}
+
+/// A file that a campaign names, or a campaign itself, as text.
+///
+/// # Errors
+/// The system's error; [`io::ErrorKind::FileTooLarge`] for a file above the size limit, [`io::ErrorKind::InvalidData`] for one that
+/// is not UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    String::from_utf8(mapper_yaml::read_limited(path, MAP_SIZE_LIMIT)?)
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8"))
+}

@@ -1,0 +1,115 @@
+//! Output of the program: colours, progress, JSON. Chosen once on the command line, for all commands.
+
+use crate::terminal::{ColourChoice, Progress, ProgressManner, is_coloured, understands_escapes};
+use clap::{ArgMatches, Args, ColorChoice};
+use mapper_report::Paint;
+use std::ffi::OsString;
+use std::io::IsTerminal;
+use std::sync::OnceLock;
+
+/// Options of every command.
+#[derive(Debug, Args)]
+pub struct OutputOptions {
+    /// When to colour; `auto`: on a terminal, unless NO_COLOR is set
+    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t, help_heading = "Output")]
+    color: ColorChoice,
+    /// Progress on standard error [default: a bar on a terminal, lines in a pipe, none with --json]
+    #[arg(long, global = true, value_parser = ProgressManner::NAMES, value_name = "FORM", help_heading = "Output")]
+    progress: Option<String>,
+}
+
+/// The chosen options.
+#[derive(Debug, Clone, Copy, Default)]
+struct ChosenOptions {
+    colour: ColourChoice,
+    progress: Option<ProgressManner>,
+    json: bool,
+    replaces: bool,
+}
+
+/// All commands with their options, as `main` has them.
+static COMMANDS: OnceLock<fn() -> clap::Command> = OnceLock::new();
+
+static CHOSEN: OnceLock<ChosenOptions> = OnceLock::new();
+
+fn chosen() -> ChosenOptions {
+    CHOSEN.get().copied().unwrap_or_default()
+}
+
+/// Keeps the chosen options, for all that is printed later.
+pub fn keep(arguments: &OutputOptions, matches: &ArgMatches) {
+    let colour = match arguments.color {
+        ColorChoice::Auto => ColourChoice::Auto,
+        ColorChoice::Always => ColourChoice::Always,
+        ColorChoice::Never => ColourChoice::Never,
+    };
+    let progress = arguments.progress.as_deref().map(ProgressManner::named);
+    let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
+    let json =
+        command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
+    let replaces = command.is_some_and(|of| of.try_contains_id("force").is_ok());
+    // It is kept once: `main` alone calls this.
+    let _ = CHOSEN.set(ChosenOptions { colour, progress, json, replaces });
+}
+
+/// Whether arguments that could not be read ask for JSON and for no colours.
+pub fn of_raw(arguments: &[OsString]) -> (bool, ColorChoice) {
+    let given = |words: &[&str]| arguments.windows(words.len()).any(|window| window == words);
+    let never = given(&["--color", "never"]) || given(&["--color=never"]);
+    let always = given(&["--color", "always"]) || given(&["--color=always"]);
+    let colour = match (never, always) {
+        (true, _) => ColorChoice::Never,
+        (_, true) => ColorChoice::Always,
+        _ => ColorChoice::Auto,
+    };
+    (given(&["--json"]), colour)
+}
+
+/// Keeps how all commands are listed, for completions and manual pages.
+pub fn keep_commands(commands: fn() -> clap::Command) {
+    let _ = COMMANDS.set(commands);
+}
+
+/// All commands with their options.
+pub fn commands() -> clap::Command {
+    COMMANDS.get().map_or_else(|| clap::Command::new("mapper"), |commands| commands())
+}
+
+/// Whether results are one JSON object.
+pub fn json() -> bool {
+    chosen().json
+}
+
+/// Whether the command can replace files that are there.
+pub fn replaces() -> bool {
+    chosen().replaces
+}
+
+/// Colours of standard output.
+pub fn paint() -> Paint {
+    if coloured(shows_escapes(&std::io::stdout())) { Paint::Coloured } else { Paint::Plain }
+}
+
+/// Whether standard error is coloured.
+pub fn warns_in_colour() -> bool {
+    coloured(shows_escapes(&std::io::stderr()))
+}
+
+/// Whether this is a terminal that moves its cursor and shows colours.
+fn shows_escapes(stream: &impl IsTerminal) -> bool {
+    stream.is_terminal() && understands_escapes(std::env::var_os("TERM").as_deref())
+}
+
+fn coloured(terminal: bool) -> bool {
+    is_coloured(chosen().colour, terminal, std::env::var_os("NO_COLOR").as_deref())
+}
+
+/// The display of progress.
+pub fn progress() -> Progress {
+    let usual = match (shows_escapes(&std::io::stderr()), json()) {
+        (true, _) => ProgressManner::Bar,
+        (false, true) => ProgressManner::Quiet,
+        (false, false) => ProgressManner::Lines,
+    };
+    Progress::new(chosen().progress.unwrap_or(usual))
+}

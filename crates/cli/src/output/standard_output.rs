@@ -1,0 +1,79 @@
+//! Standard output, whose reader may go away at any time.
+
+use crate::output::exit_code::Code;
+use crate::output::failure::Failure;
+use crate::output::standard_error;
+use crate::output::terminal_lines::on_terminal;
+use clap::Args;
+use mapper_core::terminal_text;
+use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
+use serde::Serialize;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use terminal_size::terminal_size_of;
+
+/// Whether the one JSON object has been printed.
+static PRINTED: AtomicBool = AtomicBool::new(false);
+
+/// Of a command that writes files.
+#[derive(Debug, Args)]
+pub struct Replace {
+    /// Replace files that are there already
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl Replace {
+    /// What becomes of a file that is there.
+    pub fn existing(&self) -> Existing {
+        if self.force { Existing::Replaced } else { Existing::Kept }
+    }
+
+    /// A new file with a map.
+    pub fn map<'a>(&self, path: &'a Path, format: Option<&'a str>) -> MapOut<'a> {
+        MapOut { path, format, existing: self.existing() }
+    }
+
+    /// Writes a file.
+    pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
+        write_file(path, bytes, self.existing())
+    }
+}
+
+/// Writes text to standard output, on a terminal with long sentences wrapped to its width. A closed pipe ends the command quietly.
+pub fn print(text: &str) -> Result<(), Failure> {
+    write(&on_terminal(&terminal_text(text), terminal_size_of(std::io::stdout())))
+}
+
+fn write(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|error| match error.kind() {
+        ErrorKind::BrokenPipe => Failure::closed_pipe(),
+        _ => Failure::new(Code::Failure, format!("failed to write to standard output: {error}")),
+    })
+}
+
+/// Writes what is already laid out to standard error: warnings, which no program reads.
+pub fn warn(text: &str) {
+    standard_error::say(text);
+}
+
+/// Writes the result of a command on map files, and what it assumed about them.
+pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
+    work.warnings.iter().for_each(|warning| warn(&format!("{warning}\n")));
+    if as_json { print_json(&work.json) } else { print(&work.text) }
+}
+
+/// Writes one JSON object and a line end to standard output.
+pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
+    // JSON has its own way to write control characters, and programs get every letter.
+    write(&mapper_session::json_text(value)?)?;
+    PRINTED.store(true, Ordering::Relaxed);
+    Ok(())
+}
+
+/// Whether a JSON object was printed: there is room for one.
+pub fn has_printed() -> bool {
+    PRINTED.load(Ordering::Relaxed)
+}

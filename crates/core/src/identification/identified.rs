@@ -1,0 +1,192 @@
+//! Identification result of one point, with its uncertainty.
+
+use crate::{CommonErrors, OperatingPoint, StepKind};
+use serde::{Deserialize, Serialize};
+
+/// How a point was identified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Apparent efficiency from the temperature rise at the end of the step (conventional mapping).
+    Steady,
+    /// Efficiency and heat-transfer coefficient from the transient (Burke et al., eqs. 1-3).
+    Dynamic,
+    /// All points of a campaign together: like `Dynamic`, with shared parameters fitted over all of them.
+    Joint,
+    /// Read from a map that does not state how its efficiency was found.
+    Imported,
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Method::Steady => "steady",
+            Method::Dynamic => "dynamic",
+            Method::Joint => "joint",
+            Method::Imported => "imported",
+        })
+    }
+}
+
+/// Whether a point's results may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Use it.
+    Good,
+    /// Use it with care: `warnings` give the reasons.
+    Doubtful,
+    /// Do not use it: `warnings` give the reasons. Its results are absent or meaningless.
+    Unusable,
+}
+
+impl Verdict {
+    /// The verdict after a warning; an unusable point stays unusable.
+    pub fn doubted(self) -> Self {
+        match self {
+            Verdict::Good | Verdict::Doubtful => Verdict::Doubtful,
+            Verdict::Unusable => Verdict::Unusable,
+        }
+    }
+}
+
+/// A warning about a point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Warning {
+    /// Stable key for machines, e.g. `small_gradient`.
+    pub code: String,
+    /// One sentence with values and units.
+    pub message: String,
+}
+
+/// The part of a recording that was used.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Window {
+    /// Start, run time, s.
+    pub start_s: f64,
+    /// End, run time, s.
+    pub end_s: f64,
+}
+
+/// Standard errors of a quantity, by origin: noise averages out with more samples, bias does not.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct EstimateUncertainty {
+    /// One standard error from noise, serial correlation of the residual included; unit of the quantity.
+    pub noise_standard_error: f64,
+    /// One standard error from declared fixed sensor offsets and gains, and from the estimated error of the method's own
+    /// assumptions (a constant h where the flow still moves); unit of the quantity.
+    pub bias_standard_error: f64,
+}
+
+impl EstimateUncertainty {
+    /// Both origins in quadrature; unit of the quantity.
+    pub fn combined_standard_error(&self) -> f64 {
+        self.noise_standard_error.hypot(self.bias_standard_error)
+    }
+}
+
+/// 97.5 % quantile of the standard normal distribution.
+const Z_975: f64 = 1.959_963_984_540_054;
+
+/// The 95 % interval of a normally distributed estimate: value -/+ 1.96 standard errors.
+pub fn confidence_interval_95(value: f64, standard_error: f64) -> (f64, f64) {
+    let half = half_width_95(standard_error);
+    (value - half, value + half)
+}
+
+/// Half the width of the 95 % interval of a normally distributed estimate, in the unit of its standard error.
+pub fn half_width_95(standard_error: f64) -> f64 {
+    Z_975 * standard_error
+}
+
+/// The standard error whose 95 % interval this is: the reverse of [`confidence_interval_95`].
+pub fn standard_error_of(low: f64, high: f64) -> f64 {
+    0.5 * (high - low) / Z_975
+}
+
+/// One identified point of the map. Missing results are `None`, never invented.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiedPoint {
+    /// Index of the step, from 0; files have its number, from 1.
+    #[serde(with = "crate::test_plan::step_number")]
+    pub step: usize,
+    /// Whether the step was made for the map, or to detect drift.
+    #[serde(default)]
+    pub kind: StepKind,
+    /// The target of the plan; `None` in recordings made by others.
+    pub target: Option<OperatingPoint>,
+    /// Measured shaft speed at the end of the step, rpm.
+    pub speed_rpm: f64,
+    /// Commanded valve opening relative to the nominal area; NaN (null in files) if it was not recorded.
+    #[serde(rename = "valve", deserialize_with = "nan_where_null")]
+    pub valve_opening_ratio: f64,
+    /// Compressor mass flow at the end of the step, kg/s.
+    pub flow_kg_s: f64,
+    /// Corrected mass flow at the end of the step, kg/s (the map contains the reference state).
+    pub flow_corrected_kg_s: f64,
+    /// Corrected shaft speed at the end of the step, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Total pressure ratio P2/P1 at the end of the step.
+    pub pressure_ratio: f64,
+    /// Inlet total temperature (station 1) at the end of the step, K.
+    pub t1_k: f64,
+    /// Inlet total pressure (station 1) at the end of the step, Pa.
+    pub p1_pa: f64,
+    /// Isentropic efficiency, total to total, fraction: adiabatic for `dynamic` and `joint`, apparent for `steady`.
+    pub eta: Option<f64>,
+    /// Lower end of the 95 % interval of `eta`.
+    pub eta_low: Option<f64>,
+    /// Upper end of the 95 % interval of `eta`.
+    pub eta_high: Option<f64>,
+    /// Standard errors of `eta` by origin, fraction.
+    pub eta_uncertainty: Option<EstimateUncertainty>,
+    /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K); `None` for `steady`.
+    pub h_w_m2k: Option<f64>,
+    /// Lower end of the 95 % interval of `h_w_m2k`.
+    pub h_low_w_m2k: Option<f64>,
+    /// Upper end of the 95 % interval of `h_w_m2k`.
+    pub h_high_w_m2k: Option<f64>,
+    /// Standard errors of `h_w_m2k` by origin, W/(m2 K).
+    pub h_uncertainty: Option<EstimateUncertainty>,
+    /// The part of these errors that the recording's other points share.
+    #[serde(default)]
+    pub common: CommonErrors,
+    /// How it was identified.
+    pub method: Method,
+    /// Whether to use it.
+    pub verdict: Verdict,
+    /// Reasons for a verdict other than good, and remarks.
+    pub warnings: Vec<Warning>,
+    /// Part of the recording used.
+    pub window: Option<Window>,
+    /// Root mean square of the T2 residual, K.
+    pub residual_rms_k: Option<f64>,
+    /// Change of T2 over the window, K.
+    pub dt2_k: Option<f64>,
+    /// Change of the housing temperature over the window, K.
+    pub dtc_k: Option<f64>,
+}
+
+impl IdentifiedPoint {
+    /// Standard error of `eta` that no other point shares, fraction; `None` without an interval.
+    pub fn eta_own_standard_error(&self) -> Option<f64> {
+        let all = standard_error_of(self.eta_low?, self.eta_high?);
+        Some(remaining_standard_error(all, self.common.eta_standard_error()))
+    }
+
+    /// Standard error of `h` that no other point shares, W/(m2 K); `None` without an interval.
+    pub fn h_own_standard_error_w_m2k(&self) -> Option<f64> {
+        let all = standard_error_of(self.h_low_w_m2k?, self.h_high_w_m2k?);
+        Some(remaining_standard_error(all, self.common.h_standard_error_w_m2k()))
+    }
+}
+
+/// The standard error that remains after an independent part is removed.
+fn remaining_standard_error(all: f64, part: f64) -> f64 {
+    (all * all - part * part).max(0.0).sqrt()
+}
+
+/// A number that is null if unknown.
+fn nan_where_null<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}

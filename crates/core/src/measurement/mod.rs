@@ -1,0 +1,12 @@
+//! Measured data for every step of the work: channels, sensor uncertainties, samples, events, and recordings in memory.
+
+pub(crate) mod channel;
+pub(crate) mod declared_uncertainty;
+pub(crate) mod event;
+pub(crate) mod held_point;
+pub(crate) mod joined_recordings;
+pub(crate) mod plausible;
+pub(crate) mod recording;
+pub(crate) mod redundant;
+pub(crate) mod sample;
+pub(crate) mod step_marker;

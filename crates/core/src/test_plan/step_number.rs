@@ -1,0 +1,158 @@
+//! The number of a step: from 1 in files and in all text, while code uses an index from 0.
+//!
+//! Serde adapters for the fields with such an index: this module for one named `step`, [`list`], [`lists`] and [`option`] for several
+//! and for a missing one, [`entry`] for plans and step markers, which have another form in older files.
+
+use serde::de::{Deserialize, Deserializer, Error};
+use serde::ser::{Serialize, Serializer};
+
+/// The number of the step at an index, from 1.
+pub fn step_number(place: usize) -> usize {
+    place.saturating_add(1)
+}
+
+fn place<E: Error>(number: usize) -> Result<usize, E> {
+    number.checked_sub(1).ok_or_else(|| E::custom("steps count from 1, and this one has the number 0"))
+}
+
+/// Writes the number of the step at `place`.
+///
+/// # Errors
+/// Those of the serializer.
+pub fn serialize<S: Serializer>(place: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    step_number(*place).serialize(serializer)
+}
+
+/// Reads a number from 1 as an index.
+///
+/// # Errors
+/// Those of the deserializer; 0 is not a valid step.
+pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+    place(usize::deserialize(deserializer)?)
+}
+
+/// Several steps.
+pub mod list {
+    use super::{Serialize, Serializer};
+    use crate::step_number;
+
+    /// Writes the numbers of the steps at `places`.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(places: &[usize], serializer: S) -> Result<S::Ok, S::Error> {
+        places.iter().copied().map(step_number).collect::<Vec<_>>().serialize(serializer)
+    }
+}
+
+/// Groups of steps.
+pub mod lists {
+    use super::{Serialize, Serializer};
+    use crate::step_number;
+
+    /// Writes the numbers of the steps at `places`, group by group.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(places: &[Vec<usize>], serializer: S) -> Result<S::Ok, S::Error> {
+        let numbers = |group: &Vec<usize>| group.iter().copied().map(step_number).collect::<Vec<_>>();
+        places.iter().map(numbers).collect::<Vec<_>>().serialize(serializer)
+    }
+}
+
+/// A step, or none.
+pub mod option {
+    use super::{Serialize, Serializer};
+    use crate::step_number;
+
+    /// Writes the number of the step at `place`, or null.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(place: &Option<usize>, serializer: S) -> Result<S::Ok, S::Error> {
+        place.map(step_number).serialize(serializer)
+    }
+}
+
+/// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead; the name distinguishes them.
+pub mod entry {
+    use super::{Deserialize, Deserializer, Error, Serialize, Serializer, place};
+    use crate::step_number;
+
+    #[derive(serde::Serialize)]
+    struct Written {
+        step: usize,
+    }
+
+    #[derive(serde::Deserialize)]
+    struct Read {
+        step: Option<usize>,
+        index: Option<usize>,
+    }
+
+    /// Writes `step`.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(place: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+        Written { step: step_number(*place) }.serialize(serializer)
+    }
+
+    /// Reads `step` or `index`.
+    ///
+    /// # Errors
+    /// Those of the deserializer; if neither is present, and if `step` is 0.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+        let Read { step, index } = Read::deserialize(deserializer)?;
+        match step {
+            Some(step) => place(step),
+            None => index.ok_or_else(|| D::Error::missing_field("step")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde::{Deserialize, Serialize};
+
+    #[derive(Debug, PartialEq, Serialize, Deserialize)]
+    struct Marked {
+        #[serde(flatten, with = "super::entry")]
+        index: usize,
+        at: f64,
+    }
+
+    #[derive(Debug, PartialEq, Serialize, Deserialize)]
+    struct Named {
+        #[serde(with = "super")]
+        step: usize,
+    }
+
+    #[test]
+    fn files_count_from_one_and_those_of_0_1_0_still_read() {
+        for place in [0, 1, 57, 999_999] {
+            let text = serde_json::to_string(&Marked { index: place, at: 0.1 }).unwrap();
+            assert!(text.contains(&format!("\"step\":{}", place + 1)) && !text.contains("index"), "{text}");
+            let old = format!("{{\"at\":0.1,\"index\":{place}}}");
+            for text in [text, old] {
+                assert_eq!(serde_json::from_str::<Marked>(&text).unwrap(), Marked { index: place, at: 0.1 });
+            }
+            let text = serde_json::to_string(&Named { step: place }).unwrap();
+            assert_eq!(serde_json::from_str::<Named>(&text).unwrap(), Named { step: place });
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_of_a_step_is_refused() {
+        for (text, words) in [
+            ("{\"step\":0,\"at\":0}", "count from 1"),
+            ("{\"at\":0}", "missing field `step`"),
+            ("{\"step\":-1,\"at\":0}", "integer"),
+            ("{\"step\":1.5,\"at\":0}", "floating"),
+        ] {
+            let error = serde_json::from_str::<Marked>(text).unwrap_err().to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+        assert!(serde_json::from_str::<Named>("{\"step\":0}").is_err());
+    }
+}

@@ -1,0 +1,100 @@
+//! The map points corrected for the drift.
+
+use crate::drift::causes::cause::{Cause, CauseKind};
+use crate::drift::correction::subtract_drift::without_drifts;
+use crate::drift::likelihood::fit::Fit;
+use crate::drift::likelihood::refine::Refined;
+use crate::drift::report::CorrectedPoint;
+use crate::drift::runs::request::DriftRequest;
+use crate::drift::runs::time_axis::CampaignStep;
+use crate::drift::sensitivity::constant_effect::Constant;
+use mapper_core::{Channel, IdentifiedPoint, Recording};
+use mapper_identify::identify_each;
+use mapper_observe::averages::mean_reading::mean_between;
+use nalgebra::DVector;
+
+/// Averaging time at the end of a step, s.
+const END_S: f64 = 5.0;
+
+/// Points of a run; empty if the recording cannot be identified.
+pub(crate) fn identified(recording: &Recording, request: &DriftRequest<'_>) -> Vec<IdentifiedPoint> {
+    identify_each(recording, request.identification)
+        .map(|points| points.into_iter().filter_map(Result::ok).collect())
+        .unwrap_or_default()
+}
+
+pub(crate) fn point_of<'a>(
+    points: &'a [Vec<IdentifiedPoint>],
+    step: &CampaignStep,
+) -> Option<&'a IdentifiedPoint> {
+    points.get(step.run)?.iter().find(|point| point.step == step.index)
+}
+
+/// All points, with the drifts subtracted.
+pub(crate) fn corrected_points(
+    request: &DriftRequest<'_>,
+    recordings: &[&Recording],
+    refined: &Refined,
+    points: &[Vec<IdentifiedPoint>],
+) -> Vec<CorrectedPoint> {
+    let Refined { readings, constants, fits, .. } = refined;
+    let drifts = &fits.drifts;
+    let of_sensors = drifts.iter().any(|fit| fit.cause.kind() == CauseKind::Sensor);
+    let signatures: Vec<(&Fit, Constant)> =
+        drifts.iter().filter_map(|fit| Some((fit, readings.signature(fit.cause)?))).collect();
+    let corrected: Vec<Vec<IdentifiedPoint>> = (0..recordings.len())
+        .map(|run| {
+            if !of_sensors {
+                return points[run].clone();
+            }
+            let offset_s =
+                readings.steps.iter().find(|step| step.run == run).map_or(0.0, |step| step.offset_s);
+            identified(&without_drifts(recordings[run], drifts, offset_s), request)
+        })
+        .collect();
+    readings
+        .steps
+        .iter()
+        .enumerate()
+        .filter_map(|(position, step)| {
+            let at = |fit: &Fit| fit.drift_at(step.end_s + step.offset_s);
+            // A step that the model cannot follow gives no point.
+            let (mut eta, mut h_w_m2k) =
+                *readings.step_ends.get(position).filter(|(eta, _)| eta.is_finite())?;
+            for (constant, size) in constants.iter().zip(fits.constants.iter()) {
+                eta += constant.eta[position] * size;
+                h_w_m2k += constant.h_w_m2k[position] * size;
+            }
+            for (fit, signature) in &signatures {
+                eta += signature.eta[position] * at(fit);
+                h_w_m2k += signature.h_w_m2k[position] * at(fit);
+            }
+            // Refers to the machine at the start of the campaign, at this operating point.
+            let fouling = drifts.iter().find(|fit| fit.cause == Cause::Fouling);
+            let fouled = 1.0 + fouling.map_or(0.0, at);
+            let weights = DVector::from_iterator(constants.len(), constants.iter().map(|c| c.eta[position]));
+            let identified = point_of(&corrected, step).and_then(|point| point.eta);
+            let recorded = point_of(points, step);
+            Some(CorrectedPoint {
+                run: step.run,
+                step: step.index,
+                speed_rpm: recorded.map_or_else(
+                    || end_speed_rpm(recordings[step.run], step).unwrap_or(f64::NAN),
+                    |point| point.speed_rpm,
+                ),
+                valve: step.valve_opening_ratio,
+                eta: eta / fouled,
+                sigma_eta: fits.noise.variance(&weights).max(0.0).sqrt(),
+                h_w_m2k,
+                eta_identified: identified.map(|eta| eta / fouled),
+                eta_uncorrected: recorded.and_then(|point| point.eta),
+                corrections: drifts.iter().map(at).collect(),
+            })
+        })
+        .collect()
+}
+
+/// Mean speed of the last seconds of a step, rpm.
+pub(crate) fn end_speed_rpm(recording: &Recording, step: &CampaignStep) -> Option<f64> {
+    mean_between(recording, Channel::ShaftSpeed, step.end_s - END_S, step.end_s, 1)
+}

@@ -1,0 +1,78 @@
+//! Residuals of the best explanation: segments that the model cannot follow, and noise above the declaration.
+
+use crate::drift::likelihood::candidates::Candidates;
+use crate::drift::likelihood::low_rank::LowRank;
+use crate::drift::runs::request::Unsolvable;
+use crate::drift::sensitivity::readings::Readings;
+use mapper_numerics::statistics::median;
+use mapper_observe::perturbation::UNINFORMATIVE;
+use nalgebra::{DMatrix, DVector};
+
+/// Distance from the model, relative to the median segment, above which a segment is an outlier.
+const FAR_OUT: f64 = 5.0;
+const LEAVE_OUT_ROUNDS: usize = 4;
+
+/// Excludes outlying segments even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop). Returns
+/// their number, the noise without them, and the residual of the best explanation.
+pub(crate) fn leave_out(
+    own: &mut [DMatrix<f64>],
+    readings: &Readings,
+    columns: &DMatrix<f64>,
+    difference: &DMatrix<f64>,
+    candidates: &Candidates,
+) -> Result<(usize, LowRank, DMatrix<f64>), Unsolvable> {
+    let count = readings.columns.len();
+    let mut out = vec![false; own.len()];
+    let mut noise = LowRank::new(own, columns)?;
+    let mut left = unexplained(&noise, difference, candidates);
+    for _ in 0..LEAVE_OUT_ROUNDS {
+        let sizes: Vec<f64> = (0..own.len())
+            .map(|block| {
+                left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64
+            })
+            .collect();
+        let kept = (0..own.len()).filter(|block| !out[*block]).map(|block| sizes[block]);
+        let usual = median(kept).unwrap_or(1.0).max(1.0);
+        let far: Vec<usize> = (0..own.len())
+            .filter(|block| !out[*block] && sizes[*block] > FAR_OUT * FAR_OUT * usual)
+            .collect();
+        if far.is_empty() {
+            break;
+        }
+        for block in far {
+            out[block] = true;
+            own[block] *= UNINFORMATIVE * UNINFORMATIVE;
+        }
+        noise = LowRank::new(own, columns)?;
+        left = unexplained(&noise, difference, candidates);
+    }
+    Ok((out.iter().filter(|out| **out).count(), noise, left))
+}
+
+/// Residual after constants and the most probable causes, whitened.
+fn unexplained(noise: &LowRank, difference: &DMatrix<f64>, candidates: &Candidates) -> DMatrix<f64> {
+    let explained = candidates.likelihood(noise, difference).explain(&candidates.priors).unwrap_or_default();
+    let mut left = difference.clone();
+    for member in explained.members {
+        left -= candidates.shown.columns(member.index, 1) * member.value;
+    }
+    noise.inverse_times(&noise.whiten(left))
+}
+
+/// Increases each channel's own noise to match the residual of the best explanation (`left`, whitened by `noise`).
+pub(crate) fn inflate(own: &mut [DMatrix<f64>], readings: &Readings, noise: &LowRank, left: &DMatrix<f64>) {
+    let count = readings.columns.len();
+    let rows = left.nrows() as f64;
+    // Constants use up their share of the degrees of freedom.
+    let free = (1.0 - noise.degrees_of_freedom() / rows).max(0.2);
+    let factors: Vec<f64> = (0..count)
+        .map(|column| {
+            let own: Vec<f64> = left.iter().skip(column).step_by(count).map(|value| value * value).collect();
+            (own.iter().sum::<f64>() / own.len().max(1) as f64 / free).max(1.0).sqrt()
+        })
+        .collect();
+    let scale = DMatrix::from_diagonal(&DVector::from_vec(factors));
+    for covariance in own {
+        *covariance = &scale * &*covariance * &scale;
+    }
+}

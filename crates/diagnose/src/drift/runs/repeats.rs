@@ -1,0 +1,157 @@
+//! Finds repeated jumps, and checks whether they suffice for a judgement.
+
+use crate::drift::runs::request::RecordedRun;
+use crate::drift::runs::time_axis::CampaignStep;
+use mapper_core::{Channel, Recording, step_number};
+use std::collections::BTreeMap;
+
+/// Minimum number of visits of one jump: two show a difference, only a third shows whether it persists or grows.
+const VISITS_NEEDED: usize = 3;
+/// Longest step that the model is driven through, s.
+const LONGEST_STEP_S: f64 = 86_400.0;
+/// Longest total time of all steps, s.
+const LONGEST_S: f64 = 30.0 * 86_400.0;
+/// Time without readings of a channel within the steps that counts as a gap, s.
+const GAP_S: f64 = 3.0;
+
+/// All visits of each repeated jump, by position among the steps; most visits first.
+pub(crate) fn groups(steps: &[CampaignStep]) -> Vec<Vec<usize>> {
+    let mut by_jump: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+    for (position, step) in steps.iter().enumerate() {
+        // A change within the tolerance of one operating point is not a jump.
+        if let Some(from) = step.from.filter(|from| *from != step.condition) {
+            by_jump.entry((from, step.condition)).or_default().push(position);
+        }
+    }
+    let mut groups: Vec<Vec<usize>> = by_jump.into_values().filter(|visits| visits.len() > 1).collect();
+    groups.sort_by_key(|visits| (std::cmp::Reverse(visits.len()), visits.first().copied()));
+    groups
+}
+
+/// Reason why no judgement is possible; `None` if it is.
+pub(crate) fn refusal(
+    runs: &[RecordedRun<'_>],
+    steps: &[CampaignStep],
+    groups: &[Vec<usize>],
+) -> Option<String> {
+    if let Some(first) = runs.first()
+        && let Some(other) = runs.iter().position(|run| run.fingerprint != first.fingerprint)
+    {
+        return Some(format!(
+            "No verdict: recording {} was made with another campaign or machine than recording 1 (their fingerprints \
+             differ), so differences between them need not be drift. Compare runs of one campaign on one machine.",
+            other + 1
+        ));
+    }
+    if let Some(step) = steps.iter().find(|step| !step.valve_opening_ratio.is_finite()) {
+        return Some(format!(
+            "No verdict: recording {} does not say how far the valve was open, and the model is driven with that. Map it as \
+             `valve_command`, as commanded or as measured, or give it among `constants`.",
+            step.run + 1
+        ));
+    }
+    let longest = steps.iter().find(|step| step.end_s - step.start_s > LONGEST_STEP_S);
+    let whole_s: f64 = steps.iter().map(|step| step.end_s - step.start_s).sum();
+    if let Some(step) = longest.or(steps.first().filter(|_| whole_s > LONGEST_S)) {
+        return Some(format!(
+            "No verdict: step {} of recording {} lasts {:.1} h of {:.1} h in total; steps of a campaign last up to {:.0} h, and all of \
+             them up to {:.0} h. A wrong time in the log would do that.",
+            step_number(step.index),
+            step.run + 1,
+            (step.end_s - step.start_s) / 3600.0,
+            whole_s / 3600.0,
+            LONGEST_STEP_S / 3600.0,
+            LONGEST_S / 3600.0,
+        ));
+    }
+    for (index, run) in runs.iter().enumerate() {
+        if let Some((channel, from_s, to_s)) = gap(run.recording) {
+            return Some(format!(
+                "No verdict: recording {} has a gap, {} is silent from {from_s:.1} s to {to_s:.1} s. What happened to the \
+                 machine meanwhile is not known; give the parts before and after it as recordings of their own.",
+                index + 1,
+                channel.symbol()
+            ));
+        }
+    }
+    let most = groups.first().map_or(0, Vec::len);
+    if most >= VISITS_NEEDED {
+        return None;
+    }
+    if most == 2 {
+        return Some(
+            "No verdict: only one repeat. A jump that is made twice shows a difference, but not whether it is chance, a \
+             step or a steady change; repeat the reference jump at least twice more."
+                .to_owned(),
+        );
+    }
+    let mut visits: BTreeMap<usize, usize> = BTreeMap::new();
+    for step in steps {
+        *visits.entry(step.condition).or_default() += 1;
+    }
+    Some(if visits.values().any(|count| *count > 1) {
+        "No verdict: points are visited again, but by different jumps. Each transient carries what came before it, so that \
+         only visits by the same jump can be compared; repeat the jump, not only the point."
+            .to_owned()
+    } else {
+        "No verdict: no repeats. No jump of this campaign is made twice; plan some (`repeats` in the campaign).".to_owned()
+    })
+}
+
+/// A channel with a gap within the steps, with start and end of the gap.
+fn gap(recording: &Recording) -> Option<(Channel, f64, f64)> {
+    let (start_s, end_s) = (recording.steps.first()?.start_s, recording.steps.last()?.end_s);
+    let measured = |channel: &Channel| {
+        !matches!(
+            channel,
+            Channel::P3Command
+                | Channel::T3Command
+                | Channel::ValveCommand
+                | Channel::TOilCommand
+                | Channel::TAmb
+        )
+    };
+    for (channel, series) in recording.series.iter().filter(|(channel, _)| measured(channel)) {
+        let times = series.slice(start_s, end_s).0;
+        let (Some(first), Some(last)) = (times.first(), times.last()) else {
+            return Some((*channel, start_s, end_s));
+        };
+        let inner = times.windows(2).map(|pair| (pair[0], pair[1]));
+        let mut all = inner.chain([(start_s, *first), (*last, end_s)]);
+        // A slow logger is not a gap: compare with the channel's own sample interval.
+        let usual_s = (last - first) / times.len().max(2) as f64;
+        if let Some((from_s, to_s)) = all.find(|(from_s, to_s)| to_s - from_s > GAP_S.max(20.0 * usual_s)) {
+            return Some((*channel, from_s, to_s));
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(end_s: f64, valve_opening_ratio: f64) -> CampaignStep {
+        CampaignStep {
+            run: 0,
+            index: 0,
+            start_s: 0.0,
+            end_s,
+            offset_s: 0.0,
+            condition: 0,
+            from: None,
+            valve_opening_ratio,
+            p3_pa: 2e5,
+        }
+    }
+
+    #[test]
+    fn a_log_without_a_valve_and_one_with_a_wrong_time_are_refused_by_name() {
+        let message = |steps: &[CampaignStep]| refusal(&[], steps, &[]).unwrap();
+        assert!(message(&[step(60.0, f64::NAN)]).contains("`valve_command`"));
+        // The last step reaches to a time of 1e9 s; or many steps together last for years.
+        assert!(message(&[step(60.0, 0.7), step(1e9, 0.7)]).contains("lasts 277777.8 h"));
+        assert!(message(&vec![step(8e4, 0.7); 100]).contains("2222.2 h in total"));
+        assert!(message(&[step(60.0, 0.7)]).contains("no repeats"));
+    }
+}

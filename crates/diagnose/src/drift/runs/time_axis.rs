@@ -1,0 +1,150 @@
+//! Steps of all runs on one time axis, and the segments of them over which readings are averaged.
+
+use mapper_core::{Channel, HeldPoint, NoiseColour, Recording, StepMarker};
+use mapper_numerics::coloured_noise::ColouredNoise;
+use mapper_observe::averages::mean_reading::{BEFORE_S, mean_between};
+use mapper_observe::averages::schedule::Schedule;
+
+/// From 5 s after a jump on, with increasing length.
+const STRETCHES: Schedule = Schedule {
+    first_s: 5.0,
+    lengths_s: &[(15.0, 10.0), (35.0, 20.0), (95.0, 30.0), (f64::INFINITY, 60.0)],
+    shortest_s: 5.0,
+    shortest_ratio: 0.0,
+};
+
+/// Relative difference below which two commands are the same point: other programs round them.
+const SAME_COMMAND: f64 = 1e-3;
+
+/// A step of one of the runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CampaignStep {
+    pub run: usize,
+    /// Number within its run, as its marker has it.
+    pub index: usize,
+    /// Run time, s.
+    pub start_s: f64,
+    pub end_s: f64,
+    /// Offset from run time to campaign time, s.
+    pub offset_s: f64,
+    /// Number of its operating point among all.
+    pub condition: usize,
+    /// Operating point before it; `None` for the first step of a run.
+    pub from: Option<usize>,
+    pub valve_opening_ratio: f64,
+    pub p3_pa: f64,
+}
+
+/// A segment of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Block {
+    /// Position of its step among all steps.
+    pub step: usize,
+    /// Run time, s.
+    pub start_s: f64,
+    pub end_s: f64,
+}
+
+impl Block {
+    pub fn length_s(&self) -> f64 {
+        self.end_s - self.start_s
+    }
+}
+
+/// Steps of all runs, each with its operating point.
+pub(crate) fn steps(runs: &[&Recording]) -> Vec<CampaignStep> {
+    let mut conditions: Vec<Condition> = Vec::new();
+    let mut steps: Vec<CampaignStep> = Vec::new();
+    let mut offset_s = 0.0;
+    for (run, recording) in runs.iter().enumerate() {
+        let mut from = None;
+        for marker in &recording.steps {
+            let held = HeldPoint::of(recording, marker);
+            let condition = condition_of(marker, held, &mut conditions);
+            steps.push(CampaignStep {
+                run,
+                index: marker.index,
+                start_s: marker.start_s,
+                end_s: marker.end_s,
+                offset_s,
+                condition,
+                from,
+                valve_opening_ratio: marker.valve_opening_ratio,
+                p3_pa: marker.p3_pa,
+            });
+            from = Some(condition);
+        }
+        // Only measured time counts, so the time axis has no gap between two runs.
+        offset_s += recording.steps.last().map_or(0.0, |marker| marker.end_s);
+    }
+    steps
+}
+
+/// Command of an operating point: its speed if known, since a loop that holds it moves P3; otherwise P3, Pa. Also the valve opening. Without a
+/// command, the measured value.
+#[derive(Debug, Clone, Copy)]
+struct Condition {
+    speed_rpm: Option<f64>,
+    p3_pa: f64,
+    valve_opening_ratio: f64,
+    held: Option<HeldPoint>,
+}
+
+impl Condition {
+    fn is_same(&self, other: &Condition) -> bool {
+        if let (Some(own), Some(other)) = (self.held, other.held) {
+            return own.is_same(&other);
+        }
+        let same = |a: f64, b: f64| (a - b).abs() <= SAME_COMMAND * a.abs().max(b.abs());
+        let drive = match (self.speed_rpm, other.speed_rpm) {
+            (Some(own), Some(other)) => same(own, other),
+            _ => same(self.p3_pa, other.p3_pa),
+        };
+        drive && same(self.valve_opening_ratio, other.valve_opening_ratio)
+    }
+}
+
+fn condition_of(marker: &StepMarker, held: Option<HeldPoint>, conditions: &mut Vec<Condition>) -> usize {
+    let condition = Condition {
+        speed_rpm: marker.to.map(|to| to.speed_rpm),
+        p3_pa: marker.p3_pa,
+        valve_opening_ratio: marker.valve_opening_ratio,
+        held,
+    };
+    match conditions.iter().position(|known| known.is_same(&condition)) {
+        Some(position) => position,
+        None => {
+            conditions.push(condition);
+            conditions.len() - 1
+        }
+    }
+}
+
+/// The segments of all steps.
+pub(crate) fn blocks(steps: &[CampaignStep]) -> Vec<Block> {
+    let of_step = |(position, step): (usize, &CampaignStep)| {
+        let stretches = STRETCHES.stretches(step.start_s, step.end_s, 0.0);
+        stretches.into_iter().map(move |(start_s, end_s)| Block { step: position, start_s, end_s })
+    };
+    steps.iter().enumerate().flat_map(of_step).collect()
+}
+
+/// Mean of a channel over a segment; `None` if it has fewer than three samples.
+pub(crate) fn mean(recording: &Recording, channel: Channel, block: &Block) -> Option<f64> {
+    mean_between(recording, channel, block.start_s, block.end_s, 3)
+}
+
+/// Ratio of the variance of a channel's mean over a segment to that of one reading.
+pub(crate) fn mean_variance_ratio(
+    colour: NoiseColour,
+    recording: &Recording,
+    channel: Channel,
+    block: &Block,
+) -> f64 {
+    let samples = recording
+        .series
+        .get(&channel)
+        .map_or(1, |series| series.range(block.start_s, block.end_s - BEFORE_S).len());
+    ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s)
+        .variance_of_mean(samples, block.length_s())
+}

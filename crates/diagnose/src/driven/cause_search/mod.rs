@@ -1,0 +1,16 @@
+//! Gap diagnosis without steps: which cause explains the judged channels of a side driven by its measured neighbours.
+
+mod denoise;
+mod detectable;
+mod diagnose;
+mod fit;
+mod held_out;
+mod noise;
+mod phases;
+mod search;
+mod side_diagnosis;
+mod sides;
+
+pub use diagnose::{Ask, diagnose};
+pub use side_diagnosis::{Beyond, Cause, Course, Diagnosis, HeldOut, NotAsked, Phase, Unknown, Word};
+pub use sides::side::{NoSide, Which};

@@ -1,0 +1,316 @@
+//! Compressor side of the model with all effects. Flow and efficiency come from measurement and free parameters instead of the map.
+
+use crate::driven::cause_search::sides::side::{Side, Smooth, Which, truth};
+use crate::driven::compressor_side::{EFFICIENCY, flow_coefficient, geometric_mean};
+use crate::driven::density::{ALIKE_S, HOUSING_ALIKE_S, HOUSING_SIGMA_K};
+use crate::driven::log_rows::{Rows, Wanted};
+use crate::driven::parameters::Spread;
+use crate::driven::readings::COMPRESSOR;
+use crate::driven::{PARAMETERS, Parameter};
+use mapper_core::{Channel, ReferenceState};
+use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use mapper_physics::gas::air;
+use mapper_physics::laws::housing::compressor_capacity_j_k;
+use mapper_physics::machine::params::{BoundaryConditions, MODEL_REFERENCE};
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::instruments::ChannelFollower;
+use mapper_physics::simulation::model::{State, rad_s_of_rpm};
+use std::sync::Arc;
+
+/// Free parameters of a diagnosis, in the order of [`CompressorSide::predict`]. Parameters of library causes (area split, probe) keep their
+/// declared values. The efficiency prior is wider than in identification and includes map shapes beyond a parabola, so that no cause is
+/// named for a good compressor.
+static UNKNOWNS: [Parameter; 16] = {
+    let p = PARAMETERS;
+    const FURTHER: f64 = 0.15;
+    const fn further(name: &'static str, description: &'static str) -> Parameter {
+        Parameter { name, description, unit: "", middle: 0.0, width: FURTHER, spread: Spread::Normal }
+    }
+    [
+        Parameter { middle: 0.72, width: 0.10, ..p[0] },
+        Parameter { width: 0.12, ..p[1] },
+        p[2],
+        p[3],
+        p[4],
+        p[5],
+        p[7],
+        p[8],
+        p[9],
+        p[10],
+        p[12],
+        further("eta_speed_flow", "change of the efficiency with speed times flow coefficient, logarithms"),
+        further("eta_speed_3", "cube of the efficiency over relative speed"),
+        further("eta_speed_2_flow", "change of the efficiency with speed squared times flow coefficient"),
+        further("eta_speed_flow_2", "change of the efficiency with speed times flow coefficient squared"),
+        further("eta_flow_3", "cube of the efficiency over the logarithm of the flow coefficient"),
+    ]
+};
+
+/// The compressor side.
+pub(crate) struct CompressorSide {
+    rows: Rows,
+    middle_speed_rpm: f64,
+    middle_flow: f64,
+}
+
+impl Side for CompressorSide {
+    const WHICH: Which = Which::Compressor;
+    const PRESSURE: Channel = Channel::P2;
+
+    fn wanted() -> Wanted<'static> {
+        COMPRESSOR
+    }
+
+    fn unknowns() -> &'static [Parameter] {
+        &UNKNOWNS
+    }
+
+    fn smooth() -> &'static [Smooth] {
+        // T2: error of a polynomial map and a single housing node. Tc: one thermocouple for a whole housing.
+        &[
+            Smooth { median_k: 0.18, width: 0.25, alike_s: ALIKE_S },
+            Smooth { median_k: HOUSING_SIGMA_K, width: 0.0, alike_s: HOUSING_ALIKE_S },
+        ]
+    }
+
+    fn of(rows: Rows) -> Self {
+        let middle_speed_rpm = geometric_mean(rows.drive(Channel::ShaftSpeed).iter().copied());
+        let at = |i: usize| {
+            let [speed_rpm, flow_kg_s, p1_pa, _, t1_k] = std::array::from_fn(|place| rows.drives[place].1[i]);
+            flow_coefficient(speed_rpm, flow_kg_s, p1_pa, t1_k)
+        };
+        let middle_flow = geometric_mean((0..rows.len()).map(at));
+        CompressorSide { rows, middle_speed_rpm, middle_flow }
+    }
+
+    fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    fn predict(&self, rig: &Rig, unknowns: &[f64]) -> Vec<Vec<f64>> {
+        let rows = &self.rows;
+        let mut columns = vec![Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len())];
+        let &[
+            eta,
+            eta_speed,
+            eta_speed_2,
+            eta_flow,
+            eta_flow_2,
+            h,
+            capacity,
+            loss_w_k,
+            surroundings_k,
+            start_k,
+            t2_offset_k,
+            sf,
+            sss,
+            ssf,
+            sff,
+            fff,
+        ] = unknowns
+        else {
+            return columns;
+        };
+        let read = |channel: Channel| truth(rows, rig, channel);
+        let [speeds_rpm, flows_kg_s, p1s_pa, p2s_pa, t1s_k] = [
+            read(Channel::ShaftSpeed),
+            read(Channel::CompressorFlow),
+            read(Channel::P1),
+            read(Channel::P2),
+            read(Channel::T1),
+        ];
+        let mut model = rig.model.clone();
+        model.params.compressor.nusselt_coefficient *= h;
+        model.params.compressor.housing_mass_kg *= capacity;
+        let params = model.params;
+        let compressor = params.compressor;
+        let inner_ratio = compressor.inner_capacity_ratio;
+        let moist_flow_ratio =
+            (air::GAS_CONSTANT_J_KGK / air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg)).sqrt();
+        let [mut t2_probe, mut tc_probe] =
+            [Channel::T2, Channel::Tc].map(|channel| ChannelFollower::new(*rig.instruments.path(channel)));
+        let mut state = self.start(rig, start_k, t2_offset_k);
+        let mut tip = Tip { start_k: state.t2_tip_k, last: None };
+        for i in 0..rows.len() {
+            // The turbine does not matter; it has some flow so that the model has a solution.
+            let (p1_pa, t1_k) = (p1s_pa[i], t1s_k[i]);
+            let boundary = BoundaryConditions { t1_k, p1_pa, p3_pa: 150e3, ..BoundaryConditions::default() };
+            // With recirculation, the flow through the wheel exceeds the outlet flow.
+            let wheel_kg_s = flows_kg_s[i].max(1e-4) * (1.0 + compressor.recirculation_ratio);
+            let speed = (speeds_rpm[i] / self.middle_speed_rpm).ln();
+            let flow =
+                (flow_coefficient(speeds_rpm[i], wheel_kg_s, p1s_pa[i], t1s_k[i]) / self.middle_flow).ln();
+            let efficiency = (eta
+                + (eta_speed + eta_speed_2 * speed) * speed
+                + (eta_flow + eta_flow_2 * flow) * flow
+                + speed * flow * (sf + ssf * speed + sff * flow)
+                + sss * speed.powi(3)
+                + fff * flow.powi(3))
+            .clamp(EFFICIENCY.0, EFFICIENCY.1);
+            let flow_corrected_kg_s = wheel_kg_s
+                / (MODEL_REFERENCE.physical_flow_kg_s(1.0, t1s_k[i], p1s_pa[i]) * moist_flow_ratio);
+            model.map = Arc::new(AsMeasured { flow_corrected_kg_s, efficiency });
+            state.shaft_speed_rad_s = rad_s_of_rpm(speeds_rpm[i]);
+            state.p2_pa = p2s_pa[i];
+            let prepared = model.prepare_at(rows.t_s[i], &boundary);
+            let outputs = prepared.evaluate(&state);
+            state.t2_tip_k =
+                tip.follow(rows.t_s[i], outputs.t2_probe_target_k, outputs.t2_probe_time_constant_s);
+            columns[0].push(t2_probe.read(rows.t_s[i], state.t2_tip_k) + t2_offset_k);
+            columns[1].push(tc_probe.read(rows.t_s[i], state.tc_k));
+            // Exact exponential relaxation towards the current equilibrium: bounded over any gap in the log.
+            let elapsed_s = rows.t_s.get(i + 1).map_or(0.0, |next_s| next_s - rows.t_s[i]);
+            let towards = |from_k: f64, net_w: f64, conductance_w_k: f64, capacity_j_k: f64| {
+                let share = -(-conductance_w_k * elapsed_s / capacity_j_k).exp_m1();
+                from_k + net_w / conductance_w_k * share
+            };
+            let gas_w_k = outputs.h_w_m2k * compressor.internal_area_m2 + compressor.inlet_conductance_w_k;
+            let gas_w = outputs.compressor_heat_w + outputs.added.inner_heat_w;
+            let lost_w = loss_w_k * (state.tc_k - surroundings_k) - outputs.added.compressor_heat_w;
+            let capacity_j_k = compressor_capacity_j_k(&params, state.tc_k);
+            if model.has_inner_wall() {
+                let tie_w_k = compressor.inner_conductance_w_k;
+                let inner_w = gas_w - outputs.inner_heat_w;
+                let inner_k = towards(state.inner_k, inner_w, gas_w_k + tie_w_k, inner_ratio * capacity_j_k);
+                let outer_w = outputs.inner_heat_w - lost_w;
+                state.tc_k =
+                    towards(state.tc_k, outer_w, loss_w_k + tie_w_k, (1.0 - inner_ratio) * capacity_j_k);
+                state.inner_k = inner_k;
+            } else {
+                state.tc_k = towards(state.tc_k, gas_w - lost_w, gas_w_k + loss_w_k, capacity_j_k);
+            }
+        }
+        columns
+    }
+
+    fn free(effect: &str) -> Option<&'static str> {
+        match effect {
+            "efficiency_scale" => {
+                Some("efficiency is free here, whatever a map says: it stands among the unknowns (eta)")
+            }
+            "htc_scale" => Some("h is free here within a factor of 1.6: it stands among the unknowns (h)"),
+            _ => None,
+        }
+    }
+
+    fn silent(&self, submodel: Submodel) -> &'static str {
+        match submodel {
+            Submodel::CompressorFlow => "flow is as measured here: no map is asked",
+            Submodel::Actuator | Submodel::Outlet => {
+                "P2 and flow are as measured here: nobody set P3 or a valve"
+            }
+            Submodel::Shaft => "speed is as measured here: no balance of powers is asked",
+            Submodel::TurbineFlow | Submodel::TurbineHousing => {
+                "it acts on the other side, or on the heat between housing and surroundings, which is free here"
+            }
+            Submodel::CompressorHousing => "the heat between housing and surroundings is free here",
+            Submodel::TcProbe => "Tc is not recorded",
+            _ => "nothing that is judged changes with it in this log",
+        }
+    }
+}
+
+impl CompressorSide {
+    /// Probe at its reading; housing at its reading if measured, otherwise near the mean of inlet and outlet.
+    fn start(&self, rig: &Rig, start_over_k: f64, t2_offset_k: f64) -> State {
+        let rows = &self.rows;
+        let first = |channel: Channel| {
+            let column = rows.judged.iter().find(|(of, _)| *of == channel);
+            let read = column.and_then(|(_, column)| column.iter().copied().find(|k| k.is_finite()));
+            read.map(|k| k - rig.instruments.path(channel).offset)
+        };
+        let t1_k = rows.drive(Channel::T1).first().copied().unwrap_or(f64::NAN);
+        let t2_k = first(Channel::T2).unwrap_or(t1_k) - t2_offset_k;
+        let tc_k = first(Channel::Tc).unwrap_or(0.5 * (t1_k + t2_k)) + start_over_k;
+        State::new(1.0, 1e5, tc_k, tc_k, t2_k)
+    }
+}
+
+/// Probe tip between rows: its target is a straight line, for which the lag is exact.
+struct Tip {
+    /// First reading, K.
+    start_k: f64,
+    /// Time, target and temperature of the previous row.
+    last: Option<(f64, f64, f64)>,
+}
+
+impl Tip {
+    fn follow(&mut self, t_s: f64, target_k: f64, tau_s: f64) -> f64 {
+        let tip_k = match self.last {
+            _ if tau_s <= 0.0 => target_k,
+            // A slow tip starts at its reading; a fast tip forgets it.
+            None => target_k + (self.start_k - target_k) * tau_s / (tau_s + FAST_S),
+            Some((before_s, before_k, tip_k)) => {
+                let elapsed_s = t_s - before_s;
+                let slope = (target_k - before_k) / elapsed_s.max(1e-9);
+                let follows_k = target_k - slope * tau_s;
+                follows_k + (tip_k - (before_k - slope * tau_s)) * (-elapsed_s / tau_s).exp()
+            }
+        };
+        self.last = Some((t_s, target_k, tip_k));
+        tip_k
+    }
+}
+
+/// Time constant of a tip that starts halfway between reading and target, s.
+const FAST_S: f64 = 0.3;
+
+/// A map that returns the measured values at any operating point.
+#[derive(Debug)]
+struct AsMeasured {
+    flow_corrected_kg_s: f64,
+    efficiency: f64,
+}
+
+impl CompressorCharacteristic for AsMeasured {
+    fn reference(&self) -> ReferenceState {
+        MODEL_REFERENCE
+    }
+
+    fn evaluate(&self, _: f64, _: f64) -> CharacteristicPoint {
+        CharacteristicPoint {
+            flow_corrected_kg_s: self.flow_corrected_kg_s,
+            efficiency: self.efficiency,
+            surge_position_ratio: 0.5,
+        }
+    }
+
+    fn evaluate_scaled(&self, speed_rpm: f64, pressure_ratio: f64, _: f64) -> CharacteristicPoint {
+        self.evaluate(speed_rpm, pressure_ratio)
+    }
+
+    fn surge_point(&self, _: f64) -> (f64, f64) {
+        (self.flow_corrected_kg_s, 1.0)
+    }
+
+    fn choke_flow_corrected_kg_s(&self, _: f64) -> f64 {
+        self.flow_corrected_kg_s
+    }
+
+    fn fingerprint(&self) -> String {
+        "as measured".to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_free_parameters_are_those_that_the_side_takes() {
+        let names: Vec<&str> = UNKNOWNS.iter().map(|parameter| parameter.name).collect();
+        let first = [
+            "eta",
+            "eta_speed",
+            "eta_speed_2",
+            "eta_flow",
+            "eta_flow_2",
+            "h",
+            "capacity",
+            "loss",
+            "surroundings",
+        ];
+        assert_eq!(names[..9], first);
+        assert_eq!(names[9..11], ["housing_start", "t2_offset"]);
+    }
+}

@@ -1,0 +1,5 @@
+//! Modules of sides.
+
+pub(crate) mod compressor;
+pub(crate) mod side;
+pub(crate) mod turbine;

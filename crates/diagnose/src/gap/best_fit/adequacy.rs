@@ -1,0 +1,114 @@
+//! Tests whether the residual of a fit is noise. A misfit is smooth, so the test uses a few smooth directions; thousands of noisy values
+//! would hide it.
+
+use crate::gap::best_fit::fit::Fit;
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::residuals::study::Study;
+use crate::gap::residuals::whiten::{Linearised, dot, rows_of_step};
+
+/// Time constants of the smooth basis after a jump, s: a step, and the ranges of probe, gas, housing and turbine housing.
+const BASIS_S: [f64; 5] = [f64::INFINITY, 5.0, 20.0, 60.0, 200.0];
+
+/// Smooth misfit that noise exceeds in one recording of a thousand, standard deviations. Scatter from step to step is counted relative to
+/// it, because scatter grows with the strength of an effect, even of a correct one.
+const NOISE_SIGMA: f64 = 3.3;
+const SCATTER_COUNTS: f64 = 0.25;
+
+/// Residual of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adequacy {
+    /// Energy in the smooth basis above its expectation, in its standard deviations.
+    pub smooth_sigma: f64,
+    /// Energy in the smooth basis above its expectation.
+    pub smooth_excess: f64,
+    /// Scatter of the effect's parameters from step to step above its expectation, in standard deviations; 0 without effects.
+    pub scatter_sigma: f64,
+    /// Largest cost reduction that one more library effect could achieve.
+    pub one_more: f64,
+    /// Mean squared whitened residual.
+    pub mean_square: f64,
+}
+
+impl Adequacy {
+    /// Whether the residual is consistent with noise and an imperfect fit, ignoring further library effects.
+    pub fn may_be_noise(&self) -> bool {
+        self.smooth_sigma + SCATTER_COUNTS * self.scatter_sigma < NOISE_SIGMA
+    }
+
+    /// Features for the probability of an unmodelled cause.
+    pub fn features(&self) -> [f64; 3] {
+        [self.smooth_sigma, self.scatter_sigma, self.one_more]
+    }
+}
+
+/// Energy of a whitened residual in each group's smooth basis.
+pub fn smooth_energies(study: &Study, linearised: &Linearised, residual: &[f64]) -> Vec<f64> {
+    study
+        .groups
+        .iter()
+        .enumerate()
+        .map(|(index, group)| {
+            let here = &residual[group.rows.clone()];
+            let mut directions: Vec<Vec<f64>> = Vec::new();
+            for decay_s in BASIS_S.iter().take(here.len()) {
+                let since_s = |block: &usize| study.steps[group.step].blocks[*block].since_jump_s;
+                let mut direction: Vec<f64> =
+                    group.blocks.iter().map(|block| (-since_s(block) / decay_s).exp()).collect();
+                linearised.whiten_group(index, &mut direction);
+                // Gram-Schmidt orthogonalisation.
+                for before in &directions {
+                    let along = dot(&direction, before);
+                    for (d, b) in direction.iter_mut().zip(before) {
+                        *d -= along * b;
+                    }
+                }
+                let length = dot(&direction, &direction).sqrt();
+                if length > 1e-6 {
+                    directions.push(direction.into_iter().map(|d| d / length).collect());
+                }
+            }
+            directions.iter().map(|direction| dot(direction, here).powi(2)).sum()
+        })
+        .collect()
+}
+
+/// Evaluates the residual of a fit on all steps. `one_more` is the largest gain of a further effect.
+pub fn adequacy(study: &Study, linearised: &Linearised, fit: &Fit, one_more: f64) -> Adequacy {
+    let energies = smooth_energies(study, linearised, &fit.residual);
+    let expected: f64 = study.groups.iter().map(|group| BASIS_S.len().min(group.rows.len()) as f64).sum();
+    let smooth_excess = energies.iter().sum::<f64>() - expected;
+    let everywhere = Selection::all(study);
+    let mut scatter_sigma: f64 = 0.0;
+    for column in &fit.effect_columns {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for rows in everywhere.rows(study) {
+            let own = dot(&column[rows.clone()], &column[rows.clone()]);
+            if own > 1.0 {
+                sum += dot(&column[rows.clone()], &fit.residual[rows]).powi(2) / own;
+                count += 1.0;
+            }
+        }
+        if count > 1.0 {
+            scatter_sigma = scatter_sigma.max((sum - count) / (2.0f64 * count).sqrt());
+        }
+    }
+    let mean_square = dot(&fit.residual, &fit.residual) / fit.residual.len().max(1) as f64;
+    Adequacy {
+        smooth_sigma: smooth_excess / (2.0 * expected.max(1.0)).sqrt(),
+        smooth_excess,
+        scatter_sigma,
+        one_more,
+        mean_square,
+    }
+}
+
+/// Misfit of each step: `(|r|^2 - n)/n`.
+pub fn misfit_of_steps(study: &Study, residual: &[f64]) -> Vec<f64> {
+    (0..study.steps.len())
+        .map(|step| {
+            let rows = rows_of_step(study, step);
+            let n = rows.len().max(1) as f64;
+            (dot(&residual[rows.clone()], &residual[rows]) - n) / n
+        })
+        .collect()
+}

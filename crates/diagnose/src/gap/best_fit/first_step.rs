@@ -1,0 +1,40 @@
+//! The initial metal temperature is not a machine property: a fit without the first step takes it from there.
+
+use crate::gap::best_fit::fit::{Fit, MAX_SIGMAS};
+use crate::gap::best_fit::selection::dot_over;
+use crate::gap::residuals::nuisance::NuisanceKind;
+use crate::gap::residuals::study::Study;
+use crate::gap::residuals::whiten::{Linearised, rows_of_step};
+use mapper_observe::perturbation::Perturbation;
+use nalgebra::{DMatrix, DVector};
+
+/// Whether a nuisance is the initial metal temperature.
+pub(crate) fn is_start(kind: NuisanceKind) -> bool {
+    matches!(kind, NuisanceKind::Perturbation(Perturbation::StartTc | Perturbation::StartTt))
+}
+
+/// Refits only the initial state to the first step. Otherwise a held-out first step would count an unknowable start temperature as a
+/// machine misfit, a hundred times too large. Returns the fit unchanged if the misfit of the first step does not fall.
+pub fn with_start_read(study: &Study, linearised: &Linearised, fit: Fit) -> Fit {
+    let rows = [rows_of_step(study, 0)];
+    let starts: Vec<usize> =
+        study.nuisances.iter().enumerate().filter(|(_, n)| is_start(n.kind)).map(|(i, _)| i).collect();
+    let column = |place: usize| &linearised.columns[starts[place]];
+    let n = starts.len();
+    let matrix =
+        DMatrix::from_fn(n, n, |i, j| dot_over(&rows, column(i), column(j)) + if i == j { 1.0 } else { 0.0 });
+    let right = DVector::from_fn(n, |i, _| {
+        dot_over(&rows, column(i), &fit.residual) - fit.hypothesis.nuisances[starts[i]]
+    });
+    let Some(step) = matrix.cholesky().map(|cholesky| cholesky.solve(&right)) else { return fit };
+    let mut moved = fit.hypothesis.clone();
+    for (index, by) in starts.iter().zip(step.iter()) {
+        moved.nuisances[*index] = (moved.nuisances[*index] + by).clamp(-MAX_SIGMAS, MAX_SIGMAS);
+    }
+    let Ok(prediction) = study.predict(&moved) else { return fit };
+    let residual = linearised.residual(study, &prediction);
+    if dot_over(&rows, &residual, &residual) >= dot_over(&rows, &fit.residual, &fit.residual) {
+        return fit;
+    }
+    Fit { hypothesis: moved, prediction, residual, ..fit }
+}

@@ -1,0 +1,226 @@
+//! The best fit of a hypothesis, nuisances and their priors included, and how well it is supported.
+//!
+//! Gauss-Newton on the whitened residuals. What effects do is taken again from runs of the model in each iteration
+//! (they are strong, and bend); what nuisances do is taken once, where nothing is off (they are small), but the
+//! residual is always that of the model itself.
+
+use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters, set_parameter};
+use crate::gap::best_fit::normal::{PRIOR_STEPS, normal_matrix, nuisance_products};
+use crate::gap::best_fit::selection::{Selection, dot_over};
+use crate::gap::residuals::study::{Hypothesis, PredictError, Prediction, Study};
+use crate::gap::residuals::whiten::Linearised;
+use mapper_inference::descent::{ENOUGH, End, Model, Normal, Reach, Until, descend, room_within};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+/// A hypothesis at its best.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Nuisances and effects there.
+    pub hypothesis: Hypothesis,
+    /// Squared whitened residuals and squared nuisances.
+    pub cost: f64,
+    /// Logarithm of the evidence, up to what all hypotheses share (Laplace's approximation).
+    pub score: f64,
+    /// Whitened residuals.
+    pub residual: Vec<f64>,
+    /// Prediction.
+    pub prediction: Prediction,
+    /// Whitened change for a unit of each effect's search coordinate.
+    pub effect_columns: Vec<Vec<f64>>,
+    /// Covariance of the effects' search coordinates, nuisances free.
+    pub covariance: DMatrix<f64>,
+    /// Precision of nuisances and the effects' search coordinates, priors included.
+    pub precision: DMatrix<f64>,
+    /// What one more iteration promised in the cost: much where the nuisances act otherwise here than where they were linearised.
+    pub promised: f64,
+}
+
+/// How thoroughly to fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Maximum number of iterations.
+    pub iterations: usize,
+    /// Stop where an iteration promises less than this in the cost.
+    pub enough: f64,
+    /// Maximum number of sigmas that a nuisance may move: few while an effect is far from its best, so that tolerances do not run into
+    /// its place.
+    pub most_sigmas: f64,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Effort { iterations: 10, enough: ENOUGH, most_sigmas: MAX_SIGMAS }
+    }
+}
+
+/// Fits nuisances and effects, starting at `start`.
+///
+/// # Errors
+/// [`PredictError`] where the model cannot follow at the start itself.
+pub fn fit(
+    study: &Study,
+    linearised: &Linearised,
+    start: &Hypothesis,
+    selection: &Selection,
+    effort: Effort,
+) -> Result<Fit, PredictError> {
+    let coordinates = coordinates(&study.effects, start);
+    let at = coordinates.iter().zip(parameters(start)).map(|(coordinate, value)| coordinate.of(value));
+    let unknowns = DVector::from_iterator(
+        start.nuisances.len() + coordinates.len(),
+        start.nuisances.iter().copied().chain(at),
+    );
+    let mut fitted = Fitted {
+        study,
+        linearised,
+        start,
+        rows: selection.rows(study),
+        nuisance_products: nuisance_products(study, linearised, selection),
+        coordinates,
+        most_sigmas: effort.most_sigmas,
+        effect_columns: Vec::new(),
+    };
+    let until = Until { iterations: effort.iterations, enough: effort.enough };
+    let point = fitted.at_hypothesis(start.clone())?;
+    let End { unknowns, point, normal, promised } = descend(&mut fitted, unknowns, point, until);
+    let Point { hypothesis, prediction, residual } = point;
+    let cost = cost_of(&fitted.rows, &residual, &hypothesis);
+    let nuisances = hypothesis.nuisances.len();
+    let effects = unknowns.len() - nuisances;
+    let each = 0.5 * (2.0 * std::f64::consts::PI).ln() - PRIOR_STEPS.ln();
+    let score = normal
+        .half_ln_determinant()
+        .map_or(f64::NEG_INFINITY, |half| -0.5 * cost - half + effects as f64 * each);
+    let unknown = || DMatrix::from_element(effects, effects, f64::INFINITY);
+    Ok(Fit {
+        hypothesis,
+        cost,
+        score,
+        residual,
+        prediction,
+        effect_columns: fitted.effect_columns,
+        covariance: normal.covariance_from(nuisances).unwrap_or_else(unknown),
+        precision: normal.matrix,
+        promised,
+    })
+}
+
+/// A hypothesis' nuisances, in sigmas, and behind them its effects' coordinates, as unknowns.
+struct Fitted<'a> {
+    study: &'a Study,
+    linearised: &'a Linearised,
+    start: &'a Hypothesis,
+    rows: Vec<Range<usize>>,
+    nuisance_products: DMatrix<f64>,
+    coordinates: Vec<Coordinate>,
+    most_sigmas: f64,
+    /// At the last point at which slopes were taken.
+    effect_columns: Vec<Vec<f64>>,
+}
+
+struct Point {
+    hypothesis: Hypothesis,
+    prediction: Prediction,
+    residual: Vec<f64>,
+}
+
+impl Fitted<'_> {
+    fn at_hypothesis(&self, hypothesis: Hypothesis) -> Result<Point, PredictError> {
+        let prediction = self.study.predict(&hypothesis)?;
+        let residual = self.linearised.residual(self.study, &prediction);
+        Ok(Point { hypothesis, prediction, residual })
+    }
+}
+
+impl Model for Fitted<'_> {
+    type Point = Point;
+
+    fn at(&self, unknowns: &DVector<f64>) -> Option<Point> {
+        let mut hypothesis = self.start.clone();
+        for (nuisance, sigmas) in hypothesis.nuisances.iter_mut().zip(unknowns.iter()) {
+            *nuisance = sigmas.clamp(-self.most_sigmas, self.most_sigmas);
+        }
+        let n = hypothesis.nuisances.len();
+        for (place, coordinate) in self.coordinates.iter().enumerate() {
+            set_parameter(&mut hypothesis, place, coordinate.value(unknowns[n + place]));
+        }
+        self.at_hypothesis(hypothesis).ok()
+    }
+
+    fn cost(&self, _: &DVector<f64>, point: &Point) -> f64 {
+        cost_of(&self.rows, &point.residual, &point.hypothesis)
+    }
+
+    fn normal(&mut self, _: &DVector<f64>, point: &Point, reach: Reach) -> Normal {
+        let Point { hypothesis, prediction, residual } = point;
+        let Fitted { study, linearised, coordinates, rows, .. } = self;
+        // Near surge the cost has small steps: a slope taken over more of the way sees past them.
+        let mut columns = changes_near(study, hypothesis, prediction, coordinates, reach.distance());
+        columns.iter_mut().for_each(|column| linearised.whiten(study, column));
+        let matrix = normal_matrix(rows, linearised, &self.nuisance_products, &columns);
+        let ask = |column: &Vec<f64>| dot_over(rows, column, residual);
+        let pulled = linearised.columns.iter().zip(&hypothesis.nuisances).map(|(c, sigmas)| ask(c) - sigmas);
+        let pull = DVector::from_iterator(matrix.nrows(), pulled.chain(columns.iter().map(ask)));
+        self.effect_columns = columns;
+        Normal { matrix, pull }
+    }
+
+    fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)> {
+        let n = unknowns.len() - self.coordinates.len();
+        let of_nuisances = unknowns.iter().take(n).map(|u| (-self.most_sigmas - u, self.most_sigmas - u));
+        let of_effects = self.coordinates.iter().zip(unknowns.iter().skip(n)).map(|(coordinate, at)| {
+            let (low, high) = coordinate.ends();
+            room_within(low, high, *at)
+        });
+        of_nuisances.chain(of_effects).collect()
+    }
+}
+
+fn cost_of(rows: &[std::ops::Range<usize>], residual: &[f64], hypothesis: &Hypothesis) -> f64 {
+    let cost = dot_over(rows, residual, residual) + hypothesis.nuisances.iter().map(|u| u * u).sum::<f64>();
+    if cost.is_finite() { cost } else { f64::INFINITY }
+}
+
+/// Whitened change for a unit of each effect's coordinate, by runs of the model next to the hypothesis.
+pub fn effect_changes(
+    study: &Study,
+    linearised: &Linearised,
+    hypothesis: &Hypothesis,
+    here: &Prediction,
+    coordinates: &[Coordinate],
+) -> Vec<Vec<f64>> {
+    let mut changes = changes_near(study, hypothesis, here, coordinates, Reach::Fine.distance());
+    changes.iter_mut().for_each(|change| linearised.whiten(study, change));
+    changes
+}
+
+/// Change for a unit of each effect's coordinate, from runs at `distance` from the hypothesis, in the coordinate's unit.
+pub(crate) fn changes_near(
+    study: &Study,
+    hypothesis: &Hypothesis,
+    here: &Prediction,
+    coordinates: &[Coordinate],
+    distance: f64,
+) -> Vec<Vec<f64>> {
+    let values = parameters(hypothesis);
+    coordinates
+        .iter()
+        .zip(&values)
+        .enumerate()
+        .map(|(place, (coordinate, value))| {
+            let (next, step) = coordinate.next_to(*value, distance);
+            let mut moved = hypothesis.clone();
+            set_parameter(&mut moved, place, next);
+            match study.predict(&moved) {
+                Ok(there) if step != 0.0 => {
+                    there.values.iter().zip(&here.values).map(|(t, h)| (t - h) / step).collect()
+                }
+                _ => vec![0.0; here.values.len()],
+            }
+        })
+        .collect()
+}
+
+/// Limit of a nuisance in declared sigmas: a larger deviation does not count as a tolerance.
+pub const MAX_SIGMAS: f64 = 6.0;

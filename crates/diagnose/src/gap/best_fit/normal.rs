@@ -1,0 +1,51 @@
+//! Normal equations of nuisances and effects.
+
+use crate::gap::best_fit::selection::{Selection, dot_over};
+use crate::gap::residuals::study::Study;
+use crate::gap::residuals::whiten::Linearised;
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// Prior width of an effect's parameter, in typical steps.
+pub const PRIOR_STEPS: f64 = 10.0;
+
+/// Products of the nuisance columns over the selected steps.
+pub(crate) fn nuisance_products(
+    study: &Study,
+    linearised: &Linearised,
+    selection: &Selection,
+) -> DMatrix<f64> {
+    let n = study.nuisances.len();
+    let counted = linearised.products.iter().zip(&selection.steps).filter(|(_, counts)| **counts);
+    counted.fold(DMatrix::zeros(n, n), |sum, (products, _)| sum + products)
+}
+
+/// Precision of the nuisances, including their unit priors, and of additional columns.
+pub(crate) fn normal_matrix(
+    rows: &[Range<usize>],
+    linearised: &Linearised,
+    nuisance_products: &DMatrix<f64>,
+    others: &[Vec<f64>],
+) -> DMatrix<f64> {
+    let (n, k) = (nuisance_products.nrows(), others.len());
+    let mut matrix = DMatrix::zeros(n + k, n + k);
+    matrix.view_mut((0, 0), (n, n)).copy_from(nuisance_products);
+    for i in 0..n {
+        matrix[(i, i)] += 1.0;
+    }
+    for (j, other) in others.iter().enumerate() {
+        for i in 0..n {
+            let product = dot_over(rows, &linearised.columns[i], other);
+            matrix[(i, n + j)] = product;
+            matrix[(n + j, i)] = product;
+        }
+        for (l, third) in others.iter().enumerate().take(j + 1) {
+            let product = dot_over(rows, third, other);
+            matrix[(n + l, n + j)] = product;
+            matrix[(n + j, n + l)] = product;
+        }
+        // Tiny regularisation that keeps the equations solvable if a parameter has no influence.
+        matrix[(n + j, n + j)] += 1e-6;
+    }
+    matrix
+}

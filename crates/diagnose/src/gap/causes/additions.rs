@@ -1,0 +1,199 @@
+//! Closed-form effect of adding one more effect to a fit.
+
+use crate::gap::best_fit::coordinate::Coordinate;
+use crate::gap::best_fit::fit::Fit;
+use crate::gap::best_fit::projector::Projector;
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::residuals::study::{Hypothesis, Study, members};
+use crate::gap::residuals::whiten::{Linearised, rows_of_step};
+use mapper_numerics::parallel;
+use mapper_physics::rig::effect::EffectParameter;
+use nalgebra::DVector;
+use std::ops::Range;
+
+/// Result of adding one more effect to a fit.
+#[derive(Debug)]
+pub struct Addition {
+    /// Index of the effect.
+    pub effect: usize,
+    /// Linear estimate of the cost reduction.
+    pub gain: f64,
+    /// Start of a fit.
+    pub start: Hypothesis,
+}
+
+/// Maximum trusted linear step, as a multiple of the step taken; effects are nonlinear.
+const MAX_REACH: f64 = 3.0;
+/// Minimum start offset from neutral, as a share of a step: some effects have zero slope at neutral.
+const OFF_NEUTRAL: f64 = 0.1;
+
+/// Every further effect added to a fit, in closed form from one run each; effects with interacting parameters use several starts.
+pub fn additions(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> Vec<Addition> {
+    of_kind(study, linearised, selection, base, false)
+}
+
+/// The same for the study's candidates with an onset, as if nothing before the onset changed and nothing persisted.
+pub(crate) fn onset_additions(
+    study: &Study,
+    linearised: &Linearised,
+    selection: &Selection,
+    base: &Fit,
+) -> Vec<Addition> {
+    of_kind(study, linearised, selection, base, true)
+}
+
+fn of_kind(
+    study: &Study,
+    linearised: &Linearised,
+    selection: &Selection,
+    base: &Fit,
+    onsets: bool,
+) -> Vec<Addition> {
+    let Some(projector) = Projector::new(study, linearised, selection, &base.effect_columns) else {
+        return Vec::new();
+    };
+    // At the optimum, the residual's pull on each nuisance equals its prior's. A strained tolerance therefore supports the effect that
+    // would release it.
+    let mut right_residual = projector.right(&base.residual);
+    for (right, nuisance) in right_residual.iter_mut().zip(&base.hypothesis.nuisances) {
+        *right -= nuisance;
+    }
+    let rows = (0..study.steps.len()).map(|step| rows_of_step(study, step)).collect();
+    let look = FitNeighbourhood { study, linearised, projector: &projector, base, right_residual, rows };
+    let used: Vec<usize> = members(&base.hypothesis).iter().map(|member| study.family(*member)).collect();
+    let effects: Vec<usize> = (0..study.catalogue).filter(|effect| !used.contains(effect)).collect();
+    let found = parallel::map(&effects, |effect| match study.effects[*effect].info().parameters.as_slice() {
+        [parameter] if onsets => look.with_onsets(*effect, parameter),
+        [parameter] => look.at_one(*effect, parameter).into_iter().collect(),
+        _ if onsets => Vec::new(),
+        several => corners(several).into_iter().filter_map(|corner| look.at(*effect, corner)).collect(),
+    });
+    found.into_iter().flatten().collect()
+}
+
+struct FitNeighbourhood<'a> {
+    study: &'a Study,
+    linearised: &'a Linearised,
+    projector: &'a Projector<'a>,
+    base: &'a Fit,
+    right_residual: DVector<f64>,
+    /// Rows of each step.
+    rows: Vec<Range<usize>>,
+}
+
+impl FitNeighbourhood<'_> {
+    fn with(&self, effect: usize, values: Vec<f64>) -> Hypothesis {
+        let mut start = self.base.hypothesis.clone();
+        start.effects.push((effect, values));
+        start
+    }
+
+    /// Whitened change due to an effect's values.
+    fn change(&self, effect: usize, values: Vec<f64>) -> Option<Vec<f64>> {
+        let there = self.study.predict(&self.with(effect, values)).ok()?;
+        let mut change: Vec<f64> =
+            there.values.iter().zip(&self.base.prediction.values).map(|(t, b)| t - b).collect();
+        self.linearised.whiten(self.study, &mut change);
+        Some(change)
+    }
+
+    /// Squared length of a change and its product with the residual, with nuisances free.
+    fn products(&self, change: &[f64]) -> (f64, f64) {
+        let right = self.projector.right(change);
+        let own = self.projector.product(change, &right, change, &right);
+        (own, self.projector.product(change, &right, &self.base.residual, &self.right_residual))
+    }
+
+    /// An effect with several parameters, from one of their values.
+    fn at(&self, effect: usize, values: Vec<f64>) -> Option<Addition> {
+        let (own, seen) = self.products(&self.change(effect, values.clone())?);
+        let gain = if own > 1e-9 && seen > 0.0 { seen * seen / own } else { 0.0 };
+        Some(Addition { effect, gain, start: self.with(effect, values) })
+    }
+
+    /// An effect with one parameter.
+    fn at_one(&self, effect: usize, parameter: &EffectParameter) -> Option<Addition> {
+        let (step, _, products) = self.line(effect, parameter)?;
+        Some(self.along(effect, parameter, step, products))
+    }
+
+    /// The same effect from each onset.
+    fn with_onsets(&self, effect: usize, parameter: &EffectParameter) -> Vec<Addition> {
+        let Some((step, change, _)) = self.line(effect, parameter) else { return Vec::new() };
+        let steps = self.rows.len();
+        let mut masked = vec![0.0; change.len()];
+        let mut found = Vec::new();
+        for late in self.study.onsets_of(effect) {
+            let course = self.study.courses[late];
+            for (step, rows) in self.rows.iter().enumerate() {
+                let share = course.share(step, steps);
+                for row in rows.clone() {
+                    masked[row] = share * change[row];
+                }
+            }
+            let products = self.products(&masked);
+            if products.0 > 1.0 {
+                found.push(self.along(late, parameter, step, products));
+            }
+        }
+        found
+    }
+
+    /// A step of the parameter to the side that the data suggest, with its change and products.
+    fn line(&self, effect: usize, parameter: &EffectParameter) -> Option<(f64, Vec<f64>, (f64, f64))> {
+        let step_to =
+            |by: f64| (parameter.neutral + by).clamp(parameter.low, parameter.high) - parameter.neutral;
+        let step = step_to(parameter.typical_step);
+        let change = self.change(effect, vec![parameter.neutral + step])?;
+        let products = self.products(&change);
+        let opposite = step_to(-step);
+        if products.1 < -OFF_NEUTRAL * products.0
+            && opposite != 0.0
+            && let Some(other) = self.change(effect, vec![parameter.neutral + opposite])
+        {
+            let of_other = self.products(&other);
+            if of_other.1 > 0.0 {
+                return Some((opposite, other, of_other));
+            }
+        }
+        Some((step, change, products))
+    }
+
+    /// The optimum along the line through a step.
+    fn along(
+        &self,
+        effect: usize,
+        parameter: &EffectParameter,
+        step: f64,
+        (own, seen): (f64, f64),
+    ) -> Addition {
+        let at = |share: f64| (parameter.neutral + share * step).clamp(parameter.low, parameter.high);
+        let wanted = if own > 1e-9 { (seen / own).clamp(-MAX_REACH, MAX_REACH) } else { 0.0 };
+        let share = (at(wanted) - parameter.neutral) / step;
+        let gain = 2.0 * share * seen - share * share * own;
+        let off = if wanted < 0.0 { wanted.min(-OFF_NEUTRAL) } else { wanted.max(OFF_NEUTRAL) };
+        let off = if at(off) == parameter.neutral { OFF_NEUTRAL } else { off };
+        Addition {
+            effect,
+            gain: if step == 0.0 { 0.0 } else { gain },
+            start: self.with(effect, vec![at(off)]),
+        }
+    }
+}
+
+/// Search starts for an effect of several parameters: the corners of the inner part of their ranges.
+fn corners(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {
+    let places = |p: &EffectParameter| {
+        let coordinate = Coordinate::new(p);
+        let (low, high) = (coordinate.of(p.low), coordinate.of(p.high));
+        [0.33, 0.6].map(|share| coordinate.value(low + share * (high - low)))
+    };
+    let mut corners: Vec<Vec<f64>> = vec![Vec::new()];
+    for parameter in parameters {
+        corners = corners
+            .into_iter()
+            .flat_map(|corner| places(parameter).map(|value| [corner.clone(), vec![value]].concat()))
+            .collect();
+    }
+    corners
+}

@@ -1,0 +1,59 @@
+//! Constants that convert scores into probabilities, calibrated on simulated campaigns. The data file records the seed and the command that
+//! made it.
+
+use serde::{Deserialize, Serialize};
+
+/// Calibration constants.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    /// The command that made it, with its seed.
+    pub made_by: String,
+    /// Minimum score above that of no cause for a cause to be named.
+    pub threshold: f64,
+    /// Divisor of score differences.
+    pub temperature: f64,
+    /// Prior of no cause.
+    pub prior_none: f64,
+    /// Prior of all singles together.
+    pub prior_single: f64,
+    /// Prior of all pairs together.
+    pub prior_pair: f64,
+    /// Prior of all triples together; each further effect multiplies the prior by this factor again.
+    pub prior_triple: f64,
+    /// Factor on the parameters' standard errors.
+    pub interval_factor: f64,
+    /// Logistic model of an unmodelled cause: offset, and slopes of the [`counted`] misfit, scatter and gain of one more effect.
+    pub outside: [f64; 4],
+}
+
+/// The data file.
+const TEXT: &str = include_str!("../../../calibration.json");
+
+impl Calibration {
+    /// Returns the shipped calibration.
+    ///
+    /// # Errors
+    /// A parser error if the data file is corrupt.
+    pub fn shipped() -> Result<Calibration, serde_json::Error> {
+        serde_json::from_str(TEXT)
+    }
+
+    /// Probability of an unmodelled cause, given the residual features of the best fit.
+    pub fn outside(&self, features: [f64; 3]) -> f64 {
+        let [offset, slopes @ ..] = self.outside;
+        let x = offset + slopes.iter().zip(counted(features)).map(|(slope, x)| slope * x).sum::<f64>();
+        1.0 / (1.0 + (-x).exp())
+    }
+}
+
+/// Upper limit of half the squared misfit: above it, misfits are equally gross.
+const MAX: f64 = 500.0;
+
+/// Transforms the features of an unmodelled cause for its logistic model. Smooth misfit enters as half its square, the negative
+/// log-probability under noise. Scatter and gain enter by order of magnitude: they grow with any cause, which linearised models follow only
+/// to a few per cent.
+pub fn counted([smooth_sigma, scatter_sigma, one_more]: [f64; 3]) -> [f64; 3] {
+    let unlikely = 0.5 * smooth_sigma.max(0.0).powi(2);
+    [unlikely.min(MAX), scatter_sigma.max(0.0).asinh(), one_more.max(0.0).asinh()]
+}

@@ -1,0 +1,124 @@
+//! Smallest detectable size of an effect, from its signature length with nuisances projected out and the evidence required to name a cause.
+
+use crate::gap::best_fit::coordinate::Coordinate;
+use crate::gap::best_fit::normal::PRIOR_STEPS;
+use crate::gap::best_fit::projector::Projector;
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::causes::calibration::Calibration;
+use crate::gap::causes::weigh::prior_of_number;
+use crate::gap::findings::in_words;
+use crate::gap::findings::report::SmallestSeen;
+use crate::gap::residuals::study::Study;
+use crate::gap::residuals::whiten::Linearised;
+use mapper_numerics::parallel;
+use mapper_numerics::statistics::NORMAL_95;
+use mapper_physics::rig::effect::{EffectInfo, EffectParameter};
+
+/// Maximum number of runs to find a size, and the tolerance in the logarithm of the length.
+const LOOKS: usize = 6;
+const NEAR: f64 = 0.05;
+/// Length of a signature, in sigmas, that is none: rounding.
+pub const NO_LENGTH: f64 = 1e-6;
+
+/// The size from which a recording shows an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SmallestSize {
+    /// It, as the parameter's value; `None` if it lies outside the parameter's range.
+    pub value: Option<f64>,
+    /// The value in the range that is furthest from neutral.
+    pub furthest: f64,
+    /// Whether the effect changes any reading.
+    pub acts: bool,
+}
+
+/// Log evidence that one of `count` causes needs to be named, without the width of its parameter.
+pub fn evidence_needed(calibration: &Calibration, count: usize) -> f64 {
+    calibration.threshold + prior_of_number(calibration, count, 0) - prior_of_number(calibration, count, 1)
+}
+
+/// Smallest size, on the side of the typical step, that would be named in 95 of 100 recordings. `length`: of the signature of a value, in
+/// sigmas; `against`: [`evidence_needed`]. `None` if a length is.
+pub fn smallest_size(
+    parameter: &EffectParameter,
+    against: f64,
+    mut length: impl FnMut(f64) -> Option<f64>,
+) -> Option<SmallestSize> {
+    let coordinate = Coordinate::new(parameter);
+    // Distance from neutral; its inverse for a parameter that spans decades, because the effect is strong at small values.
+    let away = |value: f64| if coordinate.is_logarithmic() { 1.0 / value } else { value - parameter.neutral };
+    let value_at = |away: f64| {
+        let value = if coordinate.is_logarithmic() { 1.0 / away } else { parameter.neutral + away };
+        value.clamp(parameter.low, parameter.high)
+    };
+    let mut here = away((parameter.neutral + parameter.typical_step).clamp(parameter.low, parameter.high));
+    let furthest = away(value_at(here * 1e9));
+    let (mut smallest, mut acts) = (None::<f64>, false);
+    let mut before: Option<(f64, f64)> = None;
+    for _ in 0..LOOKS {
+        let sigma = length(value_at(here))?;
+        if sigma <= NO_LENGTH || here == 0.0 {
+            break;
+        }
+        acts = true;
+        // Laplace evidence of one parameter with this curvature, compared with the threshold of a cause.
+        let unit = coordinate.of(value_at(here)) - coordinate.of(parameter.neutral);
+        let curvature = (sigma / unit.abs().max(1e-9)).powi(2);
+        let needed =
+            against + 0.5 * curvature.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln() + PRIOR_STEPS.ln();
+        let wanted = (2.0 * needed.max(0.0)).sqrt() + NORMAL_95;
+        if sigma > 0.9 * wanted && smallest.is_none_or(|other| here.abs() < other.abs()) {
+            smallest = Some(here);
+        }
+        if (sigma / wanted).ln().abs() < NEAR {
+            break;
+        }
+        // Interpolates logarithms with the power law of two runs, because effects are nonlinear.
+        let power = before.map_or(1.0, |(there, length): (f64, f64)| {
+            ((sigma / length).ln() / (here / there).ln()).clamp(0.6, 3.0)
+        });
+        before = Some((here, sigma));
+        let moved = here * (wanted / sigma).powf(1.0 / if power.is_finite() { power } else { 1.0 });
+        here = if moved.abs() > furthest.abs() { furthest } else { moved };
+    }
+    Some(SmallestSize { value: smallest.map(value_at), furthest: value_at(furthest), acts })
+}
+
+impl SmallestSeen {
+    /// The row of an effect.
+    pub fn of(info: &EffectInfo, parameter: &EffectParameter, value: Option<f64>) -> SmallestSeen {
+        SmallestSeen {
+            effect: info.id.to_string(),
+            name: info.name.to_string(),
+            parameter: parameter.name.to_string(),
+            value,
+            unit: parameter.unit.to_string(),
+            size: value.map(|value| in_words::size(parameter, value)),
+        }
+    }
+}
+
+/// The smallest size of each effect in recordings like this one. Effects that stay undetectable within their range have no size.
+pub fn smallest_seen(study: &Study, linearised: &Linearised, calibration: &Calibration) -> Vec<SmallestSeen> {
+    let everywhere = Selection::all(study);
+    let Some(projector) = Projector::new(study, linearised, &everywhere, &[]) else { return Vec::new() };
+    let against = evidence_needed(calibration, study.catalogue);
+    let indices: Vec<usize> = (0..study.catalogue).collect();
+    let found = parallel::map(&indices, |index| {
+        let info = study.effects[*index].info();
+        let (parameter, others) = info.parameters.split_last()?;
+        let smallest = smallest_size(parameter, against, |value| {
+            // With several parameters, the others are a typical step from neutral.
+            let typical = others.iter().map(|p| (p.neutral + p.typical_step).clamp(p.low, p.high));
+            let mut there = study.nothing();
+            there.effects = vec![(*index, typical.chain([value]).collect())];
+            let there = study.predict(&there).ok()?;
+            let mut change: Vec<f64> =
+                there.values.iter().zip(&linearised.base.values).map(|(t, b)| t - b).collect();
+            linearised.whiten(study, &mut change);
+            let right = projector.right(&change);
+            Some(projector.product(&change, &right, &change, &right).max(0.0).sqrt())
+        })?;
+        smallest.acts.then(|| SmallestSeen::of(info, parameter, smallest.value))
+    });
+    found.into_iter().flatten().collect()
+}

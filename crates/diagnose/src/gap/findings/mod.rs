@@ -1,0 +1,5 @@
+//! The diagnosis report for programs, recommended experiments, and effect sizes in engineering terms.
+
+pub mod experiment;
+pub mod in_words;
+pub mod report;

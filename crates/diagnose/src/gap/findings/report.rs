@@ -1,0 +1,428 @@
+//! Diagnosis report, machine-readable.
+
+use crate::gap::findings::experiment::{Beside, Experiment};
+use crate::gap::reference::baseline_assumptions::Since;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Overall verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Everything is within the declared tolerances.
+    WithinTolerance,
+    /// An effect or pair of the effect library leaves only noise.
+    Explained,
+    /// An effect or pair removes most of the gap, but the residual exceeds tolerance.
+    PartlyExplained,
+    /// No effect or pair removes most of the gap.
+    Unexplained,
+}
+
+/// A diagnosis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Overall verdict.
+    pub verdict: Verdict,
+    /// Set if a reference recording was given: the diagnosis then covers only changes since that recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub since: Option<Since>,
+    /// Locations of the gap, largest first.
+    pub r#where: Vec<Place>,
+    /// Causes, best first.
+    pub candidates: Vec<Candidate>,
+    /// Probability that nothing is beyond tolerance.
+    pub probability_none: f64,
+    /// Probability that the cause is not in the effect library.
+    pub probability_outside: f64,
+    /// Laws for the gap that the effect library does not explain, best first; empty if none is proposed.
+    pub laws: Vec<Law>,
+    /// Residual source term of each balance, if it is the only one, most probable first; empty without a search.
+    pub forces: Vec<MissingForce>,
+    /// The gap before and after the best cause.
+    pub gap: Gap,
+    /// Suggested next step; `None` if the diagnosis is settled.
+    pub next: Option<Next>,
+    /// Experiments that distinguish the open causes, best per minute first; `next` is the first of them.
+    pub experiments: Vec<Suggestion>,
+    /// If no cause is named: the smallest detectable size of each effect.
+    pub smallest_seen: Vec<SmallestSeen>,
+    /// Assumptions for missing campaign declarations; one sentence each.
+    pub assumed: Vec<String>,
+    /// Sensor offsets beyond tolerance found by a soak and already subtracted; one sentence each.
+    pub off_at_rest: Vec<String>,
+    /// Unusable data and caveats; one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A location of the gap.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// Part of the model.
+    pub submodel: String,
+    /// Channel with the largest share.
+    pub channel: String,
+    /// Phase of the step with the largest share.
+    pub phase: String,
+    /// Region of the map with the largest share.
+    pub region: String,
+    /// Share of the whole gap's energy, 0..1.
+    pub share: f64,
+    /// Size in declared standard deviations.
+    pub sigma: f64,
+    /// Root mean square in the channel's unit.
+    pub size: f64,
+    /// Unit of `size`.
+    pub unit: String,
+}
+
+/// A parameter with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit.
+    pub unit: String,
+    /// Value without the effect.
+    pub neutral: f64,
+    /// The best value as text.
+    pub size: String,
+}
+
+/// Onset of a cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Onset {
+    /// Index of the step, from 0; files use its number, from 1.
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::serialize")]
+    pub step: usize,
+    /// Start of the step, s of the recording.
+    pub t_s: f64,
+    /// Whether the cause grows from there to the end; otherwise it acts in full from there on.
+    pub grows: bool,
+}
+
+/// Smallest detectable size of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SmallestSeen {
+    /// Id of the effect.
+    pub effect: String,
+    /// Display name.
+    pub name: String,
+    /// The parameter that sets its size.
+    pub parameter: String,
+    /// The value that would be named in 95 of 100 recordings like this one; `None` if no value in its range would.
+    pub value: Option<f64>,
+    /// Unit.
+    pub unit: String,
+    /// The value as text.
+    pub size: Option<String>,
+}
+
+/// A law found for a residual source term.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Law {
+    /// Part of the model where it acts.
+    pub submodel: String,
+    /// The law as a sentence, with its numbers.
+    pub sentence: String,
+    /// Its terms.
+    pub terms: Vec<LawTerm>,
+    /// Probability of this law among all laws tried and no law.
+    pub probability: f64,
+    /// Share of the gap removed on steps used neither to find nor to fit the law; 0 if any channel gets worse.
+    pub shrink: f64,
+    /// Number of these held-out steps.
+    pub held_out_steps: usize,
+    /// Gap of each channel on these steps.
+    pub channels: BTreeMap<String, ChannelGap>,
+    /// Channels that get worse on these steps.
+    pub worse: Vec<String>,
+    /// Library effects fitted together with the law; empty if it was found alone.
+    pub beside: Vec<String>,
+    /// Share of the leave-one-out folds of steps that select the same part and this law's terms or equivalents.
+    pub stability: f64,
+    /// Laws that the recording cannot distinguish from this one, as sentences.
+    pub equivalent: Vec<String>,
+    /// Name of the effect file written for it.
+    pub rhai: Option<String>,
+    /// Content of that file; `None` if a script cannot express the law.
+    #[serde(skip)]
+    pub script: Option<String>,
+}
+
+/// One number of a law with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LawTerm {
+    /// Name.
+    pub term: String,
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Residual source term of one balance, assuming that it is the only one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MissingForce {
+    /// Part of the model.
+    pub submodel: String,
+    /// The missing quantity.
+    pub force: String,
+    /// Its unit.
+    pub unit: String,
+    /// Logarithm of its evidence relative to none.
+    pub evidence: f64,
+    /// At the end of each step: value and the ends of its 95 % interval.
+    pub steps: Vec<[f64; 3]>,
+}
+
+/// A cause: one or more effects.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Ids of its effects.
+    pub effects: Vec<String>,
+    /// Display names.
+    pub names: Vec<String>,
+    /// Calibrated probability of these effects, with or without others too weak to detect.
+    pub probability: f64,
+    /// Parameters; `inner_node.phi` if an effect has several.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Onsets of effects that begin with a step, by id.
+    pub onsets: BTreeMap<String, Onset>,
+    /// Causes that the data cannot distinguish from this one.
+    pub equivalent: Vec<Vec<String>>,
+}
+
+/// Root mean square residual of a channel over the steps, each predicted by a fit to other steps.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelGap {
+    /// Nominal model, nothing fitted.
+    pub nominal: f64,
+    /// Nominal model, tolerances fitted.
+    pub before: f64,
+    /// With the best cause.
+    pub after: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// Efficiency and heat transfer at the end of a step for three models, at the same speed, pressures and metal temperatures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointGap {
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Valve opening.
+    pub valve: f64,
+    /// Efficiency of the nominal model.
+    pub eta_nominal: f64,
+    /// Efficiency with the tolerances of the best cause's fit, but without the cause.
+    pub eta_before: f64,
+    /// Efficiency with the best cause.
+    pub eta_after: f64,
+    /// Heat-transfer coefficient of the nominal model, W/(m2 K).
+    pub h_nominal_w_m2k: f64,
+    /// Heat-transfer coefficient with the tolerances of the best cause's fit, but without the cause, W/(m2 K).
+    pub h_before_w_m2k: f64,
+    /// Heat-transfer coefficient with the best cause, W/(m2 K).
+    pub h_after_w_m2k: f64,
+}
+
+/// A tolerance or offset outside its prior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Strained {
+    /// Name.
+    pub what: String,
+    /// Absolute deviation in declared sigmas, > 0; at most 6.
+    pub sigmas: f64,
+}
+
+/// The gap, with each step predicted by a fit to other steps.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gap {
+    /// Mean of `(|r|^2 - n)/n` over the steps for the nominal model.
+    pub nominal: f64,
+    /// The same with tolerances fitted.
+    pub before: f64,
+    /// The same with the best cause.
+    pub after: f64,
+    /// Gap reduction as a share; 0 if a channel gets worse.
+    pub shrink: f64,
+    /// 95 % interval of this share for similar steps: lower end.
+    pub shrink_low: f64,
+    /// Upper end.
+    pub shrink_high: f64,
+    /// Number of steps with a misfit beyond noise after the tolerance fit: the sample size of the interval.
+    pub steps_with_gap: usize,
+    /// Index of the step with the largest share of the gap, from 0; files use its number, from 1.
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::option::serialize")]
+    pub largest_step: Option<usize>,
+    /// Its share of the gap.
+    pub largest_share: f64,
+    /// The tolerance furthest outside its prior without a cause; `None` if all are within three sigmas.
+    pub strained: Option<Strained>,
+    /// Channels that the cause makes worse.
+    pub worse: Vec<String>,
+    /// Indices of the steps held out in one of the folds; empty if there are too few steps. Files use numbers, from 1.
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::list::serialize")]
+    pub held_out_steps: Vec<usize>,
+    /// Folds: indices of the steps held out together, from 0; files use numbers, from 1.
+    #[serde(serialize_with = "mapper_core::test_plan::step_number::lists::serialize")]
+    pub folds: Vec<Vec<usize>>,
+    /// Each channel.
+    pub channels: BTreeMap<String, ChannelGap>,
+    /// Each operating point.
+    pub points: Vec<PointGap>,
+}
+
+/// An operating point of a jump.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct JumpPoint {
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Valve opening.
+    pub valve: f64,
+}
+
+/// Suggested next step.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Next {
+    /// The jump that best distinguishes the remaining candidates.
+    Jump {
+        /// Start.
+        from: JumpPoint,
+        /// Target.
+        to: JumpPoint,
+        /// Expected probability of the true candidate afterwards.
+        expected_probability: f64,
+        /// Duration, min.
+        minutes: f64,
+        /// T3 before and after, K, if the step changes it.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        t3_k: Option<[f64; 2]>,
+        /// Oil temperature before and after, K, if the step changes it.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        oil_temperature_k: Option<[f64; 2]>,
+    },
+    /// A soak before the next run.
+    Soak {
+        /// Time at rest, min.
+        soak_minutes: f64,
+        /// Expected probability of the true candidate afterwards.
+        expected_probability: f64,
+    },
+    /// A sensor that would distinguish them.
+    Sensor {
+        /// Name.
+        sensor: String,
+        /// Reason.
+        reason: String,
+    },
+}
+
+/// Kind of experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Change of speed, at any opening.
+    Jump,
+    /// Change of opening at one speed.
+    ValveStep,
+    /// Change of turbine inlet temperature at one point.
+    T3Step,
+    /// Change of oil temperature at one point.
+    OilStep,
+    /// A jump with an additional channel measured.
+    Sensor,
+    /// A soak before the run, in which the sensors are compared with each other.
+    Soak,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 6] =
+        [Kind::Jump, Kind::ValveStep, Kind::T3Step, Kind::OilStep, Kind::Sensor, Kind::Soak];
+
+    /// Kind of an experiment.
+    pub fn of(experiment: &Experiment) -> Kind {
+        match experiment.beside {
+            Beside::T3 { .. } => Kind::T3Step,
+            Beside::Oil { .. } => Kind::OilStep,
+            Beside::Sensor(_) => Kind::Sensor,
+            Beside::Soak(_) => Kind::Soak,
+            Beside::Nothing if experiment.is_valve_step() => Kind::ValveStep,
+            Beside::Nothing => Kind::Jump,
+        }
+    }
+}
+
+/// An experiment with its expected result.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Suggestion {
+    /// Kind.
+    pub kind: Kind,
+    /// Start, settled; standstill for a soak.
+    pub from: JumpPoint,
+    /// Target.
+    pub to: JumpPoint,
+    /// T3 before and after, K, if the step changes it.
+    pub t3_k: Option<[f64; 2]>,
+    /// Oil temperature before and after, K, if the step changes it.
+    pub oil_temperature_k: Option<[f64; 2]>,
+    /// Additionally measured channel.
+    pub sensor: Option<String>,
+    /// Duration, min; for a sensor it includes half an hour of mounting.
+    pub minutes: f64,
+    /// Probability that the true cause ends with 95 % of the probability of all open causes.
+    pub probability_settled: f64,
+    /// Expected share of the true cause afterwards.
+    pub expected_probability: f64,
+    /// Expected reduction of the entropy of the open causes, bit.
+    pub entropy_drop_bit: f64,
+    /// Entropy of the open causes before, bit.
+    pub entropy_bit: f64,
+    /// Sequence lines that run it; campaign lines for a soak.
+    pub script: Vec<String>,
+}
+
+impl Suggestion {
+    /// Converts to a next step.
+    pub fn as_next(&self) -> Next {
+        if let Some(sensor) = &self.sensor {
+            return Next::Sensor {
+                sensor: format!("a sensor for {sensor}"),
+                reason: format!(
+                    "with it one jump answers {:.0} % of what is open between the first candidates",
+                    100.0 * self.entropy_drop_bit / self.entropy_bit.max(f64::MIN_POSITIVE)
+                ),
+            };
+        }
+        if self.kind == Kind::Soak {
+            return Next::Soak {
+                soak_minutes: self.minutes,
+                expected_probability: self.expected_probability,
+            };
+        }
+        Next::Jump {
+            from: self.from,
+            to: self.to,
+            expected_probability: self.expected_probability,
+            minutes: self.minutes,
+            t3_k: self.t3_k,
+            oil_temperature_k: self.oil_temperature_k,
+        }
+    }
+}
+
+/// The law that is more probable than not; `None` if there is none.
+pub fn law_found(diagnosis: &Diagnosis) -> Option<&Law> {
+    diagnosis.laws.first().filter(|law| law.probability > 0.5)
+}

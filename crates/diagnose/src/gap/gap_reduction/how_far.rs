@@ -1,0 +1,218 @@
+//! Gap reduction on held-out steps.
+
+use crate::gap::best_fit::adequacy::misfit_of_steps;
+use crate::gap::best_fit::first_step::{is_start, with_start_read};
+use crate::gap::best_fit::fit::{Effort, Fit, fit};
+use crate::gap::best_fit::selection::{Selection, dot_over};
+use crate::gap::findings::report::{ChannelGap, Gap, PointGap, Strained};
+use crate::gap::gap_reduction::folds::Folds;
+use crate::gap::gap_reduction::gap_distribution::{StepMisfit, carried};
+use crate::gap::residuals::nuisance::{NuisanceKind, OUTPUTS};
+use crate::gap::residuals::study::{Hypothesis, Study};
+use crate::gap::residuals::whiten::{Linearised, rows_of_step};
+use mapper_numerics::parallel;
+use mapper_numerics::statistics::DOUBT_SIGMAS;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Fits to compare.
+#[derive(Clone, Copy)]
+pub struct Compared<'a> {
+    /// The recording.
+    pub study: &'a Study,
+    /// Linearised at the nominal model, and at the best cause.
+    pub linearised: [&'a Linearised; 2],
+    /// Fit of tolerances alone.
+    pub null: &'a Fit,
+    /// Causes from which each fold selects, best first; empty if none is named.
+    pub causes: &'a [&'a Fit],
+    /// Logarithm of the evidence of a fit, including priors.
+    pub weight: &'a (dyn Fn(&Fit) -> f64 + Sync),
+}
+
+/// Whitened residuals and predicted values of all steps, each from a fit to other steps.
+struct Unseen {
+    residual: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// Effort of a fit without some of the steps; it starts at the best fit to all steps.
+const EFFORT: Effort =
+    Effort { iterations: 5, enough: 0.2, most_sigmas: crate::gap::best_fit::fit::MAX_SIGMAS };
+
+/// Compares tolerances alone with the best cause on held-out steps. Each fold selects among the first few causes and refits, without its
+/// own steps.
+pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
+    let Compared { study, linearised: [nominal, _], null, .. } = compared;
+    let (before, after) = unseen(compared, folds);
+    let steps: Vec<usize> = (0..study.steps.len()).collect();
+    let (g_before, g_after) =
+        (misfit_of_steps(study, &before.residual), misfit_of_steps(study, &after.residual));
+    let mean = |g: &[f64]| g.iter().sum::<f64>() / g.len().max(1) as f64;
+    let misfits: Vec<StepMisfit> = g_before
+        .iter()
+        .zip(&g_after)
+        .enumerate()
+        .map(|(step, (before, after))| {
+            let values = rows_of_step(study, step).len();
+            StepMisfit { before: *before, after: *after, values }
+        })
+        .collect();
+    let carried = carried(&misfits);
+    let (low, high) = carried.interval;
+    let bare =
+        Unseen { residual: nominal.residual(study, &nominal.base), values: nominal.base.values.clone() };
+    let (channels, worse) = by_channel(study, [&bare, &before, &after], &steps);
+    let claimed = worse.is_empty() && !compared.causes.is_empty();
+    Gap {
+        nominal: mean(&misfit_of_steps(study, &bare.residual)),
+        before: mean(&g_before),
+        after: mean(&g_after),
+        shrink: if claimed { carried.removed } else { 0.0 },
+        shrink_low: if claimed { low } else { 0.0 },
+        shrink_high: if claimed { high } else { 0.0 },
+        steps_with_gap: carried.steps,
+        largest_step: carried.largest.map(|(step, _)| step),
+        largest_share: carried.largest.map_or(0.0, |(_, share)| share),
+        strained: strained(study, null),
+        worse,
+        held_out_steps: if folds.steps.len() > 1 { steps } else { Vec::new() },
+        folds: folds.steps.clone(),
+        channels,
+        points: points(study, &compared.causes.first().unwrap_or(&null).hypothesis),
+    }
+}
+
+/// The tolerance of a fit furthest outside its prior. Initial metal state and clock errors are excluded, because they are not rig
+/// properties.
+fn strained(study: &Study, fit: &Fit) -> Option<Strained> {
+    let own = study.nuisances.iter().zip(&fit.hypothesis.nuisances);
+    let machine = own.filter(|(n, _)| !is_start(n.kind) && !matches!(n.kind, NuisanceKind::Delay(_)));
+    let (nuisance, sigmas) = machine.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    let strained = Strained { what: nuisance.kind.to_string(), sigmas: sigmas.abs() };
+    (strained.sigmas > DOUBT_SIGMAS).then_some(strained)
+}
+
+fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
+    let Compared { study, linearised: [nominal, at_best], null, causes, weight } = compared;
+    let whole = |fit: &Fit| Unseen { residual: fit.residual.clone(), values: fit.prediction.values.clone() };
+    if folds.steps.len() < 2 {
+        return (whole(null), whole(causes.first().unwrap_or(&null)));
+    }
+    // Fits the null and each cause in every fold.
+    let jobs: Vec<(usize, usize)> =
+        (0..folds.steps.len()).flat_map(|fold| (0..=causes.len()).map(move |which| (fold, which))).collect();
+    let fitted = parallel::map(&jobs, |(fold, which)| {
+        let mut selection = Selection::all(study);
+        for step in &folds.steps[*fold] {
+            selection.steps[*step] = false;
+        }
+        let (linearised, whole) = match which.checked_sub(1) {
+            None => (nominal, null),
+            Some(cause) => (at_best, causes[cause]),
+        };
+        // If a fold cannot be fitted, it keeps the fit to all steps.
+        let fitted = fit(study, linearised, &whole.hypothesis, &selection, EFFORT);
+        let fitted = fitted.unwrap_or_else(|_| whole.clone());
+        if selection.steps[0] { fitted } else { with_start_read(study, linearised, fitted) }
+    });
+    let (mut before, mut after) = (whole(null), whole(null));
+    for (fold, steps) in folds.steps.iter().enumerate() {
+        let of_fold: Vec<&Fit> =
+            jobs.iter().zip(&fitted).filter(|((f, _), _)| *f == fold).map(|(_, fit)| fit).collect();
+        let Some((bare, causes)) = of_fold.split_first() else { continue };
+        let best = causes.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))).unwrap_or(bare);
+        for step in steps {
+            for row in rows_of_step(study, *step) {
+                before.residual[row] = bare.residual[row];
+                before.values[row] = bare.prediction.values[row];
+                after.residual[row] = best.residual[row];
+                after.values[row] = best.prediction.values[row];
+            }
+        }
+    }
+    (before, after)
+}
+
+/// Channel residuals on some steps for each prediction, and the channels that the last prediction makes worse than the one before it.
+pub fn channels_on(
+    study: &Study,
+    linearised: &Linearised,
+    [before, after]: [&Fit; 2],
+    steps: &[usize],
+) -> (BTreeMap<String, ChannelGap>, Vec<String>) {
+    let nominal = Unseen {
+        residual: linearised.residual(study, &linearised.base),
+        values: linearised.base.values.clone(),
+    };
+    let of = |fit: &Fit| Unseen { residual: fit.residual.clone(), values: fit.prediction.values.clone() };
+    by_channel(study, [&nominal, &of(before), &of(after)], steps)
+}
+
+/// A channel is worse if its residual grows by this ratio, and by more than chance.
+const WORSE_RATIO: f64 = 1.1;
+
+/// Root mean square of measured minus predicted block means of these steps, per channel in its unit: nominal model, fitted tolerances, and
+/// cause. Also returns the channels that the cause makes worse.
+fn by_channel(
+    study: &Study,
+    [nominal, before, after]: [&Unseen; 3],
+    steps: &[usize],
+) -> (BTreeMap<String, ChannelGap>, Vec<String>) {
+    let (mut channels, mut worse) = (BTreeMap::new(), Vec::new());
+    for (output, channel) in OUTPUTS.iter().enumerate() {
+        let groups = study.groups.iter().filter(|g| g.output == output && steps.contains(&g.step));
+        let rows: Vec<Range<usize>> = groups.map(|g| g.rows.clone()).collect();
+        let count: usize = rows.iter().map(Range::len).sum();
+        if count == 0 {
+            continue;
+        }
+        let rms = |predicted: &Unseen| {
+            let off: Vec<f64> = study.measured.iter().zip(&predicted.values).map(|(m, v)| m - v).collect();
+            (dot_over(&rows, &off, &off) / count as f64).sqrt()
+        };
+        let gap = ChannelGap {
+            nominal: rms(nominal),
+            before: rms(before),
+            after: rms(after),
+            unit: channel.unit().to_owned(),
+        };
+        let squares = |of: &[f64]| dot_over(&rows, of, of);
+        let apart: Vec<f64> = before.residual.iter().zip(&after.residual).map(|(b, a)| b - a).collect();
+        let more = squares(&after.residual) - squares(&before.residual);
+        // For two equally good predictions, the misfit difference has a standard deviation of twice their distance.
+        let chance = 2.0 * squares(&apart).sqrt();
+        if gap.after > WORSE_RATIO * gap.before && more > DOUBT_SIGMAS * chance.max(DOUBT_SIGMAS) {
+            worse.push(channel.symbol().to_owned());
+        }
+        channels.insert(channel.symbol().to_owned(), gap);
+    }
+    (channels, worse)
+}
+
+/// Efficiency and heat transfer at the end of each step: with the cause and its tolerances, with these tolerances alone, and for the
+/// nominal model. All use the same speed, pressures and metal temperatures, so a shifted operating point does not appear as an efficiency
+/// change.
+fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
+    let tolerances = Hypothesis { nuisances: after.nuisances.clone(), effects: Vec::new() };
+    let nothing = study.nothing();
+    let Ok(points) = study.points_beside(after, &[&nothing, &tolerances]) else { return Vec::new() };
+    study
+        .steps
+        .iter()
+        .zip(points)
+        .filter_map(|(step, (after, others))| {
+            let [nominal, before] = others.as_slice() else { return None };
+            Some(PointGap {
+                speed_rpm: after.speed_rpm,
+                valve: step.marker.valve_opening_ratio,
+                eta_nominal: nominal.efficiency,
+                eta_before: before.efficiency,
+                eta_after: after.efficiency,
+                h_nominal_w_m2k: nominal.h_w_m2k,
+                h_before_w_m2k: before.h_w_m2k,
+                h_after_w_m2k: after.h_w_m2k,
+            })
+        })
+        .collect()
+}

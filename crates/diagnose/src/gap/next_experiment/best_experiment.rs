@@ -1,0 +1,216 @@
+//! Next step: the experiments that best distinguish the remaining candidates, or the sensor that would.
+
+use crate::gap::best_fit::fit::Fit;
+use crate::gap::findings::experiment::{AllowedJump, Beside, Experiment};
+use crate::gap::findings::report::{JumpPoint, Kind, Next, Place, Suggestion};
+use crate::gap::next_experiment::odds::{Odds, entropy_bit, odds};
+use crate::gap::next_experiment::outlook::{apart, apart_at_first_sight, recorded_jumps, recorded_points};
+use crate::gap::residuals::nuisance::OUTPUTS;
+use crate::gap::residuals::study::Study;
+use mapper_core::{Channel, OperatingPoint};
+use mapper_numerics::parallel;
+use mapper_physics::rig::effect::Submodel;
+
+/// Share of the open probability above which the first cause is settled.
+pub const SETTLED: f64 = 0.95;
+/// Experiments expected to resolve less than this share of the open question are dropped.
+const MIN_ANSWER: f64 = 0.1;
+/// Number of jumps that are evaluated with refits.
+const CLOSE_LOOKS: usize = 6;
+/// Maximum number of experiments shown.
+const SHOWN: usize = 5;
+/// The same of one kind; also of those of each other kind that are evaluated.
+const OF_KIND: usize = 2;
+/// Maximum number of candidates to distinguish.
+const RIVALS: usize = 4;
+/// All experiments are compared with the same random draws.
+const SEED: u64 = 1;
+/// Time at the start of a step in a script, s: housings settle within minutes.
+const START_S: u32 = 300;
+
+/// Open candidates, best first, with their probabilities.
+pub struct Rivals<'a> {
+    /// At least two fits; the first is the best.
+    pub fits: Vec<&'a Fit>,
+    /// One probability per fit.
+    pub probabilities: Vec<f64>,
+}
+
+/// Suggested next step and the alternatives.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Suggested {
+    /// The first of `experiments`, or a sensor that the model does not include; `None` if no experiment helps.
+    pub next: Option<Next>,
+    /// Possible experiments, best first.
+    pub experiments: Vec<Suggestion>,
+}
+
+/// Ranks experiments by how well they distinguish the rivals per minute.
+///
+/// A first pass scores every `allowed` experiment with the fitted candidates: `U = sum over k, j of p_k p_j d_kj^2 / minutes`. Here
+/// `d_kj^2` is the misfit increase of a refitted `j` if `k` were true. The most promising of each kind are evaluated with every rival
+/// refitted, and ranked by the expected share of the open question resolved per minute ([`odds`]). Without allowed jumps, repeats of the
+/// recorded jumps are used. Unrecorded model channels are tried with the most promising jump. If no experiment resolves enough, the
+/// function names a sensor for the first candidate's part. `temperature` is the diagnosis'.
+pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], temperature: f64) -> Suggested {
+    rivals.fits.truncate(RIVALS);
+    rivals.probabilities.truncate(RIVALS);
+    let Some(first) = rivals.fits.first() else { return Suggested::default() };
+    let mut all = allowed.to_vec();
+    let jumps_known = all.iter().any(|experiment| Kind::of(experiment) == Kind::Jump);
+    if !jumps_known {
+        let recorded = recorded_jumps(study, &recorded_points(study, &first.hypothesis));
+        all.extend(recorded.into_iter().map(Experiment::jump));
+    }
+    let rate = |experiment: &Experiment, apart: &[Vec<f64>]| {
+        gain(&rivals.probabilities, apart) / experiment.minutes()
+    };
+    let looks = parallel::map(&all, |experiment| {
+        let apart = apart_at_first_sight(study, experiment, &rivals.fits)?;
+        Some((rate(experiment, &apart), *experiment))
+    });
+    let mut looks: Vec<(f64, Experiment)> = looks.into_iter().flatten().collect();
+    looks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut close: Vec<Experiment> = Vec::new();
+    for kind in Kind::ALL {
+        let most = if kind == Kind::Jump { CLOSE_LOOKS } else { OF_KIND };
+        let of_kind = looks.iter().map(|(_, experiment)| *experiment).filter(|e| Kind::of(e) == kind);
+        close.extend(of_kind.take(most));
+    }
+    if let Some(jump) = close.first().filter(|experiment| experiment.beside == Beside::Nothing) {
+        let missing = OUTPUTS.into_iter().filter(|c| *c != Channel::P3 && study.table.column(*c).is_none());
+        let added: Vec<Experiment> =
+            missing.map(|channel| Experiment { jump: jump.jump, beside: Beside::Sensor(channel) }).collect();
+        close.extend(added);
+    }
+    let looked = parallel::map(&close, |experiment| {
+        let apart = apart(study, experiment, &rivals.fits)?;
+        let odds = odds(&rivals.probabilities, &apart, temperature, SETTLED, SEED);
+        Some((*experiment, odds, rate(experiment, &apart)))
+    });
+    let mut looked: Vec<(Experiment, Odds, f64)> = looked.into_iter().flatten().collect();
+    // Share resolved per minute; if several experiments resolve everything, the simplest comes first.
+    let of_minute =
+        |(experiment, odds, _): &(Experiment, Odds, f64)| odds.entropy_drop_bit / experiment.minutes();
+    looked.sort_by(|a, b| of_minute(b).total_cmp(&of_minute(a)).then(b.2.total_cmp(&a.2)));
+    let open_bit = entropy_bit(&rivals.probabilities);
+    let answers = |odds: &Odds| odds.entropy_drop_bit / open_bit.max(f64::MIN_POSITIVE);
+    let most = looked.iter().map(|(_, odds, _)| answers(odds)).fold(0.0, f64::max);
+    looked.retain(|(_, odds, _)| answers(odds) >= MIN_ANSWER);
+    let mut experiments: Vec<Suggestion> = Vec::new();
+    for (experiment, odds, _) in &looked {
+        let kind = Kind::of(experiment);
+        if experiments.len() < SHOWN && experiments.iter().filter(|e| e.kind == kind).count() < OF_KIND {
+            experiments.push(suggestion(kind, experiment, odds, open_bit));
+        }
+    }
+    let next = experiments.first().map(Suggestion::as_next).or_else(|| {
+        let (effect, _) = rivals.fits.iter().find_map(|fit| fit.hypothesis.effects.first())?;
+        let among = if jumps_known { "allowed" } else { "recorded" };
+        Some(Next::Sensor {
+            sensor: sensor_for(study.effects[*effect].info().submodel).to_owned(),
+            reason: format!(
+                "none of the {} {among} steps answers more than {:.0} % of what is open between the first candidates",
+                all.len(),
+                100.0 * most
+            ),
+        })
+    });
+    Suggested { next, experiments }
+}
+
+fn suggestion(kind: Kind, experiment: &Experiment, odds: &Odds, open_bit: f64) -> Suggestion {
+    let (from, to) = (experiment.jump.from, experiment.jump.to);
+    Suggestion {
+        kind,
+        from: point(from),
+        to: point(to),
+        t3_k: if let Beside::T3 { from_k, to_k } = experiment.beside { Some([from_k, to_k]) } else { None },
+        oil_temperature_k: if let Beside::Oil { from_k, to_k } = experiment.beside {
+            Some([from_k, to_k])
+        } else {
+            None
+        },
+        sensor: if let Beside::Sensor(channel) = experiment.beside {
+            Some(channel.symbol().to_owned())
+        } else {
+            None
+        },
+        minutes: experiment.minutes(),
+        probability_settled: odds.settles,
+        expected_probability: odds.share,
+        entropy_drop_bit: odds.entropy_drop_bit,
+        entropy_bit: open_bit,
+        script: script(experiment),
+    }
+}
+
+/// Sequence lines that run a step, or campaign lines that begin with a soak.
+fn script(experiment: &Experiment) -> Vec<String> {
+    let place = |point: OperatingPoint| {
+        format!("point(\"{} krpm\", {})", round(point.speed_rpm / 1e3), round(point.valve_opening_ratio))
+    };
+    let celsius = |k: f64| round(k - 273.15);
+    let AllowedJump { from, to, dwell_s, .. } = experiment.jump;
+    let change = match experiment.beside {
+        Beside::Nothing | Beside::Sensor(_) => None,
+        Beside::Soak(soak) => return vec![format!("zero: {{soak: {} min}}", round(soak.duration_s / 60.0))],
+        Beside::T3 { to_k, .. } => Some(format!("t3(\"{} degC\");", celsius(to_k))),
+        Beside::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
+    };
+    let go = [format!("jump({}, \"{} s\");", place(to), round(dwell_s))];
+    let start = [format!("jump({}, \"{START_S} s\");", place(from))];
+    start.into_iter().chain(change).chain(go).collect()
+}
+
+/// Rounds to three decimals and removes floating-point residue.
+fn round(value: f64) -> f64 {
+    (1e3 * value).round() / 1e3
+}
+
+/// Suggestion for a gap outside the effect library: a suspected effect, or a sensor for the part with most of the gap.
+pub fn look_beside(places: &[Place]) -> Next {
+    let place = places.first();
+    let part = place.and_then(|place| Submodel::ALL.into_iter().find(|part| part.name() == place.submodel));
+    let (sensor, lies) = match part {
+        Some(part) => (sensor_for(part), format!("most of it lies in {}", part.name())),
+        None => {
+            ("a second thermocouple in the compressor housing, near the gas", "no part dominates".to_owned())
+        }
+    };
+    Next::Sensor {
+        sensor: sensor.to_owned(),
+        reason: format!(
+            "no effect of the catalogue explains all of the gap, and {lies}: write a suspected effect in rhai and give it with --effect, or measure there"
+        ),
+    }
+}
+
+fn point(point: OperatingPoint) -> JumpPoint {
+    JumpPoint { speed_rpm: point.speed_rpm, valve: point.valve_opening_ratio }
+}
+
+/// `sum p_k p_j d_kj^2`.
+fn gain(probabilities: &[f64], apart: &[Vec<f64>]) -> f64 {
+    let row = |(p, row): (&f64, &Vec<f64>)| -> f64 {
+        row.iter().zip(probabilities).map(|(d2, q)| p * q * d2).sum::<f64>()
+    };
+    probabilities.iter().zip(apart).map(row).sum()
+}
+
+/// A sensor that measures a part directly.
+fn sensor_for(part: Submodel) -> &'static str {
+    match part {
+        Submodel::Actuator | Submodel::TurbineFlow => "a second, fast pressure sensor at the turbine inlet",
+        Submodel::Shaft => "oil outlet temperature and oil flow, for the bearings' power",
+        Submodel::CompressorFlow | Submodel::FlowMeter => "a second flow meter in the compressor's line",
+        Submodel::Outlet | Submodel::P2Sensor => "a second pressure sensor at the compressor outlet",
+        Submodel::CompressorGas => "a gas temperature probe between the wheel and the volute",
+        Submodel::T1Probe => "a second probe at the compressor inlet",
+        Submodel::T2Probe => "a second T2 probe of another diameter",
+        Submodel::TcProbe | Submodel::CompressorHousing => {
+            "a second thermocouple in the compressor housing, near the gas"
+        }
+        Submodel::TurbineHousing => "thermocouples on both sides of the bearing housing",
+    }
+}

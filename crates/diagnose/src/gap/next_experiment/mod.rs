@@ -1,0 +1,6 @@
+//! Choice of the next experiment or sensor, by the expected separation of the remaining candidate effects.
+
+pub(crate) mod at_rest;
+pub mod best_experiment;
+pub mod odds;
+pub mod outlook;

@@ -1,0 +1,51 @@
+//! Compares the steps of two recordings.
+
+use crate::gap::preconditions::problem::Problem;
+use crate::gap::residuals::study::Study;
+use mapper_core::Channel;
+use mapper_observe::averages::mean_reading::mean_reading;
+
+/// Allowed differences of a step's commanded P3 (ratio) and valve opening: model error hardly changes over this distance.
+const P3_RATIO: f64 = 0.02;
+const OPENING: f64 = 0.01;
+/// Length of a step, s.
+const LENGTH_S: f64 = 1.0;
+/// Turbine inlet temperature, K: a smaller difference is ambient variation, not another operating point.
+const T3_K: f64 = 10.0;
+
+/// Rejects a reference recording with steps other than those of the recording under diagnosis.
+///
+/// # Errors
+/// [`Problem::OtherSteps`] and [`Problem::OtherStep`].
+pub(crate) fn same_steps(healthy: &Study, study: &Study) -> Result<(), Problem> {
+    if healthy.steps.len() != study.steps.len() {
+        return Err(Problem::OtherSteps { healthy: healthy.steps.len(), recorded: study.steps.len() });
+    }
+    let t3_k = |of: &Study, step: usize| {
+        let marker = &of.steps[step].marker;
+        let column = of.table.column(Channel::T3)?;
+        mean_reading(&column[of.table.range(marker.start_s, marker.end_s)])
+    };
+    for (index, (theirs, ours)) in healthy.steps.iter().zip(&study.steps).enumerate() {
+        let (theirs, ours) = (&theirs.marker, &ours.marker);
+        let differs = |what: &'static str, healthy: f64, recorded: f64, unit: &'static str, within: f64| {
+            let same = (healthy - recorded).abs() <= within || !healthy.is_finite() || !recorded.is_finite();
+            let step = ours.index;
+            if same {
+                Ok(())
+            } else {
+                Err(Problem::OtherStep { step, what, healthy, recorded, unit, within })
+            }
+        };
+        differs("commanded P3", theirs.p3_pa / 1e3, ours.p3_pa / 1e3, "kPa", P3_RATIO * ours.p3_pa / 1e3)?;
+        differs("opening of the valve", theirs.valve_opening_ratio, ours.valve_opening_ratio, "", OPENING)?;
+        // The running time before the first jump is not compared.
+        if index > 0 {
+            differs("length", theirs.end_s - theirs.start_s, ours.end_s - ours.start_s, "s", LENGTH_S)?;
+        }
+        if let (Some(before), Some(now)) = (t3_k(healthy, index), t3_k(study, index)) {
+            differs("T3", before, now, "K", T3_K)?;
+        }
+    }
+    Ok(())
+}

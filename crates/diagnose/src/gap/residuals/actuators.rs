@@ -1,0 +1,68 @@
+//! Response of P3 and the valve to their commands, and whether it is diagnosed.
+
+use mapper_core::{Channel, Recording};
+use mapper_observe::averages::time_table::Table;
+use mapper_observe::declared::Declared;
+use mapper_observe::model_inputs::lagged_command::{Response, measured_p3_response, measured_valve_response};
+use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
+
+/// Maximum number of alternations between estimating the response and the step times.
+const TIMED_TURNS: usize = 3;
+
+/// Response of P3 and the valve to their commands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Actuators {
+    /// P3; Pa/s.
+    pub p3: Response,
+    /// The valve; 1/s.
+    pub valve: Response,
+    /// Whether P3 is compared with its declared response.
+    pub judged: bool,
+}
+
+impl Actuators {
+    /// By whether the campaign declares tolerances.
+    pub fn of(
+        table: &Table,
+        recording: &Recording,
+        declared: &Declared,
+        tolerances_declared: bool,
+    ) -> Actuators {
+        let read = if tolerances_declared { Actuators::declared } else { Actuators::undeclared };
+        read(table, recording, declared)
+    }
+
+    /// For a campaign with declared tolerances: measured P3 drives the model and is compared with its declared lag; the valve follows at
+    /// once.
+    pub fn declared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
+        let p3 = timed_p3(table, recording, declared).0;
+        Actuators { p3, valve: Response::lag(0.0), judged: true }
+    }
+
+    /// For a campaign without declarations: both responses are estimated from the recording.
+    pub fn undeclared(table: &Table, recording: &Recording, declared: &Declared) -> Actuators {
+        let (p3, timed) = timed_p3(table, recording, declared);
+        let valve = measured_valve_response(table, &timed, declared.nominal.p1_pa);
+        let valve = valve.unwrap_or(Response::lag(0.0));
+        Actuators { p3, valve, judged: false }
+    }
+}
+
+/// Estimates the P3 response and shifts the steps to when their commands reached the rig; each estimate uses the other.
+fn timed_p3(table: &Table, recording: &Recording, declared: &Declared) -> (Response, Recording) {
+    let noise_sigma = declared.noise_sigma(Channel::P3);
+    let follows = |recording: &Recording| {
+        let p3 = measured_p3_response(table, recording, noise_sigma);
+        p3.unwrap_or(Response::lag(declared.tolerances.actuator_lag_s))
+    };
+    let commanded = with_command_times(recording);
+    let (mut p3, mut timed) = (follows(&commanded), commanded.clone());
+    for _ in 0..TIMED_TURNS {
+        let next = Times::read(table, &commanded, p3, noise_sigma).timed(&commanded);
+        if next.steps == timed.steps {
+            break;
+        }
+        (p3, timed) = (follows(&next), next);
+    }
+    (p3, timed)
+}

@@ -1,0 +1,44 @@
+//! Effects added to a study during a diagnosis: laws, and effects that begin with a step.
+
+use crate::gap::residuals::effect_timing::Course;
+use crate::gap::residuals::study::Study;
+use mapper_physics::rig::effect::Effect;
+use std::sync::Arc;
+
+impl Study {
+    /// Adds an effect that is not in the library and acts throughout. Returns its index.
+    pub fn add(&mut self, effect: Arc<dyn Effect>) -> usize {
+        self.effects.push(effect);
+        self.courses.push(Course::Throughout);
+        self.effects.len() - 1
+    }
+
+    /// Adds candidates for every library effect beginning with a step after the first, or growing from it.
+    pub(crate) fn add_onsets(&mut self) {
+        let last = self.steps.len().saturating_sub(1);
+        for effect in 0..self.catalogue {
+            // Growth over a single step equals an onset there.
+            let courses =
+                (1..=last).map(Course::From).chain((1..last).map(Course::Growing)).collect::<Vec<_>>();
+            for course in courses {
+                self.effects.push(self.effects[effect].clone());
+                self.courses.push(course);
+            }
+        }
+    }
+
+    /// Candidates with an onset of one library effect.
+    pub(crate) fn onsets_of(&self, effect: usize) -> impl Iterator<Item = usize> {
+        let is_one = move |index: &usize| {
+            self.courses[*index].onset().is_some()
+                && Arc::ptr_eq(&self.effects[*index], &self.effects[effect])
+        };
+        (self.catalogue..self.effects.len()).filter(is_one)
+    }
+
+    /// The library effect behind a candidate with any onset; the candidate itself if it is not in the library.
+    pub(crate) fn family(&self, index: usize) -> usize {
+        let same = |known: &usize| Arc::ptr_eq(&self.effects[*known], &self.effects[index]);
+        (0..self.catalogue).find(same).unwrap_or(index)
+    }
+}

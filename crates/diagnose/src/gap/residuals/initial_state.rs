@@ -1,0 +1,37 @@
+//! Whether the machine had settled when the recording began, and its initial state otherwise.
+
+use mapper_core::Channel;
+use mapper_observe::averages::mean_reading::mean_reading;
+use mapper_observe::averages::time_table::Table;
+use mapper_physics::simulation::model::Model;
+
+/// Factor on the metal's heat capacity that holds its temperature while everything else settles.
+const HEAVY_RATIO: f64 = 1e9;
+
+/// The model with its metal temperatures held.
+pub(crate) fn with_metal_held(model: &Model) -> Model {
+    let mut heavy = model.clone();
+    heavy.params.compressor.housing_mass_kg *= HEAVY_RATIO;
+    heavy.params.turbine.housing_mass_kg *= HEAVY_RATIO;
+    heavy
+}
+
+/// Time over which the initial metal temperatures are checked, s, and the rate above which they are not settled, K/s. The rate is some
+/// hundred times noise, and a tenth of that of a machine started cold minutes ago.
+const WATCH_S: f64 = 30.0;
+const RESTLESS_K_S: f64 = 0.05;
+
+/// Whether the metal temperatures are steady when the first step of a recording begins.
+pub(crate) fn rested(table: &Table, start_s: f64) -> bool {
+    [Channel::Tc, Channel::Tt].into_iter().all(|channel| {
+        let Some(column) = table.column(channel) else { return true };
+        let middle = |from_s: f64| {
+            let range = table.range(from_s, from_s + 0.3 * WATCH_S);
+            mean_reading(&column[range].iter().copied().filter(|v| v.is_finite()).collect::<Vec<_>>())
+        };
+        let (Some(first), Some(last)) = (middle(start_s), middle(start_s + 0.7 * WATCH_S)) else {
+            return true;
+        };
+        (last - first).abs() < RESTLESS_K_S * 0.7 * WATCH_S
+    })
+}

@@ -1,0 +1,161 @@
+//! Nuisance parameters: declared offsets and tolerances, the initial state, clocks. Every hypothesis refits each of them, with its declared
+//! size as the prior.
+
+use crate::gap::residuals::shape::SHAPES;
+use mapper_core::{Channel, Dimension};
+use mapper_observe::channels::{self, DRIVERS};
+use mapper_observe::declared::Declared;
+use mapper_observe::perturbation::Perturbation;
+use mapper_physics::rig::effect::Rig;
+
+/// Outputs of the model that sensors measure, in the order of the residuals.
+pub const OUTPUTS: [Channel; 9] = {
+    let [n, p2, m_c, m_t, t2, tc, tt, t4] = channels::OUTPUTS;
+    [n, m_c, p2, t2, tc, m_t, t4, tt, Channel::P3]
+};
+
+/// Start of the name of an offset; the channel follows.
+pub const OFFSET_PREFIX: &str = "offset of ";
+
+/// Kind of nuisance parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NuisanceKind {
+    /// Fixed offset of a sensor.
+    Offset(Channel),
+    /// Common offset of all sensors of one dimension that were compared at rest.
+    CommonOffset(Dimension),
+    /// Gain of the compressor's flow meter.
+    FlowMeterGain,
+    /// One quantity of machine, cell or initial state.
+    Perturbation(Perturbation),
+    /// Gas temperature drop through the turbine relative to the shaft power.
+    TurbineDrop,
+    /// A smooth deviation of the efficiency map.
+    Shape(usize),
+    /// Clock error of one output, by its index in [`OUTPUTS`].
+    Delay(usize),
+}
+
+impl std::fmt::Display for NuisanceKind {
+    /// Name in files and messages.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            NuisanceKind::Offset(channel) => write!(f, "{OFFSET_PREFIX}{channel}"),
+            NuisanceKind::CommonOffset(Dimension::Pressure) => f.write_str("common offset of the pressures"),
+            NuisanceKind::CommonOffset(_) => f.write_str("common offset of the temperatures"),
+            NuisanceKind::FlowMeterGain => f.write_str("flow_meter_gain"),
+            NuisanceKind::Perturbation(Perturbation::Flow) => f.write_str("flow_map"),
+            NuisanceKind::Perturbation(Perturbation::Efficiency) => f.write_str("compressor_efficiency"),
+            NuisanceKind::Perturbation(Perturbation::TurbineEfficiency) => f.write_str("turbine_efficiency"),
+            NuisanceKind::Perturbation(Perturbation::ValveArea) => f.write_str("valve_area"),
+            NuisanceKind::Perturbation(Perturbation::CompressorConvection) => f.write_str("convection"),
+            NuisanceKind::Perturbation(Perturbation::ExternalConvection) => {
+                f.write_str("external_convection")
+            }
+            NuisanceKind::Perturbation(Perturbation::OilConductance) => f.write_str("oil_conductance"),
+            NuisanceKind::Perturbation(knob) => write!(f, "{knob:?}"),
+            NuisanceKind::TurbineDrop => f.write_str("turbine_drop"),
+            NuisanceKind::Shape(i) => write!(f, "efficiency_shape {i}"),
+            NuisanceKind::Delay(output) => write!(f, "delay of {}", OUTPUTS[*output]),
+        }
+    }
+}
+
+/// A nuisance parameter with its prior.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nuisance {
+    /// Kind.
+    pub kind: NuisanceKind,
+    /// Prior mean, in the unit of what it changes: 0 for the nominal rig, or the value from an earlier recording of this rig.
+    pub centre: f64,
+    /// One sigma, in the unit of what it changes.
+    pub sigma: f64,
+}
+
+impl Nuisance {
+    /// Physical value at so many sigmas from the centre.
+    pub fn value(&self, sigmas: f64) -> f64 {
+        self.centre + sigmas * self.sigma
+    }
+}
+
+/// Uncertainty of the turbine drop. Swirling, unmixed gas behind the turbine and bearing losses limit how well T4 gives the turbine's work.
+const TURBINE_DROP_RATIO: f64 = 0.03;
+/// Clocks of one rig agree within a fraction of a sample, s.
+const DELAY_SIGMA_S: f64 = 0.02;
+
+/// All nuisances of a rig; undeclared ones are omitted.
+pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
+    use NuisanceKind as K;
+    let t = &declared.tolerances;
+    let knob = |knob: Perturbation| (K::Perturbation(knob), knob.tolerance(t));
+    let mut all: Vec<(NuisanceKind, f64)> = vec![
+        (K::FlowMeterGain, declared.of(Channel::CompressorFlow).gain_sigma_ratio),
+        knob(Perturbation::Flow),
+        knob(Perturbation::Efficiency),
+        knob(Perturbation::TurbineEfficiency),
+        (K::TurbineDrop, TURBINE_DROP_RATIO),
+        knob(Perturbation::ValveArea),
+        knob(Perturbation::CompressorConvection),
+        knob(Perturbation::ExternalConvection),
+        knob(Perturbation::OilConductance),
+        knob(Perturbation::Ambient),
+        knob(Perturbation::StartTc),
+        knob(Perturbation::StartTt),
+    ];
+    // Each has the declared size, although the root mean square of all is then 1.7 of it: a deviation of one corner of the map is plausible.
+    all.extend((0..SHAPES).map(|i| (K::Shape(i), t.efficiency_shape_ratio)));
+    let sensors = DRIVERS.iter().chain(OUTPUTS.iter().filter(|channel| !DRIVERS.contains(channel)));
+    all.extend(sensors.map(|channel| (K::Offset(*channel), declared.offset_sigma(*channel))));
+    all.extend(declared.common_offsets.iter().filter_map(|common| {
+        Some((K::CommonOffset(common.channels.first()?.info().dimension), common.sigma))
+    }));
+    all.extend((0..OUTPUTS.len()).map(|i| (K::Delay(i), DELAY_SIGMA_S)));
+    all.into_iter()
+        .filter(|(_, sigma)| *sigma > 0.0)
+        .map(|(kind, sigma)| Nuisance { kind, centre: 0.0, sigma })
+        .collect()
+}
+
+/// Operating circumstances that are not part of the rig.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Circumstances {
+    /// Perturbations of the ambient temperature and the start, each in its unit.
+    pub knobs: Vec<(Perturbation, f64)>,
+    /// Relative increase of the temperature drop through the turbine.
+    pub t4_drop_ratio: f64,
+    /// Coefficients of the efficiency map's shape.
+    pub shape: [f64; SHAPES],
+    /// Clock delay of each output, s.
+    pub delay_s: [f64; OUTPUTS.len()],
+}
+
+/// Applies one nuisance of size `value` (in the unit of what it changes) to a rig.
+pub fn apply(
+    declared: &Declared,
+    kind: NuisanceKind,
+    value: f64,
+    rig: &mut Rig,
+    circumstances: &mut Circumstances,
+) {
+    use NuisanceKind as K;
+    match kind {
+        K::CommonOffset(dimension) => {
+            let sharing = declared.common_offsets.iter().flat_map(|common| &common.channels);
+            for channel in sharing.filter(|channel| channel.info().dimension == dimension) {
+                rig.instruments.path_mut(*channel).offset += value;
+            }
+        }
+        K::Offset(channel) => rig.instruments.path_mut(channel).offset += value,
+        K::FlowMeterGain => rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *= 1.0 + value,
+        // The cell sensor reads too high by this amount, so the model is driven with less.
+        K::Perturbation(Perturbation::Ambient) => circumstances.knobs.push((Perturbation::Ambient, -value)),
+        K::Perturbation(knob @ (Perturbation::StartTc | Perturbation::StartTt)) => {
+            circumstances.knobs.push((knob, value))
+        }
+        K::Perturbation(knob) => knob.turn(&mut rig.model.params, value),
+        K::TurbineDrop => circumstances.t4_drop_ratio += value,
+        K::Shape(i) => circumstances.shape[i] += value,
+        K::Delay(i) => circumstances.delay_s[i] += value,
+    }
+}

@@ -1,0 +1,499 @@
+//! One prepared recording: residual layout, whitening, and model predictions for any hypothesis.
+
+use crate::gap::residuals::actuators::Actuators;
+use crate::gap::residuals::effect_timing::Course;
+pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
+use crate::gap::residuals::initial_state::{rested, with_metal_held};
+use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
+pub use crate::gap::residuals::point_state::PointState;
+use crate::gap::residuals::shape::{SHAPES, ShapedMap};
+use mapper_core::{Channel, Recording, StepMarker};
+use mapper_observe::averages::block::{Block, block_mean, blocks};
+use mapper_observe::averages::mean_reading::mean_reading;
+use mapper_observe::averages::schedule::Schedule;
+use mapper_observe::averages::time_table::Table;
+use mapper_observe::channels::DRIVERS;
+use mapper_observe::declared::Declared;
+use mapper_observe::initial_state::state_as_read;
+use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Response};
+use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
+use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
+use mapper_observe::perturbation::{Perturbation, Shifted};
+use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, add};
+use mapper_physics::rig::instruments::{ChannelFollower, true_value};
+use mapper_physics::simulation::driven::{DriveError, FrozenGrid, drive, settle};
+use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::simulation::model::{Model, Outputs, PreparedModel, State};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Values of one output in one step with common noise.
+#[derive(Debug, Clone)]
+pub struct Group {
+    /// Step, by its index in [`Study::steps`].
+    pub step: usize,
+    /// Output, by its index in [`OUTPUTS`].
+    pub output: usize,
+    /// Rows of the group in the vector of residuals.
+    pub rows: std::ops::Range<usize>,
+    /// Blocks of the values, by their index in the step.
+    pub blocks: Vec<usize>,
+}
+
+/// One step with its blocks.
+#[derive(Debug, Clone)]
+pub struct StudyStep {
+    /// As recorded.
+    pub marker: StepMarker,
+    /// Whether P3 or valve jumped at its start.
+    pub jumped: bool,
+    /// Its blocks.
+    pub blocks: Vec<Block>,
+}
+
+/// Model prediction for a hypothesis.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Block means in the residuals' layout, in the channels' units.
+    pub values: Vec<f64>,
+    /// Their slopes, unit/s.
+    pub slopes: Vec<f64>,
+}
+
+/// Errors that prevent a prediction.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PredictError {
+    /// The model cannot follow.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// A value is out of its range.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}
+
+/// One prepared recording.
+#[derive(Debug, Clone)]
+pub struct Study {
+    /// Declared tolerances and noise.
+    pub declared: Declared,
+    /// All samples.
+    pub table: Table,
+    /// Steps.
+    pub steps: Vec<StudyStep>,
+    /// The nominal rig.
+    pub nominal: Rig,
+    /// Candidate effects.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// When each effect acts.
+    pub courses: Vec<Course>,
+    /// Number of library effects; they are followed by candidates that begin with a step.
+    pub catalogue: usize,
+    /// Nuisance parameters.
+    pub nuisances: Vec<Nuisance>,
+    /// Values of one output and step each.
+    pub groups: Vec<Group>,
+    /// Measured block means, in the layout of the groups.
+    pub measured: Vec<f64>,
+    /// The recorded inputs.
+    pub inputs: SmoothedInputs,
+    /// Recorded response of P3 and the valve to their commands.
+    pub actuators: Actuators,
+    /// Scatter of the sample times, s: it adds uncertainty to moving quantities.
+    pub scatter_s: f64,
+    /// Whether the metal had settled when the recording began.
+    rested: bool,
+    grid: FrozenGrid,
+    /// Times at which the model is evaluated: two per block, and one at each jump.
+    times_s: Vec<f64>,
+    /// Step and block of each time; `None` at a jump.
+    places: Vec<Option<(usize, usize)>>,
+    /// Row of each output in each step's blocks.
+    pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
+    /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
+    pub(crate) noise_besides: Vec<DMatrix<f64>>,
+}
+
+/// The first step counts from this time before the first jump, s. The rig's earlier history is unknown, and the metal's start is fitted
+/// anyway.
+const HOLD_S: f64 = 100.0;
+
+/// Blocks of phases in which only the metal temperature changes.
+const SLOW: Schedule =
+    Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.0, shortest_ratio: 0.5 };
+/// Blocks after a jump.
+const AFTER_JUMP: Schedule = Schedule {
+    lengths_s: &[(1.0, 0.1), (3.0, 0.2), (6.0, 1.0), (14.0, 2.0), (30.0, 4.0), (f64::INFINITY, 10.0)],
+    ..SLOW
+};
+
+/// Blocks after a jump in a recording with more steps than [`MANY_STEPS`]: half as many, over half the time.
+const AFTER_ONE_OF_MANY: Schedule = Schedule {
+    lengths_s: &[(1.0, 0.2), (3.0, 0.5), (7.0, 2.0), (15.0, 4.0), (31.0, 8.0), (f64::INFINITY, 16.0)],
+    ..SLOW
+};
+/// Number of steps above which each has fewer blocks.
+const MANY_STEPS: usize = 30;
+
+impl Study {
+    /// Prepares a recording whose campaign declares the actuator response.
+    pub fn new(
+        recording: &Recording,
+        table: Table,
+        declared: Declared,
+        model: Model,
+        effects: Vec<Arc<dyn Effect>>,
+    ) -> Study {
+        let actuators = Actuators::declared(&table, recording, &declared);
+        Study::with_actuators(recording, table, declared, model, effects, actuators)
+    }
+
+    /// Prepares a recording.
+    pub fn with_actuators(
+        recording: &Recording,
+        table: Table,
+        declared: Declared,
+        model: Model,
+        effects: Vec<Arc<dyn Effect>>,
+        actuators: Actuators,
+    ) -> Study {
+        let recording = &with_command_times(recording);
+        let times = Times::read(&table, recording, actuators.p3, declared.noise_sigma(Channel::P3));
+        let timed = times.timed(recording);
+        let mut nominal = Rig::new(model);
+        nominal.instruments.p3_lag_s = declared.tolerances.actuator_lag_s;
+        let many = recording.steps.len() > MANY_STEPS;
+        let after_jump = if many { AFTER_ONE_OF_MANY } else { AFTER_JUMP };
+        let first_s = table.t_s.first().copied().unwrap_or(0.0);
+        let steps: Vec<StudyStep> = recording
+            .steps
+            .iter()
+            .enumerate()
+            .map(|(index, marker)| {
+                let jumped = index > 0;
+                // Half a sample after the last one, which is the next step's first sample if steps are contiguous.
+                let end_s = recording.steps.get(index + 1).map_or(marker.end_s, |next| next.start_s);
+                let start_s =
+                    if jumped { marker.start_s } else { marker.start_s.max(end_s - HOLD_S).max(first_s) };
+                let schedule = if jumped { after_jump } else { SLOW };
+                StudyStep { marker: *marker, jumped, blocks: blocks(&table, start_s, end_s, &schedule) }
+            })
+            .collect();
+        let inputs = SmoothedInputs::read(&table, &timed, &declared, (actuators.p3, actuators.valve));
+        let mut groups = Vec::new();
+        let mut measured = Vec::new();
+        let mut rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>> =
+            steps.iter().map(|step| vec![[None; OUTPUTS.len()]; step.blocks.len()]).collect();
+        for (step_index, step) in steps.iter().enumerate() {
+            for (output, channel) in OUTPUTS.iter().enumerate() {
+                // If no P3 response is declared, none is wrong.
+                if *channel == Channel::P3 && !actuators.judged {
+                    continue;
+                }
+                let Some(column) = table.column(*channel) else { continue };
+                let start = measured.len();
+                let mut of_group = Vec::new();
+                for (block_index, block) in step.blocks.iter().enumerate() {
+                    if let Some(mean) = block_mean(column, block) {
+                        rows[step_index][block_index][output] = Some(measured.len() as u32);
+                        measured.push(mean);
+                        of_group.push(block_index);
+                    }
+                }
+                if !of_group.is_empty() {
+                    groups.push(Group {
+                        step: step_index,
+                        output,
+                        rows: start..measured.len(),
+                        blocks: of_group,
+                    });
+                }
+            }
+        }
+        let mut reads: Vec<(f64, Option<(usize, usize)>)> = Vec::new();
+        for (step_index, step) in steps.iter().enumerate() {
+            if step.jumped {
+                reads.push((times.starts_s[step_index], None));
+            }
+            for (block_index, block) in step.blocks.iter().enumerate() {
+                // The mean of the two one-sigma ends has the mean and the spread of the samples.
+                let place = Some((step_index, block_index));
+                reads.push((block.mean_s - block.spread_s, place));
+                if block.spread_s > 0.0 {
+                    reads.push((block.mean_s + block.spread_s, place));
+                }
+            }
+        }
+        reads.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let start_s = reads.first().map_or(first_s, |(t_s, _)| *t_s) - 0.5;
+        let end_s = reads.last().map_or(start_s + 1.0, |(t_s, _)| t_s + 0.1);
+        let jumps_s: Vec<f64> =
+            times.starts_s.iter().zip(&steps).filter(|(_, step)| step.jumped).map(|(s, _)| *s).collect();
+        let (times_s, places): (Vec<f64>, Vec<_>) = reads.into_iter().unzip();
+        Study {
+            nuisances: nuisances(&declared),
+            courses: vec![Course::Throughout; effects.len()],
+            catalogue: effects.len(),
+            actuators,
+            scatter_s: times.scatter_s,
+            rested: rested(&table, start_s),
+            grid: FrozenGrid::new(start_s, end_s, &jumps_s, &times_s),
+            declared,
+            table,
+            steps,
+            nominal,
+            effects,
+            groups,
+            measured,
+            inputs,
+            times_s,
+            places,
+            rows,
+            noise_besides: Vec::new(),
+        }
+    }
+
+    /// The null hypothesis.
+    pub fn nothing(&self) -> Hypothesis {
+        Hypothesis { nuisances: vec![0.0; self.nuisances.len()], effects: Vec::new() }
+    }
+
+    /// The rig of a hypothesis in one step, and its operating circumstances.
+    fn rig(&self, hypothesis: &Hypothesis, step: usize) -> Result<(Rig, Circumstances), EffectError> {
+        let mut rig = self.nominal.clone();
+        let mut circumstances = Circumstances::default();
+        for (index, values) in &hypothesis.effects {
+            let share = self.courses[*index].share(step, self.steps.len());
+            if share == 1.0 {
+                add(&mut rig, self.effects[*index].as_ref(), values)?;
+            } else if share > 0.0 {
+                let parameters = &self.effects[*index].info().parameters;
+                let grown = |(p, value): (&EffectParameter, &f64)| p.neutral + share * (value - p.neutral);
+                let values: Vec<f64> = parameters.iter().zip(values).map(grown).collect();
+                add(&mut rig, self.effects[*index].as_ref(), &values)?;
+            }
+        }
+        for (nuisance, sigmas) in self.nuisances.iter().zip(&hypothesis.nuisances) {
+            apply(&self.declared, nuisance.kind, nuisance.value(*sigmas), &mut rig, &mut circumstances);
+        }
+        if circumstances.shape != [0.0; SHAPES] {
+            rig.model.map =
+                Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
+        }
+        // A sensor that reads too high drives the model too high, so its offset is subtracted.
+        let read =
+            DRIVERS.map(|channel| (Perturbation::Input(channel), -rig.instruments.path(channel).offset));
+        circumstances.knobs.extend(read);
+        Ok((rig, circumstances))
+    }
+
+    /// Offset of a channel under a hypothesis at the end of the recording, in its unit.
+    pub(crate) fn offset_at_end(&self, hypothesis: &Hypothesis, channel: Channel) -> Option<f64> {
+        let last = self.steps.len().checked_sub(1)?;
+        Some(self.rig(hypothesis, last).ok()?.0.instruments.path(channel).offset)
+    }
+
+    /// Segments of steps with a constant rig under a hypothesis: the first step of each.
+    fn stretches(&self, hypothesis: &Hypothesis) -> Vec<usize> {
+        let shares = |step: usize| {
+            hypothesis
+                .effects
+                .iter()
+                .map(move |(index, _)| self.courses[*index].share(step, self.steps.len()))
+        };
+        let steady = hypothesis.effects.iter().all(|(index, _)| self.courses[*index] == Course::Throughout);
+        let last = if steady { 1 } else { self.steps.len().max(1) };
+        (0..last).filter(|step| *step == 0 || !shares(*step).eq(shares(step - 1))).collect()
+    }
+
+    /// Drives the model of a hypothesis through the recording. `on_sample` receives the index of each of `times_s`, the rig, its
+    /// circumstances, and the model state.
+    fn drive(
+        &self,
+        hypothesis: &Hypothesis,
+        times_s: &[f64],
+        mut on_sample: impl FnMut(usize, &(Rig, Circumstances), &PreparedModel<'_>, &State, &Outputs),
+    ) -> Result<(), PredictError> {
+        let stretches = self.stretches(hypothesis);
+        let mut state: Option<State> = None;
+        let mut done = 0;
+        for (place, first) in stretches.iter().enumerate() {
+            let there = self.rig(hypothesis, *first)?;
+            let (rig, circumstances) = &there;
+            let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
+            let start = match state {
+                None => self.start(rig, &inputs, circumstances)?,
+                Some(state) => state,
+            };
+            let sample = |index: usize, prepared: &PreparedModel<'_>, state: &State, outputs: &Outputs| {
+                on_sample(done + index, &there, prepared, state, outputs);
+            };
+            let Some(next) = stretches.get(place + 1) else {
+                if stretches.len() == 1 {
+                    drive(&rig.model, &inputs, start, &self.grid, times_s, sample)?;
+                } else {
+                    let grid = self.grid.part(self.steps[*first].marker.start_s, f64::INFINITY);
+                    drive(&rig.model, &inputs, start, &grid, &times_s[done..], sample)?;
+                }
+                break;
+            };
+            let end_s = self.steps[*next].marker.start_s;
+            let from_s = if place == 0 { f64::NEG_INFINITY } else { self.steps[*first].marker.start_s };
+            let until = times_s.partition_point(|t| *t <= end_s);
+            let grid = self.grid.part(from_s, end_s);
+            let mut ended = drive(&rig.model, &inputs, start, &grid, &times_s[done..until], sample)?;
+            done = until;
+            // An instantaneous probe has no state until a slow probe replaces it.
+            if rig.model.params.t2_probe_diameter_m == 0.0 {
+                let boundary = inputs.at(end_s - 1e-6);
+                ended.t2_tip_k = rig.model.prepare(&boundary).evaluate(&ended).t2_k;
+            }
+            state = Some(ended);
+        }
+        Ok(())
+    }
+
+    /// Predicts the recording.
+    ///
+    /// # Errors
+    /// [`PredictError`] if a value is out of its range or the model cannot follow.
+    pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
+        let mut followers =
+            OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
+        let mut values = vec![0.0; self.measured.len()];
+        let mut delay_s = [0.0; OUTPUTS.len()];
+        let mut command: Option<LaggedCommand> = None;
+        self.drive(hypothesis, &self.times_s, |index, (rig, circumstances), prepared, state, outputs| {
+            delay_s = circumstances.delay_s;
+            let t_s = self.times_s[index];
+            let place = self.places[index];
+            if command.as_ref().is_none_or(|command| command.p3.lag_s != rig.instruments.p3_lag_s) {
+                let p3 = Response { lag_s: rig.instruments.p3_lag_s, ..self.actuators.p3 };
+                let levels = self.inputs.command.levels().to_vec();
+                command = Some(LaggedCommand::new(levels, p3, self.actuators.valve));
+            }
+            for (output, channel) in OUTPUTS.iter().enumerate() {
+                let seen = match &command {
+                    Some(command) if *channel == Channel::P3 => command.p3_pa(t_s),
+                    _ => true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN),
+                };
+                // T4 is T3' minus a temperature drop that is known only to a few per cent.
+                let seen = if *channel == Channel::T4 {
+                    seen - circumstances.t4_drop_ratio * (outputs.turbine.t3_prime_k - outputs.turbine.t4_k)
+                } else {
+                    seen
+                };
+                followers[output].turn_to(*rig.instruments.path(*channel));
+                let reading = followers[output].read(t_s, seen);
+                let Some((step, block)) = place else { continue };
+                let Some(row) = self.rows[step][block][output] else { continue };
+                let single = self.steps[step].blocks[block].spread_s == 0.0;
+                values[row as usize] += if single { reading } else { 0.5 * reading };
+            }
+        })?;
+        let slopes = self.slopes(&values);
+        for group in &self.groups {
+            let delay_s = delay_s[group.output];
+            if delay_s != 0.0 {
+                for row in group.rows.clone() {
+                    values[row] -= delay_s * slopes[row];
+                }
+            }
+        }
+        Ok(Prediction { values, slopes })
+    }
+
+    /// For each step, its blocks' times after its start, s, and their position on the speed line (beyond 1: surge).
+    pub(crate) fn surge_positions(
+        &self,
+        hypothesis: &Hypothesis,
+    ) -> Result<Vec<Vec<(f64, f64)>>, PredictError> {
+        let mut positions = vec![Vec::new(); self.steps.len()];
+        self.drive(hypothesis, &self.times_s, |index, _, _, _, outputs| {
+            if let Some((step, block)) = self.places[index] {
+                let since_s = self.steps[step].blocks[block].since_jump_s;
+                positions[step].push((since_s, outputs.surge_position_ratio));
+            }
+        })?;
+        Ok(positions)
+    }
+
+    /// Model state at the end of each step.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
+        Ok(self.points_beside(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
+    }
+
+    /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
+    /// temperatures.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn points_beside(
+        &self,
+        hypothesis: &Hypothesis,
+        others: &[&Hypothesis],
+    ) -> Result<Vec<(PointState, Vec<PointState>)>, PredictError> {
+        let times_s: Vec<f64> = self
+            .steps
+            .iter()
+            .map(|step| step.blocks.last().map_or(step.marker.end_s, |block| block.mean_s + block.spread_s))
+            .collect();
+        let mut rigs = Vec::with_capacity(times_s.len());
+        for step in 0..times_s.len() {
+            let of_step: Result<Vec<_>, _> = others.iter().map(|other| self.rig(other, step)).collect();
+            rigs.push(of_step?);
+        }
+        let mut points = vec![(PointState::default(), Vec::new()); times_s.len()];
+        self.drive(hypothesis, &times_s, |index, _, prepared, state, outputs| {
+            let other_point = |(rig, _): &(Rig, Circumstances)| {
+                let outputs = rig.model.prepare(prepared.boundary()).evaluate(state);
+                PointState::of(state, &outputs)
+            };
+            points[index] = (PointState::of(state, outputs), rigs[index].iter().map(other_point).collect());
+        })?;
+        Ok(points)
+    }
+
+    /// Slopes of predicted values, from block to block.
+    fn slopes(&self, values: &[f64]) -> Vec<f64> {
+        let mut slopes = vec![0.0; values.len()];
+        for group in &self.groups {
+            let time = |i: usize| self.steps[group.step].blocks[group.blocks[i]].mean_s;
+            let last = group.blocks.len() - 1;
+            for (i, row) in group.rows.clone().enumerate() {
+                let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+                if before < after {
+                    let rise = values[group.rows.start + after] - values[group.rows.start + before];
+                    slopes[row] = rise / (time(after) - time(before));
+                }
+            }
+        }
+        slopes
+    }
+
+    /// Settled state under the first inputs, shifted by the circumstances. If the metal had not settled when the recording began, its
+    /// measured temperature is kept.
+    fn start(
+        &self,
+        rig: &Rig,
+        inputs: &impl Inputs,
+        circumstances: &Circumstances,
+    ) -> Result<State, DriveError> {
+        let start_s = self.grid.nodes_s().first().copied().unwrap_or(0.0);
+        let boundary = inputs.at(start_s);
+        // Not from the very start of the recording, where the machine may still be at standstill.
+        let read = |channel: Channel| {
+            let column = &self.table.column(channel)?[self.table.range(start_s, f64::INFINITY)];
+            mean_reading(&column.iter().copied().filter(|v| v.is_finite()).take(20).collect::<Vec<_>>())
+        };
+        let guess = state_as_read(&boundary, read);
+        let held = (!self.rested).then(|| with_metal_held(&rig.model));
+        let mut start = settle(held.as_ref().unwrap_or(&rig.model), &boundary, guess)?;
+        for (knob, by) in &circumstances.knobs {
+            knob.start(&mut start, *by);
+        }
+        Ok(start)
+    }
+}

@@ -1,0 +1,160 @@
+//! A law as a hypothesis: its coefficients are fitted by model runs, together with tolerances and any other effects.
+
+use crate::gap::best_fit::fit::{Effort, Fit, fit};
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::residuals::study::{Hypothesis, Study};
+use crate::gap::residuals::whiten::Linearised;
+use crate::missing_terms::search::select::Choice;
+use crate::missing_terms::terms::law_effect::LawEffect;
+use crate::missing_terms::terms::term::{Role, Term};
+use mapper_numerics::parallel;
+use mapper_numerics::statistics::HINT_SIGMAS;
+use mapper_physics::rig::effect::Effect;
+use std::sync::Arc;
+
+/// A fitted law; its effect is [`Bench::study`]'s effect number `effect`.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Terms, by index in the term library.
+    pub choice: Choice,
+    /// Index of the law's effect in the study.
+    pub effect: usize,
+    /// Best fit.
+    pub fit: Fit,
+}
+
+impl Candidate {
+    /// Logarithm of the evidence, including the rarity.
+    pub fn score(&self) -> f64 {
+        self.fit.score - self.choice.rarity
+    }
+
+    /// Whether every coefficient differs significantly from 0; the level that accompanies a slope may have any value.
+    pub fn is_determined(&self, library: &[Term]) -> bool {
+        let covariance = &self.fit.covariance;
+        let terms: Vec<&Term> = self.choice.terms.iter().map(|place| &library[*place]).collect();
+        let first = covariance.nrows().saturating_sub(terms.len());
+        let sink = terms.iter().any(|term| term.role == Role::Slope);
+        let values = self.coefficients();
+        terms.iter().zip(values).enumerate().all(|(place, (term, value))| {
+            let variance = covariance.get((first + place, first + place)).copied().unwrap_or(f64::INFINITY);
+            (sink && term.role == Role::Level) || (value / term.step).abs() > HINT_SIGMAS * variance.sqrt()
+        })
+    }
+
+    /// The law's coefficients.
+    pub fn coefficients(&self) -> &[f64] {
+        let own = self.fit.hypothesis.effects.iter().find(|(index, _)| *index == self.effect);
+        own.map_or(&[], |(_, values)| values)
+    }
+}
+
+/// A study to which laws are added as effects.
+#[derive(Debug)]
+pub struct Bench {
+    /// The recording, with the library effects followed by the laws.
+    pub study: Study,
+    /// The term library.
+    pub library: Vec<Term>,
+}
+
+impl Bench {
+    /// Fits choices from their linear estimate, together with the effects of the base.
+    pub fn fit(
+        &mut self,
+        base_hypothesis: &Hypothesis,
+        linearised: &Linearised,
+        choices: &[Choice],
+        selection: &Selection,
+        effort: Effort,
+    ) -> Vec<Candidate> {
+        let starts: Vec<(Choice, usize, Hypothesis)> =
+            choices.iter().map(|choice| self.start(base_hypothesis, choice)).collect();
+        let fitted = parallel::map(&starts, |(choice, effect, start)| {
+            let fit = fit(&self.study, linearised, start, selection, effort).ok()?;
+            Some(Candidate { choice: choice.clone(), effect: *effect, fit })
+        });
+        let mut found: Vec<Candidate> = fitted.into_iter().flatten().collect();
+        sort(&mut found);
+        found
+    }
+
+    /// Refits candidates from their current values.
+    pub fn refit(
+        &self,
+        candidates: &[Candidate],
+        linearised: &Linearised,
+        selection: &Selection,
+        effort: Effort,
+    ) -> Vec<Candidate> {
+        let fitted = parallel::map(candidates, |candidate| {
+            let fit = fit(&self.study, linearised, &candidate.fit.hypothesis, selection, effort).ok()?;
+            Some(Candidate { fit, ..candidate.clone() })
+        });
+        let mut found: Vec<Candidate> = fitted.into_iter().flatten().collect();
+        sort(&mut found);
+        found
+    }
+
+    /// A candidate's fit in a study with only the library effects and its own law, without the other laws tried.
+    pub fn alone(&self, catalogue: &Study, candidate: &Candidate) -> (Study, Fit) {
+        let mut own = catalogue.clone();
+        let law = own.add(self.study.effects[candidate.effect].clone());
+        let mut fit = candidate.fit.clone();
+        for (index, _) in &mut fit.hypothesis.effects {
+            *index = if *index == candidate.effect { law } else { *index };
+        }
+        (own, fit)
+    }
+
+    fn start(&mut self, base: &Hypothesis, choice: &Choice) -> (Choice, usize, Hypothesis) {
+        let terms: Vec<Term> = choice.terms.iter().map(|place| self.library[*place].clone()).collect();
+        let law = LawEffect::new(terms);
+        let parameters = &law.info().parameters;
+        let values = parameters
+            .iter()
+            .zip(&choice.coefficients)
+            .map(|(p, steps)| (steps * p.typical_step).clamp(0.9 * p.low, 0.9 * p.high))
+            .collect();
+        let effect = self.study.add(Arc::new(law));
+        let mut start = base.clone();
+        start.effects.push((effect, values));
+        (choice.clone(), effect, start)
+    }
+}
+
+/// Drops candidates with an insignificant coefficient, if others remain.
+pub fn keep_determined(library: &[Term], candidates: &mut Vec<Candidate>) {
+    if candidates.iter().any(|candidate| candidate.is_determined(library)) {
+        candidates.retain(|candidate| candidate.is_determined(library));
+    }
+}
+
+/// Sorts best first.
+pub fn sort(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+}
+
+/// Selects the choices to fit: the best ones, and the best of every machine part with a sufficient linear gain.
+pub fn worth(library: &[Term], choices: &[Choice]) -> Vec<Choice> {
+    let Some(best) = choices.first() else { return Vec::new() };
+    let mut selected: Vec<Choice> = Vec::new();
+    let part = |choice: &Choice| library[choice.terms[0]].submodel();
+    // With a strong term present, the linearisation is less accurate.
+    let least = PROMISE * best.gain;
+    for choice in choices.iter().filter(|choice| choice.gain > least) {
+        let of_part = selected.iter().filter(|other| part(other) == part(choice)).count();
+        let parts = if part(choice) == part(best) { OF_THE_BEST_PART } else { OF_OTHER_PARTS };
+        if of_part < parts && selected.len() < MAX {
+            selected.push(choice.clone());
+        }
+    }
+    selected
+}
+
+/// Minimum linear gain of another machine part, as a share of the best gain.
+const PROMISE: f64 = 0.3;
+/// Maximum number of fitted laws.
+const MAX: usize = 6;
+const OF_THE_BEST_PART: usize = 3;
+const OF_OTHER_PARTS: usize = 1;

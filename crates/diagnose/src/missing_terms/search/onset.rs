@@ -1,0 +1,166 @@
+//! Laws that begin during a recording.
+
+use crate::gap::best_fit::normal::PRIOR_STEPS;
+use crate::gap::residuals::whiten::rows_of_step;
+use crate::missing_terms::search::columns::{Base, Products};
+use crate::missing_terms::search::evidence::weigh;
+use crate::missing_terms::search::residual_source::APART;
+use crate::missing_terms::search::select::Choice;
+use crate::missing_terms::terms::expression::{Expression, product};
+use crate::missing_terms::terms::term::{Role, Term};
+use crate::missing_terms::terms::time_history::{Course, Shape};
+use mapper_core::step_number;
+use nalgebra::DMatrix;
+
+/// Maximum number of terms tried with an onset.
+const TRIED: usize = 12;
+/// Maximum number of terms per machine part.
+const OF_A_PART: usize = 7;
+/// Number of machine parts whose constants are tried.
+const PARTS: usize = 2;
+
+/// The best choices, each with the onset step that fits the recording best, best first; adds their terms to the library. `choices` must
+/// come from the same products and steps, best first.
+pub fn begun(
+    base: &Base<'_>,
+    library: &mut Vec<Term>,
+    choices: &[Choice],
+    counts: &[bool],
+    folds: &[Vec<bool>],
+) -> Option<(Vec<Choice>, f64)> {
+    let part = |choice: &Choice| library[choice.terms[0]].submodel();
+    let mut parts = Vec::new();
+    for choice in choices {
+        if parts.len() < PARTS && !parts.contains(&part(choice)) {
+            parts.push(part(choice));
+        }
+    }
+    // A constant with an onset does not look like a constant, so the best parts' constants are tried whatever their gain.
+    let constants = choices.iter().filter(|choice| {
+        choice.terms.iter().all(|term| library[*term].is_constant()) && parts.contains(&part(choice))
+    });
+    let mut tried: Vec<&Choice> = Vec::new();
+    for choice in constants.chain(choices) {
+        let lags = choice.terms.iter().any(|term| library[*term].has_memory());
+        let of_part = tried.iter().filter(|other| part(other) == part(choice)).count();
+        let known = tried.iter().any(|other| other.terms == choice.terms);
+        if choice.terms.len() == 1 && !lags && !known && of_part < OF_A_PART && tried.len() < TRIED {
+            tried.push(choice);
+        }
+    }
+    let steps = base.study.steps.len();
+    // Each term's change for every possible onset.
+    let mut terms: Vec<usize> = tried.iter().flat_map(|choice| choice.terms.iter().copied()).collect();
+    terms.sort_unstable();
+    terms.dedup();
+    let columns: Vec<Vec<f64>> =
+        terms.iter().flat_map(|term| from_each_step(base, &library[*term])).collect();
+    let products = Products::new(base, &columns);
+    let best = |counts: &[bool]| {
+        let projected: DMatrix<f64> = products.projected(counts)?;
+        let mut found: Vec<Choice> = Vec::new();
+        for choice in &tried {
+            let rarity = choice.rarity + (steps as f64).ln();
+            for begin in 1..steps {
+                let places: Option<Vec<usize>> = choice
+                    .terms
+                    .iter()
+                    .map(|term| Some(terms.iter().position(|other| other == term)? * steps + begin))
+                    .collect();
+                let Some(evidence) = weigh(&projected, &places?, PRIOR_STEPS) else { continue };
+                let coefficients: Vec<f64> = evidence.coefficients.iter().copied().collect();
+                let wrong = choice
+                    .terms
+                    .iter()
+                    .zip(&coefficients)
+                    .any(|(term, c)| library[*term].positive && *c < 0.0);
+                if !wrong && evidence.gain.is_finite() {
+                    found.push(Choice {
+                        gain: evidence.gain - rarity,
+                        rarity,
+                        begin,
+                        coefficients,
+                        terms: choice.terms.clone(),
+                    });
+                }
+            }
+        }
+        found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        Some(found)
+    };
+    let found = best(counts)?;
+    let first = found.first()?;
+    let again = folds.iter().filter(|fold| {
+        let in_fold = best(fold);
+        let of_fold = in_fold.as_ref().and_then(|found| found.first());
+        of_fold
+            .is_some_and(|of_fold| of_fold.terms == first.terms && of_fold.begin.abs_diff(first.begin) <= 1)
+    });
+    let stability = again.count() as f64 / folds.len().max(1) as f64;
+    let mut chosen: Vec<Choice> = Vec::new();
+    for choice in found {
+        if chosen.len() < 3 && chosen.iter().all(|other| other.terms != choice.terms) {
+            chosen.push(choice);
+        }
+    }
+    for choice in &mut chosen {
+        let begin_s = base.study.steps[choice.begin].marker.start_s;
+        choice.terms = choice
+            .terms
+            .iter()
+            .map(|term| {
+                library.push(from(&library[*term], begin_s, choice.begin));
+                library.len() - 1
+            })
+            .collect();
+    }
+    Some((chosen, stability))
+}
+
+/// A term with an onset.
+fn from(term: &Term, begin_s: f64, step: usize) -> Term {
+    let mut later = term.clone();
+    for (_, formula) in &mut later.acts_on {
+        *formula = product(Expression::InTime(Course::from(begin_s)), formula.clone());
+    }
+    // Level and slope form separate laws now: each sentence includes its own onset.
+    later.role = Role::Other;
+    later.words = format!("{} from step {} on", later.words, step_number(step));
+    later
+}
+
+/// Whitened changes for one step of a term's coefficient, for an onset at each step of the recording.
+fn from_each_step(base: &Base<'_>, term: &Term) -> Vec<Vec<f64>> {
+    let study = base.study;
+    let steps = study.steps.len();
+    let span = |step: usize| {
+        let begin_s = if step == 0 { f64::NEG_INFINITY } else { study.steps[step].marker.start_s };
+        (begin_s, study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s))
+    };
+    let members = |colour: usize| (colour..steps).step_by(APART);
+    let during: Vec<Term> = (0..APART.min(steps))
+        .map(|colour| {
+            let course = Course { shape: Shape::Level, spans_s: members(colour).map(span).collect() };
+            let mut during = term.clone();
+            for (_, formula) in &mut during.acts_on {
+                *formula = product(Expression::InTime(course.clone()), formula.clone());
+            }
+            during
+        })
+        .collect();
+    let mut columns = vec![vec![0.0; study.measured.len()]; steps];
+    for (colour, change) in base.changes(&during).into_iter().enumerate() {
+        let Some(change) = change else { continue };
+        for member in members(colour) {
+            // A term with an onset is the sum of its parts in each later step.
+            for step in member..(member + APART).min(steps) {
+                for row in rows_of_step(study, step) {
+                    for column in &mut columns[..=member] {
+                        column[row] += change[row];
+                    }
+                }
+            }
+        }
+    }
+    columns
+}

@@ -1,0 +1,216 @@
+//! Residual source term of each balance, estimated from the recording as a smooth process over the operating points.
+//!
+//! In each step the source term has a level and a part that decays after the jump. Both are Gaussian processes: a common level, a part
+//! smooth over speed and opening, and a small free part per step. The evidence determines their size.
+
+use crate::gap::residuals::nuisance::OUTPUTS;
+use crate::gap::residuals::study::{PointState, Study};
+use crate::gap::residuals::whiten::rows_of_step;
+use crate::missing_terms::search::columns::{Base, Products};
+use crate::missing_terms::search::evidence::{Posterior, weigh_process};
+use crate::missing_terms::terms::balance::Balance;
+use crate::missing_terms::terms::expression::Expression;
+use crate::missing_terms::terms::term::{Role, Term};
+use crate::missing_terms::terms::time_history::{Course, Shape};
+use mapper_core::Channel;
+use mapper_numerics::parallel;
+use nalgebra::{DMatrix, DVector};
+
+/// Distance between steps that share one run: a housing forgets an earlier step within a minute or two.
+pub const APART: usize = 5;
+
+/// Balances whose source term needs model runs.
+const RUN: [Balance; 8] = [
+    Balance::CompressorHousing,
+    Balance::TurbineHousing,
+    Balance::Shaft,
+    Balance::Outlet,
+    Balance::GasBefore,
+    Balance::GasAfter,
+    Balance::Work,
+    Balance::MapFlow,
+];
+
+/// A balance with its residual source term.
+#[derive(Debug, Clone)]
+pub struct Force {
+    /// The balance.
+    pub balance: Balance,
+    /// Log evidence relative to none.
+    pub gain: f64,
+    /// Change of the recording, in the channels' units.
+    pub signature: Vec<f64>,
+    /// Level at the end of each step with its standard error, in the balance's unit.
+    pub levels: Vec<(f64, f64)>,
+}
+
+/// All balances that a recording can have a source term in.
+pub fn balances(study: &Study) -> Vec<Balance> {
+    let recorded = |channel: &Channel| *channel != Channel::P3 && study.table.column(*channel).is_some();
+    RUN.into_iter().chain(OUTPUTS.into_iter().filter(recorded).map(Balance::Reading)).collect()
+}
+
+/// Residual source terms of all `wanted` balances, each assumed to be the only one; best evidence first.
+pub fn forces(base: &Base<'_>, counts: &[bool], wanted: &dyn Fn(&Balance) -> bool) -> Vec<Force> {
+    let study = base.study;
+    let points = study.points(&study.nothing()).unwrap_or_default();
+    let balances: Vec<Balance> = balances(study).into_iter().filter(wanted).collect();
+    let mut found: Vec<Force> = parallel::map(&balances, |balance| {
+        let columns = columns(base, *balance);
+        force(base, *balance, &columns, counts, &points)
+    })
+    .into_iter()
+    .flatten()
+    .collect();
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found
+}
+
+/// Changes due to a typical source term in one step each, in the channels' units: levels first, then the decaying parts.
+pub fn columns(base: &Base<'_>, balance: Balance) -> Vec<Vec<f64>> {
+    let study = base.study;
+    let steps = study.steps.len();
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for shape in [Shape::Level, Shape::Decay] {
+        let of_shape = match balance {
+            Balance::Reading(channel) => read(study, channel, shape),
+            _ => run(base, balance, shape),
+        };
+        columns.extend(
+            (0..steps).filter(|step| shape == Shape::Level || *step > 0).map(|step| of_shape[step].clone()),
+        );
+    }
+    for column in &mut columns {
+        column.iter_mut().for_each(|value| *value *= balance.plain_size());
+    }
+    columns
+}
+
+/// A sensor offset needs no model run.
+fn read(study: &Study, channel: Channel, shape: Shape) -> Vec<Vec<f64>> {
+    (0..study.steps.len())
+        .map(|step| {
+            let mut column = vec![0.0; study.measured.len()];
+            for group in study.groups.iter().filter(|g| g.step == step && OUTPUTS[g.output] == channel) {
+                for (row, block) in group.rows.clone().zip(&group.blocks) {
+                    column[row] = shape.at(study.steps[step].blocks[*block].since_jump_s.max(0.0));
+                }
+            }
+            column
+        })
+        .collect()
+}
+
+/// Changes per unit of source term, from runs in which several distant steps have it.
+fn run(base: &Base<'_>, balance: Balance, shape: Shape) -> Vec<Vec<f64>> {
+    let study = base.study;
+    let steps = study.steps.len();
+    let span = |step: usize| {
+        let begin_s = if step == 0 { f64::NEG_INFINITY } else { study.steps[step].marker.start_s };
+        let end_s = study.steps.get(step + 1).map_or(f64::INFINITY, |next| next.marker.start_s);
+        (begin_s, end_s)
+    };
+    let members = |colour: usize| (colour..steps).step_by(APART);
+    let terms: Vec<Term> = (0..APART.min(steps))
+        .map(|colour| {
+            let course = Course { shape, spans_s: members(colour).map(span).collect() };
+            Term {
+                acts_on: vec![(balance, Expression::InTime(course))],
+                unit: balance.unit(),
+                step: balance.plain_size(),
+                words: String::new(),
+                role: Role::Other,
+                positive: false,
+            }
+        })
+        .collect();
+    let mut columns = vec![vec![0.0; study.measured.len()]; steps];
+    for (colour, change) in base.raw_changes(&terms).into_iter().enumerate() {
+        let Some(change) = change else { continue };
+        for member in members(colour) {
+            for step in member..(member + APART).min(steps) {
+                for row in rows_of_step(study, step) {
+                    columns[member][row] = change[row] / balance.plain_size();
+                }
+            }
+        }
+    }
+    columns
+}
+
+fn force(
+    base: &Base<'_>,
+    balance: Balance,
+    columns: &[Vec<f64>],
+    counts: &[bool],
+    points: &[PointState],
+) -> Option<Force> {
+    let whitened: Vec<Vec<f64>> = columns
+        .iter()
+        .map(|column| {
+            let mut column = column.clone();
+            base.linearised.whiten(base.study, &mut column);
+            column
+        })
+        .collect();
+    let projected = Products::new(base, &whitened).projected(counts)?;
+    let k = columns.len();
+    let products = projected.view((0, 0), (k, k)).into_owned();
+    let right = DVector::from_fn(k, |i, _| projected[(i, k)]);
+    let study = base.study;
+    let shape = covariance(study, points);
+    // The evidence selects the size among the possible ones.
+    let mut best: Option<Posterior> = None;
+    for exponent in -4..=6 {
+        let scale = 2f64.powi(exponent);
+        let posterior = weigh_process(&products, &right, &(&shape * (scale * scale)));
+        if let Some(posterior) = posterior
+            && best.as_ref().is_none_or(|best| posterior.gain > best.gain)
+        {
+            best = Some(posterior);
+        }
+    }
+    let best = best?;
+    let size = balance.plain_size();
+    let levels = (0..study.steps.len())
+        .map(|step| (size * best.mean[step], size * best.covariance[(step, step)].max(0.0).sqrt()))
+        .collect();
+    let mut signature = vec![0.0; study.measured.len()];
+    for (column, mean) in columns.iter().zip(best.mean.iter()) {
+        for (sum, change) in signature.iter_mut().zip(column) {
+            *sum += mean * change;
+        }
+    }
+    Some(Force { balance, gain: best.gain, signature, levels })
+}
+
+/// Correlation lengths of a source term over speed, rpm, and opening.
+const SMOOTH_RPM: f64 = 35e3;
+const SMOOTH_OPENING: f64 = 0.3;
+/// Variances of the common level, the part smooth over the map, and the free part of each step.
+const COMMON: f64 = 0.5;
+const SMOOTH: f64 = 0.5;
+const FREE: f64 = 0.02;
+
+/// Prior covariance of levels and decaying parts for a source term of typical size.
+pub fn covariance(study: &Study, points: &[PointState]) -> DMatrix<f64> {
+    let steps = study.steps.len();
+    let at = |step: usize| {
+        let speed_rpm = points.get(step).map_or(0.0, |point| point.speed_rpm);
+        (speed_rpm / SMOOTH_RPM, study.steps[step].marker.valve_opening_ratio / SMOOTH_OPENING)
+    };
+    let near = |a: (f64, f64), b: (f64, f64)| (-0.5 * ((a.0 - b.0).powi(2) + (a.1 - b.1).powi(2))).exp();
+    // The decaying part is similar for jumps of similar size.
+    let jump = |step: usize| {
+        let (before, after) = (at(step - 1), at(step));
+        (after.0 - before.0, after.1 - before.1)
+    };
+    DMatrix::from_fn(2 * steps - 1, 2 * steps - 1, |i, j| {
+        let free = if i == j { FREE } else { 0.0 };
+        match (i < steps, j < steps) {
+            (true, true) => COMMON + SMOOTH * near(at(i), at(j)) + free,
+            (false, false) => 0.5 * SMOOTH * near(jump(i - steps + 1), jump(j - steps + 1)) + free,
+            _ => 0.0,
+        }
+    })
+}

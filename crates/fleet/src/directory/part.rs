@@ -1,0 +1,163 @@
+//! The outcome of an item: a header line, then the result or the reason why there is none.
+
+use crate::directory::shared_files::{Durability, Machine, write_whole};
+use crate::{FleetError, Hash, Item};
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Largest first line, bytes.
+const LONGEST_HEAD_BYTES: usize = 4096;
+/// Largest result of one item, bytes.
+const LARGEST_BODY_BYTES: u64 = 64 << 20;
+
+/// The outcome of an item.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The body is its result.
+    Done,
+    /// The body is the reason for the missing result.
+    Failed,
+}
+
+/// The first line of a part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// The item.
+    pub item: Hash,
+    /// Program, version and commit that did it.
+    pub program: String,
+    /// The outcome.
+    pub outcome: Outcome,
+    /// How long it took on one core, s.
+    pub duration_s: f64,
+    /// Peak memory of the process, over its workers, bytes; 0 if unknown.
+    pub memory_bytes: u64,
+    /// Length of the body, bytes.
+    pub body_bytes: u64,
+    /// SHA-256 of the body.
+    pub body_sha256: Hash,
+}
+
+/// Why a file is not a valid part of the study.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PartRefusal {
+    /// It cannot be read.
+    #[error("cannot be read: {0}")]
+    Unread(String),
+    /// It does not begin like a part.
+    #[error("is not a part")]
+    NotAPart,
+    /// Its header names another item.
+    #[error("holds the item {0}")]
+    OtherItem(Hash),
+    /// Another version made it.
+    #[error("was made by {0}")]
+    OtherProgram(String),
+    /// Its length differs from its header.
+    #[error("has {found} bytes of {stated}")]
+    Length {
+        /// Actual length.
+        found: u64,
+        /// Length in its header.
+        stated: u64,
+    },
+    /// It is larger than any part.
+    #[error("has {found} bytes, more than the {limit} that are read")]
+    TooLarge {
+        /// Actual length.
+        found: u64,
+        /// Maximum length.
+        limit: u64,
+    },
+    /// Its content was changed.
+    #[error("has been changed: its checksum is wrong")]
+    Checksum,
+    /// The kind cannot read its content.
+    #[error("does not hold what it should: {0}")]
+    Content(String),
+}
+
+/// Requirements of a part file.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Expected<'a> {
+    pub hash: &'a Hash,
+    pub program: &'a str,
+}
+
+impl Part {
+    /// Writes the outcome of an item.
+    pub(crate) fn write(
+        path: &Path,
+        of: (&Hash, &Item),
+        outcome: (Outcome, &str),
+        cost: (f64, u64),
+        machine: &Machine<'_>,
+    ) -> Result<Part, FleetError> {
+        let part = Part {
+            item: *of.0,
+            program: of.1.program.clone(),
+            outcome: outcome.0,
+            // A clock that goes backwards gives no duration.
+            duration_s: if cost.0.is_finite() { cost.0.max(0.0) } else { 0.0 },
+            memory_bytes: cost.1,
+            body_bytes: outcome.1.len() as u64,
+            body_sha256: Hash::of(outcome.1.as_bytes()),
+        };
+        let head = serde_json::to_vec(&part).map_err(FleetError::content(path, "a part"))?;
+        write_whole(path, &[&head, b"\n", outcome.1.as_bytes()], machine.name, Durability::Synced)?;
+        Ok(part)
+    }
+
+    /// A part with its body, whose checksum is checked; `None` without a file.
+    pub(crate) fn read(path: &Path, expected: Expected<'_>) -> Option<Result<(Part, String), PartRefusal>> {
+        match std::fs::symlink_metadata(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+            Err(error) => Some(Err(PartRefusal::Unread(error.to_string()))),
+            // A pipe would hang, a link may lead anywhere.
+            Ok(found) if !found.is_file() => Some(Err(PartRefusal::NotAPart)),
+            Ok(_) => Some(read_body(path, expected)),
+        }
+    }
+}
+
+fn unread(error: impl std::fmt::Display) -> PartRefusal {
+    PartRefusal::Unread(error.to_string())
+}
+
+/// The header, the rest of the file, and the part of the body already read.
+fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), PartRefusal> {
+    let mut file = File::open(path).map_err(unread)?;
+    let length = file.metadata().map_err(unread)?.len();
+    let mut bytes = Vec::with_capacity(LONGEST_HEAD_BYTES);
+    (&mut file).take(LONGEST_HEAD_BYTES as u64).read_to_end(&mut bytes).map_err(unread)?;
+    let end = bytes.iter().position(|byte| *byte == b'\n').ok_or(PartRefusal::NotAPart)?;
+    let part: Part = serde_json::from_slice(&bytes[..end]).map_err(|_| PartRefusal::NotAPart)?;
+    if part.item != *expected.hash {
+        return Err(PartRefusal::OtherItem(part.item));
+    }
+    if part.program != expected.program {
+        return Err(PartRefusal::OtherProgram(part.program));
+    }
+    if part.body_bytes > LARGEST_BODY_BYTES {
+        return Err(PartRefusal::TooLarge { found: part.body_bytes, limit: LARGEST_BODY_BYTES });
+    }
+    let found = length.saturating_sub(end as u64 + 1);
+    if found != part.body_bytes {
+        return Err(PartRefusal::Length { found, stated: part.body_bytes });
+    }
+    Ok((part, file, bytes.split_off(end + 1)))
+}
+
+fn read_body(path: &Path, expected: Expected<'_>) -> Result<(Part, String), PartRefusal> {
+    let (part, file, mut body) = open(path, expected)?;
+    file.take(LARGEST_BODY_BYTES + 1).read_to_end(&mut body).map_err(unread)?;
+    if Hash::of(&body) != part.body_sha256 {
+        return Err(PartRefusal::Checksum);
+    }
+    let body = String::from_utf8(body).map_err(|_| PartRefusal::Checksum)?;
+    Ok((part, body))
+}

@@ -1,0 +1,204 @@
+//! Compares efficiencies of the joint fit with a smooth or declared map, as the logarithm of work over isentropic work: `-ln eta`.
+//!
+//! An error of a temperature adds to the work, so large errors are nearly as linear as small ones. A scale of all efficiencies is a constant.
+//! The effect of a constant error is proportional to one over the rise, so it bends the map. The effect of an error that grows over the run
+//! does not depend on the map position.
+
+use crate::faults::balance_rows::{Machine, Rows, common, own};
+use crate::faults::end_readings::{PerChannel, Readings};
+use crate::faults::places::{Places, is_on_a_map};
+use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
+use crate::nominal_rig::NominalRig;
+use mapper_core::{Channel, ReferenceState};
+use mapper_physics::laws::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
+use mapper_physics::rig::sensor_fault::FaultKind;
+use nalgebra::{DMatrix, DVector};
+
+/// Efficiencies as fitted, before the smoothness prior.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FittedEfficiencies {
+    /// Positions of the steps.
+    pub(crate) positions: Vec<usize>,
+    /// Fractions.
+    pub(crate) eta: Vec<f64>,
+    /// Their covariance, without the declared errors of the sensors.
+    pub(crate) covariance: DMatrix<f64>,
+    /// Sensitivity of each one to a constant error of each channel in all steps, per unit of the channel; `None` if no error of the channel is
+    /// declared, because the fit then does not compute it.
+    pub(crate) by_reading: Vec<[Option<f64>; 7]>,
+    /// The same of ln h.
+    pub(crate) heat: FittedHeat,
+}
+
+/// Heat-transfer coefficients as fitted.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FittedHeat {
+    /// ln of h, W/(m2 K).
+    pub(crate) ln_h: Vec<f64>,
+    /// Their covariance, without the declared errors of the sensors.
+    pub(crate) covariance: DMatrix<f64>,
+    /// Sensitivity of each one to a constant error of each channel in all steps.
+    pub(crate) by_reading: Vec<[Option<f64>; 7]>,
+}
+
+/// `-ln eta` of any compressor: it changes by 0.4 over a speed line and by some 0.1 over the speeds. Judgement, checked by the chi-square of
+/// [`ANY_ROUGHNESS`].
+const ANY_MAP: Smooth = Smooth {
+    terms: &[
+        (0, 0, 1.0),
+        (1, 0, 0.06),
+        (0, 1, 0.3),
+        (2, 0, 0.05),
+        (1, 1, 0.15),
+        (0, 2, 0.3),
+        (1, 2, 0.15),
+        (2, 1, 0.07),
+        (3, 0, 0.03),
+        (0, 3, 0.15),
+        (2, 2, 0.07),
+    ],
+    slow: 0.015,
+    amplitude: 0.03,
+    lengths: (0.7, 0.5),
+};
+/// Shape of a declared map's error, in units of its tolerance.
+const DECLARED_MAP: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
+/// Deviation of the rig from a declared map, ratio: a tenth of a point of efficiency.
+const ROUGHNESS: f64 = 1.5e-3;
+/// Relative error of the heat between gas and housing in eqs. 1-3, one standard deviation. Judgement: the fitted convection law contains most
+/// of the heat.
+const HEAT_RATIO: f64 = 0.05;
+/// Position error of a point along its speed line due to the tolerances of flow map and valve, one standard deviation. Unit: the line's
+/// largest flow and largest PR - 1.
+const PLACE_RATIO: f64 = 0.01;
+
+/// Range of usable efficiencies: outside it a point carries no information about the work.
+const USED: std::ops::RangeInclusive<f64> = 0.05..=3.0;
+
+/// `readings`: of all steps, by position.
+pub(crate) fn rows(
+    fitted: &FittedEfficiencies,
+    readings: &[Option<Readings>],
+    reference: ReferenceState,
+    nominal: Option<&NominalRig<'_>>,
+) -> Option<Rows> {
+    // Includes the slope along the speed line.
+    let expected = |readings: &Readings| match nominal {
+        Some(nominal) => nominal.efficiency(readings).map(|(eta, slope)| (-eta.ln(), slope / eta)),
+        None => Some((0.0, 0.0)),
+    };
+    let known: Vec<(usize, Readings, (f64, f64))> = fitted
+        .positions
+        .iter()
+        .enumerate()
+        .filter_map(|(row, position)| {
+            let readings = (*readings.get(*position)?).filter(is_on_a_map)?;
+            let (ln_work, slope) = expected(&readings)?;
+            (USED.contains(&fitted.eta[row]) && ln_work.is_finite()).then_some((
+                row,
+                readings,
+                (ln_work, slope),
+            ))
+        })
+        .collect();
+    let count = known.len();
+    let readings: Vec<Readings> = known.iter().map(|(_, readings, _)| *readings).collect();
+    let places = Places::of(&readings, reference)?;
+    let at: Vec<At> = readings.iter().map(|readings| places.at(readings)).collect();
+    let residual: Vec<f64> =
+        known.iter().map(|(row, _, (ln_work, _))| -fitted.eta[*row].ln() - ln_work).collect();
+    let by_eta: Vec<f64> = known.iter().map(|(row, _, _)| -fitted.eta[*row].recip()).collect();
+    let measured = DMatrix::from_fn(count, count, |i, j| {
+        by_eta[i] * by_eta[j] * fitted.covariance[(known[i].0, known[j].0)]
+    });
+    let heat: Vec<f64> = known.iter().map(|(row, readings, _)| heat(readings, fitted.eta[*row])).collect();
+    let measured = measured + common(&heat, HEAT_RATIO);
+    let (covariance, by_machine, by_place): (_, _, Vec<PerChannel>) = match nominal {
+        Some(nominal) => {
+            let tolerances = nominal.tolerances;
+            let all = vec![1.0; count];
+            let shape = tolerances.efficiency_shape_ratio.powi(2) * DECLARED_MAP.covariance(&at);
+            let misplaced = known.iter().map(|(_, _, (_, slope))| (PLACE_RATIO * slope).hypot(ROUGHNESS));
+            let covariance = measured
+                + own(misplaced.collect::<Vec<_>>().into_iter())
+                + common(&all, tolerances.compressor_efficiency_ratio)
+                + shape;
+            let map = |readings: &Readings| expected(readings).map_or(f64::NAN, |(ln_work, _)| ln_work);
+            let by_place = readings.iter().map(|readings| readings.derivatives(map)).collect();
+            (covariance, vec![(Machine::Efficiency, vec![-1.0; count])], by_place)
+        }
+        None => {
+            let covariance = measured + own(vec![ANY_ROUGHNESS; count].into_iter()) + ANY_MAP.covariance(&at);
+            let weights = covariance.clone().cholesky()?.solve(&DVector::from_column_slice(&residual));
+            let map = |readings: &Readings| ANY_MAP.value(&places.at(readings), &at, &weights);
+            let by_place = readings.iter().map(|readings| readings.derivatives(map)).collect();
+            (covariance, Vec::new(), by_place)
+        }
+    };
+    let by_reading = (0..count).map(|i| {
+        let (row, readings, _) = &known[i];
+        let (by_fit, apparent) = (fitted.by_reading[*row], readings.derivatives(apparent));
+        std::array::from_fn(|channel| {
+            by_eta[i] * by_fit[channel].unwrap_or(apparent[channel]) - by_place[i][channel]
+        })
+    });
+    let by_reading = by_reading.collect();
+    let readings =
+        known.iter().map(|(row, readings, _)| as_gains_count(readings, fitted.eta[*row])).collect();
+    // It changes the slope of T2 over Tc, which convection absorbs, and nothing at equal temperatures.
+    let by_fault = vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])];
+    Some(Rows { residual, covariance, readings, by_reading, by_machine, by_fault })
+}
+
+/// The efficiencies themselves, with the effects of errors on them.
+pub(crate) fn measured(fitted: &FittedEfficiencies, readings: &[Option<Readings>]) -> Rows {
+    let known: Vec<(usize, Readings)> = fitted
+        .positions
+        .iter()
+        .enumerate()
+        .filter_map(|(row, position)| Some((row, (*readings.get(*position)?)?)))
+        .collect();
+    let by_reading = |(row, readings): &(usize, Readings)| {
+        let apparent = readings.derivatives(apparent);
+        std::array::from_fn(|channel| fitted.by_reading[*row][channel].unwrap_or(apparent[channel]))
+    };
+    let count = known.len();
+    Rows {
+        residual: known.iter().map(|(row, _)| fitted.eta[*row]).collect(),
+        covariance: DMatrix::zeros(count, count),
+        by_reading: known.iter().map(by_reading).collect(),
+        readings: known.iter().map(|(row, readings)| as_gains_count(readings, fitted.eta[*row])).collect(),
+        by_machine: Vec::new(),
+        by_fault: vec![(Channel::T2, FaultKind::TowardsWall, vec![0.0; count])],
+    }
+}
+
+/// Efficiency of a compressor without heat transfer.
+fn apparent(readings: &Readings) -> f64 {
+    isentropic_rise_k(readings) / actual_rise_k(readings.t1_k(), readings.t2_k(), readings.air)
+}
+
+fn isentropic_rise_k(readings: &Readings) -> f64 {
+    readings.t1_k()
+        * isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k(), readings.air)
+}
+
+/// Temperature after compression without heat transfer, K.
+pub(crate) fn compressed(readings: &Readings, eta: f64) -> f64 {
+    let rise = isentropic_rise_ratio(readings.p2_pa() / readings.p1_pa(), readings.t1_k(), readings.air);
+    compressed_k(readings.t1_k(), rise, eta, readings.air)
+}
+
+/// Temperature loss of the gas to the housing, relative to its rise by compression.
+fn heat(readings: &Readings, eta: f64) -> f64 {
+    let t2_prime_k = compressed(readings, eta);
+    (t2_prime_k - readings.t2_k()) / (t2_prime_k - readings.t1_k())
+}
+
+/// Readings with the temperature at which a gain of T2 or Tc applies. Such a gain also changes the slope of T2 over Tc, which convection
+/// absorbs. The remaining effect is the error at equal temperatures, at the temperature after compression without heat.
+fn as_gains_count(readings: &Readings, eta: f64) -> Readings {
+    let mut other = *readings;
+    [other.values[1], other.values[2]] = [compressed(readings, eta); 2];
+    other
+}

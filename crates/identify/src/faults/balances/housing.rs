@@ -1,0 +1,207 @@
+//! Tc against T2: the housing's heat balance.
+//!
+//! Within a step the housing temperature changes, and T2 follows it by a share `s` that the step itself determines. By eq. 3, `T2 = s Tc + (1
+//! - s) T2ad`, so `s` is the slope of T2 over Tc, whatever the offsets. The heat flow from gas to housing is `K (T2 - Tc)` with `K = m cp s/(1
+//! - s)`, and it is stored or lost:
+//!
+//! `K (T2 - Tc) = C dTc/dt + b Tc - a + alpha K (Tc - T1) + K d`
+//!
+//! with one heat capacity `C`, one loss `b` to oil, cell and turbine, and one share `alpha` before the wheel for the whole recording. `d` is
+//! the reading difference of T2 and Tc at equal temperature. `K` changes by a factor of five over a map and `dTc/dt` its sign. A single
+//! recording therefore determines `d` to some tenths of a kelvin. A housing of several masses shifts `d`, which is part of the declared
+//! uncertainty.
+
+use crate::IdentifyConfig;
+use crate::faults::balance_rows::{Rows, common, own};
+use crate::faults::end_readings::{CHANNELS, PerChannel, Readings, span_s};
+use crate::step_data::samples::Samples;
+use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
+use mapper_numerics::statistics::mean;
+use mapper_physics::rig::sensor_fault::FaultKind;
+
+/// Start of the evaluation after the step's start, s: speed, flow and probe have settled.
+const AFTER_S: f64 = 10.0;
+/// Length of a part over which the housing's slope is taken, s.
+const PART_S: f64 = 18.0;
+/// Maximum number of parts of a step, and of all together: the cost grows with the cube.
+const MAX_PARTS: usize = 8;
+const MAX_PARTS_IN_ALL: usize = 1000;
+/// Shortest usable length after that start, s: three correlation times of noise determine neither slope nor share.
+const SHORTEST_S: f64 = 27.0;
+/// Minimum number of points that determine the balance. Repeats do not count.
+const MIN_POINTS: usize = 8;
+/// Minimum number of rows of a part and of a step.
+const MIN_ROWS: usize = 10;
+/// Usable range of the share of T2 that follows the housing.
+const SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.95;
+/// Number of correlated samples at 10 Hz, for noise of 2 s.
+const ALIKE: f64 = 20.0;
+/// Closure error of a balance, W, and as a share of the conductance.
+const LACKS_W: f64 = 10.0;
+const LACKS_RATIO: f64 = 0.05;
+/// Difference of T2 and Tc in a housing with more than one temperature, one standard deviation, K: 1 K is three of it.
+const UNEVEN_K: f64 = 0.35;
+/// The same for the part that develops over the run as it warms up, K: a housing of two walls makes up to 3 K.
+const UNEVEN_DRIFT_K: f64 = 1.0;
+/// Reference temperature of Tc and T4, so that the constants stay small, K.
+const AROUND_K: f64 = 330.0;
+/// Heat capacity of the housing, J/K, its loss, W/K and W, and alpha_A: the range of turbochargers, one standard deviation each.
+const ANY_CAPACITY_J_K: f64 = 3e3;
+const ANY_LOSS_W_K: f64 = 50.0;
+const ANY_LOSS_W: f64 = 3e3;
+const ANY_SHARE: f64 = 0.5;
+
+/// A part of a step.
+struct Part {
+    slope_k_s: f64,
+    t1_k: f64,
+    t2_k: f64,
+    tc_k: f64,
+    conductance_w_k: f64,
+    /// Noise error of the conductance, which all parts of a step share, one standard deviation, W/K.
+    conductance_error_w_k: f64,
+    middle_s: f64,
+}
+
+impl Part {
+    /// Effect of area before the wheel in addition to its distance from T1, per share of it, K: compression amplifies that heat, and the slope
+    /// of T2 over Tc includes it with the heat after the wheel.
+    fn carried_on_k(&self) -> f64 {
+        (self.t2_k - self.t1_k) / self.t1_k * (self.t2_k - self.tc_k)
+    }
+}
+
+pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]) -> Option<Rows> {
+    let count = used.iter().filter(|used| **used).count();
+    let most = (MAX_PARTS_IN_ALL / count.max(1)).clamp(1, MAX_PARTS);
+    let steps: Vec<Vec<Part>> = recording
+        .steps
+        .iter()
+        .zip(used)
+        .map(|(step, used)| {
+            if *used {
+                parts(recording, step.start_s + AFTER_S, step.end_s, config, most)
+            } else {
+                Vec::new()
+            }
+        })
+        .collect();
+    let is_point =
+        |(step, parts): &(&StepMarker, &Vec<Part>)| step.kind == StepKind::Point && !parts.is_empty();
+    if recording.steps.iter().zip(&steps).filter(is_point).count() < MIN_POINTS {
+        return None;
+    }
+    let parts: Vec<&Part> = steps.iter().flatten().collect();
+    let step_of: Vec<usize> =
+        steps.iter().enumerate().flat_map(|(step, parts)| vec![step; parts.len()]).collect();
+    let (first_s, last_s) = span_s(recording)?;
+    let run_ratio = |part: &Part| (part.middle_s - first_s) / (last_s - first_s);
+    let column = |of: &dyn Fn(&Part) -> f64| parts.iter().map(|part| of(part)).collect::<Vec<f64>>();
+    let any = [
+        (column(&|part| part.slope_k_s), ANY_CAPACITY_J_K),
+        (column(&|part| part.tc_k - AROUND_K), ANY_LOSS_W_K),
+        (column(&|_| 1.0), ANY_LOSS_W),
+        (column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)), ANY_SHARE),
+        (column(&|part| part.conductance_w_k * part.carried_on_k()), ANY_SHARE),
+        (column(&|part| part.conductance_w_k), UNEVEN_K),
+        (column(&|part| part.conductance_w_k * (run_ratio(part) - 0.5)), UNEVEN_DRIFT_K),
+    ];
+    let covariance = any
+        .iter()
+        .map(|(column, sigma)| common(column, *sigma))
+        .fold(own(parts.iter().map(|part| LACKS_W + LACKS_RATIO * part.conductance_w_k)), |sum, one| {
+            sum + one
+        });
+    let by_conductance = column(&|part| part.conductance_error_w_k * (part.t2_k - part.tc_k));
+    let of_the_same_step = common(&by_conductance, 1.0)
+        .map_with_location(|i, j, shared| if step_of[i] == step_of[j] { shared } else { 0.0 });
+    let covariance = covariance + of_the_same_step;
+    let by_reading = |part: &&Part| -> PerChannel {
+        CHANNELS.map(|channel| match channel {
+            Channel::T2 => part.conductance_w_k,
+            Channel::Tc => -part.conductance_w_k,
+            _ => 0.0,
+        })
+    };
+    // A gain of T2 also scales the conductance, which capacity and loss absorb. The remaining effect is its error at the housing temperature.
+    let readings = |part: &&Part| {
+        let values = CHANNELS.map(|channel| match channel {
+            Channel::T1 => part.t1_k,
+            Channel::T2 | Channel::Tc => part.tc_k,
+            _ => f64::NAN,
+        });
+        Readings { values, run_ratio: run_ratio(part), air: config.air }
+    };
+    Some(Rows {
+        residual: column(&|part| part.conductance_w_k * (part.t2_k - part.tc_k)),
+        covariance,
+        readings: parts.iter().map(readings).collect(),
+        by_reading: parts.iter().map(by_reading).collect(),
+        by_machine: Vec::new(),
+        // It scales the conductance and the difference of the temperatures, which capacity and loss absorb.
+        by_fault: vec![(Channel::T2, FaultKind::TowardsWall, column(&|_| 0.0))],
+    })
+}
+
+/// At most `most` parts of a step; none if T2 does not determine how far it follows the housing.
+fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfig, most: usize) -> Vec<Part> {
+    if end_s - start_s < SHORTEST_S {
+        return Vec::new();
+    }
+    let samples = Samples::of(recording, Window { start_s, end_s }, config, true);
+    let Some((kept, error)) = kept_ratio(&samples) else { return Vec::new() };
+    if !SHARES.contains(&(1.0 - kept)) {
+        return Vec::new();
+    }
+    let count = (((end_s - start_s) / PART_S).floor() as usize).min(most);
+    let whole = samples.len();
+    let part = |place: usize| {
+        let range = place * whole / count..(place + 1) * whole / count;
+        if range.len() < MIN_ROWS {
+            return None;
+        }
+        let of = |column: &[f64]| mean(&column[range.clone()]);
+        let (middle_s, tc_k, t1_k) = (of(&samples.t_s)?, of(&samples.tc_k)?, of(&samples.t1_k)?);
+        let t2_k = of(&samples.t2_k)?;
+        let capacity_w_k = of(&samples.flow_kg_s)? * config.air.heat_capacity_j_kgk(t1_k);
+        let (top, bottom) = range.clone().fold((0.0, 0.0), |(top, bottom), i| {
+            let since_s = samples.t_s[i] - middle_s;
+            (top + since_s * samples.tc_k[i], bottom + since_s * since_s)
+        });
+        let conductance_w_k = capacity_w_k * (1.0 - kept) / kept;
+        // d((1 - kept)/kept) = -d kept/kept^2.
+        let conductance_error_w_k = capacity_w_k * error / (kept * kept);
+        let slope_k_s = top / bottom;
+        (slope_k_s.is_finite() && conductance_error_w_k.is_finite()).then_some(Part {
+            slope_k_s,
+            t1_k,
+            t2_k,
+            tc_k,
+            conductance_w_k,
+            conductance_error_w_k,
+            middle_s,
+        })
+    };
+    (0..count).filter_map(part).collect()
+}
+
+/// Share of its temperature after compression that the gas keeps, and its error: by least squares of `T2 - Tc = kept (T1 - Tc) + (kept/eta)
+/// dT_is`.
+fn kept_ratio(samples: &Samples) -> Option<(f64, f64)> {
+    let count = samples.len();
+    if count < 2 * MIN_ROWS {
+        return None;
+    }
+    let row = |i: usize| {
+        let rise_k = samples.t1_k[i] * samples.rise_ratio[i];
+        (samples.t1_k[i] - samples.tc_k[i], rise_k, samples.t2_k[i] - samples.tc_k[i])
+    };
+    let (aa, ab, bb, ay, by) = (0..count).map(row).fold((0.0, 0.0, 0.0, 0.0, 0.0), |sums, (a, b, y)| {
+        (sums.0 + a * a, sums.1 + a * b, sums.2 + b * b, sums.3 + a * y, sums.4 + b * y)
+    });
+    let determinant = aa * bb - ab * ab;
+    let (kept, of_rise) = ((bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant);
+    let left: f64 = (0..count).map(row).map(|(a, b, y)| (y - kept * a - of_rise * b).powi(2)).sum();
+    let variance = ALIKE * left / count as f64 * bb / determinant;
+    (kept.is_finite() && variance.is_finite() && variance > 0.0).then(|| (kept, variance.sqrt()))
+}

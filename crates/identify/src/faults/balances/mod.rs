@@ -1,0 +1,8 @@
+//! Physical relations that reveal sensor faults: head, housing heat, valve flow, efficiency, convection, and conditions.
+
+pub(crate) mod conditions;
+pub(crate) mod convection;
+pub(crate) mod efficiency;
+pub(crate) mod head;
+pub(crate) mod housing;
+pub(crate) mod valve;

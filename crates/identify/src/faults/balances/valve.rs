@@ -1,0 +1,85 @@
+//! Flow through the back-pressure valve: one opening has one area.
+//!
+//! `m sqrt(T2)/(P2 psi(P1/P2))`, with the St. Venant and Wantzel function psi of an orifice that discharges to the inlet pressure, is the area
+//! of the valve. Without a declared valve the area is unknown, and need not be proportional to the opening.
+
+use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
+use crate::faults::end_readings::{PerChannel, Readings};
+use crate::nominal_rig::NominalRig;
+use mapper_physics::laws::orifice;
+use nalgebra::DMatrix;
+
+/// Pressure difference over the valve below which its flow carries no information about it, Pa.
+const MIN_DIFFERENCE_PA: f64 = 5e3;
+/// Difference between the pressure behind the valve, which is not measured, and the inlet pressure, one standard deviation, Pa. Judgement:
+/// filters, silencers and exhaust lines have some hundred.
+const BEHIND_PA: f64 = 300.0;
+/// Variation of a valve's discharge coefficient with the pressure ratio, one standard deviation, and the difference of the logarithm over
+/// which it varies. Judgement.
+const DISCHARGE_RATIO: f64 = 0.02;
+const DISCHARGE_LENGTH: f64 = 0.5;
+/// Repeatability of a valve's area, one standard deviation. Judgement: a positioner resolves some tenths of a per cent of the travel.
+const SET_AGAIN_RATIO: f64 = 0.005;
+/// Area of an unknown opening, one standard deviation of its logarithm: uninformative.
+const ANY: f64 = 3.0;
+
+pub(crate) fn rows(
+    steps: &[(f64, Readings)],
+    noise: &PerChannel,
+    nominal: Option<&NominalRig<'_>>,
+) -> Option<Rows> {
+    let known = |step: &&(f64, Readings)| {
+        let (opening, readings) = step;
+        *opening > 0.0
+            && readings.p2_pa() - readings.p1_pa() > MIN_DIFFERENCE_PA
+            && ln_area(readings).is_finite()
+    };
+    let known: Vec<&(f64, Readings)> = steps.iter().filter(known).collect();
+    let count = known.len();
+    if count == 0 {
+        return None;
+    }
+    let openings: Vec<f64> = known.iter().map(|(opening, _)| *opening).collect();
+    let readings: Vec<Readings> = known.iter().map(|(_, readings)| *readings).collect();
+    let by_reading: Vec<PerChannel> = readings.iter().map(|readings| readings.derivatives(ln_area)).collect();
+    let behind: Vec<f64> = by_reading.iter().map(|by| by[3]).collect();
+    let ln_ratio = |k: usize| (readings[k].p2_pa() / readings[k].p1_pa()).ln();
+    let discharge = DMatrix::from_fn(count, count, |i, j| {
+        DISCHARGE_RATIO.powi(2) * (-0.5 * ((ln_ratio(i) - ln_ratio(j)) / DISCHARGE_LENGTH).powi(2)).exp()
+    });
+    let mut covariance =
+        own(errors(&by_reading, noise, SET_AGAIN_RATIO).into_iter()) + common(&behind, BEHIND_PA);
+    let mut by_machine = Vec::new();
+    let expected: Vec<f64> = match nominal {
+        Some(nominal) => {
+            let outlet = &nominal.model.params.outlet;
+            let sigma = nominal.tolerances.valve_area_ratio;
+            covariance += common(&vec![1.0; count], sigma);
+            by_machine.push((Machine::ValveArea, vec![1.0; count]));
+            let whole = outlet.discharge_coefficient * outlet.valve_area_m2;
+            openings.iter().map(|opening| (opening * whole).ln()).collect()
+        }
+        None => {
+            let same = |i: usize, j: usize| (openings[i] - openings[j]).abs() < 1e-6;
+            covariance += discharge;
+            covariance += DMatrix::from_fn(count, count, |i, j| if same(i, j) { ANY * ANY } else { 0.0 });
+            let middle = readings.iter().map(ln_area).sum::<f64>() / count as f64;
+            vec![middle; count]
+        }
+    };
+    let residual = readings.iter().zip(expected).map(|(readings, expected)| ln_area(readings) - expected);
+    Some(Rows {
+        residual: residual.collect(),
+        covariance,
+        readings,
+        by_reading,
+        by_machine,
+        by_fault: Vec::new(),
+    })
+}
+
+/// ln of the valve's area, including the discharge coefficient, m2.
+fn ln_area(readings: &Readings) -> f64 {
+    let per_m2 = orifice::flow_kg_s(1.0, readings.p2_pa(), readings.t2_k(), readings.p1_pa());
+    (readings.flow_kg_s() / per_m2).ln()
+}

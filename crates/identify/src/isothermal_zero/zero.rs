@@ -1,0 +1,390 @@
+//! The isothermal zero: sensor offsets from a state in which all sensors must read the same.
+//!
+//! In a long soak at standstill the shaft is stopped, and oil and cell have one temperature. T1, T2, Tc and T_oil then see one temperature,
+//! and P1 and P2 one pressure. Their differences are offsets, up to the residual non-uniformity of the rig. Their common error keeps its
+//! declared uncertainty. It changes an efficiency only by its share of the absolute temperature, which is negligible, but it matters in a
+//! diagnosis of the whole machine.
+
+use crate::IdentifyConfig;
+use crate::config::coloured;
+use crate::isothermal_zero::relaxation;
+use crate::single_step::expected::DECLARED_INTERVAL_S;
+use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
+use mapper_numerics::coloured_noise::variance_of_mean;
+use mapper_numerics::statistics::mean;
+use mapper_observe::declared::CommonOffset;
+use mapper_observe::plausible::is_reading;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Residual non-uniformity of a soak, and the criteria by which a soak is recognised.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ZeroSettings {
+    /// Residual temperature non-uniformity (one standard deviation of a sensor from the mean), K, > 0.
+    pub temperature_sigma_k: f64,
+    /// Residual pressure non-uniformity, one standard deviation, Pa, > 0.
+    pub pressure_sigma_pa: f64,
+    /// Longest segment before the first step that is used, s: the last one of the standstill.
+    pub longest_s: f64,
+    /// Minimum length of the segment, s.
+    pub shortest_s: f64,
+    /// Maximum drift of a temperature over the segment, K/min; a faster drift means an unfinished soak.
+    pub drift_k_min: f64,
+}
+
+impl Default for ZeroSettings {
+    /// Default non-uniformity; accepts the last minute to ten minutes if they drift by less than 0.1 K/min.
+    fn default() -> Self {
+        ZeroSettings {
+            temperature_sigma_k: Soak::TEMPERATURE_SIGMA_K,
+            pressure_sigma_pa: Soak::PRESSURE_SIGMA_PA,
+            longest_s: 600.0,
+            shortest_s: 60.0,
+            drift_k_min: 0.1,
+        }
+    }
+}
+
+impl From<Soak> for ZeroSettings {
+    /// With the declared non-uniformity.
+    fn from(soak: Soak) -> Self {
+        ZeroSettings {
+            temperature_sigma_k: soak.temperature_sigma_k,
+            pressure_sigma_pa: soak.pressure_sigma_pa,
+            ..ZeroSettings::default()
+        }
+    }
+}
+
+/// Shaft speed below which the machine is at standstill, rpm: far below any idle, far above any sensor's noise.
+const AT_REST_RPM: f64 = 1000.0;
+/// Shortest soak from which the limit of a relaxing reading is estimated, s.
+const SHORTEST_RELAXATION_S: f64 = 600.0;
+/// Longest part of the soak that is used for it, s: three time constants of a heavy housing, for any sample interval.
+const LONGEST_RELAXATION_S: f64 = 3600.0;
+/// Number of segments over which readings are averaged for it.
+const BLOCK_S: f64 = 30.0;
+/// Standard deviations by which readings may differ before the soak itself is doubtful.
+const UNEVEN_SIGMAS: f64 = 5.0;
+
+/// The estimated offsets and their segment.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct IsothermalZero {
+    /// Start of the segment, s.
+    pub start_s: f64,
+    /// End of the segment, s.
+    pub end_s: f64,
+    /// Reading minus the common reading, K or Pa.
+    pub offsets: BTreeMap<Channel, f64>,
+    /// Remaining standard deviation of each offset, K or Pa.
+    pub left_sigma: BTreeMap<Channel, f64>,
+    /// Remaining common error of all offsets of one dimension: the common reading is only as accurate as the declared offsets.
+    #[serde(default)]
+    pub common: Vec<CommonOffset>,
+}
+
+/// Why a recording has no isothermal zero.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoZero {
+    /// The standstill before the first step was too short.
+    #[error("the shaft rests for {found_s:.0} s before the first step; the zero needs {needed_s:.0} s")]
+    NoSoak {
+        /// Time at standstill, s.
+        found_s: f64,
+        /// Time needed, s.
+        needed_s: f64,
+    },
+    /// A temperature is still drifting.
+    #[error(
+        "{channel} still drifts by {drift_k_min:+.2} K/min in the soak (limit {limit_k_min:.2}): soak longer"
+    )]
+    Drifts {
+        /// The channel.
+        channel: Channel,
+        /// Its drift, K/min.
+        drift_k_min: f64,
+        /// Maximum drift, K/min.
+        limit_k_min: f64,
+    },
+    /// Sensors differ by more than their declared offsets allow.
+    #[error(
+        "{channel} reads {off:+.2} {} off the others in the soak, {:.1} times its declared offset: the rig is not uniform, or the sensor is broken",
+        channel.unit(), off.abs() / sigma
+    )]
+    Uneven {
+        /// The channel.
+        channel: Channel,
+        /// Reading minus the common reading, K or Pa.
+        off: f64,
+        /// Its expected standard deviation, K or Pa.
+        sigma: f64,
+    },
+}
+
+/// Finds the offsets of T1, T2, Tc and T_oil against each other, and of P1 and P2.
+///
+/// Channels without a declared offset count as exact. Common temperature and pressure are means weighted by declared offset and
+/// non-uniformity.
+///
+/// # Errors
+/// [`NoZero`] if the recording has no soak, or an unsuitable one.
+pub fn isothermal_zero(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    settings: &ZeroSettings,
+) -> Result<IsothermalZero, NoZero> {
+    zero_of(recording, config, settings, false)
+}
+
+/// Like [`isothermal_zero`], for a rig on which one temperature sensor may exceed its declared offset: it is compared with the others, and
+/// drifting oil is left out. If two pressure taps differ by more, either may be wrong, so both keep their declared offsets.
+///
+/// # Errors
+/// [`NoZero`] if the recording has no soak, or an unsuitable one.
+pub fn isothermal_zero_with_a_fault(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    settings: &ZeroSettings,
+) -> Result<IsothermalZero, NoZero> {
+    zero_of(recording, config, settings, true)
+}
+
+fn zero_of(
+    recording: &Recording,
+    config: &IdentifyConfig,
+    settings: &ZeroSettings,
+    a_fault: bool,
+) -> Result<IsothermalZero, NoZero> {
+    let (start_s, end_s) = at_rest(recording);
+    let no_soak = NoZero::NoSoak { found_s: (end_s - start_s).max(0.0), needed_s: settings.shortest_s };
+    if (end_s - start_s).is_nan() || end_s - start_s < settings.shortest_s {
+        return Err(no_soak);
+    }
+    let rest = (start_s, end_s);
+    let start_s = start_s.max(end_s - settings.longest_s);
+    let mut zero = IsothermalZero { start_s, end_s, ..IsothermalZero::default() };
+    for (group, sigma) in groups(settings) {
+        let mut readings = Vec::new();
+        for channel in group {
+            let Some(reading) = soak_mean(recording, *channel, start_s, end_s) else { continue };
+            let drifts = group.len() > 2 && reading.drift_per_min.abs() > settings.drift_k_min;
+            // A drifting oil supply is independent of the cell, and no other sensor depends on it.
+            if drifts && a_fault && *channel == Channel::TOil {
+                continue;
+            }
+            if drifts {
+                return Err(NoZero::Drifts {
+                    channel: *channel,
+                    drift_k_min: reading.drift_per_min,
+                    limit_k_min: settings.drift_k_min,
+                });
+            }
+            let declared = config.declared.get(channel).copied().unwrap_or_default();
+            let mut mean = reading.mean;
+            let mut own = sigma.hypot(sigma_of_mean(declared.noise_sigma, end_s - start_s, config));
+            // The housing reaches the cell's temperature last, and its drift is below the threshold.
+            if *channel == Channel::Tc
+                && let Some((limit, error)) = housing_limit(recording, rest, config)
+            {
+                (mean, own) = (limit, sigma.hypot(error));
+            }
+            readings.push(Reading { channel: *channel, mean, own, total: own.hypot(declared.offset_sigma) });
+        }
+        let mut common = common(&readings);
+        if readings.len() < 2 || !common.is_finite() {
+            continue;
+        }
+        let uneven = |common: f64, at_fault: Option<Channel>| {
+            let mut fault_free = readings.iter().filter(|reading| Some(reading.channel) != at_fault);
+            fault_free.find(|reading| (reading.mean - common).abs() > UNEVEN_SIGMAS * reading.total)
+        };
+        if let Some(first) = uneven(common, None) {
+            let Reading { channel, mean, total, .. } = *first;
+            let refused = NoZero::Uneven { channel, off: mean - common, sigma: total };
+            if !a_fault {
+                return Err(refused);
+            }
+            if readings.len() < 3 {
+                continue;
+            }
+            // Leave out the sensor without which the others agree best.
+            let without = |channel: Channel| {
+                let others: Vec<Reading> =
+                    readings.iter().filter(|other| other.channel != channel).copied().collect();
+                let common = self::common(&others);
+                let spread: f64 =
+                    others.iter().map(|other| ((other.mean - common) / other.total).powi(2)).sum();
+                (channel, common, spread)
+            };
+            let tried = readings.iter().map(|reading| without(reading.channel));
+            let Some((at_fault, of_others, _)) = tried.min_by(|a, b| a.2.total_cmp(&b.2)) else { continue };
+            if uneven(of_others, Some(at_fault)).is_some() {
+                return Err(refused);
+            }
+            common = of_others;
+        }
+        let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
+        zero.common.push(CommonOffset {
+            channels: readings.iter().map(|reading| reading.channel).collect(),
+            sigma: weight.sqrt().recip(),
+        });
+        for reading in readings {
+            zero.offsets.insert(reading.channel, reading.mean - common);
+            zero.left_sigma.insert(reading.channel, reading.own);
+        }
+    }
+    if zero.offsets.is_empty() { Err(no_soak) } else { Ok(zero) }
+}
+
+/// The recording without the offsets, and the configuration with the remaining uncertainty as declared offset: prior of the joint method, bias
+/// of the others.
+pub fn zeroed(
+    mut recording: Recording,
+    mut config: IdentifyConfig,
+    zero: &IsothermalZero,
+) -> (Recording, IdentifyConfig) {
+    for (channel, offset) in &zero.offsets {
+        if let Some(series) = recording.series.get_mut(channel) {
+            series.values.iter_mut().for_each(|value| *value -= offset);
+        }
+        if let (Some(declared), Some(left)) = (config.declared.get_mut(channel), zero.left_sigma.get(channel))
+        {
+            *declared = DeclaredUncertainty { offset_sigma: *left, ..*declared };
+        }
+    }
+    (recording, config)
+}
+
+/// Predicts the remaining offset uncertainty after a zero of `soak_s`.
+pub fn expected_after_zero(
+    mut config: IdentifyConfig,
+    settings: &ZeroSettings,
+    soak_s: f64,
+) -> IdentifyConfig {
+    let stretch_s = soak_s.min(settings.longest_s);
+    for (channels, sigma) in groups(settings) {
+        for channel in channels {
+            let Some(declared) = config.declared.get(channel).copied() else { continue };
+            let averaged = sigma_of_mean(declared.noise_sigma, stretch_s, &config);
+            let error = match channel {
+                Channel::Tc => {
+                    expected_limit_error(declared.noise_sigma, soak_s, &config).unwrap_or(averaged)
+                }
+                _ => averaged,
+            };
+            let left = DeclaredUncertainty { offset_sigma: sigma.hypot(error), ..declared };
+            config.declared.insert(*channel, left);
+        }
+    }
+    config
+}
+
+/// Standard error of the mean over `stretch_s` of a reading with the standard deviation `noise_sigma`. The white part of the noise averages
+/// over hundreds of samples.
+fn sigma_of_mean(noise_sigma: f64, stretch_s: f64, config: &IdentifyConfig) -> f64 {
+    let colour = coloured(config.noise_colour);
+    noise_sigma
+        * variance_of_mean(colour.first_order_variance_ratio(), stretch_s, colour.time_constant_s).sqrt()
+}
+
+/// Channels that read the same at standstill, and the non-uniformity of each group.
+fn groups(settings: &ZeroSettings) -> [(&'static [Channel], f64); 2] {
+    let [temperatures, pressures] = Soak::ALIKE;
+    [(temperatures, settings.temperature_sigma_k), (pressures, settings.pressure_sigma_pa)]
+}
+
+/// The last standstill before the first step with a running machine. If steps were detected from the readings, the soak may count as a step.
+fn at_rest(recording: &Recording) -> (f64, f64) {
+    let runs = |step: &&StepMarker| {
+        let speed = recording.series.get(&Channel::ShaftSpeed);
+        let last = speed.and_then(|speed| speed.slice(step.start_s, step.end_s).1.last());
+        last.is_none_or(|speed_rpm| speed_rpm.abs() >= AT_REST_RPM)
+    };
+    let first_s = recording.steps.iter().find(runs).map_or(f64::INFINITY, |step| step.start_s);
+    let Some(speed) = recording.series.get(&Channel::ShaftSpeed) else { return (0.0, 0.0) };
+    let before = speed.t_s.partition_point(|t| *t < first_s);
+    let rests = |i: usize| speed.values.get(i).is_some_and(|value| value.abs() < AT_REST_RPM);
+    let Some(last) = (0..before).rev().find(|i| rests(*i)) else { return (0.0, 0.0) };
+    let first = (0..last).rev().find(|i| !rests(*i)).map_or(0, |i| i + 1);
+    // The last sample at standstill may already belong to the start of the machine.
+    (speed.t_s[first], speed.t_s[last.saturating_sub(1).max(first)])
+}
+
+/// Limit of the housing reading, K, from the last two thirds of the soak, and its standard error. `None` for a soak of less than ten minutes
+/// and for a sensor without declared noise.
+fn housing_limit(
+    recording: &Recording,
+    (start_s, end_s): (f64, f64),
+    config: &IdentifyConfig,
+) -> Option<(f64, f64)> {
+    let first_s = (start_s + (end_s - start_s) / 3.0).max(end_s - LONGEST_RELAXATION_S);
+    let noise_sigma = config.declared.get(&Channel::Tc)?.noise_sigma;
+    if end_s - start_s < SHORTEST_RELAXATION_S {
+        return None;
+    }
+    let series = recording.series.get(&Channel::Tc)?;
+    let (mut t_s, mut means, mut fewest) = (Vec::new(), Vec::new(), usize::MAX);
+    for block in 0..((end_s - first_s) / BLOCK_S) as usize {
+        let from_s = first_s + block as f64 * BLOCK_S;
+        let (_, values) = series.slice(from_s, from_s + BLOCK_S);
+        let usable: Vec<f64> =
+            values.iter().copied().filter(|value| is_reading(Channel::Tc, *value)).collect();
+        let Some(mean) = mean(&usable) else { continue };
+        t_s.push(from_s + 0.5 * BLOCK_S);
+        means.push(mean);
+        fewest = fewest.min(usable.len());
+    }
+    let variance = coloured(config.noise_colour).variance_of_mean(fewest, BLOCK_S);
+    relaxation::limit(&t_s, &means, noise_sigma * variance.sqrt())
+}
+
+/// The standard error of [`housing_limit`] after a soak of `soak_s`.
+fn expected_limit_error(noise_sigma: f64, soak_s: f64, config: &IdentifyConfig) -> Option<f64> {
+    if soak_s < SHORTEST_RELAXATION_S {
+        return None;
+    }
+    let used_s = (2.0 / 3.0 * soak_s).min(LONGEST_RELAXATION_S);
+    let t_s: Vec<f64> = (0..(used_s / BLOCK_S) as usize)
+        .map(|block| soak_s - used_s + (block as f64 + 0.5) * BLOCK_S)
+        .collect();
+    let samples = (BLOCK_S / DECLARED_INTERVAL_S) as usize;
+    let variance = coloured(config.noise_colour).variance_of_mean(samples, BLOCK_S);
+    let relaxing: Vec<f64> = t_s.iter().map(|t_s| relaxation::usual_k(*t_s)).collect();
+    relaxation::limit(&t_s, &relaxing, noise_sigma * variance.sqrt()).map(|(_, error)| error)
+}
+
+/// Reading of a sensor at standstill, K or Pa.
+#[derive(Clone, Copy)]
+struct Reading {
+    channel: Channel,
+    mean: f64,
+    /// Remaining standard deviation of its offset.
+    own: f64,
+    /// The same with the declared offset.
+    total: f64,
+}
+
+/// The common reading of the sensors.
+fn common(readings: &[Reading]) -> f64 {
+    let weight: f64 = readings.iter().map(|reading| reading.total.powi(-2)).sum();
+    readings.iter().map(|reading| reading.mean * reading.total.powi(-2)).sum::<f64>() / weight
+}
+
+struct SoakMean {
+    mean: f64,
+    drift_per_min: f64,
+}
+
+/// Mean of a channel over a segment, and its drift from the first to the last third.
+fn soak_mean(recording: &Recording, channel: Channel, start_s: f64, end_s: f64) -> Option<SoakMean> {
+    let series: &Series = recording.series.get(&channel)?;
+    let third_s = (end_s - start_s) / 3.0;
+    let of = |start_s: f64, end_s: f64| {
+        let (_, values) = series.slice(start_s, end_s);
+        let usable: Vec<f64> = values.iter().copied().filter(|value| is_reading(channel, *value)).collect();
+        mean(&usable)
+    };
+    let (early, late) = (of(start_s, start_s + third_s)?, of(end_s - third_s, end_s)?);
+    Some(SoakMean { mean: of(start_s, end_s)?, drift_per_min: (late - early) / (2.0 * third_s / 60.0) })
+}

@@ -1,0 +1,173 @@
+//! Decides whether h before the wheel equals h after it or follows the law at the inlet's own diameter.
+//!
+//! Both models have the same parameters and predict nearly the same T2. A recording determines `h alpha_A` before the wheel and `h (1 -
+//! alpha_A)` after it. Another h before the wheel therefore changes alpha_A and h, but not the efficiencies. The ratio of the two laws varies
+//! by a few percent over a map, with the gas temperature after the wheel. A recording can distinguish the laws only by this variation, unless
+//! alpha_A is fixed as declared. Then the models differ by some hundredths of alpha_A, and small model errors can cause the same change. A map
+//! steeper than the fitted surface has favoured the wrong model by odds of hundreds to one. So both models are fitted and compared, with such
+//! errors included. If the recording does not decide, the difference becomes an error of everything that it moves.
+
+use crate::joint::fit::solve::{Covariance, FULLY, Problem};
+use crate::joint::step_model::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
+use mapper_core::{FoundInlet, InletConvection, Origin};
+use mapper_numerics::statistics::{HINT_SIGMAS, mean};
+use nalgebra::DMatrix;
+
+/// Change of alpha_A that small model errors can cause: a clearance that grows by a percent as the housing warms up by 100 K looks like 0.06.
+const PASSES_FOR_ALPHA: f64 = 0.025;
+/// Minimum spread of the points about the efficiency surface when the models are compared, fraction. A true map steeper than the surface
+/// favours the wrong model. The surface misses the nominal map by as much at eighteen points without noise (`tests/inlet.rs`).
+const MIN_SURFACE_SIGMA: f64 = 3e-3;
+/// Probability of the other model below which the recording has decided.
+const DECIDED: f64 = 0.05;
+/// Minimum standard deviation if the recording has not decided, as a share of the distance between the models: the 95 % interval then reaches
+/// from one to the other and a quarter beyond, for the noise of the other.
+const OPEN_SIGMA: f64 = 0.65;
+
+/// Maximum ratio of the distance to its linear estimate: beyond it the linearisation is not valid.
+const LARGEST_STRETCH: f64 = 2.0;
+
+/// Degree to which h before the wheel follows the inlet's own law.
+pub(crate) fn power_of(convection: InletConvection) -> f64 {
+    match convection {
+        InletConvection::Shared => 0.0,
+        InletConvection::Own => 1.0,
+    }
+}
+
+fn convection_of(power: f64) -> InletConvection {
+    if power == 0.0 { InletConvection::Shared } else { InletConvection::Own }
+}
+
+/// Compares both models on a problem at its minimum and selects the other one if the recording decides for it. Returns the remaining
+/// uncertainty of the power, one standard deviation; `None` if it makes no difference.
+pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
+    let error = problem.covariance()?.error_of(ALPHA).unwrap_or(0.0);
+    // The difference of the models is then smaller than the uncertainty of alpha_A.
+    if problem.shared[ALPHA] <= HINT_SIGMAS * error {
+        return Some(None);
+    }
+    let tight = problem.surface_sigma;
+    let moved_to = |problem: &mut Problem<'_>, surface_sigma: f64| {
+        problem.surface_sigma = surface_sigma;
+        problem.active[PROBE_MM2] = problem.probe_fitted;
+        problem.minimise(FULLY)
+    };
+    if tight < MIN_SURFACE_SIGMA {
+        moved_to(problem, MIN_SURFACE_SIGMA)?;
+    }
+    let left_open = compared(problem)?;
+    moved_to(problem, tight)?;
+    Some(left_open)
+}
+
+fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
+    let declared = FoundInlet {
+        convection: convection_of(problem.shared[INLET]),
+        diameter_m: problem.setting.inlet_diameter_m,
+        origin: Origin::Assumed,
+        probability: 1.0,
+        alpha_area_otherwise_ratio: None,
+    };
+    problem.inlet = Some(declared);
+    let Some(mut other) = problem.inlet_sought.then(|| otherwise(problem)).flatten() else {
+        return Some(None);
+    };
+    let seen = 0.5 * (problem.square() - other.square()) * share_of_noise(problem)?;
+    let mut left = 1.0 / (1.0 + (-seen).exp());
+    // Keep the declared model unless the recording decides against it: the other one has other efficiencies.
+    if left > 1.0 - DECIDED {
+        std::mem::swap(problem, &mut other);
+        left = 1.0 - left;
+    }
+    let decided = left < DECIDED;
+    problem.inlet = Some(FoundInlet {
+        convection: convection_of(problem.shared[INLET]),
+        origin: if decided { Origin::Fitted } else { Origin::NotIdentifiable },
+        probability: 1.0 - left,
+        alpha_area_otherwise_ratio: problem.active[ALPHA].then_some(other.shared[ALPHA]),
+        ..declared
+    });
+    let sigma = if decided { left.sqrt() } else { left.sqrt().max(OPEN_SIGMA) };
+    problem.priors[INLET] = Prior { mean: problem.shared[INLET], sigma };
+    problem.active[INLET] = true;
+    let stretched = sigma * stretch(problem, &other, &problem.covariance()?);
+    problem.active[INLET] = false;
+    Some(Some(stretched))
+}
+
+/// Adds the undecided difference between the models to the covariance: how far each quantity moves from one towards the other.
+pub(crate) fn carry(problem: &mut Problem<'_>, sigma: f64, without: &Covariance) -> Option<Covariance> {
+    problem.priors[INLET].sigma = sigma;
+    problem.active[INLET] = true;
+    let mut with = problem.covariance()?;
+    let own = with.row_of(INLET)?;
+    let moved = with.shared.column(own) / sigma;
+    let place = |row: usize| if row < own { Some(row) } else { row.checked_sub(1).filter(|_| row > own) };
+    with.shared = DMatrix::from_fn(moved.len(), moved.len(), |a, b| {
+        let known = place(a).zip(place(b)).map_or(0.0, |(a, b)| without.shared[(a, b)]);
+        known + moved[a] * moved[b]
+    });
+    for (i, answer) in with.answers.iter().enumerate() {
+        let (own_before, mixed_before) = &without.own[i];
+        let alone = own_before - mixed_before * without.answers[i].transpose();
+        let mixed = answer * &with.shared;
+        with.own[i] = (alone + &mixed * answer.transpose(), mixed);
+    }
+    Some(with)
+}
+
+/// Factor by which model errors weaken the decision between the models, compared with noise alone: the noise's share of the variance of the
+/// power (0 to 1) by which h before the wheel follows its own law. It is 1 if alpha_A is fitted, because alpha_A then absorbs such errors.
+fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
+    if problem.active[ALPHA] {
+        return Some(1.0);
+    }
+    let by_noise = problem.information(INLET)?.powf(-0.5);
+    let alpha = problem.shared[ALPHA];
+    let ln_ratios = problem.ln_inlet_ratios();
+    let ln_ratio = mean(&ln_ratios)?;
+    // The change of alpha_A equivalent to the whole way from one model to the other.
+    let way = (alpha * (1.0 - alpha) * ln_ratio).abs();
+    let by_faults = PASSES_FOR_ALPHA / way;
+    let share = (by_noise / by_noise.hypot(by_faults)).powi(2);
+    share.is_finite().then_some(share)
+}
+
+/// Ratio of the distance between the two fits to its linear estimate. The dependence is curved because only the product of alpha_A and h is
+/// determined.
+fn stretch(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) -> f64 {
+    let Some(own) = covariance.row_of(INLET) else { return 1.0 };
+    let way = other.shared[INLET] - problem.shared[INLET];
+    [ALPHA, LN_COEFFICIENT]
+        .into_iter()
+        .filter_map(|index| Some((index, covariance.row_of(index)?)))
+        .map(|(index, row)| {
+            let straight = way * covariance.shared[(row, own)] / covariance.shared[(own, own)];
+            (other.shared[index] - problem.shared[index]) / straight
+        })
+        .filter(|ratio| ratio.is_finite())
+        .fold(1.0, f64::max)
+        .min(LARGEST_STRETCH)
+}
+
+/// The problem at its minimum with the other model; `None` if the fit does not converge.
+fn otherwise<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
+    let mut other = problem.clone();
+    other.shared[INLET] = 1.0 - problem.shared[INLET];
+    let alpha = problem.shared[ALPHA];
+    if problem.active[ALPHA] && alpha > 0.0 && alpha < 1.0 {
+        // Start with equal heat flows: keep h alpha_A, and h (1 - alpha_A) times the ratio before the wheel.
+        let ln_ratios = problem.ln_inlet_ratios();
+        let ln_ratio = mean(&ln_ratios)?;
+        let towards_own = other.shared[INLET] - problem.shared[INLET];
+        let odds = alpha / (1.0 - alpha) * (-towards_own * ln_ratio).exp();
+        other.shared[ALPHA] = odds / (1.0 + odds);
+        other.shared[LN_COEFFICIENT] += ((1.0 - alpha) * (1.0 + odds)).ln();
+    }
+    // The probe does not depend on the inlet, but it could be on its bound in only one of the fits.
+    other.active[PROBE_MM2] = false;
+    other.minimise(FULLY)?;
+    other.active[PROBE_MM2] = problem.active[PROBE_MM2];
+    Some(other)
+}

@@ -1,0 +1,201 @@
+//! Selects the model parameters with a prior in eqs. 1-3: alpha_A, the probe, and the heating/cooling ratio of h.
+//!
+//! Each free parameter increases the uncertainty of the points, even if the machine does not need it. Small model errors also look like a
+//! small value of each. So each one is neutral or free, and all sets are evaluated on the Gaussian of a fit with all of them free
+//! ([`mapper_inference::mixture`]). The fit moves to the mean of the mixture and is linearised again there, because the probe's lag is far
+//! from linear. The spread of the mixture then enters the uncertainty of every number of every point.
+
+use crate::joint::fit::solve::{Covariance, FULLY, Problem};
+use crate::joint::step_model::parameters::{ALPHA, ETA, OFFSETS, PROBE_MM2, REFINEMENTS, SURFACE};
+use mapper_core::standard_error_of;
+use mapper_inference::interval;
+use mapper_inference::mixture::{Draw, Mixture, Parameter};
+use mapper_numerics::statistics::mean;
+use nalgebra::{DMatrix, DVector};
+
+/// The joint distribution of the parameters with a prior.
+#[derive(Debug, Clone)]
+pub(crate) struct Refinements {
+    /// Indices of the shared parameters.
+    pub(crate) indices: Vec<usize>,
+    pub(crate) mixture: Mixture,
+    /// Current values, as differences from the declared values.
+    at: DVector<f64>,
+    /// Best-fit values with all of them free, as differences from the declared values, and their standard errors.
+    free: Vec<(f64, f64)>,
+}
+
+/// Regression of every shared parameter on these parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Gain(pub(crate) DMatrix<f64>);
+
+/// The parameters that a problem searches for.
+fn sought(problem: &Problem<'_>) -> Vec<(usize, f64, f64, f64)> {
+    let looked_for =
+        |index: usize| if index == PROBE_MM2 { problem.probe_fitted } else { problem.active[index] };
+    REFINEMENTS.into_iter().filter(|(index, ..)| looked_for(*index)).collect()
+}
+
+/// Fixes these parameters at their declared values.
+pub(crate) fn hold(problem: &mut Problem<'_>) {
+    for (index, ..) in REFINEMENTS {
+        problem.active[index] = false;
+        problem.shared[index] = problem.priors[index].mean;
+    }
+}
+
+/// Error of the efficiencies, fraction (rms of one standard error), if the parameters selected by `neutral` were not neutral. This is the
+/// uncertainty of the efficiencies without the declaration.
+pub(crate) fn resting_on_declaration(open: &Problem<'_>, neutral: impl Fn(usize) -> bool) -> Option<f64> {
+    let sought: Vec<_> = sought(open).into_iter().filter(|(index, ..)| neutral(*index)).collect();
+    if sought.is_empty() {
+        return Some(0.0);
+    }
+    let mut held = open.clone();
+    sought.iter().for_each(|(index, ..)| held.active[*index] = false);
+    let (open, held) = (open.covariance()?, held.covariance()?);
+    let variance = |covariance: &Covariance, i: usize| covariance.own.get(i).map(|(own, _)| own[(ETA, ETA)]);
+    let of_steps: Vec<f64> = (0..open.own.len())
+        .filter_map(|i| Some((variance(&open, i)? - variance(&held, i)?).max(0.0)))
+        .collect();
+    Some(mean(&of_steps)?.sqrt())
+}
+
+/// Evaluates the mixture of a problem at its minimum and moves the problem to the mean of the mixture; `Some(None)` if there is nothing to
+/// search for.
+pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<Refinements>> {
+    let sought = sought(problem);
+    if sought.is_empty() {
+        return Some(None);
+    }
+    linearised(problem, &sought)?;
+    // Again at its mean; a third time changes the error of five classes of `benches/identification.py` by less than 0.001 points.
+    Some(Some(linearised(problem, &sought)?))
+}
+
+/// Evaluates the mixture by linearising the problem at its current values, and moves the problem to its mean.
+fn linearised(problem: &mut Problem<'_>, sought: &[(usize, f64, f64, f64)]) -> Option<Refinements> {
+    let indices: Vec<usize> = sought.iter().map(|(index, ..)| *index).collect();
+    let declared: Vec<f64> = indices.iter().map(|index| problem.priors[*index].mean).collect();
+    indices.iter().for_each(|index| problem.active[*index] = true);
+    let covariance = problem.covariance()?;
+    let best = problem.full_step(&indices)?;
+    let rows: Vec<usize> = indices.iter().filter_map(|index| covariance.row_of(*index)).collect();
+    let spread = DMatrix::from_fn(rows.len(), rows.len(), |a, b| covariance.shared[(rows[a], rows[b])]);
+    let found = DVector::from_iterator(
+        indices.len(),
+        best.iter().zip(&declared).map(|(best, declared)| best - declared),
+    );
+    let parameters: Vec<Parameter> = sought
+        .iter()
+        .zip(&declared)
+        .map(|((index, _, slab_sigma, model_error), declared)| {
+            // alpha_A is a share of an area, and the probe parameter is the square of a diameter.
+            let (lowest, highest) = match *index {
+                ALPHA => (0.0, 1.0),
+                PROBE_MM2 => (0.0, f64::INFINITY),
+                _ => (f64::NEG_INFINITY, f64::INFINITY),
+            };
+            Parameter {
+                slab_sigma: *slab_sigma,
+                low: lowest - declared,
+                high: highest - declared,
+                model_error: *model_error,
+                fitted_under_sigma: problem.priors[*index].sigma,
+            }
+        })
+        .collect();
+    let mixture = Mixture::of(&found, &spread, &parameters)?;
+    let at = mixture.mean()?;
+    for ((index, declared), at) in indices.iter().zip(&declared).zip(at.iter()) {
+        problem.shared[*index] = declared + at;
+        problem.active[*index] = false;
+    }
+    problem.minimise(FULLY)?;
+    indices.iter().for_each(|index| problem.active[*index] = true);
+    let free = found.iter().zip(spread.diagonal().iter()).map(|(x, v)| (*x, v.sqrt())).collect();
+    Some(Refinements { indices, mixture, at, free })
+}
+
+impl Refinements {
+    /// Position of a parameter among the others.
+    fn place(&self, index: usize) -> Option<usize> {
+        self.indices.iter().position(|other| *other == index)
+    }
+
+    /// Probability that a parameter is not neutral; 0 if it is not searched for.
+    pub(crate) fn probability(&self, index: usize) -> f64 {
+        self.place(index).map_or(0.0, |place| self.mixture.off_neutral[place])
+    }
+
+    /// Best-fit value with all of them free, as a difference from the declared value, and its standard error; `None` if it is not searched
+    /// for.
+    pub(crate) fn free(&self, index: usize) -> Option<(f64, f64)> {
+        self.place(index).map(|place| self.free[place])
+    }
+
+    /// Replaces the Gaussian of these parameters with the mixture. The offsets keep their declared spread and do not move: these parameters
+    /// give no reliable information about them.
+    pub(crate) fn apply(&self, covariance: &mut Covariance) -> Option<Gain> {
+        let rows: Vec<usize> = self.indices.iter().filter_map(|index| covariance.row_of(*index)).collect();
+        let columns =
+            |matrix: &DMatrix<f64>| DMatrix::from_fn(matrix.nrows(), rows.len(), |i, a| matrix[(i, rows[a])]);
+        let block = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(rows.len(), rows.len(), |a, b| matrix[(rows[a], rows[b])])
+        };
+        // The remaining variance if the offsets, which are mutually independent, are known.
+        let mut by_noise = covariance.shared.clone();
+        for (row, index) in covariance.fitted.iter().enumerate() {
+            if (OFFSETS..SURFACE).contains(index) {
+                let with = covariance.shared.column(row).into_owned();
+                by_noise -= &with * with.transpose() / covariance.shared[(row, row)];
+            }
+        }
+        let gain = columns(&by_noise) * block(&by_noise).cholesky()?.inverse();
+        let shared = &covariance.shared;
+        let across = columns(shared) * gain.transpose();
+        let change = block(shared) + self.mixture.covariance()?;
+        let changed = shared - &across - across.transpose() + &gain * change * gain.transpose();
+        for ((own, mixed), answer) in covariance.own.iter_mut().zip(&covariance.answers) {
+            let after = answer * &changed;
+            *own += (&after - &*mixed) * answer.transpose();
+            *mixed = after;
+        }
+        covariance.shared = changed;
+        Some(Gain(gain))
+    }
+
+    /// 95 % interval of a quantity with this value, this normal variance and this sensitivity to the shared parameters. It is the union of the
+    /// shortest interval of the mixture and the interval with all parameters free: a small effect that the mixture takes for neutral must not
+    /// narrow it. Also returns the signed standard error that this adds, which all quantities share.
+    pub(crate) fn interval(
+        &self,
+        gain: &Gain,
+        answer: &DVector<f64>,
+        value: f64,
+        variance: f64,
+    ) -> Option<((f64, f64), f64)> {
+        let by_refinement = gain.0.tr_mul(answer);
+        let centres = |draws: &[Draw]| -> Vec<(f64, f64)> {
+            let centre = |draw: &Draw| value + by_refinement.dot(&(&draw.values - &self.at));
+            draws.iter().map(|draw| (draw.weight, centre(draw))).collect()
+        };
+        let mixed = centres(&self.mixture.draws);
+        let spread: f64 = mixed.iter().map(|(weight, centre)| weight * (centre - value).powi(2)).sum();
+        let sigma = (variance - spread).max(0.0).sqrt();
+        let (low, high) = interval::shortest(&mixed, sigma, interval::COVERAGE)?;
+        let free = centres(&self.mixture.all_free);
+        let (free_low, free_high) = interval::shortest(&free, sigma, interval::COVERAGE)?;
+        let (low, high) = (low.min(free_low), high.max(free_high));
+        let added = (standard_error_of(low, high).powi(2) - variance).max(0.0).sqrt();
+        let moved: f64 = free.iter().map(|(weight, centre)| weight * (centre - value)).sum();
+        Some(((low, high), added.copysign(moved)))
+    }
+}
+
+impl Gain {
+    /// Adds a row for one more parameter that does not depend on these parameters.
+    pub(crate) fn with_row(self, row: usize) -> Self {
+        Gain(self.0.insert_row(row, 0.0))
+    }
+}

@@ -1,0 +1,392 @@
+//! Prepares a recording for the fit, and estimates noise and spreads from the fit.
+
+use crate::joint::fit::inlet;
+use crate::joint::fit::input_noise_spline::Explained;
+use crate::joint::fit::solve::{Member, NO_SURFACE_SIGMA, Problem};
+use crate::joint::step_model::model::{Course, Setting};
+use crate::joint::step_model::parameters::{
+    ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
+    LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior,
+    REFINEMENTS, SHARED, SLOPE, SURFACE,
+};
+use crate::joint::step_model::rows::{StepRows, condensed};
+use crate::joint::step_model::surface::{SurfaceScale, TERM_COUNT, dot};
+use crate::single_step::dynamic::{self, Estimate};
+use crate::step_data::cleaning::cleaned;
+use crate::step_data::end_state::EndState;
+use crate::step_data::samples::Samples;
+use crate::step_data::window;
+use crate::step_outcome::findings::{Findings, code};
+use crate::{IdentifyConfig, WindowRule, step_data::commands};
+use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
+use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
+use mapper_numerics::parallel;
+use mapper_numerics::statistics::{DOUBT_SIGMAS, mean, median};
+use mapper_physics::gas::air;
+use nalgebra::DVector;
+
+/// Start of the used part of a step after the last command change, s: h and efficiency are modelled while the operating point settles. If
+/// noise could look like a slow probe, the fit needs the seconds right after the jump, where the two differ by tens of kelvin. Without noise
+/// they only show where the surface is wrong. Inputs are smoothed over 3 s at first: starting at 1.5 s made a probe of 0.7 mm 0.026 mm too
+/// small, from 2 s on it is within its error (mean of 20 seeds).
+pub(crate) const START_S: f64 = 3.0;
+pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
+/// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. The recordings of
+/// `benches/identification.py` have 0.0006, those of a machine with a map that drops steeply at choke 0.005.
+const SURFACE_SIGMA: f64 = 1e-3;
+/// Relative error of the surface's effect on a prediction: surfaces through a few points bend differently from maps.
+const SHAPE_ERROR_RATIO: f64 = 0.03;
+/// Residual of a single step, relative to the median step and in K, above which the step is excluded until it is shown to fit the others.
+const SUSPECT_RATIO: f64 = 6.0;
+const SUSPECT_K: f64 = 0.5;
+/// Expected spread of the points' h about the law, ratio. The recordings of `benches/identification.py` have 0.0022 to 0.003.
+const LAW_SIGMA: f64 = 3e-3;
+/// Weight of the expected spread, in points: small next to the dozens of points of a campaign, sufficient without any.
+const PRIOR_WEIGHT: f64 = 4.0;
+/// Number of spreads tried on either side of the expected one, and their distance in logarithms: from a thirtieth to thirty times.
+const SPREADS: i32 = 34;
+const SPREAD_STEP: f64 = 0.1;
+/// Standard deviation of a T2 sample without a declaration, K; refined from the residual.
+const UNDECLARED_NOISE_K: f64 = 0.1;
+
+/// Condenses every step that has a window with enough samples.
+pub(crate) fn steps(
+    recording: &Recording,
+    end_states: &[Option<EndState>],
+    config: &IdentifyConfig,
+    findings: &mut [Findings],
+) -> Vec<StepRows> {
+    let states: Vec<(usize, &EndState)> = end_states
+        .iter()
+        .enumerate()
+        .filter_map(|(position, state)| Some((position, state.as_ref()?)))
+        .collect();
+    let found = parallel::map(&states, |(position, state)| {
+        let mut own = Findings::new();
+        (rows_of(recording, *position, state, config, &mut own), own)
+    });
+    let mut steps = Vec::new();
+    for ((position, _), (rows, own)) in states.into_iter().zip(found) {
+        if let Some(findings) = findings.get_mut(position) {
+            findings.take(own);
+            steps.extend(rows);
+        }
+    }
+    steps
+}
+
+/// Condenses one step.
+fn rows_of(
+    recording: &Recording,
+    position: usize,
+    end_state: &EndState,
+    config: &IdentifyConfig,
+    own: &mut Findings,
+) -> Option<StepRows> {
+    let step = recording.steps.get(position)?;
+    let after_s = if config.declared.is_empty() { START_S } else { START_WITH_NOISE_S };
+    let start_s = commands::at_rest_s(recording, step).max(step.start_s) + after_s;
+    let window = Window { start_s, end_s: step.end_s };
+    if start_s.is_nan() || start_s >= step.end_s {
+        let message =
+            format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
+        own.refuse(code::TOO_FEW_SAMPLES, message);
+        return None;
+    }
+    let samples = cleaned(Samples::of(recording, window, config, true), config, own);
+    if !dynamic::enough(&samples, config, own) {
+        return None;
+    }
+    if !config.declared.is_empty() {
+        // The fit follows changes within the step, but the point is the settled end of the step.
+        let rest = window::rest(recording, step, &config.settle_bands);
+        let needed_s = WindowRule::rest_at_end_s(step.end_s - step.start_s);
+        if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
+            let message = format!(
+                "the {} still varies beyond its limit {:.0} s before the step's end (needed: {needed_s:.0} s)",
+                rest.slowest, rest.settled_s
+            );
+            own.doubt(code::NOT_STABILISED, message);
+        }
+    }
+    condensed(recording, position, &samples, end_state, config)
+}
+
+/// The fit with its start values.
+pub(crate) fn problem<'a>(
+    steps: &'a [StepRows],
+    alone: &[Estimate],
+    config: &IdentifyConfig,
+) -> Option<Problem<'a>> {
+    let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
+    let scale = SurfaceScale::of(&places, config.reference)?;
+    let choice = &config.joint;
+    let with_law = choice.h == ConvectionWithinStep::Law;
+    let shaped = choice.efficiency == EfficiencyWithinStep::Shaped;
+    let reynolds = |step: &StepRows| {
+        let bulk_k = step.end.t2_k;
+        4.0 * step.end.flow_kg_s
+            / (std::f64::consts::PI * config.outlet_diameter_m * air::viscosity_pa_s(bulk_k))
+    };
+    let ln_reference = steps.iter().map(|step| reynolds(step).ln()).sum::<f64>() / steps.len() as f64;
+    let setting = Setting {
+        air: config.air,
+        internal_area_m2: config.internal_area_m2,
+        outlet_diameter_m: config.outlet_diameter_m,
+        inlet_diameter_m: config.inlet_diameter_m,
+        reynolds_reference: ln_reference.exp(),
+        with_law,
+        shaped,
+    };
+
+    let free = Prior { mean: 0.0, sigma: f64::INFINITY };
+    let mut priors = [free; SHARED];
+    let mut shared = [0.0; SHARED];
+    let mut active = [false; SHARED];
+    let mut lowest = [f64::NEG_INFINITY; SHARED];
+    // The law of a turbocharger may differ much from Appendix A, but not by orders of magnitude.
+    let law = mapper_physics::machine::params::Params::default().compressor;
+    shared[EXPONENT] = law.nusselt_exponent;
+    shared[LN_COEFFICIENT] = law.nusselt_coefficient.ln() + law.nusselt_exponent * ln_reference;
+    priors[LN_COEFFICIENT] = Prior { mean: shared[LN_COEFFICIENT], sigma: 3.0 };
+    priors[EXPONENT] = Prior { mean: 0.9, sigma: 0.5 };
+    active[LN_COEFFICIENT] = with_law;
+    active[EXPONENT] = with_law;
+    REFINEMENTS.into_iter().for_each(|(index, sigma, ..)| priors[index].sigma = sigma);
+    shared[ALPHA] = config.alpha_area_ratio;
+    priors[ALPHA].mean = config.alpha_area_ratio;
+    active[ALPHA] = choice.alpha_area == Choice::Fitted;
+    let probe_mm2 = (1e3 * config.probe_diameter_m).powi(2);
+    shared[PROBE_MM2] = if choice.probe == Choice::Fitted { probe_mm2.max(0.5) } else { probe_mm2 };
+    priors[PROBE_MM2].mean = probe_mm2;
+    active[PROBE_MM2] = choice.probe == Choice::Fitted;
+    lowest[PROBE_MM2] = 0.0;
+    active[LN_DIRECTION] = choice.direction == Choice::Fitted;
+    shared[INLET] = inlet::power_of(config.inlet_convection);
+    if choice.offsets == Choice::Fitted {
+        for (i, channel) in OFFSET_CHANNELS.iter().enumerate() {
+            let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
+            priors[OFFSETS + i] = Prior { mean: 0.0, sigma };
+            active[OFFSETS + i] = sigma > 0.0;
+            priors[BENDS + i] = priors[OFFSETS + i];
+            active[BENDS + i] = shaped && sigma > 0.0;
+        }
+        let sigma =
+            config.declared.get(&Channel::CompressorFlow).map_or(0.0, |declared| declared.gain_sigma_ratio);
+        priors[FLOW_GAIN] = Prior { mean: 0.0, sigma };
+        active[FLOW_GAIN] = sigma > 0.0;
+        for (i, channel) in GAIN_CHANNELS.iter().enumerate() {
+            let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.gain_sigma_ratio);
+            priors[GAINS + i] = Prior { mean: 0.0, sigma };
+            active[GAINS + i] = sigma > 0.0;
+        }
+        priors[BAROMETER] = Prior { mean: 0.0, sigma: config.barometer_sigma_pa };
+        active[BAROMETER] = config.barometer_sigma_pa > 0.0;
+        priors[HUMIDITY] = Prior { mean: 0.0, sigma: config.humidity_sigma_kg_kg };
+        active[HUMIDITY] = config.humidity_sigma_kg_kg > 0.0;
+    }
+    let etas: Vec<f64> = steps
+        .iter()
+        .filter_map(|step| alone.get(step.position)?.eta.map(|(eta, _)| eta))
+        .filter(|eta| (0.2..0.95).contains(eta))
+        .collect();
+    let mean_eta = mean(&etas).unwrap_or(0.65);
+    shared[SURFACE] = mean_eta;
+    for (k, sigma) in SurfaceScale::prior_sigmas().into_iter().enumerate() {
+        priors[SURFACE + k] = Prior { mean: shared[SURFACE + k], sigma };
+        active[SURFACE + k] = shaped;
+    }
+
+    let residuals_k = steps.iter().filter_map(|step| alone.get(step.position)?.residual_rms_k);
+    let suspect_k =
+        median(residuals_k).map_or(f64::INFINITY, |middle| (SUSPECT_RATIO * middle).max(SUSPECT_K));
+    let members = steps
+        .iter()
+        .map(|step| {
+            let found = alone.get(step.position);
+            let shares = found.and_then(|found| found.residual_rms_k).is_none_or(|rms_k| rms_k <= suspect_k);
+            Member { shares, ..member(step, found, &scale, mean_eta, config) }
+        })
+        .collect();
+    let surface_sigma = if shaped { 0.005 } else { NO_SURFACE_SIGMA };
+    Some(Problem {
+        setting,
+        members,
+        shared,
+        priors,
+        active,
+        lowest,
+        surface_sigma,
+        explained: Explained::default(),
+        probe_fitted: choice.probe == Choice::Fitted,
+        inlet_sought: choice.inlet_h == Choice::Fitted,
+        inlet: None,
+    })
+}
+
+/// A step with its start values. `found`: result of the step alone; `mean_eta` replaces an efficiency that it does not give.
+pub(crate) fn member<'a>(
+    step: &'a StepRows,
+    found: Option<&Estimate>,
+    scale: &SurfaceScale,
+    mean_eta: f64,
+    config: &IdentifyConfig,
+) -> Member<'a> {
+    let free = Prior { mean: 0.0, sigma: f64::INFINITY };
+    let end_terms = scale.terms(step.end.place);
+    let terms = step
+        .rows
+        .iter()
+        .map(|row| {
+            let here = scale.terms(row.place);
+            std::array::from_fn::<f64, TERM_COUNT, _>(|k| here[k] - end_terms[k])
+        })
+        .collect();
+    let eta = found.and_then(|found| found.eta).map_or(mean_eta, |(eta, _)| eta).clamp(0.3, 0.9);
+    let first_k = step.rows.first().map_or(step.end.t2_k, |row| row.t2_k);
+    let mut local = [0.0; LOCAL];
+    let mut own = [free; LOCAL];
+    local[ETA] = eta;
+    own[LN_DEVIATION] = Prior { mean: 0.0, sigma: 0.01 };
+    if config.joint.h != ConvectionWithinStep::Law {
+        local[LN_DEVIATION] =
+            found.and_then(|found| found.h_w_m2k).map_or(500.0, |(h, _)| h).clamp(20.0, 5e3).ln();
+        own[LN_DEVIATION] = Prior { mean: local[LN_DEVIATION], sigma: 3.0 };
+    }
+    local[FIRST_READING] = first_k;
+    own[FIRST_READING] = Prior { mean: first_k, sigma: 5.0 };
+    local[SLOPE] = 1.0;
+    own[SLOPE] = Prior { mean: 1.0, sigma: 0.05 };
+    Member {
+        course: Course { rows: &step.rows, terms },
+        measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
+        whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K, |_| 0.0),
+        coupling: std::array::from_fn(|i| {
+            i.checked_sub(SURFACE).and_then(|k| end_terms.get(k)).copied().unwrap_or(0.0)
+        }),
+        local,
+        priors: own,
+        shares: true,
+        barred: false,
+    }
+}
+
+/// `shape_k`: effect of the surface on the prediction at each row, K. Part of it is wrong, and varies as slowly as it does.
+fn whitening(
+    step: &StepRows,
+    config: &IdentifyConfig,
+    sigma_k: f64,
+    white_sigma_k: f64,
+    shape_k: impl Fn(usize) -> f64,
+) -> WhiteningFilter {
+    let noise = step.rows.iter().enumerate().map(|(i, row)| {
+        let wrong = SHAPE_ERROR_RATIO * shape_k(i) / sigma_k;
+        (row.t_s, BlockNoise { first_order: row.noise.first_order + wrong * wrong, ..row.noise })
+    });
+    WhiteningFilter::new(noise, config.noise_colour.time_constant_s, sigma_k, white_sigma_k)
+}
+
+/// Estimates the noise of each step and the spreads of the points about surface and law from the fit; `None` if the equations are singular.
+pub(crate) fn refine(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) -> Option<()> {
+    set_weights(problem, steps, config);
+    let covariance = problem.with_exact_readings().covariance()?;
+    let of_steps = || problem.members.iter().zip(&covariance.own).filter(|(member, _)| member.shares);
+    let off_surface: Vec<(f64, f64)> = of_steps()
+        .map(|(member, (own, mixed))| {
+            let coupling = DVector::from_iterator(
+                covariance.fitted.len(),
+                covariance.fitted.iter().map(|index| member.coupling[*index]),
+            );
+            let by_shared = &covariance.shared * &coupling;
+            let variance =
+                own[(ETA, ETA)] - 2.0 * mixed.row(ETA).transpose().dot(&coupling) + coupling.dot(&by_shared);
+            (member.off_surface(&problem.shared, &member.local), variance)
+        })
+        .collect();
+    let off_law: Vec<(f64, f64)> = of_steps()
+        .map(|(member, (own, _))| (member.local[LN_DEVIATION], own[(LN_DEVIATION, LN_DEVIATION)]))
+        .collect();
+    if problem.setting.shaped {
+        problem.surface_sigma = spread(&off_surface, problem.surface_sigma, SURFACE_SIGMA);
+    }
+    if problem.setting.with_law {
+        let before = problem.members.first().map_or(LAW_SIGMA, |member| member.priors[LN_DEVIATION].sigma);
+        let sigma = spread(&off_law, before, LAW_SIGMA);
+        for member in &mut problem.members {
+            member.priors[LN_DEVIATION].sigma = sigma;
+        }
+    }
+    Some(())
+}
+
+/// Standard deviation of a zero-mean normal distribution, from posterior means and variances found with another one, `under_sigma`. Returns
+/// the most probable value under an inverse chi-square prior about `expected`.
+fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
+    // Values and variances from the recording alone.
+    let seen: Vec<(f64, f64)> = posteriors
+        .iter()
+        .filter_map(|(value, variance)| {
+            let information = 1.0 / variance - under_sigma.powi(-2);
+            (information > 0.0).then(|| (value / (variance * information), 1.0 / information))
+        })
+        .collect();
+    let ln_density = |sigma: f64| -> f64 {
+        let of_point = |(value, variance): &(f64, f64)| {
+            let total = sigma * sigma + variance;
+            // A bad step must not widen its own tolerance.
+            -0.5 * (total.ln() + (value * value / total).min(DOUBT_SIGMAS * DOUBT_SIGMAS))
+        };
+        let prior = -PRIOR_WEIGHT * (sigma.ln() + 0.5 * (expected / sigma).powi(2));
+        seen.iter().map(of_point).sum::<f64>() + prior
+    };
+    (-SPREADS..=SPREADS)
+        .map(|k| expected * (f64::from(k) * SPREAD_STEP).exp())
+        .max_by(|a, b| ln_density(*a).total_cmp(&ln_density(*b)))
+        .unwrap_or(expected)
+}
+
+/// Sensitivity of the fitted efficiency to the offsets, from the sensitivities of T2 to the readings and to the efficiency; `None` if T2 does
+/// not depend on the efficiency.
+pub(crate) fn coupled(slopes: &[f64; 6], by_eta: f64) -> Option<[f64; OFFSET_CHANNELS.len()]> {
+    let coupled = std::array::from_fn(|i| -slopes[i] / by_eta);
+    coupled.iter().all(|x: &f64| x.is_finite()).then_some(coupled)
+}
+
+/// Sets the noise of each step and the sensitivity of its efficiency to offsets, at the current parameters.
+pub(crate) fn set_weights(problem: &mut Problem<'_>, steps: &[StepRows], config: &IdentifyConfig) {
+    let channels = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
+    let declared: Vec<f64> = channels
+        .iter()
+        .map(|channel| config.declared.get(channel).map_or(0.0, |declared| declared.noise_sigma))
+        .collect();
+    for (i, step) in steps.iter().enumerate().take(problem.members.len()) {
+        let member = &problem.members[i];
+        let slopes = problem.setting.sensitivities(&step.end, &problem.shared, &member.local);
+        let expected: f64 = slopes.iter().zip(&declared).map(|(slope, sigma)| (slope * sigma).powi(2)).sum();
+        // Without a declaration the residual gives the noise; 0.3 mK is the error of block means.
+        let sigma_k = if expected > 0.0 {
+            expected.sqrt()
+        } else {
+            let prediction = problem.setting.predict(
+                &member.course,
+                &problem.shared,
+                &member.local,
+                &[false; SHARED],
+                false,
+            );
+            let square: f64 =
+                member.measured_k.iter().zip(&prediction.t2_k).skip(1).map(|(a, b)| (a - b).powi(2)).sum();
+            (square / (member.measured_k.len() as f64 - 3.0).max(1.0)).sqrt().max(3e-4)
+        };
+        let by_eta = problem.setting.by_efficiency(&step.end, &problem.shared, &member.local);
+        if let Some(coupled) = coupled(&slopes, by_eta).filter(|_| problem.setting.shaped) {
+            problem.members[i].coupling[BENDS..].copy_from_slice(&coupled);
+        }
+        let white_sigma_k = if expected > 0.0 { declared[1].max(0.1 * sigma_k) } else { sigma_k };
+        let terms = &problem.members[i].course.terms;
+        let surface = crate::joint::step_model::model::surface_of(&problem.shared);
+        let shape_k = |row: usize| terms.get(row).map_or(0.0, |terms| by_eta * dot(terms, surface));
+        let new = whitening(step, config, sigma_k, white_sigma_k, shape_k);
+        problem.members[i].whitening = new;
+    }
+}

@@ -1,0 +1,159 @@
+//! One step condensed to block means, with the map position of each block.
+
+use crate::IdentifyConfig;
+use crate::config::coloured;
+use crate::joint::step_model::smoothing::Smoother;
+use crate::step_data::end_state::EndState;
+use crate::step_data::samples::Samples;
+use mapper_core::{Channel, Recording, Window};
+use mapper_numerics::coloured_noise::BlockNoise;
+use mapper_numerics::statistics::mean;
+
+/// Length of the blocks over which samples are averaged before the fit, s: a quarter of the correlation time of sensor noise, and far below
+/// any time scale in a window.
+const BLOCK_S: f64 = 0.5;
+/// The same for noisy data once only the housing still changes, s: half the correlation time of sensor noise, with almost no loss of
+/// information. Without noise it would cost a thousandth of alpha_A behind a slow probe.
+const LATE_BLOCK_S: f64 = 1.0;
+/// Time from the first sample after which that applies, s: several settling times of probe and speed.
+const LATE_S: f64 = 20.0;
+
+/// Time from the first row after which lags of lines and sensors have become invisible, s.
+const SETTLED_S: f64 = 8.5;
+/// Minimum number of rows of a shortened step.
+const MIN_ROWS: usize = 20;
+
+/// Means over one block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Row {
+    pub(crate) t_s: f64,
+    pub(crate) t1_k: f64,
+    pub(crate) t2_k: f64,
+    pub(crate) tc_k: f64,
+    pub(crate) p1_pa: f64,
+    pub(crate) p2_pa: f64,
+    pub(crate) flow_kg_s: f64,
+    /// Corrected speed and flow.
+    pub(crate) place: (f64, f64),
+    pub(crate) noise: BlockNoise,
+}
+
+/// One step with the data that the fit needs.
+#[derive(Debug, Clone)]
+pub(crate) struct StepRows {
+    /// Position in the recording.
+    pub(crate) position: usize,
+    pub(crate) rows: Vec<Row>,
+    /// Means over the step's end: one additional row that is not fitted.
+    pub(crate) end: Row,
+}
+
+impl StepRows {
+    /// Returns the step without the rows in which pressures, flow and speed still follow the jump.
+    pub(crate) fn settled(&self) -> StepRows {
+        let from_s = self.rows.first().map_or(0.0, |row| row.t_s) + SETTLED_S;
+        let rows: Vec<Row> = self.rows.iter().filter(|row| row.t_s >= from_s).copied().collect();
+        StepRows { rows: if rows.len() < MIN_ROWS { self.rows.clone() } else { rows }, ..self.clone() }
+    }
+}
+
+/// Condenses the samples of a window.
+pub(crate) fn condensed(
+    recording: &Recording,
+    position: usize,
+    samples: &Samples,
+    end_state: &EndState,
+    config: &IdentifyConfig,
+) -> Option<StepRows> {
+    let step = recording.steps.get(position)?;
+    let speed = recording.series.get(&Channel::ShaftSpeed)?;
+    let mut rows = Vec::new();
+    let mut start = 0;
+    while start < samples.len() {
+        let start_s = samples.t_s[start];
+        let block_s = block_s_after(start_s - samples.t_s[0], config);
+        // Half a nanosecond: times of samples are rounded.
+        let end = samples.t_s.partition_point(|t| *t < start_s + block_s - 5e-10).max(start + 1);
+        let of = |column: &[f64]| mean(&column[start..end]).unwrap_or(f64::NAN);
+        let t_s = of(&samples.t_s);
+        let (first_s, last_s) = (samples.t_s[start], samples.t_s[end - 1]);
+        let (_, speeds) = speed.slice(first_s, last_s);
+        let speeds: Vec<f64> =
+            speeds.iter().copied().filter(|value| *value > 0.0 && value.is_finite()).collect();
+        let speed_rpm = mean(&speeds).or_else(|| speed.interpolate(t_s)).unwrap_or(end_state.speed_rpm);
+        let (t1_k, p1_pa, flow_kg_s) = (of(&samples.t1_k), of(&samples.p1_pa), of(&samples.flow_kg_s));
+        let count = (end - start) as f64;
+        let block_s = if end > start + 1 { (last_s - first_s) * count / (count - 1.0) } else { 0.0 };
+        rows.push(Row {
+            t_s,
+            t1_k,
+            t2_k: of(&samples.t2_k),
+            tc_k: of(&samples.tc_k),
+            p1_pa,
+            p2_pa: of(&samples.p2_pa),
+            flow_kg_s,
+            place: place(config, speed_rpm, flow_kg_s, t1_k, p1_pa),
+            noise: BlockNoise::of_mean(coloured(config.noise_colour), count, block_s),
+        });
+        start = end;
+    }
+    if !config.declared.is_empty() {
+        smooth(&mut rows);
+    }
+    let last = *rows.last()?;
+    let end_window = Window { start_s: step.end_s - config.thresholds.end_mean_s, end_s: step.end_s };
+    let at_end = Samples::of(recording, end_window, config, true);
+    let of = |column: &[f64], otherwise: f64| mean(column).unwrap_or(otherwise);
+    let end = Row {
+        t_s: step.end_s,
+        t1_k: end_state.t1_k,
+        t2_k: of(&at_end.t2_k, last.t2_k),
+        tc_k: of(&at_end.tc_k, last.tc_k),
+        p1_pa: end_state.p1_pa,
+        p2_pa: end_state.p1_pa * end_state.pressure_ratio,
+        flow_kg_s: end_state.flow_kg_s,
+        place: place(config, end_state.speed_rpm, end_state.flow_kg_s, end_state.t1_k, end_state.p1_pa),
+        noise: last.noise,
+    };
+    let usable = end.place.0 > 0.0 && end.place.1 > 0.0 && rows.iter().all(|row| row.place.0.is_finite());
+    usable.then_some(StepRows { position, rows, end })
+}
+
+/// Length of a block that starts at this time after the first sample, s.
+pub(crate) fn block_s_after(elapsed_s: f64, config: &IdentifyConfig) -> f64 {
+    let late = !config.declared.is_empty() && elapsed_s >= LATE_S;
+    if late { LATE_BLOCK_S } else { BLOCK_S }
+}
+
+/// Smooths T1, Tc, P1, P2, flow and the map position.
+fn smooth(rows: &mut [Row]) {
+    let t_s: Vec<f64> = rows.iter().map(|row| row.t_s).collect();
+    let smoother = Smoother::new(&t_s);
+    let mut column = |read: fn(&Row) -> f64, write: fn(&mut Row, f64)| {
+        let raw: Vec<f64> = rows.iter().map(read).collect();
+        for (row, value) in rows.iter_mut().zip(smoother.apply(&raw)) {
+            write(row, value);
+        }
+    };
+    column(|row| row.t1_k, |row, value| row.t1_k = value);
+    column(|row| row.tc_k, |row, value| row.tc_k = value);
+    column(|row| row.p1_pa, |row, value| row.p1_pa = value);
+    column(|row| row.p2_pa, |row, value| row.p2_pa = value);
+    column(|row| row.flow_kg_s, |row, value| row.flow_kg_s = value);
+    column(|row| row.place.0, |row, value| row.place.0 = value);
+    column(|row| row.place.1, |row, value| row.place.1 = value);
+}
+
+/// Corrected speed, rpm, and flow, kg/s.
+pub(crate) fn place(
+    config: &IdentifyConfig,
+    speed_rpm: f64,
+    flow_kg_s: f64,
+    t1_k: f64,
+    p1_pa: f64,
+) -> (f64, f64) {
+    (
+        config.reference.corrected_speed_rpm(speed_rpm, t1_k),
+        config.corrected_flow_kg_s(flow_kg_s, t1_k, p1_pa),
+    )
+}

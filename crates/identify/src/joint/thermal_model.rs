@@ -1,0 +1,148 @@
+//! Reports the shared parameters of a joint fit.
+
+use crate::IdentifyConfig;
+use crate::joint::fit::refinements::Refinements;
+use crate::joint::fit::solve::{Covariance, Problem};
+use crate::joint::judge;
+use crate::joint::step_model::parameters::{
+    ALPHA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS, PROBE_MM2,
+    SURFACE, symbol,
+};
+use crate::joint::step_model::rows::StepRows;
+use crate::joint::uncertainty::profile;
+use crate::joint::uncertainty::quantity::is_offset;
+use crate::joint::uncertainty::smoothness::Smoothed;
+use mapper_core::{ConvectionLaw, Entangled, EstimateUncertainty, Origin, SharedValue, ThermalModel};
+use mapper_inference::interval::IDENTIFIED_RATIO;
+
+/// Correlation above which two parameters count as entangled.
+const ENTANGLED: f64 = 0.95;
+
+/// Collects the shared parameters.
+pub(crate) fn thermal_model(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    smoothed: &Smoothed,
+    refinements: Option<&Refinements>,
+    steps: &[StepRows],
+    config: &IdentifyConfig,
+) -> ThermalModel {
+    let of = |index: usize, transform: &dyn Fn(f64) -> f64| {
+        value(problem, covariance, smoothed, refinements, index, transform)
+    };
+    let reynolds: Vec<f64> = steps
+        .iter()
+        .zip(&problem.members)
+        .map(|(step, member)| {
+            problem.setting.reynolds_reference
+                * problem.setting.h_at_end(&step.end, &problem.shared, &member.local).1.exp()
+        })
+        .collect();
+    let range = reynolds.iter().fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(*x), high.max(*x)));
+    let deviations: f64 = problem.members.iter().map(|member| member.local[LN_DEVIATION].powi(2)).sum();
+    let reference = problem.setting.reynolds_reference;
+    let exponent = problem.shared[EXPONENT];
+    let convection = problem.setting.with_law.then(|| ConvectionLaw {
+        diameter_m: problem.setting.outlet_diameter_m,
+        coefficient: of(LN_COEFFICIENT, &|x| x.exp() * reference.powf(-exponent)),
+        exponent: of(EXPONENT, &|x| x),
+        reynolds_reference: reference,
+        reynolds_range: range,
+        deviation_ratio: (deviations / (problem.members.len() as f64).max(1.0)).sqrt(),
+    });
+    let mut entangled = Vec::new();
+    for (row, a) in covariance.fitted.iter().enumerate() {
+        for (column, b) in covariance.fitted.iter().enumerate().skip(row + 1) {
+            if *a >= SURFACE || *b >= SURFACE {
+                continue;
+            }
+            let correlation = covariance.shared[(row, column)]
+                / (covariance.shared[(row, row)] * covariance.shared[(column, column)]).sqrt();
+            if correlation.abs() > ENTANGLED {
+                entangled.push(Entangled { first: symbol(*a), second: symbol(*b), correlation });
+            }
+        }
+    }
+    ThermalModel {
+        convection,
+        internal_area_m2: problem.setting.internal_area_m2,
+        alpha_area_ratio: of(ALPHA, &|x| x),
+        alpha_area_profile: profile::alpha_area(problem),
+        inlet: problem.inlet,
+        probe_diameter_m: probe(problem, covariance),
+        direction_factor: of(LN_DIRECTION, &f64::exp),
+        offsets: OFFSET_CHANNELS
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| problem.active[OFFSETS + i])
+            .map(|(i, channel)| (*channel, of(OFFSETS + i, &|x| x)))
+            .collect(),
+        entangled,
+        doubts: judge::doubts(problem, covariance, smoothed, refinements, config),
+    }
+}
+
+/// A reported parameter; `transform` converts from the fitted to the reported form.
+fn value(
+    problem: &Problem<'_>,
+    covariance: &Covariance,
+    smoothed: &Smoothed,
+    refinements: Option<&Refinements>,
+    index: usize,
+    transform: &dyn Fn(f64) -> f64,
+) -> SharedValue {
+    let Some(row) = covariance.row_of(index) else {
+        return SharedValue::assumed(transform(problem.shared[index]));
+    };
+    let (shift, sigma) = smoothed.shared[row];
+    let fitted = problem.shared[index] + shift;
+    let reported = transform(fitted);
+    let variance = sigma * sigma;
+    let slope = (transform(fitted + 1e-6) - transform(fitted - 1e-6)) / 2e-6;
+    let mut bias = 0.0;
+    for (other, index) in covariance.fitted.iter().enumerate() {
+        if (OFFSETS..SURFACE).contains(index) {
+            bias += covariance.shared[(row, other)].powi(2) * problem.priors[*index].weight();
+        }
+    }
+    let beforehand = problem.priors[index].sigma;
+    // For a parameter with a prior, use the error from the recording alone.
+    let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
+    let uninformed = known > IDENTIFIED_RATIO * beforehand;
+    let is_offset = is_offset(index);
+    SharedValue {
+        // An offset has its declared spread even if the recording adds nothing.
+        value: (!uninformed || is_offset).then_some(reported),
+        uncertainty: EstimateUncertainty {
+            noise_standard_error: slope.abs() * (variance - bias.min(variance)).max(0.0).sqrt(),
+            bias_standard_error: slope.abs() * bias.min(variance).sqrt(),
+        },
+        origin: if uninformed { Origin::NotIdentifiable } else { Origin::Fitted },
+    }
+}
+
+/// The probe's diameter. Its square is fitted, which is 0 for an ideal probe: the error is then the largest probe that noise could hide.
+fn probe(problem: &Problem<'_>, covariance: &Covariance) -> SharedValue {
+    let square = problem.shared[PROBE_MM2].max(0.0);
+    if !problem.probe_fitted {
+        return SharedValue::assumed(1e-3 * square.sqrt());
+    }
+    let sigma = covariance.error_of(PROBE_MM2).or_else(|| {
+        let mut free = problem.clone();
+        free.active[PROBE_MM2] = true;
+        free.covariance()?.error_of(PROBE_MM2)
+    });
+    let Some(sigma) = sigma else {
+        return SharedValue {
+            value: None,
+            uncertainty: EstimateUncertainty::default(),
+            origin: Origin::NotIdentifiable,
+        };
+    };
+    let error_m = 1e-3 * ((square + sigma).sqrt() - square.sqrt());
+    SharedValue {
+        value: (sigma < IDENTIFIED_RATIO * problem.priors[PROBE_MM2].sigma).then_some(1e-3 * square.sqrt()),
+        uncertainty: EstimateUncertainty { noise_standard_error: error_m, bias_standard_error: 0.0 },
+        origin: Origin::Fitted,
+    }
+}

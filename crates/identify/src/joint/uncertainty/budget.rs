@@ -1,0 +1,148 @@
+//! Contributions of the sources of uncertainty to a number of the joint fit.
+//!
+//! The posterior is linearised at the fit. Declared errors of readings are independent of each other and of everything else, so each contributes
+//! its sensitivity, as the smoothness prior leaves it, times its declared size. alpha_A, probe and direction factor are correlated: each
+//! contributes what the ones before it do not explain (Cholesky factor of their covariance). The step's own noise, with the scatter of its h
+//! about the law, comes next. The rest is due to the shared law of h and the shape of the map, which the noise of all steps leaves open.
+
+use crate::joint::fit::refinements::{Gain, Refinements};
+use crate::joint::fit::solve::Covariance;
+use crate::joint::step_model::parameters::{
+    BAROMETER, FLOW_GAIN, GAINS, HUMIDITY, INLET, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, SURFACE, symbol,
+};
+use crate::joint::uncertainty::quantity::Quantity;
+use mapper_core::BudgetRow;
+use nalgebra::DVector;
+
+/// Names of the sources that are not shared parameters.
+const NOISE: &str = "noise of the step, scatter about the law of h";
+const LAW: &str = "law of h and shape of the map";
+const NEUTRAL: &str = "alpha_A, probe and direction factor taken for neutral";
+
+/// Unit of a source that is given in the unit of the number.
+const OWN_UNIT: &str = "of the number";
+
+/// What the smoothness prior does to a number: weight, and the pull of each point's efficiency.
+pub(crate) type Pull = (f64, DVector<f64>);
+
+/// A number with its error after smoothing: without the excess of the interval over the mixture, and that excess.
+pub(crate) struct Stated {
+    pub(crate) error: f64,
+    pub(crate) added: f64,
+    /// Degrees of freedom of the step's noise.
+    pub(crate) degrees_of_freedom: f64,
+}
+
+/// The rows of a number. `step`: its position among `etas`.
+pub(crate) fn rows(
+    covariance: &Covariance,
+    refined: Option<(&Refinements, &Gain)>,
+    (quantity, etas, step): (&Quantity, &[Quantity], usize),
+    pulls: &[Pull],
+    stated: &Stated,
+) -> Vec<BudgetRow> {
+    let mut rows = Vec::new();
+    let mut left = stated.error * stated.error;
+    let mut push = |source: String, sigma: f64, unit: &str, contribution: f64, freedom: Option<f64>| {
+        left = (left - contribution * contribution).max(0.0);
+        if sigma > 0.0 && contribution != 0.0 {
+            rows.push(BudgetRow {
+                source,
+                standard_uncertainty: sigma,
+                unit: unit.to_owned(),
+                sensitivity: contribution / sigma,
+                contribution,
+                degrees_of_freedom: freedom,
+            });
+        }
+        left
+    };
+    for (row, index) in covariance.fitted.iter().enumerate() {
+        if (OFFSETS..SURFACE).contains(index) {
+            let sigma = covariance.shared[(row, row)].sqrt();
+            let contribution = through(quantity, etas, pulls, |of| of.by_shared[row] / sigma);
+            push(symbol(*index), sigma, unit(*index), contribution, None);
+        }
+    }
+    for (name, sigma, contribution, unit) in refinement_rows(refined, quantity) {
+        push(name, sigma, unit, contribution, None);
+    }
+    let own = pulls
+        .iter()
+        .map(|(weight, pull)| {
+            let pull = pull[step];
+            let moved = pull * (pull * etas[step].own_variance - 2.0 * quantity.own_with_eta);
+            weight * (quantity.own_variance + moved)
+        })
+        .sum::<f64>();
+    let own = if pulls.is_empty() { quantity.own_variance } else { own };
+    let before = push(String::new(), 0.0, "", 0.0, None);
+    let noise = own.clamp(0.0, before).sqrt();
+    let rest = push(NOISE.to_owned(), noise, OWN_UNIT, noise, Some(stated.degrees_of_freedom)).sqrt();
+    push(LAW.to_owned(), rest, OWN_UNIT, rest, None);
+    push(NEUTRAL.to_owned(), stated.added.abs(), OWN_UNIT, stated.added, None);
+    rows
+}
+
+/// A row of ln of a number as one of the number itself.
+pub(crate) fn in_unit(row: BudgetRow, number: f64, unit: &str) -> BudgetRow {
+    let (scale, unit) = if row.unit == OWN_UNIT { (number, unit.to_owned()) } else { (1.0, row.unit) };
+    let (standard_uncertainty, contribution) = (scale * row.standard_uncertainty, number * row.contribution);
+    BudgetRow {
+        standard_uncertainty,
+        contribution,
+        sensitivity: contribution / standard_uncertainty,
+        unit,
+        ..row
+    }
+}
+
+/// A linear function of a number after smoothing, rms over the choices of the prior, with the sign of the mean.
+fn through(quantity: &Quantity, etas: &[Quantity], pulls: &[Pull], of: impl Fn(&Quantity) -> f64) -> f64 {
+    if pulls.is_empty() {
+        return of(quantity);
+    }
+    let all: Vec<f64> = etas.iter().map(&of).collect();
+    let after = |pull: &DVector<f64>| of(quantity) - pull.iter().zip(&all).map(|(a, b)| a * b).sum::<f64>();
+    let (mean, square) = pulls.iter().fold((0.0, 0.0), |(mean, square), (weight, pull)| {
+        let share = after(pull);
+        (mean + weight * share, square + weight * share * share)
+    });
+    square.sqrt().copysign(mean)
+}
+
+/// Name, standard uncertainty, contribution and unit of each parameter that may be neutral.
+fn refinement_rows(
+    refined: Option<(&Refinements, &Gain)>,
+    quantity: &Quantity,
+) -> Vec<(String, f64, f64, &'static str)> {
+    let Some((refinements, gain)) = refined else { return Vec::new() };
+    let Some(covariance) = refinements.mixture.covariance() else { return Vec::new() };
+    let answer = gain.0.tr_mul(&quantity.answer);
+    // A parameter that is neutral for certain has no variance.
+    let open: Vec<usize> = (0..covariance.nrows()).filter(|k| covariance[(*k, *k)] > 0.0).collect();
+    let part = nalgebra::DMatrix::from_fn(open.len(), open.len(), |a, b| covariance[(open[a], open[b])]);
+    let Some(factor) = part.cholesky() else { return Vec::new() };
+    let lower = factor.l();
+    let contribution = |k: usize| (k..open.len()).map(|a| lower[(a, k)] * answer[open[a]]).sum::<f64>();
+    open.iter()
+        .enumerate()
+        .map(|(k, place)| {
+            let index = refinements.indices[*place];
+            let unit = if index == PROBE_MM2 { "mm2" } else { "1" };
+            (symbol(index), covariance[(*place, *place)].sqrt(), contribution(k), unit)
+        })
+        .collect()
+}
+
+/// Unit of a declared error.
+fn unit(index: usize) -> &'static str {
+    match index {
+        BAROMETER => "Pa",
+        HUMIDITY => "kg/kg",
+        FLOW_GAIN | GAINS..BAROMETER | INLET => "1",
+        _ => OFFSET_CHANNELS
+            .get(index.wrapping_sub(OFFSETS))
+            .map_or("1", |channel| channel.info().dimension.unit()),
+    }
+}

@@ -1,0 +1,130 @@
+//! Effect of each sensor's declared uncertainty on T2 and on the fitted parameters.
+//!
+//! Linearised: a sensor offset changes the fitted T2 by its sensitivity. The parameters respond as to the same change of the measured T2, with
+//! opposite sign. Sensors are independent, so squares add.
+
+use crate::IdentifyConfig;
+use crate::single_step::fit::{Fit, Geometry, Row, rows, t2_k};
+use crate::step_data::samples::Samples;
+use mapper_core::Channel;
+use mapper_physics::laws::compression::isentropic_rise_ratio;
+
+/// The channels that enter eqs. 1-3.
+const ENTERING: [Channel; 6] =
+    [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2, Channel::CompressorFlow];
+
+/// Effect of the declared uncertainties.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct DeclaredEffect {
+    /// Standard errors of eta and h from fixed offsets and gains.
+    pub(crate) bias_standard_errors: [f64; 2],
+    /// Signed effect of one standard deviation of each offset, each gain and the assumed alpha_A, which all points share. The order depends on
+    /// the declaration alone.
+    pub(crate) common: [Vec<f64>; 2],
+    /// Effect of the assumed alpha_A on eta and h, one standard deviation.
+    pub(crate) assumed_alpha: [f64; 2],
+    /// Variance of (measured minus fitted T2) from sample noise, K2. It is an upper bound for a probe with inertia, which smooths the
+    /// gas-temperature noise from the other channels.
+    pub(crate) noise_k2: f64,
+}
+
+/// Sums over all declared sensors.
+pub(crate) fn declared_effect(
+    fit: &Fit,
+    samples: &Samples,
+    geometry: Geometry,
+    config: &IdentifyConfig,
+) -> DeclaredEffect {
+    let mut effect = DeclaredEffect::default();
+    let mut squares = [0.0; 2];
+    for channel in ENTERING {
+        let Some(declared) = config.declared.get(&channel) else { continue };
+        let values = column(samples, channel);
+        let sensitivity = sensitivity(fit, samples, geometry, channel);
+        let read = |change_k: Vec<f64>| {
+            // The probe's lag does not act on its own offset.
+            let change_k = if channel == Channel::T2 { change_k } else { fit.read(change_k) };
+            fit.response(change_k.into_iter())
+        };
+        let responses = [
+            read(sensitivity.iter().map(|s| s * declared.offset_sigma).collect()),
+            read(sensitivity.iter().zip(values).map(|(s, v)| s * v * declared.gain_sigma_ratio).collect()),
+        ];
+        for (response, sigma) in responses.into_iter().zip([declared.offset_sigma, declared.gain_sigma_ratio])
+        {
+            squares[0] += response[0] * response[0];
+            squares[1] += response[1] * response[1];
+            if sigma > 0.0 {
+                effect.push(response);
+            }
+        }
+        let mean_square = sensitivity.iter().map(|s| s * s).sum::<f64>() / samples.len().max(1) as f64;
+        effect.noise_k2 += mean_square * declared.noise_sigma * declared.noise_sigma;
+    }
+    effect.bias_standard_errors = squares.map(f64::sqrt);
+    if config.alpha_area_sigma_ratio > 0.0 {
+        // The effect of another alpha_A equals that of the same error of the measured T2.
+        let fitted_k = |row: Row, by: f64| {
+            let geometry = Geometry { alpha_area_ratio: geometry.alpha_area_ratio + by, ..geometry };
+            t2_k(geometry, row, fit.eta, fit.h_w_m2k)
+        };
+        // Step towards the middle, so that the share stays valid.
+        let away = if geometry.alpha_area_ratio > 0.5 { -1.0 } else { 1.0 };
+        let sigma = away * config.alpha_area_sigma_ratio;
+        let moved_k = rows(samples).map(|row| fitted_k(row, sigma) - fitted_k(row, 0.0)).collect();
+        effect.assumed_alpha = fit.response(fit.read(moved_k).into_iter());
+        effect.push(effect.assumed_alpha);
+    }
+    effect
+}
+
+impl DeclaredEffect {
+    fn push(&mut self, response: [f64; 2]) {
+        for (common, change) in self.common.iter_mut().zip(response) {
+            common.push(change);
+        }
+    }
+}
+
+fn column(samples: &Samples, channel: Channel) -> &[f64] {
+    match channel {
+        Channel::T1 => &samples.t1_k,
+        Channel::Tc => &samples.tc_k,
+        Channel::P1 => &samples.p1_pa,
+        Channel::P2 => &samples.p2_pa,
+        Channel::CompressorFlow => &samples.flow_kg_s,
+        _ => &samples.t2_k,
+    }
+}
+
+/// Derivative of (measured minus fitted T2) by the reading of a channel, per row.
+fn sensitivity(fit: &Fit, samples: &Samples, geometry: Geometry, channel: Channel) -> Vec<f64> {
+    if channel == Channel::T2 {
+        return vec![1.0; samples.len()];
+    }
+    let fitted_k = |row: Row| t2_k(geometry, row, fit.eta, fit.h_w_m2k);
+    rows(samples)
+        .enumerate()
+        .map(|(i, row)| {
+            let reading = column(samples, channel)[i];
+            let step = 1e-5 * reading;
+            let moved = |by: f64| {
+                let pressures = match channel {
+                    Channel::P1 => samples.p2_pa[i] / (samples.p1_pa[i] + by),
+                    Channel::P2 => (samples.p2_pa[i] + by) / samples.p1_pa[i],
+                    _ => samples.p2_pa[i] / samples.p1_pa[i],
+                };
+                match channel {
+                    Channel::Tc => Row { tc_k: row.tc_k + by, ..row },
+                    Channel::CompressorFlow => Row { flow_kg_s: row.flow_kg_s + by, ..row },
+                    Channel::T1 => {
+                        let t1_k = row.t1_k + by;
+                        Row { t1_k, rise_ratio: isentropic_rise_ratio(pressures, t1_k, geometry.air), ..row }
+                    }
+                    _ => Row { rise_ratio: isentropic_rise_ratio(pressures, row.t1_k, geometry.air), ..row },
+                }
+            };
+            -(fitted_k(moved(step)) - fitted_k(moved(-step))) / (2.0 * step)
+        })
+        .collect()
+}

@@ -1,0 +1,91 @@
+//! Uncertainty budgets of a point.
+
+use crate::IdentifyConfig;
+use crate::config::coloured;
+use crate::single_step::dynamic::Estimate;
+use mapper_core::{
+    BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, Recording, StepMarker,
+    UncertaintyBudget, half_width_95,
+};
+
+/// A source that is known in the unit of the number only.
+pub(crate) fn own_row(source: &str, contribution: f64, unit: &str) -> BudgetRow {
+    BudgetRow {
+        source: source.to_owned(),
+        standard_uncertainty: contribution.abs(),
+        unit: unit.to_owned(),
+        sensitivity: 1.0_f64.copysign(contribution),
+        contribution,
+        degrees_of_freedom: None,
+    }
+}
+
+/// The budgets of a point from its estimate.
+pub(crate) fn of_point(
+    point: &IdentifiedPoint,
+    estimate: &Estimate,
+    (recording, step): (&Recording, &StepMarker),
+    config: &IdentifyConfig,
+) -> PointBudgets {
+    let of =
+        |value: Option<f64>, low: Option<f64>, high: Option<f64>, rows: &[BudgetRow], error, unit: &str| {
+            let rows = if rows.is_empty() { by_origin(error?, unit) } else { rows.to_vec() };
+            Some(UncertaintyBudget::of(value?, rows, 0.5 * (high? - low?)))
+        };
+    let [eta, h] = &estimate.budgets;
+    PointBudgets {
+        step: point.step,
+        eta: of(point.eta, point.eta_low, point.eta_high, eta, point.eta_uncertainty, "1"),
+        h_w_m2k: of(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, h, point.h_uncertainty, "W/(m2 K)"),
+        pressure_ratio: pressure_ratio(point, (recording, step), config),
+    }
+}
+
+/// The two origins that every method gives.
+fn by_origin(error: EstimateUncertainty, unit: &str) -> Vec<BudgetRow> {
+    vec![
+        own_row("noise", error.noise_standard_error, unit),
+        own_row("declared errors of the sensors, assumptions", error.bias_standard_error, unit),
+    ]
+}
+
+fn pressure_ratio(
+    point: &IdentifiedPoint,
+    (recording, step): (&Recording, &StepMarker),
+    config: &IdentifyConfig,
+) -> UncertaintyBudget {
+    let (ratio, p1_pa) = (point.pressure_ratio, point.p1_pa);
+    let p2_pa = ratio * p1_pa;
+    let mut rows = Vec::new();
+    let mut push = |source: String, sigma: f64, unit: &str, sensitivity: f64| {
+        if sigma > 0.0 {
+            rows.push(BudgetRow {
+                source,
+                standard_uncertainty: sigma,
+                unit: unit.to_owned(),
+                sensitivity,
+                contribution: sensitivity * sigma,
+                degrees_of_freedom: None,
+            });
+        }
+    };
+    let start_s = step.end_s - config.thresholds.end_mean_s;
+    for (channel, reading_pa, by_reading) in
+        [(Channel::P1, p1_pa, -ratio / p1_pa), (Channel::P2, p2_pa, ratio / p2_pa)]
+    {
+        let declared = config.declared.get(&channel).copied().unwrap_or_default();
+        push(format!("offset of {channel}"), declared.offset_sigma, "Pa", by_reading);
+        push(format!("gain of {channel}"), declared.gain_sigma_ratio, "1", by_reading * reading_pa);
+        let samples =
+            recording.series.get(&channel).map_or(1, |series| series.range(start_s, step.end_s).len());
+        let mean =
+            coloured(config.noise_colour).variance_of_mean(samples, config.thresholds.end_mean_s).sqrt();
+        push(format!("noise of {channel}"), declared.noise_sigma * mean, "Pa", by_reading);
+    }
+    push("barometer".to_owned(), config.barometer_sigma_pa, "Pa", (1.0 - ratio) / p1_pa);
+    let mut budget = UncertaintyBudget::of(ratio, rows, 0.0);
+    let half = half_width_95(budget.combined_standard_uncertainty());
+    budget.expanded_uncertainty = half;
+    budget.coverage_factor = half_width_95(1.0);
+    budget
+}

@@ -1,0 +1,315 @@
+//! The two-parameter fit: efficiency and heat-transfer coefficient, constant over the window, by least squares on T2
+//! with eqs. 1-3 of the paper and the measured T1, Tc, flow and pressure ratio, read through the declared probe.
+
+use crate::IdentifyConfig;
+use crate::single_step::probe_reading::{Followed, Probe};
+use crate::step_data::samples::Samples;
+use mapper_core::InletConvection;
+use mapper_physics::gas::air::Air;
+use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
+use mapper_physics::laws::inlet_convection::InletLaw;
+use mapper_physics::machine::params::Params;
+use rmpfit::{MPConfig, MPFitter, MPPar, MPResult, MPSide};
+
+/// Search range of the efficiency, fraction. Above 1 is impossible and is reported; the fit may go there to show it.
+pub(crate) const ETA_BOUNDS: (f64, f64) = (0.05, 2.0);
+/// Search range of the heat-transfer coefficient, W/(m2 K).
+pub(crate) const H_BOUNDS_W_M2K: (f64, f64) = (0.0, 1e5);
+/// Relative step of the two-sided derivatives: rounding and curvature are both below 1e-9 there.
+const DERIVATIVE_STEP_RATIO: f64 = 1e-5;
+/// Scale of steps and bounds for h near zero, W/(m2 K).
+const DERIVATIVE_STEP_H_W_M2K: f64 = 1e-2;
+
+/// Parameters of eqs. 1-3 in addition to the samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Geometry {
+    pub(crate) alpha_area_ratio: f64,
+    pub(crate) internal_area_m2: f64,
+    /// The law of h before the wheel, if it differs from h.
+    pub(crate) inlet: Option<InletLaw>,
+    pub(crate) probe: Probe,
+    pub(crate) air: Air,
+}
+
+impl Geometry {
+    /// As declared. The exponent of the inlet's law is that of Appendix A: a single step does not determine one.
+    pub(crate) fn of(config: &IdentifyConfig) -> Self {
+        let own = InletLaw {
+            exponent: Params::default().compressor.nusselt_exponent,
+            inlet_diameter_m: config.inlet_diameter_m,
+            outlet_diameter_m: config.outlet_diameter_m,
+        };
+        Geometry {
+            alpha_area_ratio: config.alpha_area_ratio,
+            internal_area_m2: config.internal_area_m2,
+            inlet: (config.inlet_convection == InletConvection::Own).then_some(own),
+            probe: Probe { diameter_m: config.probe_diameter_m, pipe_diameter_m: config.outlet_diameter_m },
+            air: config.air,
+        }
+    }
+
+    /// Ratio of h before the wheel to h after it.
+    fn inlet_h_ratio(&self, row: Row, eta: f64) -> f64 {
+        let bulk_k = || compressed_k(row.t1_k, row.rise_ratio, eta, self.air);
+        self.inlet.map_or(1.0, |law| law.h_ratio(row.t1_k, bulk_k()))
+    }
+}
+
+/// A fit with the data needed to judge it.
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    pub(crate) eta: f64,
+    pub(crate) h_w_m2k: f64,
+    /// Measured minus fitted T2, K.
+    pub(crate) residual_k: Vec<f64>,
+    /// Derivatives of the probe's reading by eta (K) and by h (K m2 K/W), after projecting out its first reading.
+    pub(crate) jacobian: [Vec<f64>; 2],
+    /// Derivative of the gas's own T2 by h, K m2 K/W.
+    pub(crate) gas_by_h: Vec<f64>,
+    /// Response of the probe to the gas; `None` without inertia.
+    pub(crate) followed: Option<Followed>,
+    /// `(J'J)^-1`.
+    pub(crate) inverse_normal: [[f64; 2]; 2],
+}
+
+impl Fit {
+    /// The probe's response to a change of the gas's T2.
+    pub(crate) fn read(&self, gas_change_k: Vec<f64>) -> Vec<f64> {
+        match &self.followed {
+            Some(followed) => followed.read(&gas_change_k),
+            None => gas_change_k,
+        }
+    }
+
+    /// Parameter change due to a change of the reading: `(J'J)^-1 J' y`.
+    pub(crate) fn response(&self, t2_change_k: impl Iterator<Item = f64>) -> [f64; 2] {
+        let mut right = [0.0; 2];
+        for (i, change_k) in t2_change_k.enumerate() {
+            right[0] += self.jacobian[0][i] * change_k;
+            right[1] += self.jacobian[1][i] * change_k;
+        }
+        let g = &self.inverse_normal;
+        [g[0][0] * right[0] + g[0][1] * right[1], g[1][0] * right[0] + g[1][1] * right[1]]
+    }
+
+    /// Root mean square of the residual, K.
+    pub(crate) fn residual_rms_k(&self) -> f64 {
+        let sum: f64 = self.residual_k.iter().map(|r| r * r).sum();
+        (sum / self.residual_k.len().max(1) as f64).sqrt()
+    }
+
+    /// Name of a parameter on its bound, if any.
+    pub(crate) fn at_bound(&self) -> Option<String> {
+        let near = |value: f64, bound: f64, size: f64| (value - bound).abs() < 1e-6 * size;
+        if near(self.eta, ETA_BOUNDS.0, 1.0) || near(self.eta, ETA_BOUNDS.1, 1.0) {
+            return Some(format!("the efficiency at {:.3}", self.eta));
+        }
+        if near(self.h_w_m2k, H_BOUNDS_W_M2K.0, 1e3) || near(self.h_w_m2k, H_BOUNDS_W_M2K.1, 1e5) {
+            return Some(format!("the heat-transfer coefficient at {:.0} W/(m2 K)", self.h_w_m2k));
+        }
+        None
+    }
+}
+
+/// T2 by eqs. 1-3 for one row, K.
+#[inline]
+pub(crate) fn t2_k(geometry: Geometry, row: Row, eta: f64, h_w_m2k: f64) -> f64 {
+    let inputs = CompressionInputs {
+        t1_k: row.t1_k,
+        tc_k: row.tc_k,
+        flow_kg_s: row.flow_kg_s,
+        isentropic_rise_ratio: row.rise_ratio,
+        efficiency: eta,
+        h_w_m2k,
+        inlet_h_ratio: geometry.inlet_h_ratio(row, eta),
+        alpha_area_ratio: geometry.alpha_area_ratio,
+        internal_area_m2: geometry.internal_area_m2,
+        air: geometry.air,
+    };
+    compress(&inputs, None).t2_k
+}
+
+/// Inputs of eqs. 1-3 from one sample.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub(crate) t1_k: f64,
+    pub(crate) tc_k: f64,
+    pub(crate) flow_kg_s: f64,
+    pub(crate) rise_ratio: f64,
+}
+
+/// The rows of the samples in order.
+pub(crate) fn rows(samples: &Samples) -> impl Iterator<Item = Row> + '_ {
+    let pairs = samples.t1_k.iter().zip(&samples.tc_k).zip(&samples.flow_kg_s).zip(&samples.rise_ratio);
+    pairs.map(|(((t1_k, tc_k), flow_kg_s), rise_ratio)| Row {
+        t1_k: *t1_k,
+        tc_k: *tc_k,
+        flow_kg_s: *flow_kg_s,
+        rise_ratio: *rise_ratio,
+    })
+}
+
+struct Problem<'a> {
+    samples: &'a Samples,
+    geometry: Geometry,
+    followed: Option<&'a Followed>,
+    config: MPConfig,
+    parameters: [MPPar; 2],
+}
+
+impl MPFitter for Problem<'_> {
+    fn eval(&mut self, parameters: &[f64], deviates: &mut [f64]) -> MPResult<()> {
+        let [eta, h_w_m2k] = [parameters[0], parameters[1]];
+        let gas_k = rows(self.samples).map(|row| t2_k(self.geometry, row, eta, h_w_m2k));
+        let measured_k = &self.samples.t2_k;
+        match self.followed {
+            None => {
+                for ((deviate, gas_k), measured_k) in deviates.iter_mut().zip(gas_k).zip(measured_k) {
+                    *deviate = measured_k - gas_k;
+                }
+            }
+            Some(followed) => {
+                let read_k = followed.read(&gas_k.collect::<Vec<f64>>());
+                for ((deviate, read_k), measured_k) in deviates.iter_mut().zip(read_k).zip(measured_k) {
+                    *deviate = measured_k - read_k;
+                }
+                followed.without_first_reading(deviates);
+            }
+        }
+        Ok(())
+    }
+
+    fn number_of_points(&self) -> usize {
+        self.samples.len()
+    }
+
+    fn config(&self) -> &MPConfig {
+        &self.config
+    }
+
+    fn parameters(&self) -> &[MPPar] {
+        &self.parameters
+    }
+}
+
+fn parameter((low, high): (f64, f64), step: f64, rel_step: f64) -> MPPar {
+    MPPar {
+        limited_low: true,
+        limited_up: true,
+        limit_low: low,
+        limit_up: high,
+        side: MPSide::Both,
+        step,
+        rel_step,
+        ..MPPar::new()
+    }
+}
+
+/// The least-squares fit; `None` if it does not converge (or for fewer than 3 samples).
+pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
+    if samples.len() < 3 {
+        return None;
+    }
+    let mut parameters = start(samples, geometry);
+    let followed = Followed::of(samples, geometry.probe);
+    let mut problem = Problem {
+        samples,
+        geometry,
+        followed: followed.as_ref(),
+        config: MPConfig { ftol: 1e-15, xtol: 1e-13, gtol: 1e-14, max_iter: 100, ..MPConfig::new() },
+        parameters: [
+            parameter(ETA_BOUNDS, 0.0, DERIVATIVE_STEP_RATIO),
+            parameter(H_BOUNDS_W_M2K, DERIVATIVE_STEP_H_W_M2K, 0.0),
+        ],
+    };
+    let status = problem.mpfit(&mut parameters).ok()?;
+    let [eta, h_w_m2k] = parameters;
+    if !(eta.is_finite() && h_w_m2k.is_finite()) {
+        return None;
+    }
+    judged(samples, geometry, followed, [eta, h_w_m2k], status.resid)
+}
+
+/// Residual, derivatives and normal matrix at given parameters.
+fn judged(
+    samples: &Samples,
+    geometry: Geometry,
+    followed: Option<Followed>,
+    [eta, h_w_m2k]: [f64; 2],
+    residual_k: Vec<f64>,
+) -> Option<Fit> {
+    let step_eta = DERIVATIVE_STEP_RATIO * eta;
+    let step_h = DERIVATIVE_STEP_H_W_M2K.max(DERIVATIVE_STEP_RATIO * h_w_m2k);
+    let mut jacobian = [Vec::with_capacity(samples.len()), Vec::with_capacity(samples.len())];
+    for row in rows(samples) {
+        let by_eta = (t2_k(geometry, row, eta + step_eta, h_w_m2k)
+            - t2_k(geometry, row, eta - step_eta, h_w_m2k))
+            / (2.0 * step_eta);
+        let by_h = (t2_k(geometry, row, eta, h_w_m2k + step_h) - t2_k(geometry, row, eta, h_w_m2k - step_h))
+            / (2.0 * step_h);
+        jacobian[0].push(by_eta);
+        jacobian[1].push(by_h);
+    }
+    let gas_by_h = jacobian[1].clone();
+    if let Some(followed) = &followed {
+        for column in &mut jacobian {
+            *column = followed.read(column);
+            followed.without_first_reading(column);
+        }
+    }
+    let product = |i: usize, j: usize| jacobian[i].iter().zip(&jacobian[j]).map(|(a, b)| a * b).sum::<f64>();
+    let crossed = product(0, 1);
+    let inverse_normal = inverted([[product(0, 0), crossed], [crossed, product(1, 1)]])?;
+    Some(Fit { eta, h_w_m2k, residual_k, jacobian, gas_by_h, followed, inverse_normal })
+}
+
+/// Inverse of a symmetric positive definite matrix; `None` if it is numerically singular.
+pub(crate) fn inverted(m: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
+    let determinant = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+    let usable = determinant.is_finite() && determinant > 1e-13 * m[0][0] * m[1][1];
+    usable.then(|| {
+        [[m[1][1] / determinant, -m[0][1] / determinant], [-m[1][0] / determinant, m[0][0] / determinant]]
+    })
+}
+
+/// Start values: with the measured T2 in the heat terms, eqs. 1-3 are linear in 1/eta and h except for one product, which takes 1/eta from the
+/// temperature rise.
+fn start(samples: &Samples, geometry: Geometry) -> [f64; 2] {
+    let (mut rise_k, mut isentropic_k) = (0.0, 0.0);
+    for (row, t2_k) in rows(samples).zip(&samples.t2_k) {
+        rise_k += t2_k - row.t1_k;
+        isentropic_k += row.t1_k * row.rise_ratio;
+    }
+    let apparent = (rise_k / isentropic_k).clamp(1.0, 4.0);
+    let mut normal = [[0.0; 2]; 2];
+    let mut right = [0.0; 2];
+    for (row, t2_k) in rows(samples).zip(&samples.t2_k) {
+        let before = geometry.inlet_h_ratio(row, 1.0 / apparent)
+            * geometry.alpha_area_ratio
+            * geometry.internal_area_m2
+            / (row.flow_kg_s * geometry.air.heat_capacity_j_kgk(row.t1_k));
+        let after = (1.0 - geometry.alpha_area_ratio) * geometry.internal_area_m2
+            / (row.flow_kg_s * geometry.air.heat_capacity_j_kgk(*t2_k));
+        let columns = [
+            row.t1_k * row.rise_ratio,
+            before * (row.tc_k - row.t1_k) * (1.0 + row.rise_ratio * apparent) + after * (row.tc_k - t2_k),
+        ];
+        for i in 0..2 {
+            right[i] += columns[i] * (t2_k - row.t1_k);
+            for j in 0..2 {
+                normal[i][j] += columns[i] * columns[j];
+            }
+        }
+    }
+    let inside = |value: f64, (low, high): (f64, f64), fallback: f64| {
+        if value.is_finite() && value > low && value < high { value } else { fallback }
+    };
+    let [inverse_eta, h_w_m2k] = match inverted(normal) {
+        Some(g) => [g[0][0] * right[0] + g[0][1] * right[1], g[1][0] * right[0] + g[1][1] * right[1]],
+        None => [apparent, f64::NAN],
+    };
+    [
+        inside(1.0 / inverse_eta, ETA_BOUNDS, (1.0 / apparent).clamp(0.25, 1.0)),
+        inside(h_w_m2k, H_BOUNDS_W_M2K, 500.0),
+    ]
+}

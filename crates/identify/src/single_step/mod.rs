@@ -1,0 +1,13 @@
+//! Identification of efficiency and heat transfer from one step alone, with uncertainties and expected results.
+
+pub(crate) mod bias;
+pub(crate) mod budgets;
+pub(crate) mod covariance;
+pub(crate) mod dynamic;
+pub(crate) mod expected;
+pub(crate) mod fit;
+pub(crate) mod flow_drift;
+pub(crate) mod probe;
+pub(crate) mod probe_reading;
+pub(crate) mod steady;
+pub(crate) mod t2_course;

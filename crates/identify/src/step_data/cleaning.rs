@@ -1,0 +1,111 @@
+//! Removes samples that are not measurements: spikes, and constant readings of a channel with declared noise.
+
+use crate::IdentifyConfig;
+use crate::step_data::samples::Samples;
+use crate::step_outcome::findings::{Findings, code};
+use mapper_core::Channel;
+use mapper_numerics::statistics::{median_of_sorted, robust_sigma};
+use mapper_physics::rig::sensor_fault::repeats_s;
+
+/// Number of samples on either side whose median a spike is compared with.
+const NEIGHBOURS: usize = 7;
+/// Robust standard deviations beyond which a sample is a spike.
+pub(crate) const SPIKE_SIGMAS: f64 = 8.0;
+
+/// The samples without spikes; reports removals in `findings`.
+pub(crate) fn without_spikes(samples: Samples, findings: &mut Findings) -> Samples {
+    // A channel without declared noise is never treated as stuck.
+    cleaned(samples, &IdentifyConfig::default(), findings)
+}
+
+/// The samples without spikes and without those of a stuck channel; reports removals in `findings`.
+pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut Findings) -> Samples {
+    // Smallest relevant differences: K for temperatures, share of the reading for flow and pressures.
+    let columns: [(Channel, &[f64], f64); 6] = [
+        (Channel::T1, &samples.t1_k, 1.0),
+        (Channel::T2, &samples.t2_k, 1.0),
+        (Channel::Tc, &samples.tc_k, 1.0),
+        (Channel::P1, &samples.p1_pa, 500.0),
+        (Channel::P2, &samples.p2_pa, 1000.0),
+        (Channel::CompressorFlow, &samples.flow_kg_s, 2e-3),
+    ];
+    let mut kept = vec![true; samples.len()];
+    let mut spikes = 0;
+    for (channel, column, smallest) in columns {
+        for index in spikes_of(column, smallest) {
+            if let Some(keep) = kept.get_mut(index) {
+                spikes += usize::from(*keep);
+                *keep = false;
+            }
+        }
+        let noisy = config.declared.get(&channel).is_some_and(|declared| declared.noise_sigma > 0.0);
+        if !noisy {
+            continue;
+        }
+        let stuck = stuck_of(&samples.t_s, column, repeats_s(channel));
+        if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
+            let message = format!(
+                "{channel} shows the same value for {:.0} s though noise is declared: these samples are left out",
+                samples
+                    .t_s
+                    .get(*last)
+                    .zip(samples.t_s.get(*first))
+                    .map_or(0.0, |(last_s, first_s)| last_s - first_s)
+            );
+            findings.doubt(code::STUCK, message);
+        }
+        for index in stuck {
+            if let Some(keep) = kept.get_mut(index) {
+                *keep = false;
+            }
+        }
+    }
+    if spikes > 0 {
+        let remark = match spikes {
+            1 => "1 sample far from its neighbours is left out".to_owned(),
+            _ => format!("{spikes} samples far from their neighbours are left out"),
+        };
+        findings.remark(code::OUTLIERS, remark);
+    }
+    if kept.iter().all(|keep| *keep) {
+        return samples;
+    }
+    samples.filtered(|index| kept.get(index).copied().unwrap_or(false))
+}
+
+fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
+    // The sorted neighbours; from one sample to the next, one enters and one leaves.
+    let mut sorted: Vec<f64> = Vec::with_capacity(2 * NEIGHBOURS + 2);
+    let place = |sorted: &[f64], value: f64| sorted.partition_point(|other| other.total_cmp(&value).is_lt());
+    for value in column.iter().take(NEIGHBOURS) {
+        sorted.insert(place(&sorted, *value), *value);
+    }
+    let mut off = Vec::with_capacity(column.len());
+    for (i, value) in column.iter().enumerate() {
+        if let Some(coming) = column.get(i + NEIGHBOURS) {
+            sorted.insert(place(&sorted, *coming), *coming);
+        }
+        if let Some(going) = i.checked_sub(NEIGHBOURS + 1).and_then(|before| column.get(before)) {
+            sorted.remove(place(&sorted, *going));
+        }
+        off.push(value - median_of_sorted(&sorted).unwrap_or(*value));
+    }
+    let Some(sigma) = robust_sigma(&off) else { return Vec::new() };
+    let limit = (SPIKE_SIGMAS * sigma).max(smallest);
+    (0..off.len()).filter(|i| off[*i].abs() > limit).collect()
+}
+
+fn stuck_of(t_s: &[f64], column: &[f64], repeats_s: f64) -> Vec<usize> {
+    let mut stuck = Vec::new();
+    let mut start = 0;
+    for i in 1..=column.len() {
+        if i < column.len() && column[i] == column[start] {
+            continue;
+        }
+        if t_s[i - 1] - t_s[start] >= repeats_s {
+            stuck.extend(start..i);
+        }
+        start = i;
+    }
+    stuck
+}

@@ -1,0 +1,107 @@
+//! The identification window: fixed, or found from the settling of the operating point.
+
+use crate::step_data::commands;
+use crate::step_outcome::findings::{Findings, code};
+use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Window, WindowRule};
+use mapper_numerics::statistics::median;
+use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
+
+/// Maximum number of blocks checked, from the step's end backwards: bounds the work on absurd step times.
+const MAX_BLOCKS: usize = 20_000;
+
+/// The window of a step; `None` if the step is too short for one.
+pub(crate) fn choose(
+    recording: &Recording,
+    step: &StepMarker,
+    rule: WindowRule,
+    bands: &SettleBands,
+    findings: &mut Findings,
+) -> Option<Window> {
+    match rule {
+        WindowRule::Fixed { start_s, end_s } => fixed(step, start_s, end_s, findings),
+        WindowRule::Auto => settled(recording, step, bands, findings),
+    }
+}
+
+fn fixed(step: &StepMarker, start_s: f64, end_s: f64, findings: &mut Findings) -> Option<Window> {
+    let asked_end_s = step.start_s + end_s;
+    let window = Window { start_s: step.start_s + start_s, end_s: asked_end_s.min(step.end_s) };
+    // A millisecond of tolerance: step times of other loggers are rounded.
+    if window.end_s + 1e-3 < asked_end_s {
+        let message = format!(
+            "the window was asked to end {end_s:.1} s after the jump; the step ends after {:.1} s",
+            step.end_s - step.start_s
+        );
+        findings.remark(code::WINDOW_CUT, message);
+    }
+    (window.start_s < window.end_s).then_some(window)
+}
+
+fn settled(
+    recording: &Recording,
+    step: &StepMarker,
+    bands: &SettleBands,
+    findings: &mut Findings,
+) -> Option<Window> {
+    let Rest { slowest, settled_s, earliest_s, whole } = rest(recording, step, bands)?;
+    let end_s = step.end_s;
+    let start_s = if whole { earliest_s } else { end_s - settled_s };
+    if end_s - start_s >= WindowRule::SHORTEST_S {
+        return Some(Window { start_s, end_s });
+    }
+    let start_s = (end_s - WindowRule::SHORTEST_S).max(earliest_s);
+    let message = format!(
+        "the {slowest} still varies beyond its limit {settled_s:.0} s before the step's end (needed: {:.0} s); the last {:.0} s are used",
+        WindowRule::SHORTEST_S,
+        end_s - start_s
+    );
+    findings.doubt(code::NOT_STABILISED, message);
+    Some(Window { start_s, end_s })
+}
+
+/// Settling of an operating point.
+pub(crate) struct Rest {
+    /// The quantity that settles last.
+    pub(crate) slowest: &'static str,
+    /// How long it has been settled at the step's end, s.
+    pub(crate) settled_s: f64,
+    /// Earliest time checked, s.
+    earliest_s: f64,
+    /// Whether all quantities were settled from then on.
+    pub(crate) whole: bool,
+}
+
+/// Checks a step from its end backwards; `None` for a step that ends before the earliest time.
+pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands) -> Option<Rest> {
+    let earliest_s = commands::at_rest_s(recording, step) + WindowRule::EARLIEST_S;
+    let end_s = step.end_s;
+    if end_s.is_nan() || earliest_s.is_nan() || earliest_s >= end_s {
+        return None;
+    }
+    let block_count = (((end_s - earliest_s) / BLOCK_S).floor() as usize).clamp(1, MAX_BLOCKS);
+    let blocks = |channel| block_medians(recording.series.get(&channel), end_s, block_count);
+    let (p1_pa, p2_pa) = (blocks(Channel::P1), blocks(Channel::P2));
+    let pressure_ratio: Vec<f64> = p2_pa.iter().zip(&p1_pa).map(|(p2, p1)| p2 / p1).collect();
+    let signals =
+        with_bands(blocks(Channel::ShaftSpeed), blocks(Channel::CompressorFlow), pressure_ratio, bands);
+    let (slowest, settled_blocks) = signals
+        .into_iter()
+        .map(|(name, backwards, allowed_ratio)| {
+            let spread = noise_spread(&backwards);
+            (name, settled_count(backwards, allowed_ratio, spread))
+        })
+        .min_by_key(|(_, blocks)| *blocks)?;
+    let settled_s = settled_blocks as f64 * BLOCK_S;
+    Some(Rest { slowest, settled_s, earliest_s, whole: settled_blocks == block_count })
+}
+
+/// Medians over blocks counted backwards from `end_s`; NaN for a block without values.
+fn block_medians(series: Option<&Series>, end_s: f64, count: usize) -> Vec<f64> {
+    let Some(series) = series else { return vec![f64::NAN; count] };
+    (0..count)
+        .map(|block| {
+            let range = series.range(end_s - (block + 1) as f64 * BLOCK_S, end_s - block as f64 * BLOCK_S);
+            median(series.values[range].iter().filter(|value| value.is_finite())).unwrap_or(f64::NAN)
+        })
+        .collect()
+}

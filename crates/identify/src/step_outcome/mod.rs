@@ -1,0 +1,6 @@
+//! Outcome of a step in addition to its numbers: reasons for failure, warnings, and causes of wide intervals.
+
+pub(crate) mod error;
+pub(crate) mod findings;
+pub(crate) mod interval_width;
+pub(crate) mod two_parameter;

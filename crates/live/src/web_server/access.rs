@@ -1,0 +1,95 @@
+//! Access control for the page and its buttons.
+
+use crate::web_server::request::Request;
+use std::net::SocketAddr;
+
+/// Requirements for a request.
+#[derive(Debug, Clone)]
+pub(crate) struct Access {
+    /// The token, required on every address except the loopback address.
+    token: Option<String>,
+    /// Accepted host names; `None`: any, because the token is required.
+    hosts: Option<Vec<String>>,
+    /// `http` or `https`, as used by the server's own page.
+    scheme: &'static str,
+}
+
+impl Access {
+    /// Rules for a server at this address.
+    pub(crate) fn new(address: SocketAddr, token: Option<String>, encrypted: bool) -> Self {
+        let port = address.port();
+        let here = ["127.0.0.1", "localhost", "[::1]"].map(|name| format!("{name}:{port}"));
+        let hosts = (!address.ip().is_unspecified()).then(|| {
+            let own = address.to_string();
+            here.into_iter().filter(|_| address.ip().is_loopback()).chain([own]).collect()
+        });
+        Access { token, hosts, scheme: if encrypted { "https" } else { "http" } }
+    }
+
+    /// Whether the request uses the server's own host name. This rejects pages that reach the address by DNS rebinding.
+    pub(crate) fn calls_by_name(&self, request: &Request) -> bool {
+        let Some(host) = &request.host else { return false };
+        self.hosts.as_ref().is_none_or(|hosts| hosts.iter().any(|own| own.eq_ignore_ascii_case(host)))
+    }
+
+    /// Whether the request comes from the server's own page. Browsers report the origin with every request that changes something.
+    pub(crate) fn is_of_own_page(&self, request: &Request) -> bool {
+        let own = request.host.as_ref().map(|host| format!("{}://{host}", self.scheme));
+        request.origin.is_some() && request.origin == own
+    }
+
+    /// Whether the browser reports that a page of another origin sent the request.
+    pub(crate) fn is_of_another_page(&self, request: &Request) -> bool {
+        request.origin.is_some() && !self.is_of_own_page(request)
+    }
+
+    /// Whether the request has the token, if required. The comparison takes the same time for any token of the right length.
+    pub(crate) fn has_token(&self, request: &Request) -> bool {
+        let Some(token) = &self.token else { return true };
+        let given =
+            request.authorization.as_deref().and_then(|text| text.strip_prefix("Bearer ")).unwrap_or("");
+        let differs = given.len() ^ token.len();
+        let differs = given.bytes().zip(token.bytes()).fold(differs, |d, (a, b)| d | usize::from(a ^ b));
+        differs == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(host: &str, origin: Option<&str>, authorization: Option<&str>) -> Request {
+        Request {
+            method: "POST".to_owned(),
+            path: "/ask/hold".to_owned(),
+            host: Some(host.to_owned()),
+            origin: origin.map(str::to_owned),
+            authorization: authorization.map(str::to_owned),
+        }
+    }
+
+    #[test]
+    fn another_name_another_page_and_another_token_are_refused() {
+        let here = Access::new("127.0.0.1:7373".parse().unwrap(), None, false);
+        assert!(here.calls_by_name(&request("localhost:7373", None, None)));
+        assert!(!here.calls_by_name(&request("evil.example:7373", None, None)));
+        assert!(!here.calls_by_name(&request("localhost:80", None, None)));
+        let from = |origin| request("127.0.0.1:7373", origin, None);
+        assert!(here.is_of_own_page(&from(Some("http://127.0.0.1:7373"))));
+        assert!(!here.is_of_own_page(&from(Some("http://evil.example"))));
+        assert!(!here.is_of_own_page(&from(Some("null"))) && !here.is_of_own_page(&from(None)));
+        assert!(here.has_token(&from(None)), "none is needed on this machine");
+
+        let there = Access::new("192.0.2.7:7373".parse().unwrap(), Some("abc".to_owned()), true);
+        assert!(!there.calls_by_name(&request("localhost:7373", None, None)));
+        for (given, right) in
+            [("Bearer abc", true), ("Bearer abd", false), ("Bearer ab", false), ("abc", false)]
+        {
+            assert_eq!(there.has_token(&request("192.0.2.7:7373", None, Some(given))), right, "{given}");
+        }
+        assert!(!there.has_token(&request("192.0.2.7:7373", None, None)));
+        let from = |origin| request("192.0.2.7:7373", Some(origin), None);
+        assert!(there.is_of_own_page(&from("https://192.0.2.7:7373")));
+        assert!(!there.is_of_own_page(&from("http://192.0.2.7:7373")), "a page in clear is another one");
+    }
+}

@@ -1,0 +1,82 @@
+//! The fitted surface, and what it says at a place.
+
+use crate::map_fit::fitted_surface::line_errors::LineErrors;
+use crate::map_fit::least_squares::observations::Observations;
+use crate::map_fit::least_squares::solution::Solution;
+use crate::map_fit::speed_lines::line_shape::LineShape;
+use crate::map_fit::speed_lines::nearest::{Scales, nearest};
+
+/// Lowest and highest speed that a fit answers for, over the slowest and the fastest measured speed.
+pub(crate) const SPEED_REACH: (f64, f64) = (0.1, 1.3);
+
+/// A fitted surface.
+#[derive(Debug, Clone)]
+pub struct MapFit {
+    pub(crate) data: Observations,
+    pub(crate) solution: Solution,
+}
+
+/// How far a point lies from a fitted line, and what the line says there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestPlace {
+    /// Distance in units of the line's scales (flow, pressure ratio less 1), not negative.
+    pub distance_ratio: f64,
+    /// Efficiency of the line at the nearest place, fraction.
+    pub eta: f64,
+    /// One standard error of the line there, across it, in units of the line's scales.
+    pub distance_standard_error_ratio: f64,
+    /// One standard error of the efficiency, without what all points share, fraction.
+    pub eta_standard_error: f64,
+}
+
+impl MapFit {
+    /// Nearest place of the line at `speed_corrected_rpm` to a flow (kg/s) and pressure ratio; distances are measured
+    /// in `flow_scale_kg_s` and `ratio_scale`, both above 0.
+    pub fn nearest(
+        &self,
+        speed_corrected_rpm: f64,
+        flow_corrected_kg_s: f64,
+        pressure_ratio: f64,
+        flow_scale_kg_s: f64,
+        ratio_scale: f64,
+    ) -> NearestPlace {
+        let speed_ratio = self.speed_ratio(speed_corrected_rpm);
+        let scales = Scales { flow_kg_s: flow_scale_kg_s, ratio: ratio_scale };
+        let point = (flow_corrected_kg_s, pressure_ratio);
+        let foot = nearest(&self.shape(speed_corrected_rpm), speed_ratio, point, scales, None);
+        let (x, y) = (
+            (foot.place.flow_kg_s - point.0) / scales.flow_kg_s,
+            (foot.place.pressure_ratio - point.1) / scales.ratio,
+        );
+        let error = LineErrors::new(&self.solution, speed_ratio).at(foot.angle_rad, scales);
+        NearestPlace {
+            distance_ratio: x.hypot(y),
+            eta: self.believed(foot.place.eta, self.outside(speed_ratio)),
+            distance_standard_error_ratio: error.distance_ratio,
+            eta_standard_error: error.eta,
+        }
+    }
+
+    pub(crate) fn speed_ratio(&self, speed_corrected_rpm: f64) -> f64 {
+        speed_corrected_rpm / self.data.nominal_speed_rpm
+    }
+
+    pub(crate) fn shape(&self, speed_corrected_rpm: f64) -> LineShape {
+        self.solution.shape(self.speed_ratio(speed_corrected_rpm))
+    }
+
+    /// Whether a speed lies beyond the slowest or the fastest measured one.
+    pub(crate) fn outside(&self, speed_ratio: f64) -> bool {
+        self.solution.splines.shape.outside(speed_ratio) > 1e-9
+    }
+
+    /// Efficiency as it is answered: where nothing was measured, no better than the best that was.
+    pub(crate) fn believed(&self, eta: f64, extrapolated: bool) -> f64 {
+        if extrapolated { eta.min(self.solution.best_eta) } else { eta }
+    }
+
+    pub(crate) fn speed_bounds_rpm(&self) -> (f64, f64) {
+        let (first, last) = (self.data.lines_rpm.first(), self.data.lines_rpm.last());
+        (SPEED_REACH.0 * first.copied().unwrap_or(1.0), SPEED_REACH.1 * last.copied().unwrap_or(1.0))
+    }
+}

@@ -1,0 +1,174 @@
+//! What a map says to a fit: its points as measured, each at its own speed.
+
+use crate::map_fit::MapFitError;
+use crate::map_fit::least_squares::common_errors::CommonErrorField;
+use mapper_core::{CompressorMap, MapPoint, SurgeMark, Verdict};
+use mapper_physics::compressor_map::similarity::head_ratio;
+
+/// Maximum number of points and lines that a fit takes: several times what the largest measured maps have.
+const MAX_POINTS: usize = 2000;
+const MAX_LINES: usize = 60;
+/// A surge mark belongs to a line whose speed is as near as this, ratio.
+const MARK_SPEED_RATIO: f64 = 0.03;
+
+/// One point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Observation {
+    /// Index of the line in [`Observations::lines`].
+    pub line: usize,
+    /// Corrected speed over the nominal speed of the fit.
+    pub speed_ratio: f64,
+    pub flow_kg_s: f64,
+    pub pressure_ratio: f64,
+    pub eta: Option<f64>,
+    /// Standard error of the efficiency that no other point shares, fraction; 0 if none is known.
+    pub eta_error: f64,
+    /// Whether it is a surge mark: it says where the line ends, nothing of efficiency.
+    pub is_mark: bool,
+    /// The line's largest flow, kg/s, and largest pressure ratio less 1: units of the distance.
+    pub flow_scale_kg_s: f64,
+    pub ratio_scale: f64,
+}
+
+impl Observation {
+    /// Flow over speed.
+    pub(crate) fn flow(&self) -> f64 {
+        self.flow_kg_s / self.speed_ratio
+    }
+
+    /// Isentropic head over the square of speed.
+    pub(crate) fn head(&self) -> f64 {
+        head_ratio(self.pressure_ratio) / (self.speed_ratio * self.speed_ratio)
+    }
+}
+
+/// All points of a map.
+#[derive(Debug, Clone)]
+pub(crate) struct Observations {
+    /// Speed that counts as 1, rpm.
+    pub nominal_speed_rpm: f64,
+    /// Corrected speeds of the lines, rpm, rising.
+    pub lines_rpm: Vec<f64>,
+    pub points: Vec<Observation>,
+    /// What the points have in common that the fit cannot see.
+    pub common: CommonErrorField,
+}
+
+impl Observations {
+    pub(crate) fn of(map: &CompressorMap) -> Result<Self, MapFitError> {
+        let usable = |p: &&MapPoint| {
+            let p = &p.identified;
+            [p.flow_corrected_kg_s, p.pressure_ratio, p.speed_corrected_rpm]
+                .iter()
+                .all(|v| v.is_finite() && *v > 0.0)
+                && p.pressure_ratio < 50.0
+        };
+        let mut lines: Vec<(f64, Vec<&MapPoint>)> = map
+            .lines
+            .iter()
+            .map(|line| (line.speed_corrected_rpm, line.points.iter().filter(usable).collect::<Vec<_>>()))
+            .filter(|(speed, points)| speed.is_finite() && *speed > 0.0 && !points.is_empty())
+            .collect();
+        lines.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let count: usize = lines.iter().map(|(_, points)| points.len()).sum();
+        if lines.len() > MAX_LINES || count > MAX_POINTS {
+            return Err(MapFitError::TooMany {
+                points: count,
+                lines: lines.len(),
+                most_points: MAX_POINTS,
+                most_lines: MAX_LINES,
+            });
+        }
+        let nominal_speed_rpm = lines.get(lines.len() / 2).map_or(1.0, |line| line.0);
+        let (mut points, mut common) = (Vec::with_capacity(count), CommonErrorField::default());
+        for (index, (speed_corrected_rpm, members)) in lines.iter().enumerate() {
+            let largest =
+                |value: fn(&MapPoint) -> f64| members.iter().map(|p| value(p)).fold(f64::MIN, f64::max);
+            let flow_scale_kg_s = largest(|p| p.identified.flow_corrected_kg_s);
+            let ratio_scale = largest(|p| p.identified.pressure_ratio) - 1.0;
+            if ratio_scale <= 1e-4 {
+                return Err(MapFitError::NoCompression { speed_corrected_rpm: *speed_corrected_rpm });
+            }
+            for point in members {
+                let own = observation(point, index, nominal_speed_rpm, flow_scale_kg_s, ratio_scale);
+                common.add(own.speed_ratio, own.flow_kg_s / flow_scale_kg_s, point);
+                points.push(own);
+            }
+            let on_line = |mark: &&SurgeMark| {
+                (mark.speed_corrected_rpm / speed_corrected_rpm - 1.0).abs() < MARK_SPEED_RATIO
+                    && mark.flow_corrected_kg_s > 0.0
+                    && mark.pressure_ratio > 1.0
+            };
+            points.extend(map.surge.iter().filter(on_line).map(|mark| Observation {
+                line: index,
+                speed_ratio: mark.speed_corrected_rpm / nominal_speed_rpm,
+                flow_kg_s: mark.flow_corrected_kg_s,
+                pressure_ratio: mark.pressure_ratio,
+                eta: None,
+                eta_error: 0.0,
+                is_mark: true,
+                flow_scale_kg_s,
+                ratio_scale,
+            }));
+        }
+        let lines_rpm = lines.iter().map(|line| line.0).collect();
+        let all = Observations { nominal_speed_rpm, lines_rpm, points, common };
+        all.enough()?;
+        Ok(all)
+    }
+
+    /// All but one line.
+    pub(crate) fn without(&self, line: usize) -> Result<Self, MapFitError> {
+        let mut lines_rpm = self.lines_rpm.clone();
+        lines_rpm.remove(line);
+        let points = self
+            .points
+            .iter()
+            .filter(|p| p.line != line)
+            .map(|p| Observation { line: if p.line > line { p.line - 1 } else { p.line }, ..*p });
+        let rest = Observations {
+            nominal_speed_rpm: self.nominal_speed_rpm,
+            lines_rpm,
+            points: points.collect(),
+            common: self.common.clone(),
+        };
+        rest.enough()?;
+        Ok(rest)
+    }
+
+    fn enough(&self) -> Result<(), MapFitError> {
+        // Lines at one speed are one line to a fit over speed.
+        let distinct = 1 + self.lines_rpm.windows(2).filter(|w| w[1] > w[0] * (1.0 + 1e-3)).count();
+        if self.lines_rpm.len() < 2 || distinct < 2 {
+            return Err(MapFitError::TooFewLines { lines: distinct.min(self.lines_rpm.len()) });
+        }
+        let with_eta = self.points.iter().filter(|p| p.eta.is_some()).count();
+        if self.points.len() < 8 || with_eta < 6 {
+            return Err(MapFitError::TooFewPoints { points: self.points.len(), with_eta });
+        }
+        Ok(())
+    }
+}
+
+fn observation(
+    point: &MapPoint,
+    line: usize,
+    nominal_speed_rpm: f64,
+    flow_scale_kg_s: f64,
+    ratio_scale: f64,
+) -> Observation {
+    let p = &point.identified;
+    let eta = point.eta.filter(|eta| p.verdict != Verdict::Unusable && (-1.0..=1.5).contains(eta));
+    let eta_error = p.eta_own_standard_error().unwrap_or(0.0);
+    Observation {
+        line,
+        speed_ratio: p.speed_corrected_rpm / nominal_speed_rpm,
+        flow_kg_s: p.flow_corrected_kg_s,
+        pressure_ratio: p.pressure_ratio,
+        eta,
+        is_mark: false,
+        eta_error: if eta_error.is_finite() { eta_error.clamp(0.0, 1.0) } else { 1.0 },
+        flow_scale_kg_s,
+        ratio_scale,
+    }
+}

@@ -1,0 +1,87 @@
+//! What a fit gives: parameters at any speed, with their covariance.
+
+use crate::map_fit::least_squares::problem::LINE_OFFSETS;
+use crate::map_fit::speed_lines::ends::{Beyond, BothEnds, End, PLAIN};
+use crate::map_fit::speed_lines::line_shape::{FlowFrame, LineShape, PARAMETERS, Parameters, WORK};
+use crate::map_fit::speed_lines::splines::Splines;
+use mapper_numerics::statistics::{NORMAL_975, student_quantile};
+use nalgebra::DMatrix;
+
+/// A solved problem.
+#[derive(Debug, Clone)]
+pub(crate) struct Solution {
+    pub splines: Splines,
+    pub frame: FlowFrame,
+    /// Parameters at the knots.
+    pub(crate) values: DMatrix<f64>,
+    /// Covariance of all unknowns, parameters first (parameter by parameter, knot by knot).
+    pub(crate) covariance: DMatrix<f64>,
+    /// One over the penalty: variance of the roughness.
+    pub(crate) roughness_variance: Parameters,
+    /// How much wider what is drawn on beyond the measured speeds is than its roughness says.
+    pub(crate) beyond: BothEnds,
+    /// Standard deviations of the line offsets, logarithms.
+    pub line_scatter: [f64; 3],
+    /// Scales of distance and efficiency that the residuals were weighted by.
+    pub(crate) scales: [f64; 2],
+    /// Root mean squares of distance and efficiency.
+    pub rms: [f64; 2],
+    /// Minus twice the logarithm of the marginal likelihood by Laplace's approximation, but for a constant of the data.
+    pub(crate) improbability: f64,
+    /// Highest efficiency of the fit at the points, fraction.
+    pub best_eta: f64,
+    /// Angles of the feet, in the order of the points.
+    pub angles_rad: Vec<f64>,
+}
+
+impl Solution {
+    /// Parameters of the smooth surface at a speed.
+    pub(crate) fn parameters(&self, speed_ratio: f64) -> Parameters {
+        let rows = self.splines.rows(speed_ratio);
+        std::array::from_fn(|q| self.values.row(q).transpose().dot(rows.of(q)))
+    }
+
+    pub(crate) fn shape(&self, speed_ratio: f64) -> LineShape {
+        LineShape::new(&self.parameters(speed_ratio), self.frame)
+    }
+
+    /// Factors at a speed: those of the end beyond which it lies.
+    fn beyond_at(&self, speed_ratio: f64) -> Beyond {
+        match self.splines.shape.end_beyond(speed_ratio) {
+            None => PLAIN,
+            Some(End::Slow) => self.beyond.slow,
+            Some(End::Fast) => self.beyond.fast,
+        }
+    }
+
+    /// Covariance of the parameters at a speed: of the surface, of a line about it, and of what may happen between the
+    /// knots and beyond them. There a trend may die away, as the surface's does, or go straight on, or anything between: a third
+    /// of the square of the difference, as of any value that is equally likely between two.
+    pub(crate) fn covariance(&self, speed_ratio: f64) -> DMatrix<f64> {
+        let (rows, knots) = (self.splines.rows(speed_ratio), self.splines.len());
+        // The roughness was estimated on this many second differences: Student's quantile over the normal one, squared.
+        let freedom = knots.saturating_sub(2).max(1) as f64;
+        let few = student_quantile(0.975, freedom).map_or(1.0, |quantile| (quantile / NORMAL_975).powi(2));
+        let open =
+            (self.splines.shape.open_variance(speed_ratio), self.splines.work.open_variance(speed_ratio));
+        let beyond = self.beyond_at(speed_ratio);
+        let trends = [self.splines.shape.died_away(speed_ratio), self.splines.work.died_away(speed_ratio)];
+        let mut out = DMatrix::zeros(PARAMETERS, PARAMETERS);
+        for a in 0..PARAMETERS {
+            for b in 0..PARAMETERS {
+                let block = self.covariance.view((a * knots, b * knots), (knots, knots));
+                out[(a, b)] = (rows.of(a).transpose() * block * rows.of(b))[(0, 0)];
+            }
+            let (open, trend, widened) =
+                if a < WORK { (open.0, &trends[0], beyond.shape) } else { (open.1, &trends[1], beyond.work) };
+            let died_away = self.values.row(a).transpose().dot(trend);
+            out[(a, a)] += widened * (open * self.roughness_variance[a] * few + died_away * died_away / 3.0);
+        }
+        for (index, together) in LINE_OFFSETS.iter().enumerate() {
+            for (a, b) in together.iter().flat_map(|a| together.iter().map(move |b| (*a, *b))) {
+                out[(a, b)] += self.line_scatter[index].powi(2);
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,183 @@
+//! The rounds of a fit: steps of Levenberg and Marquardt, and between them the variances.
+
+use crate::map_fit::MapFitError;
+use crate::map_fit::least_squares::observations::Observations;
+use crate::map_fit::least_squares::precisions::{Precisions, ROUGHNESS_REACH};
+use crate::map_fit::least_squares::problem::{LINE_OFFSETS, Problem, Unknowns};
+use crate::map_fit::least_squares::solution::Solution;
+use crate::map_fit::speed_lines::ends::BothEnds;
+use crate::map_fit::speed_lines::line_shape::{FlowFrame, Parameters, WORK};
+use mapper_numerics::least_squares::{Damping, DampingRule, damped_step, inverse};
+use nalgebra::{DMatrix, DVector};
+
+/// Rounds with everything fixed but the parameters, rounds that estimate the variances, and rounds to settle.
+const ROUNDS: [usize; 3] = [8, 22, 15];
+/// Largest relative change of a variance component at which the estimation has settled.
+const SETTLED: f64 = 0.05;
+/// Scatter of whole lines where the estimation starts: small, since on a map of few lines what begins as scatter is never
+/// found to be shape.
+const SCATTER: f64 = 0.005;
+/// Scales of the residuals where the estimation starts: the first always, the others where it ends [`FAR`] off.
+const START_SCALES: [f64; 3] = [0.01, 0.003, 0.02];
+/// Root mean square of distance or efficiency beyond which a fit is tried from other scales.
+const FAR: f64 = 0.006;
+/// Roughness of each parameter over speed where the estimation starts.
+const ROUGHNESS: Parameters = [0.5, 0.5, 3.0, 1.0, 1.5, 1.5, 0.15, 0.15, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+
+/// Of the search for a step: careful, since feet jump and weights change from round to round.
+const DAMPING: DampingRule = DampingRule {
+    start: 1e-2,
+    growth: 5.0,
+    relief: 0.2,
+    renewed: 1e-6,
+    least: 1e-9,
+    most: f64::INFINITY,
+    tries: 6,
+};
+
+/// Start of a search.
+#[derive(Clone, Copy)]
+enum Start<'a> {
+    /// From the points alone, with this scale of the residuals.
+    Scale(f64),
+    /// The result of another fit.
+    Near(&'a Solution),
+}
+
+/// What a round of the fit is for.
+enum Phase {
+    /// The parameters come near, the variances stand.
+    Free,
+    /// The variances are estimated.
+    Estimate,
+    /// The parameters follow the last variances.
+    Settle,
+}
+
+/// Fits. `stiffness` (1 or more) is the factor on the smallest penalty that the estimation may choose.
+///
+/// If the points end far from their lines, the estimation may have settled on scatter where there is shape, or on
+/// outliers where there are none: then it is made again from other scales, and the most probable is kept.
+///
+/// `near`: a fit of nearly the same points, from which the search may start.
+pub(crate) fn solve(
+    data: &Observations,
+    stiffness: f64,
+    near: Option<&Solution>,
+) -> Result<Solution, MapFitError> {
+    let frame = near.map(|near| near.frame);
+    let from = |start: Start<'_>| solve_from(data, stiffness, frame, start);
+    let [first, others @ ..] = START_SCALES.map(Start::Scale);
+    let mut best = from(near.map_or(first, Start::Near))?;
+    if best.rms[0] > FAR || best.rms[1] > FAR {
+        for start in near.map(|_| first).into_iter().chain(others) {
+            if let Ok(other) = from(start)
+                && other.improbability < best.improbability
+            {
+                best = other;
+            }
+        }
+    }
+    Ok(best)
+}
+
+fn solve_from(
+    data: &Observations,
+    stiffness: f64,
+    frame: Option<FlowFrame>,
+    start: Start<'_>,
+) -> Result<Solution, MapFitError> {
+    let mut problem = Problem::new(data, frame);
+    let start_rough: Parameters = ROUGHNESS.map(|r| stiffness / (r * r));
+    let mut unknowns = problem.initial()?;
+    problem.start =
+        std::array::from_fn(|q| if q < WORK { problem.start[q] } else { unknowns.values[(q, 0)] });
+    let mut precisions = match start {
+        Start::Scale(scale) => {
+            Precisions { rough: start_rough, lines: [1.0 / SCATTER.powi(2); 3], scales: [scale; 2] }
+        }
+        Start::Near(near) => {
+            unknowns.values = problem.splines.values(|speed_ratio| near.parameters(speed_ratio));
+            Precisions {
+                rough: std::array::from_fn(|q| {
+                    let [least, most] = ROUGHNESS_REACH.map(|ratio| ratio * start_rough[q]);
+                    (1.0 / near.roughness_variance[q]).clamp(least, most)
+                }),
+                lines: near.line_scatter.map(|sigma| 1.0 / (sigma * sigma)),
+                scales: near.scales,
+            }
+        }
+    };
+    let mut feet = problem.feet(&unknowns, None);
+    let mut damping = Damping::new(DAMPING);
+    let [free, estimate, settle] = ROUNDS;
+    let mut phase = Phase::Free;
+    for round in 0..free + estimate + settle {
+        let residuals = problem.residuals(&feet);
+        let weights = problem.weights(&residuals, &precisions.scales);
+        let jacobian = problem.jacobian(&unknowns, &feet, &weights);
+        let (penalty, gradient) = problem.penalty(&unknowns, &precisions);
+        let scaled = DVector::from_iterator(
+            2 * residuals.len(),
+            residuals.iter().zip(&weights).flat_map(|(r, w)| [r[0] * w[0].sqrt(), r[1] * w[1].sqrt()]),
+        );
+        let transposed = jacobian.transpose();
+        let gradient = &transposed * scaled + gradient;
+        // Not tr_mul: a product of two matrices goes through matrixmultiply's kernels.
+        let normal_matrix = transposed * &jacobian + &penalty;
+        let cost = problem.cost(&residuals, &weights) + problem.penalty_value(&unknowns, &precisions);
+        let right = -gradient;
+        let better = damping.search(|damping| {
+            let next = problem.stepped(&unknowns, &damped_step(&normal_matrix, &right, damping)?);
+            let next_feet = problem.feet(&next, Some(&feet));
+            let next_cost = problem.cost(&problem.residuals(&next_feet), &weights)
+                + problem.penalty_value(&next, &precisions);
+            (next_cost < cost).then_some((next, next_feet, next_cost))
+        });
+        let gain = better.as_ref().map_or(0.0, |(.., next_cost)| cost - next_cost);
+        if let Some((next, next_feet, _)) = better {
+            (unknowns, feet) = (next, next_feet);
+        }
+        match phase {
+            Phase::Free if round + 1 >= free || gain < 1e-2 * cost => phase = Phase::Estimate,
+            Phase::Estimate => {
+                let inverse = inverse(&normal_matrix.cholesky().ok_or(MapFitError::Singular)?);
+                let residuals = problem.residuals(&feet);
+                let change =
+                    problem.update(&mut precisions, &unknowns, &inverse, &jacobian, &residuals, &start_rough);
+                if round + 1 >= free + estimate || (change < SETTLED && gain < 1e-3 * cost) {
+                    // A foot may have been caught on a wrong part of the line: look at the whole line once more.
+                    feet = problem.feet(&unknowns, None);
+                    phase = Phase::Settle;
+                }
+            }
+            Phase::Settle if gain < 1e-4 * cost => break,
+            _ => {}
+        }
+    }
+    let residuals = problem.residuals(&feet);
+    let jacobian = problem.jacobian(&unknowns, &feet, &problem.weights(&residuals, &precisions.scales));
+    let information = jacobian.transpose() * &jacobian + problem.penalty(&unknowns, &precisions).0;
+    let factor = information.cholesky().ok_or(MapFitError::Singular)?;
+    let improbability = problem.improbability(&unknowns, &precisions, &residuals)
+        + 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+    let covariance = inverse(&factor);
+    // As a user meets the map: points against the smooth surface, without the lines' own offsets.
+    let smooth =
+        Unknowns { offsets: DMatrix::zeros(LINE_OFFSETS.len(), data.lines_rpm.len()), ..unknowns.clone() };
+    let smooth_feet = problem.feet(&smooth, Some(&feet));
+    Ok(Solution {
+        beyond: BothEnds::PLAIN,
+        rms: problem.rms(&problem.residuals(&smooth_feet)),
+        improbability,
+        best_eta: smooth_feet.iter().map(|foot| foot.place.eta).fold(0.0, f64::max),
+        angles_rad: smooth_feet.iter().map(|foot| foot.angle_rad).collect(),
+        splines: problem.splines,
+        frame: problem.frame,
+        values: unknowns.values,
+        covariance,
+        roughness_variance: precisions.rough.map(|p| 1.0 / p),
+        line_scatter: precisions.lines.map(|p| 1.0 / p.sqrt()),
+        scales: precisions.scales,
+    })
+}

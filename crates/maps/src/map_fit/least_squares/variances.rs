@@ -1,0 +1,97 @@
+//! The variance components of a fit, and how probable they make what was measured.
+//!
+//! The penalty of each parameter over speed, the scatter of the lines and the two residual scales are estimated together
+//! with the fit by the update of S. N. Wood and M. Fasiolo ("A generalized Fellner-Schall method for smoothing parameter
+//! optimization", Biometrics 73 (2017) 1071-1081). No number is tuned to a machine: what a map has enough lines to show is
+//! followed, the rest stays straight over speed.
+
+use crate::map_fit::least_squares::precisions::{Precisions, ROBUST, ROUGHNESS_REACH};
+use crate::map_fit::least_squares::problem::{Problem, Unknowns};
+use crate::map_fit::speed_lines::line_shape::{PARAMETERS, Parameters};
+use nalgebra::DMatrix;
+
+impl Problem<'_> {
+    /// [`Solution::improbability`] without the determinant of the information.
+    pub(crate) fn improbability(
+        &self,
+        unknowns: &Unknowns,
+        precisions: &Precisions,
+        residuals: &[[f64; 2]],
+    ) -> f64 {
+        let mut sum = self.penalty_value(unknowns, precisions);
+        for (p, r) in self.data.points.iter().zip(residuals) {
+            let scales = precisions.scales.map(|s| s * s);
+            let loss = |variance: f64, r: f64| {
+                variance.ln() + ROBUST * ROBUST * (r * r / variance / (ROBUST * ROBUST)).ln_1p()
+            };
+            sum += loss(scales[0], r[0]);
+            if p.eta.is_some() {
+                sum += loss(scales[1] + p.eta_error * p.eta_error, r[1]);
+            }
+        }
+        let free = self.splines.len().saturating_sub(2) as f64;
+        sum -= precisions.rough.iter().map(|p| free * p.ln()).sum::<f64>();
+        sum - precisions.lines.iter().map(|p| self.data.lines_rpm.len() as f64 * p.ln()).sum::<f64>()
+    }
+
+    /// One step of the variance components; the largest relative change of one.
+    pub(crate) fn update(
+        &self,
+        precisions: &mut Precisions,
+        unknowns: &Unknowns,
+        inverse: &DMatrix<f64>,
+        jacobian: &DMatrix<f64>,
+        residuals: &[[f64; 2]],
+        start_rough: &Parameters,
+    ) -> f64 {
+        let (knots, lines) = (self.splines.len(), self.data.lines_rpm.len());
+        let mut change = 0.0f64;
+        let mut set = |precision: &mut f64, next: f64| {
+            change = change.max((next / *precision - 1.0).abs());
+            *precision = next;
+        };
+        for (q, start) in start_rough.iter().enumerate() {
+            let values = unknowns.values.row(q).transpose();
+            let block = inverse.view((q * knots, q * knots), (knots, knots));
+            let used = precisions.rough[q] * (block * &self.splines.of(q).penalty).trace();
+            let free = (knots.saturating_sub(2) as f64 - used).max(1e-2);
+            let wanted = free / (values.dot(&(&self.splines.of(q).penalty * &values)) + 1e-9);
+            let step = (wanted / precisions.rough[q]).clamp(0.3, 3.0);
+            let [least, most] = ROUGHNESS_REACH.map(|ratio| ratio * start);
+            let next = (precisions.rough[q] * step).clamp(least, most);
+            set(&mut precisions.rough[q], next);
+        }
+        for (index, precision) in precisions.lines.iter_mut().enumerate() {
+            let first = PARAMETERS * knots + index * lines;
+            let trace: f64 = (first..first + lines).map(|i| inverse[(i, i)]).sum();
+            let wanted = (lines as f64 - *precision * trace).max(0.01)
+                / (unknowns.offsets.row(index).norm_squared() + 1e-9);
+            // Between 0.05 % and 3 %: less is not an error of speed, more is another machine.
+            let next = (*precision * (wanted / *precision).clamp(0.5, 2.0)).clamp(1.0 / 9e-4, 4e6);
+            set(precision, next);
+        }
+        let projected = jacobian * inverse;
+        for c in 0..2 {
+            let mut sum = [0.0; 3];
+            for (i, (p, r)) in self.data.points.iter().zip(residuals).enumerate() {
+                if c == 1 && p.eta.is_none() {
+                    continue;
+                }
+                let own = if c == 1 { p.eta_error.powi(2) } else { 0.0 };
+                let variance = precisions.scales[c].powi(2) + own;
+                let robust = 1.0 / (1.0 + r[c] * r[c] / variance / (ROBUST * ROBUST));
+                // What a point declares of itself is not scatter of the fit's.
+                let share = precisions.scales[c].powi(2) / variance;
+                let leverage = projected.row(2 * i + c).dot(&jacobian.row(2 * i + c));
+                sum[0] += robust * share * share * (r[c] * r[c] - own).max(0.0);
+                sum[1] += robust * share * share;
+                sum[2] += (leverage * share * share).min(1.0);
+            }
+            let degrees = (sum[1] - sum[2]).max(0.25 * sum[1]).max(1e-9);
+            let wanted = (sum[0] / degrees).sqrt();
+            let scale = precisions.scales[c];
+            set(&mut precisions.scales[c], wanted.clamp((0.7 * scale).max(1e-3), (1.2 * scale).min(0.03)));
+        }
+        change
+    }
+}

@@ -1,0 +1,42 @@
+//! How far a fit misses a point, and by how much it may.
+
+use crate::map_fit::fitted_surface::surface::MapFit;
+use crate::map_fit::least_squares::observations::Observation;
+
+/// A deviation and its standard error: of the line, of a point about it, and of the point itself.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Off {
+    pub by: f64,
+    pub standard_error: f64,
+}
+
+/// How far a point lies from the line at its speed.
+pub(crate) struct Miss {
+    /// In units of the line's scales.
+    pub distance: Off,
+    /// Of efficiency, fraction; `None` if the point has none.
+    pub eta: Option<Off>,
+}
+
+impl MapFit {
+    pub(crate) fn miss(&self, point: &Observation) -> Miss {
+        let [distance_rms, eta_rms] = self.solution.rms;
+        let place = self.nearest(
+            point.speed_ratio * self.data.nominal_speed_rpm,
+            point.flow_kg_s,
+            point.pressure_ratio,
+            point.flow_scale_kg_s,
+            point.ratio_scale,
+        );
+        Miss {
+            distance: Off {
+                by: place.distance_ratio,
+                standard_error: place.distance_standard_error_ratio.hypot(distance_rms),
+            },
+            eta: point.eta.map(|eta| Off {
+                by: (eta - place.eta).abs(),
+                standard_error: place.eta_standard_error.hypot(eta_rms).hypot(point.eta_error),
+            }),
+        }
+    }
+}

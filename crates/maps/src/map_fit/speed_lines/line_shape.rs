@@ -1,0 +1,202 @@
+//! One speed line in similarity coordinates: flow over speed, isentropic head over its square.
+//!
+//! Ellipse family of O. Leufven and L. Eriksson ("A surge and choke capable compressor flow model", Control
+//! Engineering Practice 21 (2013) 1871-1883; LiU CPgui): a zero-slope point, a choke point and two exponents,
+//! `((flow - flow_zs)/(flow_ch - flow_zs))^n + ((head - head_ch)/(head_zs - head_ch))^k = 1`. Here it is walked by the
+//! angle around the ellipse's centre, so that the flat part at surge, the vertical part at choke and what lies on the
+//! surge side of the zero-slope point are one smooth curve; the radius takes a small harmonic correction.
+//!
+//! Efficiency is isentropic head over actual work. The logarithm of the work coefficient (Euler work less slip, plus
+//! friction and recirculation) is a cubic of the flow coefficient with two terms for the drop towards choke; it changes
+//! little with speed, which is what lets efficiency be carried to speeds that were not measured.
+
+use mapper_physics::compressor_map::similarity::pressure_ratio_of_signed_head;
+
+/// Terms of the radius' correction.
+pub(crate) const HARMONICS: usize = 2;
+/// Terms of the work coefficient.
+pub(crate) const WORK_TERMS: usize = 6;
+/// Parameters of a line.
+pub(crate) const PARAMETERS: usize = 6 + HARMONICS + WORK_TERMS;
+
+/// Parameter: logarithm of the choke flow.
+pub(crate) const CHOKE_FLOW: usize = 0;
+/// Parameter: logarithm of the head at zero slope.
+pub(crate) const ZERO_SLOPE_HEAD: usize = 1;
+/// Parameter: logit of the zero-slope flow over the choke flow.
+pub(crate) const ZERO_SLOPE_FLOW: usize = 2;
+/// Parameter: head at choke over head at zero slope, softly limited.
+pub(crate) const CHOKE_HEAD: usize = 3;
+/// Parameters: logarithms of the exponents less [`MIN_EXPONENT`].
+pub(crate) const EXPONENTS: [usize; 2] = [4, 5];
+/// First parameter of the correction.
+pub(crate) const HARMONIC: usize = 6;
+/// First parameter of the work coefficient.
+pub(crate) const WORK: usize = 6 + HARMONICS;
+
+/// Parameters of a line, see the constants.
+pub(crate) type Parameters = [f64; PARAMETERS];
+
+/// Exponents stay above this: at 1 the line would have corners.
+const MIN_EXPONENT: f64 = 1.05;
+/// Largest size of the choke head over that at zero slope.
+const CHOKE_HEAD_LIMIT: f64 = 0.7;
+/// Lowest angle at all, rad: low enough for a pressure ratio below 1 on every line ([`CHOKE_HEAD_LIMIT`]).
+pub(crate) const LOWEST_ANGLE: f64 = -3.0;
+/// Bounds of the angle where points are looked for, rad: 0 is choke, pi/2 zero slope; below 0 the line falls vertically.
+pub(crate) const ANGLE_RANGE: (f64, f64) = (-0.6, 0.8 * std::f64::consts::PI);
+
+/// Location and scale of the flow coefficients: makes the work coefficient's terms of order 1.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FlowFrame {
+    /// Middle of all measured flows over the speed ratio, kg/s.
+    pub middle_kg_s: f64,
+    /// Half their range, kg/s.
+    pub half_range_kg_s: f64,
+}
+
+/// A place on a line in similarity coordinates; the speed ratio is the speed over the fit's nominal one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    /// Flow over the speed ratio, kg/s.
+    pub flow_at_nominal_kg_s: f64,
+    /// Isentropic head over the speed ratio's square; see `mapper_physics::compressor_map::similarity`.
+    pub head: f64,
+    /// Work in the units of `head`.
+    pub work: f64,
+}
+
+/// A place on a line at a speed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PhysicalPlace {
+    pub flow_kg_s: f64,
+    pub pressure_ratio: f64,
+    pub eta: f64,
+}
+
+/// A line ready to be walked.
+#[derive(Debug, Clone)]
+pub(crate) struct LineShape {
+    choke_flow: f64,
+    zero_slope_flow: f64,
+    choke_head: f64,
+    zero_slope_head: f64,
+    exponents: [f64; 2],
+    harmonics: [f64; HARMONICS],
+    work: [f64; WORK_TERMS],
+    frame: FlowFrame,
+}
+
+impl LineShape {
+    pub(crate) fn new(p: &Parameters, frame: FlowFrame) -> Self {
+        let choke_flow = p[CHOKE_FLOW].exp();
+        let zero_slope_head = p[ZERO_SLOPE_HEAD].exp();
+        let mut harmonics = [0.0; HARMONICS];
+        harmonics.copy_from_slice(&p[HARMONIC..WORK]);
+        let mut work = [0.0; WORK_TERMS];
+        work.copy_from_slice(&p[WORK..]);
+        LineShape {
+            choke_flow,
+            zero_slope_flow: choke_flow / (1.0 + (-p[ZERO_SLOPE_FLOW]).exp()),
+            choke_head: zero_slope_head * CHOKE_HEAD_LIMIT * (p[CHOKE_HEAD] / CHOKE_HEAD_LIMIT).tanh(),
+            zero_slope_head,
+            exponents: EXPONENTS.map(|i| MIN_EXPONENT + p[i].clamp(-4.0, 2.2).exp()),
+            harmonics,
+            work,
+            frame,
+        }
+    }
+
+    /// The place at an angle, rad.
+    pub(crate) fn at(&self, angle_rad: f64) -> Place {
+        let (x, y) = if angle_rad <= 0.0 {
+            // Choked: the flow stays, the head falls at will.
+            (1.0, angle_rad)
+        } else {
+            let (sin, cos) = angle_rad.sin_cos();
+            let r = self.radius(angle_rad, cos.abs(), sin.abs());
+            (r * cos, r * sin)
+        };
+        let flow = self.zero_slope_flow + (self.choke_flow - self.zero_slope_flow) * x;
+        let head = self.choke_head + (self.zero_slope_head - self.choke_head) * y;
+        let log_work: f64 =
+            self.work_terms(flow, head).iter().zip(&self.work).map(|(term, c)| term * c).sum();
+        Place { flow_at_nominal_kg_s: flow, head, work: log_work.clamp(-8.0, 5.0).exp() }
+    }
+
+    /// Derivatives of the logarithm of the work coefficient by its parameters, at a place of the line.
+    pub(crate) fn work_terms(&self, flow: f64, head: f64) -> [f64; WORK_TERMS] {
+        let z = ((flow - self.frame.middle_kg_s) / self.frame.half_range_kg_s).clamp(-1.6, 1.6);
+        let y = (head - self.choke_head) / (self.zero_slope_head - self.choke_head);
+        let drop = (1.0 - y).clamp(0.0, 1.0);
+        [1.0, z, z * z, drop, drop * drop, z * z * z]
+    }
+
+    /// Distance of the curve from the ellipse's centre, in units of its half axes.
+    fn radius(&self, angle_rad: f64, cos: f64, sin: f64) -> f64 {
+        let [n, k] = self.exponents;
+        let (log_cos, log_sin) = (cos.max(1e-300).ln(), sin.max(1e-300).ln());
+        // The ellipse's equation as ln((r cos)^n + (r sin)^k) = 0 in ln r: convex, nearly straight, of slope between n
+        // and k, so that Newton's steps need no guard and few rounds.
+        let mut log_r = -log_cos.max(log_sin) - 0.15;
+        for _ in 0..20 {
+            let (a, b) = ((n * (log_r + log_cos)).exp(), (k * (log_r + log_sin)).exp());
+            let sum = a + b;
+            let step = sum.ln() * sum / (n * a + k * b);
+            log_r -= step;
+            // The error after a step is about the square of the step.
+            if step.abs() < 1e-7 {
+                break;
+            }
+        }
+        let r = log_r.exp();
+        // None at choke, nor its slope: there the line must not lean over.
+        let correction: f64 = sin
+            * sin
+            * self
+                .harmonics
+                .iter()
+                .enumerate()
+                .map(|(j, c)| c * (2.0 * (j as f64 + 1.0) * angle_rad).sin())
+                .sum::<f64>();
+        r * (1.0 + correction.clamp(-0.5, 0.5))
+    }
+
+    /// The place at a speed over the fit's nominal speed.
+    pub(crate) fn physical(&self, angle_rad: f64, speed_ratio: f64) -> PhysicalPlace {
+        let place = self.at(angle_rad);
+        PhysicalPlace {
+            flow_kg_s: place.flow_at_nominal_kg_s * speed_ratio,
+            pressure_ratio: pressure_ratio_of_signed_head(place.head * speed_ratio * speed_ratio),
+            eta: place.head / place.work,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Flow never falls and head never rises on the way from zero slope to choke, whatever the exponents.
+        #[test]
+        fn the_line_falls_from_zero_slope_to_choke(
+            ratio in -2.0..2.0f64, choke in -0.6..0.5f64, n in -1.5..1.5f64, k in -1.5..1.5f64,
+        ) {
+            let mut p = [0.0; PARAMETERS];
+            (p[ZERO_SLOPE_FLOW], p[CHOKE_HEAD], p[EXPONENTS[0]], p[EXPONENTS[1]]) = (ratio, choke, n, k);
+            let shape = LineShape::new(&p, FlowFrame { middle_kg_s: 0.5, half_range_kg_s: 0.5 });
+            let walk: Vec<Place> = (0..=40).map(|i| shape.at(f64::from(i) / 40.0 * std::f64::consts::FRAC_PI_2)).collect();
+            for pair in walk.windows(2) {
+                prop_assert!(pair[1].flow_at_nominal_kg_s <= pair[0].flow_at_nominal_kg_s + 1e-9 && pair[1].head >= pair[0].head - 1e-9);
+            }
+            // The ellipse's equation itself.
+            for place in &walk {
+                let x = (place.flow_at_nominal_kg_s - shape.zero_slope_flow) / (shape.choke_flow - shape.zero_slope_flow);
+                let y = (place.head - shape.choke_head) / (shape.zero_slope_head - shape.choke_head);
+                prop_assert!((x.abs().powf(shape.exponents[0]) + y.abs().powf(shape.exponents[1]) - 1.0).abs() < 1e-9);
+            }
+        }
+    }
+}

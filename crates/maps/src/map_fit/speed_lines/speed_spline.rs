@@ -1,0 +1,219 @@
+//! A natural cubic spline over a coordinate of speed, with the penalty that makes it smooth.
+//!
+//! Source: P. J. Green, B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2: values
+//! at the knots as parameters, `g'' = R^-1 Q' g`, integral of `g''^2` equal to `g' K g` with `K = Q R^-1 Q'`.
+
+use crate::map_fit::speed_lines::ends::End;
+use nalgebra::{DMatrix, DVector};
+
+/// Length over which the slope beyond the outermost knots dies away, as a share of the nominal speed (or its inverse),
+/// and at most half of what the knots cover: far outside, similarity holds, and what is a trend inside must not run away.
+const DAMPING: f64 = 0.5;
+
+/// The coordinate of a parameter, of speed over the nominal speed: flow and head change with the Mach number, in
+/// proportion to speed; what work there is besides Euler's (friction at small Reynolds numbers, heat) fades with its
+/// inverse. Between measured lines this matters little, beyond them much.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Coordinate {
+    Speed,
+    Slowness,
+}
+
+impl Coordinate {
+    pub(crate) fn of(self, speed_ratio: f64) -> f64 {
+        match self {
+            Coordinate::Speed => speed_ratio,
+            // Rising with speed, as the other.
+            Coordinate::Slowness => -1.0 / speed_ratio,
+        }
+    }
+}
+
+/// The spline's knots and what follows from them.
+#[derive(Debug, Clone)]
+pub(crate) struct SpeedSpline {
+    coordinate: Coordinate,
+    knots: Vec<f64>,
+    /// Second derivatives at the knots from the values there.
+    second: DMatrix<f64>,
+    /// Integral of the squared second derivative as a quadratic form of the values.
+    pub penalty: DMatrix<f64>,
+}
+
+impl SpeedSpline {
+    /// `speed_ratios` of the knots strictly rising, at least one.
+    pub(crate) fn new(coordinate: Coordinate, speed_ratios: &[f64]) -> Self {
+        SpeedSpline::with_knots(coordinate, speed_ratios.iter().map(|v| coordinate.of(*v)).collect())
+    }
+
+    fn with_knots(coordinate: Coordinate, knots: Vec<f64>) -> Self {
+        let n = knots.len();
+        let (mut second, mut penalty) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+        if n >= 3 {
+            let h: Vec<f64> = knots.windows(2).map(|w| w[1] - w[0]).collect();
+            let (mut q, mut r) = (DMatrix::zeros(n, n - 2), DMatrix::zeros(n - 2, n - 2));
+            for j in 0..n - 2 {
+                q[(j, j)] = 1.0 / h[j];
+                q[(j + 1, j)] = -1.0 / h[j] - 1.0 / h[j + 1];
+                q[(j + 2, j)] = 1.0 / h[j + 1];
+                r[(j, j)] = (h[j] + h[j + 1]) / 3.0;
+                if j + 1 < n - 2 {
+                    r[(j, j + 1)] = h[j + 1] / 6.0;
+                    r[(j + 1, j)] = h[j + 1] / 6.0;
+                }
+            }
+            // R is diagonally dominant: it has a Cholesky factor for any rising knots.
+            if let Some(factor) = r.cholesky() {
+                let inner = factor.solve(&q.transpose());
+                second.view_mut((1, 0), (n - 2, n)).copy_from(&inner);
+                penalty = &q * inner;
+            }
+        }
+        SpeedSpline { coordinate, knots, second, penalty }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.knots.len()
+    }
+
+    /// Weights of the knot values that give the value at a speed.
+    pub(crate) fn row(&self, speed_ratio: f64) -> DVector<f64> {
+        let at = self.coordinate.of(speed_ratio);
+        let (n, x) = (self.knots.len(), &self.knots);
+        let mut row = DVector::zeros(n);
+        if n == 1 {
+            row[0] = 1.0;
+            return row;
+        }
+        if self.outside(speed_ratio) > 0.0 {
+            let (reach, _) = self.reach(speed_ratio);
+            row = self.end_slope(at) * reach;
+            row[if at < x[0] { 0 } else { n - 1 }] += 1.0;
+            return row;
+        }
+        let i = x.partition_point(|knot| *knot <= at).clamp(1, n - 1) - 1;
+        let h = x[i + 1] - x[i];
+        let (a, b) = ((x[i + 1] - at) / h, (at - x[i]) / h);
+        row[i] = a;
+        row[i + 1] = b;
+        for k in 0..n {
+            row[k] += h * h / 6.0
+                * ((a * a * a - a) * self.second[(i, k)] + (b * b * b - b) * self.second[(i + 1, k)]);
+        }
+        row
+    }
+
+    /// How far the slope at the end goes on beyond the knots before it has died away, and how much further the speed lies, both in
+    /// the coordinate.
+    fn reach(&self, speed_ratio: f64) -> (f64, f64) {
+        let (outside, x) = (self.outside(speed_ratio), &self.knots);
+        let damping = DAMPING.min(0.5 * (x[x.len() - 1] - x[0]));
+        let reach = if damping > 0.0 { damping * (1.0 - (-outside / damping).exp()) } else { 0.0 };
+        (reach, outside - reach)
+    }
+
+    /// Weights of the knot values that give the slope at the end nearest to a place outside, outwards: the secant's, corrected by
+    /// the curvature at the inner knot. At least two knots.
+    fn end_slope(&self, at: f64) -> DVector<f64> {
+        let (n, x) = (self.knots.len(), &self.knots);
+        let (end, inner) = if at < x[0] { (0, 1) } else { (n - 1, n - 2) };
+        let h = (x[end] - x[inner]).abs();
+        let mut row = self.second.row(inner).transpose() * (h / 6.0);
+        row[end] += 1.0 / h;
+        row[inner] -= 1.0 / h;
+        row
+    }
+
+    /// Weights of the knot values that give by how much more the value would change beyond the knots if the slope at the end
+    /// went straight on instead of dying away; zeros inside.
+    pub(crate) fn died_away(&self, speed_ratio: f64) -> DVector<f64> {
+        if self.knots.len() < 2 || self.outside(speed_ratio) == 0.0 {
+            return DVector::zeros(self.knots.len());
+        }
+        self.end_slope(self.coordinate.of(speed_ratio)) * self.reach(speed_ratio).1
+    }
+
+    /// Variance of the value at a speed where all knot values are known, for roughness (the variance that the penalty
+    /// is one over of) 1: with that prior the spline is an integrated random walk, and what it does between its knots and
+    /// beyond them is open. 0 at a knot.
+    pub(crate) fn open_variance(&self, speed_ratio: f64) -> f64 {
+        let at = self.coordinate.of(speed_ratio);
+        let place = self.knots.partition_point(|knot| *knot < at);
+        let near = |knot: &f64| (knot - at).abs() < 1e-6 * (1.0 + at.abs());
+        if self.knots[place.saturating_sub(1)..].iter().take(2).any(near) {
+            return 0.0;
+        }
+        let mut knots = self.knots.clone();
+        knots.insert(place, at);
+        // The precision of one value given all others is on the diagonal.
+        let precision = SpeedSpline::with_knots(self.coordinate, knots).penalty[(place, place)];
+        if precision > 0.0 { 1.0 / precision } else { 0.0 }
+    }
+
+    /// Beyond which end of the knots a speed lies; `None` inside.
+    pub(crate) fn end_beyond(&self, speed_ratio: f64) -> Option<End> {
+        let slow = self.coordinate.of(speed_ratio) < self.knots[0];
+        (self.outside(speed_ratio) > 0.0).then_some(if slow { End::Slow } else { End::Fast })
+    }
+
+    /// How far a speed lies outside the knots, in the coordinate; 0 inside.
+    pub(crate) fn outside(&self, speed_ratio: f64) -> f64 {
+        let at = self.coordinate.of(speed_ratio);
+        let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
+        (first - at).max(at - last).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn straight_lines_are_kept_and_cost_nothing(
+            steps in proptest::collection::vec(0.05..1.0f64, 1..8), slope in -2.0..2.0f64, t in 0.0..1.0f64,
+        ) {
+            let mut at = 0.0;
+            let mut knots = vec![at];
+            for step in &steps { at += step; knots.push(at); }
+            let spline = SpeedSpline::new(Coordinate::Speed, &knots);
+            let values = DVector::from_iterator(knots.len(), knots.iter().map(|k| 0.3 + slope * k));
+            let inside = t * at;
+            prop_assert!((spline.row(inside).dot(&values) - (0.3 + slope * inside)).abs() < 1e-9);
+            prop_assert!((values.transpose() * &spline.penalty * &values)[(0, 0)].abs() < 1e-9);
+            // Outside the slope goes on at first and then dies away.
+            let near = spline.row(at + 1e-6).dot(&values);
+            prop_assert!((near - (0.3 + slope * (at + 1e-6))).abs() < 1e-9);
+            let far = spline.row(at + 50.0).dot(&values);
+            prop_assert!((far - (0.3 + slope * (at + DAMPING.min(0.5 * at)))).abs() < 1e-9);
+            // What has died away is the rest of the straight line.
+            let straight = far + spline.died_away(at + 50.0).dot(&values);
+            prop_assert!((straight - (0.3 + slope * (at + 50.0))).abs() < 1e-9);
+        }
+
+        /// A straight line through two knots, a third value in their middle at distance h: the curvature is spread over
+        /// two parabola halves, integral of g''^2 = 3 d^2 / h^3 for a rise d: Green and Silverman, ch. 2.
+        #[test]
+        fn what_lies_between_two_knots_is_open(h in 0.05..2.0f64) {
+            let spline = SpeedSpline::new(Coordinate::Speed, &[0.0, 2.0 * h]);
+            let exact = h.powi(3) / 6.0;
+            prop_assert!((spline.open_variance(h) / exact - 1.0).abs() < 1e-9);
+            prop_assert!(spline.open_variance(2.0 * h) == 0.0);
+            prop_assert!(spline.open_variance(3.0 * h) > spline.open_variance(2.5 * h));
+        }
+
+        #[test]
+        fn it_is_continuous_with_its_slope(values in proptest::collection::vec(-1.0..1.0f64, 5)) {
+            let spline = SpeedSpline::new(Coordinate::Speed, &[0.0, 0.2, 0.5, 0.6, 1.1]);
+            let values = DVector::from_vec(values);
+            let value = |at: f64| spline.row(at).dot(&values);
+            for knot in [0.0, 0.2, 0.5, 0.6, 1.1] {
+                let h = 1e-5;
+                let (left, right) = ((value(knot) - value(knot - h)) / h, (value(knot + h) - value(knot)) / h);
+                // The second derivative is below 1e3 for values of order 1 and knots 0.1 apart.
+                prop_assert!((left - right).abs() < 0.05, "{} {}", left, right);
+            }
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! What a column of a map's table holds, from its heading.
+
+use crate::table::columns::quantity::Quantity;
+use crate::table::columns::quantity_name::{is_turbine, quantity_of_name, quantity_of_turbine};
+use mapper_core::ReferenceState;
+use mapper_physics::gas::air::GAS_CONSTANT_J_KGK;
+use mapper_yaml::units::{Kind, Reference, Unit, header_unit, split_unit, volume_flow_m3_s};
+
+/// A column with its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Column {
+    pub(crate) index: usize,
+    pub(crate) quantity: Quantity,
+    /// Its heading.
+    pub(crate) heading: String,
+    /// Its unit as written; empty if it names none.
+    pub(crate) unit: String,
+    scale: Scale,
+}
+
+/// How a value becomes SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Scale {
+    Unit(&'static Unit),
+    Factor(f64),
+}
+
+impl Column {
+    /// A column without a heading, in SI and rpm.
+    pub(crate) fn bare(index: usize, quantity: Quantity) -> Column {
+        Column { index, quantity, heading: String::new(), unit: String::new(), scale: Scale::Factor(1.0) }
+    }
+
+    /// A column with the unit of its heading, if there is one.
+    ///
+    /// # Errors
+    /// [`ColumnError::Unit`] if it is none of the quantity.
+    pub(crate) fn with_unit(
+        index: usize,
+        quantity: Quantity,
+        heading: &str,
+        unit: Option<&str>,
+    ) -> Result<Column, ColumnError> {
+        let heading: String = heading.chars().take(60).collect();
+        let Some(text) = unit.filter(|unit| !says_nothing(unit)) else {
+            return Ok(Column { heading, ..Column::bare(index, quantity) });
+        };
+        match scale(quantity, text) {
+            Some(scale) => Ok(Column { index, quantity, heading, unit: text.to_owned(), scale }),
+            None => Err(ColumnError::Unit {
+                heading,
+                unit: text.chars().take(40).collect(),
+                kind: quantity.kind().name(),
+                known: quantity.unit_list(),
+            }),
+        }
+    }
+
+    /// A value in SI and rpm; reduced ones in rpm/K^0.5 and kg K^0.5/(s kPa).
+    pub(crate) fn plain(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Unit(unit) => unit.to_inside(value),
+            Scale::Factor(factor) => factor * value,
+        }
+    }
+
+    /// A value in SI and rpm. Volume flows count at the density of the reference state, reduced quantities become corrected ones.
+    pub(crate) fn inside(&self, value: f64, reference: ReferenceState) -> f64 {
+        let value = self.plain(value);
+        let (t_ref_k, p_ref_pa) = (reference.t_ref_k, reference.p_ref_pa);
+        match self.quantity {
+            Quantity::ReducedSpeed => value * t_ref_k.sqrt(),
+            Quantity::ReducedFlow => value * (p_ref_pa / 1000.0) / t_ref_k.sqrt(),
+            Quantity::VolumeFlow => value * p_ref_pa / (GAS_CONSTANT_J_KGK * t_ref_k),
+            _ => value,
+        }
+    }
+
+    /// Whether the heading names a unit.
+    pub(crate) fn has_unit(&self) -> bool {
+        !self.unit.is_empty()
+    }
+}
+
+/// Why a heading is not understood.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum ColumnError {
+    #[error(
+        "the heading `{heading}` has the unit `{unit}`, which is not a unit of {kind}; write one of {known}"
+    )]
+    Unit { heading: String, unit: String, kind: &'static str, known: String },
+    #[error("the heading `{heading}` belongs to a turbine map")]
+    Turbine { heading: String },
+}
+
+/// The machine of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Machine {
+    #[default]
+    Compressor,
+    Turbine,
+}
+
+/// The column of a heading; `None` if it holds none of the quantities.
+pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Option<Column>, ColumnError> {
+    let (name, unit) = parts(heading);
+    let plain: String =
+        name.to_lowercase().chars().filter(|c| c.is_alphanumeric() || "/√η^.".contains(*c)).collect();
+    let shown = || heading.chars().take(60).collect::<String>();
+    if machine == Machine::Compressor && is_turbine(&plain) {
+        return Err(ColumnError::Turbine { heading: shown() });
+    }
+    let by_unit = unit.as_deref().and_then(quantity_of_unit);
+    let of_turbine = (machine == Machine::Turbine).then(|| quantity_of_turbine(&plain, by_unit)).flatten();
+    let Some(quantity) =
+        of_turbine.or_else(|| quantity_of_name(&plain, by_unit)).or(by_unit.filter(|_| plain.is_empty()))
+    else {
+        return Ok(None);
+    };
+    Column::with_unit(index, quantity, heading, unit.as_deref()).map(Some)
+}
+
+/// Name and unit of a heading. Brackets that name the kind of a ratio are dropped.
+pub(crate) fn parts(heading: &str) -> (String, Option<String>) {
+    let heading = heading.trim();
+    if !heading.contains(['[', '(']) && quantity_of_unit(heading).is_some() {
+        return (String::new(), Some(heading.to_owned()));
+    }
+    if let Some((name, inside)) = last_bracket(heading)
+        && !in_name(name, inside)
+    {
+        return (name.to_owned(), (!is_kind(inside)).then(|| inside.to_owned()));
+    }
+    // `MASSc-kg/s`, `Flow kg/s`, `m / kg/h`, `flow_kg_s`.
+    let known = |unit: &str| quantity_of_unit(unit).is_some();
+    if let (name, Some(unit)) = split_unit(heading)
+        && known(&unit)
+        && !says_nothing(&unit)
+    {
+        return (name, Some(unit));
+    }
+    for separator in [" - ", "-", " ", "/"] {
+        for (at, _) in heading.match_indices(separator) {
+            let (name, unit) = (heading[..at].trim(), heading[at + separator.len()..].trim());
+            if !name.is_empty() && unit.len() > 1 && known(unit) {
+                return (name.to_owned(), Some(unit.to_owned()));
+            }
+        }
+    }
+    (heading.to_owned(), None)
+}
+
+/// What is before the bracket that ends a heading, and what is inside. Name and unit may hold brackets of their own.
+fn last_bracket(heading: &str) -> Option<(&str, &str)> {
+    let inside = heading.strip_suffix([']', ')'])?;
+    let mut depth = 1;
+    for (at, c) in inside.char_indices().rev() {
+        match c {
+            ']' | ')' => depth += 1,
+            '[' | '(' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return (at > 0).then(|| (inside[..at].trim(), inside[at + 1..].trim()));
+        }
+    }
+    None
+}
+
+/// `sqrt(T)`: the bracket belongs to the name.
+fn in_name(name: &str, inside: &str) -> bool {
+    let root = name.to_lowercase();
+    (root.ends_with("sqrt") || root.ends_with('√')) && inside.len() <= 4
+}
+
+/// Total or static ratios, and words that stand in brackets without being a unit.
+fn is_kind(inside: &str) -> bool {
+    let plain: String = inside.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
+    matches!(
+        plain.as_str(),
+        "ts" | "tt"
+            | "cc"
+            | "ss"
+            | "corr"
+            | "corrected"
+            | "red"
+            | "reduced"
+            | "is"
+            | "isentropic"
+            | "total"
+            | "korr"
+            | "t"
+            | "s"
+    ) || says_nothing(inside)
+}
+
+/// Whether a text is a unit of a quantity.
+pub(crate) fn is_unit(quantity: Quantity, text: &str) -> bool {
+    scale(quantity, text).is_some()
+}
+
+/// A unit of mass flow, kg/s.
+pub fn flow_unit_kg_s(text: &str) -> Option<f64> {
+    Some(unit_of(Kind::MassFlow, text)?.to_inside(1.0))
+}
+
+fn says_nothing(unit: &str) -> bool {
+    matches!(
+        unit.to_lowercase().as_str(),
+        "" | "-" | "--" | "1" | "ratio" | "fraction" | "frac" | "dimensionless" | "dec" | "nd"
+    )
+}
+
+/// What a unit measures.
+fn quantity_of_unit(unit: &str) -> Option<Quantity> {
+    let lower = unit.trim().to_lowercase();
+    if volume_flow_m3_s(unit).is_some() {
+        return Some(Quantity::VolumeFlow);
+    }
+    if lower == "%" {
+        return Some(Quantity::Efficiency);
+    }
+    if is_root(&lower) {
+        return Some(if lower.contains("kg") || lower.contains("lb") {
+            Quantity::ReducedFlow
+        } else {
+            Quantity::ReducedSpeed
+        });
+    }
+    match header_unit(unit)?.kind {
+        Kind::Speed => Some(Quantity::Speed),
+        Kind::MassFlow => Some(Quantity::Flow),
+        _ => None,
+    }
+}
+
+fn is_root(lower: &str) -> bool {
+    ["k^0.5", "k^.5", "k^1/2", "sqrt(k", "sqrtk", "√k", "k0.5", "k**0.5"]
+        .iter()
+        .any(|root| lower.contains(root))
+}
+
+fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
+    let lower = unit.trim().to_lowercase();
+    match quantity {
+        Quantity::VolumeFlow => Some(Scale::Factor(volume_flow_m3_s(unit)??)),
+        Quantity::ReducedSpeed if is_root(&lower) => {
+            let speed = lower.split(['/', '*', '-']).next()?;
+            Some(Scale::Factor(unit_of(Kind::Speed, speed)?.to_inside(1.0)))
+        }
+        Quantity::ReducedFlow => {
+            // `kg/s*K^0.5/kPa`, `kg-sqrt(K)/s-kPa`, `kg*sqrt(K)/(s*kPa)`: the mass is first, the pressure last.
+            let mass = unit.split(['*', '-', ' ']).next()?;
+            let mass = if mass.contains('/') { mass.to_owned() } else { format!("{mass}/s") };
+            let pressure = unit.trim_end_matches([')', ' ']).rsplit(['/', '*', '-', ' ', '(']).next()?;
+            let kg_s = unit_of(Kind::MassFlow, &mass)?.to_inside(1.0);
+            Some(Scale::Factor(kg_s * (1000.0 / unit_of(Kind::Pressure, pressure)?.to_inside(1.0))))
+        }
+        // Positions are only compared with each other.
+        Quantity::Vane if matches!(lower.as_str(), "deg" | "°" | "mm") => Some(Scale::Factor(1.0)),
+        // Speeds over that of the design point.
+        Quantity::Speed if lower == "%" => Some(Scale::Factor(0.01)),
+        _ => unit_of(quantity.kind(), unit).map(Scale::Unit),
+    }
+}
+
+/// The unit of a kind under any spelling that headings use. A map has absolute pressures.
+fn unit_of(kind: Kind, text: &str) -> Option<&'static Unit> {
+    let named =
+        || header_unit(text).filter(|found| found.kind == kind && found.reference != Reference::Gauge);
+    kind.unit(text).or_else(|| Some(named()?.unit))
+}

@@ -1,0 +1,6 @@
+//! Quantities and units of the columns of a map table, from their headings or from the user's map description.
+
+pub(crate) mod column;
+pub(crate) mod described_columns;
+pub(crate) mod quantity;
+pub(crate) mod quantity_name;

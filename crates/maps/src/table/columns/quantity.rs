@@ -1,0 +1,121 @@
+//! The quantities of a table of points.
+
+use mapper_yaml::units::Kind;
+
+/// Quantities of a table of points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Corrected speed; the measured speed in a table of measured points.
+    Speed,
+    /// Speed over the root of T1.
+    ReducedSpeed,
+    /// Corrected flow; the measured flow in a table of measured points.
+    Flow,
+    /// Volume flow at the inlet, at the reference state.
+    VolumeFlow,
+    /// Flow times the root of T1 over P1.
+    ReducedFlow,
+    /// Total pressure ratio.
+    PressureRatio,
+    /// Isentropic efficiency.
+    Efficiency,
+    /// Position of a turbine's vanes.
+    Vane,
+    /// Measured inlet pressure.
+    P1,
+    /// Measured outlet pressure.
+    P2,
+    /// Measured inlet temperature.
+    T1,
+    /// Measured outlet temperature.
+    T2,
+}
+
+impl Quantity {
+    /// Every quantity.
+    pub(crate) const ALL: [Quantity; 12] = [
+        Quantity::Speed,
+        Quantity::ReducedSpeed,
+        Quantity::Flow,
+        Quantity::VolumeFlow,
+        Quantity::ReducedFlow,
+        Quantity::PressureRatio,
+        Quantity::Efficiency,
+        Quantity::Vane,
+        Quantity::P1,
+        Quantity::P2,
+        Quantity::T1,
+        Quantity::T2,
+    ];
+
+    /// Its key in a map description.
+    pub fn key(self) -> &'static str {
+        match self {
+            Quantity::Speed => "speed",
+            Quantity::ReducedSpeed => "reduced_speed",
+            Quantity::Flow => "flow",
+            Quantity::VolumeFlow => "volume_flow",
+            Quantity::ReducedFlow => "reduced_flow",
+            Quantity::PressureRatio => "pressure_ratio",
+            Quantity::Efficiency => "efficiency",
+            Quantity::Vane => "vane",
+            Quantity::P1 => "p1",
+            Quantity::P2 => "p2",
+            Quantity::T1 => "t1",
+            Quantity::T2 => "t2",
+        }
+    }
+
+    /// The quantity of a key.
+    pub(crate) fn of_key(key: &str) -> Option<Quantity> {
+        Quantity::ALL.into_iter().find(|quantity| quantity.key() == key)
+    }
+
+    /// Whether two are forms of the same quantity.
+    pub(crate) fn is_like(self, other: Quantity) -> bool {
+        let form = |quantity| match quantity {
+            Quantity::ReducedSpeed => Quantity::Speed,
+            Quantity::VolumeFlow | Quantity::ReducedFlow => Quantity::Flow,
+            quantity => quantity,
+        };
+        form(self) == form(other)
+    }
+
+    /// Its units in messages.
+    pub(crate) fn unit_list(self) -> String {
+        match self {
+            Quantity::VolumeFlow => "m3/s, m3/min, m3/h, l/s, CFM".to_owned(),
+            Quantity::ReducedFlow => "kg/s*K^0.5/kPa, kg/s*K^0.5/MPa, kg/s*K^0.5/bar".to_owned(),
+            _ => self.kind().unit_list(),
+        }
+    }
+
+    /// Its name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::Speed => "speed",
+            Quantity::ReducedSpeed => "speed over the root of temperature",
+            Quantity::Flow => "mass flow",
+            Quantity::VolumeFlow => "volume flow",
+            Quantity::ReducedFlow => "flow times the root of temperature over pressure",
+            Quantity::PressureRatio => "pressure ratio",
+            Quantity::Efficiency => "efficiency",
+            Quantity::Vane => "vane position",
+            Quantity::P1 => "P1",
+            Quantity::P2 => "P2",
+            Quantity::T1 => "T1",
+            Quantity::T2 => "T2",
+        }
+    }
+
+    /// What it measures.
+    pub(crate) fn kind(self) -> Kind {
+        match self {
+            Quantity::Speed | Quantity::ReducedSpeed => Kind::Speed,
+            Quantity::Flow | Quantity::VolumeFlow | Quantity::ReducedFlow => Kind::MassFlow,
+            Quantity::PressureRatio | Quantity::Efficiency | Quantity::Vane => Kind::Fraction,
+            Quantity::P1 | Quantity::P2 => Kind::Pressure,
+            Quantity::T1 | Quantity::T2 => Kind::Temperature,
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! Reads tables over speed and an auxiliary coordinate (beta, R line) from the scripts and files of simulation programs: arrays of MATLAB and
+//! Python, nested tables of NPSS.
+
+use crate::table::efficiency_comment::efficiency_in_comment;
+use crate::table::gas_turbine::beta_design::{between, design_of, flow_unit, scales_flow};
+use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
+use crate::table::reference::in_comment;
+use crate::table::rows_to_lines::{Row, map_of_rows, room_for_one_more};
+use mapper_core::{CompressorMap, ImportError, ImportRemark, ImportedMap, MapDescription};
+
+/// Numbers of the quantities, speed by speed.
+#[derive(Debug, Default)]
+struct BetaTables {
+    speeds: Vec<f64>,
+    /// Auxiliary coordinate of the columns.
+    beta: Vec<f64>,
+    flow: Vec<f64>,
+    pressure_ratio: Vec<f64>,
+    efficiency: Vec<f64>,
+}
+
+/// Maximum number of numbers in a file.
+const NUMBER_LIMIT: usize = 4 * crate::table::rows_to_lines::POINT_LIMIT;
+
+/// The map of a script with arrays: `name = [1 2; 3 4]` or `name = np.array([[1, 2], [3, 4]])`.
+pub(crate) fn read_arrays(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let code: String = text
+        .lines()
+        .map(|line| line.split(['%', '#']).next().unwrap_or_default())
+        .collect::<Vec<_>>()
+        .join("\n");
+    let mut tables = BetaTables::default();
+    for (at, _) in code.match_indices('=') {
+        let name =
+            code[..at].trim_end().rsplit(|c: char| c.is_whitespace() || c == ';').next().unwrap_or_default();
+        let value = code[at + 1..].trim_start();
+        let value =
+            value.strip_prefix("np.array(").or_else(|| value.strip_prefix("numpy.array(")).unwrap_or(value);
+        if value.starts_with('[')
+            && let Some(place) = tables.place(name)
+            && place.is_empty()
+        {
+            *place = bracketed(value, ('[', ']'), line_of(&code, at))?;
+        }
+    }
+    tables.map(text, &code, given)
+}
+
+/// The map of nested tables: `NcorrMap = 0.5 { RlineMap = {1, 2} WcMap = {0.1, 0.2} }`.
+pub(crate) fn read_nested(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let code: String =
+        text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
+    let mut tables = BetaTables::default();
+    let (mut speeds, mut by_beta) = (Vec::new(), false);
+    let starts: Vec<usize> = code.match_indices("Table ").map(|(at, _)| at).collect();
+    for (index, start) in starts.iter().enumerate() {
+        let part = &code[*start..starts.get(index + 1).copied().unwrap_or(code.len())];
+        // Of several vane angles the first counts.
+        let angles: Vec<usize> = part
+            .match_indices("alphaMap")
+            .map(|(at, _)| at)
+            .filter(|at| part[*at..].trim_start_matches("alphaMap").trim_start().starts_with('='))
+            .collect();
+        let part = &part[..angles.get(1).copied().unwrap_or(part.len())];
+        let mut of_table = Vec::new();
+        let mut is_known = false;
+        for (at, _) in part.match_indices('=') {
+            let line = line_of(&code, start + at);
+            let is_name = |c: char| c.is_alphanumeric() || c == '_';
+            let name = part[..at].trim_end().rsplit(|c: char| !is_name(c)).next().unwrap_or_default();
+            let value = part[at + 1..].trim_start();
+            let (is_speed, is_list) = (name.to_lowercase().starts_with("nc"), value.starts_with('{'));
+            if is_speed && is_list {
+                // Each value of beta has a list over all speeds.
+                by_beta = true;
+                if of_table.is_empty() {
+                    of_table = bracketed(value, ('{', '}'), line)?;
+                }
+            } else if is_speed {
+                let end =
+                    value.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(value.len());
+                of_table.extend(value[..end].parse::<f64>().ok());
+            } else if is_list && let Some(place) = tables.place(name) {
+                let numbers = bracketed(value, ('{', '}'), line)?;
+                // The coordinate of the columns is repeated at every speed.
+                if name.to_lowercase().starts_with("rline") {
+                    *place = numbers;
+                } else {
+                    place.extend(numbers);
+                    is_known = true;
+                }
+            }
+        }
+        if is_known && speeds.is_empty() {
+            speeds = of_table;
+        }
+    }
+    tables.speeds = speeds;
+    if by_beta {
+        tables.turn();
+    }
+    tables.map(text, &code, given)
+}
+
+/// The map of text tables of Modelica: `double name(rows, columns)`, the first row the auxiliary coordinate behind one unused number, the
+/// first column the speeds.
+pub(crate) fn read_modelica(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let code: String =
+        text.lines().map(|line| line.split('#').next().unwrap_or_default()).collect::<Vec<_>>().join("\n");
+    let mut tables = BetaTables::default();
+    let starts: Vec<usize> = code.match_indices("double ").map(|(at, _)| at).collect();
+    for (index, start) in starts.iter().enumerate() {
+        let part = &code[*start..starts.get(index + 1).copied().unwrap_or(code.len())];
+        let Some((head, body)) = part.split_once(')') else { continue };
+        let Some((name, size)) = head.trim_start_matches("double ").split_once('(') else { continue };
+        let columns = size.split(',').nth(1).and_then(|columns| columns.trim().parse::<usize>().ok());
+        let Some(columns) = columns.filter(|columns| *columns > 1) else { continue };
+        let numbers = bracketed(body, ('[', ']'), line_of(&code, *start))?;
+        let rows: Vec<&[f64]> = numbers.chunks(columns).collect();
+        let Some(place) = tables.place(name.trim()) else { continue };
+        let (beta, lines) = rows.split_first().map_or((&[][..], &[][..]), |(first, rest)| (*first, rest));
+        *place = lines.iter().flat_map(|line| line.iter().skip(1)).copied().collect();
+        tables.beta = beta.iter().skip(1).copied().collect();
+        tables.speeds = lines.iter().filter_map(|line| line.first()).copied().collect();
+    }
+    tables.map(text, &code, given)
+}
+
+/// Line of a place in a text, from 1.
+fn line_of(text: &str, at: usize) -> usize {
+    1 + text[..at].matches('\n').count()
+}
+
+/// The numbers between a bracket and its partner, in order. `line`: the line of the file at which they begin.
+fn bracketed(text: &str, (open, close): (char, char), line: usize) -> Result<Vec<f64>, ImportError> {
+    let mut depth = 0usize;
+    let mut end = text.len();
+    for (at, c) in text.char_indices() {
+        depth += usize::from(c == open);
+        if c == close {
+            depth = depth.saturating_sub(1);
+            if depth == 0 {
+                end = at;
+                break;
+            }
+        }
+    }
+    let mut numbers = Vec::new();
+    let words = text[..end].split(|c: char| c.is_whitespace() || ",;[]{}()".contains(c));
+    for word in words.filter(|word| !word.is_empty() && *word != "...") {
+        if numbers.len() >= NUMBER_LIMIT {
+            return Err(ImportError::TooMany { line, limit: NUMBER_LIMIT });
+        }
+        numbers.push(word.parse().map_err(|_| ImportError::NotANumber {
+            line,
+            quantity: "table".to_owned(),
+            text: word.chars().take(40).collect(),
+        })?);
+    }
+    Ok(numbers)
+}
+
+impl BetaTables {
+    /// The quantity of an array, by the names in use: T-MATS, pyCycle, NPSS, and those that `mapper` writes.
+    fn place(&mut self, name: &str) -> Option<&mut Vec<f64>> {
+        let name = name.rsplit('.').next().unwrap_or_default().to_lowercase();
+        match name.as_str() {
+            "ncvec"
+            | "ncmap"
+            | "nc"
+            | "nc_vec"
+            | "ncorr"
+            | "ncorrmap"
+            | "corrected_speed_rpm"
+            | "x_c_map_ncvec" => Some(&mut self.speeds),
+            "rlinevec" | "rlinemap" | "rline" | "beta" => Some(&mut self.beta),
+            "wcarray" | "wcmap" | "wc" | "wc_map" | "corrected_flow_kg_s" | "flow_corrected_kg_s" | "mc" => {
+                Some(&mut self.flow)
+            }
+            "prarray" | "prmap" | "pr" | "pr_map" | "pressure_ratio" => Some(&mut self.pressure_ratio),
+            "effarray" | "effmap" | "eff" | "eff_map" | "isentropic_efficiency" | "eta" => {
+                Some(&mut self.efficiency)
+            }
+            _ => None,
+        }
+    }
+
+    /// From beta by beta to speed by speed.
+    fn turn(&mut self) {
+        let speeds = self.speeds.len().max(1);
+        for values in [&mut self.flow, &mut self.pressure_ratio, &mut self.efficiency] {
+            *values =
+                (0..speeds).flat_map(|speed| values.iter().skip(speed).step_by(speeds).copied()).collect();
+        }
+    }
+
+    fn map(&self, text: &str, code: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+        let mut rows = self.rows()?;
+        let mut remarks = Vec::new();
+        let unit_kg_s = flow_unit(code, given)?;
+        for row in &mut rows {
+            row.flow_corrected_kg_s *= unit_kg_s.unwrap_or(1.0);
+        }
+        let mut design: MapDesign = design_of(code);
+        let at_design = |values: &[f64]| between(&self.speeds, &self.beta, values, design);
+        design.values =
+            match [&self.flow, &self.pressure_ratio, &self.efficiency].map(|values| at_design(values)) {
+                [Some(flow), Some(ratio), Some(eta)] => Some([unit_kg_s.unwrap_or(1.0) * flow, ratio, eta]),
+                _ => None,
+            };
+        let is_relative = scale_to_design(&mut rows, design, given.design, &mut remarks)?;
+        // Files of `mapper` have kg/s.
+        let machine = text.lines().find_map(|line| line.split_once("compressor map of "));
+        if unit_kg_s.is_none() && !scales_flow(given.design) && machine.is_none() {
+            if is_relative {
+                return Err(ImportError::FlowUnit);
+            }
+            remarks.push(ImportRemark::FlowUnitAssumed);
+        }
+        rows.iter().try_for_each(Row::check)?;
+        let found = text.lines().find_map(in_comment);
+        let machine = machine.map(|(_, name)| name.trim().chars().take(200).collect());
+        let efficiency = text.lines().find_map(efficiency_in_comment);
+        let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given.reference)?;
+        Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns: Vec::new(), remarks })
+    }
+
+    /// The points of the tables, as written.
+    fn rows(&self) -> Result<Vec<Row>, ImportError> {
+        let missing = [
+            (&self.speeds, "speed"),
+            (&self.flow, "corrected flow"),
+            (&self.pressure_ratio, "pressure ratio"),
+            (&self.efficiency, "efficiency"),
+        ];
+        if let Some((_, missing)) = missing.iter().find(|(values, _)| values.is_empty()) {
+            return Err(ImportError::NoTable { missing });
+        }
+        let lines = self.speeds.len();
+        // A map with vanes has one table per angle; the first counts.
+        let columns = if self.beta.is_empty() { self.flow.len() / lines } else { self.beta.len() };
+        let table = lines * columns;
+        let fits = |values: &[f64]| table > 0 && values.len().is_multiple_of(table) && !values.is_empty();
+        if ![&self.flow, &self.pressure_ratio, &self.efficiency].into_iter().all(|values| fits(values)) {
+            return Err(ImportError::TableSize {
+                speeds: lines,
+                flows: self.flow.len(),
+                pressure_ratios: self.pressure_ratio.len(),
+                efficiencies: self.efficiency.len(),
+            });
+        }
+        let mut rows = Vec::with_capacity(lines * columns);
+        for (line, speed_corrected_rpm) in self.speeds.iter().enumerate() {
+            for place in line * columns..(line + 1) * columns {
+                room_for_one_more(rows.len(), place + 1)?;
+                let value = |values: &[f64]| values.get(place).copied().unwrap_or(f64::NAN);
+                rows.push(Row {
+                    at: place + 1,
+                    speed_corrected_rpm: *speed_corrected_rpm,
+                    flow_corrected_kg_s: value(&self.flow),
+                    pressure_ratio: value(&self.pressure_ratio),
+                    eta: Some(value(&self.efficiency)),
+                });
+            }
+        }
+        Ok(rows)
+    }
+}

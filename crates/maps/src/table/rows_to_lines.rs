@@ -1,0 +1,195 @@
+//! Rows to speed lines.
+
+use crate::table::reference;
+use mapper_core::{
+    CommonErrors, CompressorMap, IdentifiedPoint, ImportError, MapPoint, Method, ReferenceState, SpeedLine,
+    SpeedShift, StepKind, Verdict,
+};
+use mapper_physics::compressor_map::inlet_limit::{SLOWEST_TOP_SPEED_RPM, largest_flow_kg_s};
+use mapper_physics::compressor_map::similarity::at_speed;
+
+/// Maximum number of points.
+pub const POINT_LIMIT: usize = 100_000;
+
+/// Maximum relative speed difference within a line: lines of maps are 5 % or more apart, speed within a line is steady to 1 %.
+const SAME_LINE_RATIO: f64 = 0.015;
+
+/// The four numbers of a row, common to all maps.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// Line of the file, from 1.
+    pub at: usize,
+    /// Corrected speed, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Corrected flow, kg/s.
+    pub flow_corrected_kg_s: f64,
+    /// Total pressure ratio.
+    pub pressure_ratio: f64,
+    /// Isentropic efficiency, fraction.
+    pub eta: Option<f64>,
+}
+
+impl Row {
+    /// # Errors
+    /// [`ImportError`] with the value that no map has.
+    pub fn check(&self) -> Result<(), ImportError> {
+        let positive = "a number above 0";
+        for (quantity, value, good, needed) in [
+            (
+                "corrected speed",
+                self.speed_corrected_rpm,
+                (1.0..=2e6).contains(&self.speed_corrected_rpm),
+                "between 1 and 2e6 rpm",
+            ),
+            (
+                "corrected flow",
+                self.flow_corrected_kg_s,
+                self.flow_corrected_kg_s > 0.0 && self.flow_corrected_kg_s < 1e4,
+                positive,
+            ),
+            (
+                "pressure ratio",
+                self.pressure_ratio,
+                self.pressure_ratio > 0.0 && self.pressure_ratio < 50.0,
+                "above 0, below 50",
+            ),
+            (
+                "efficiency",
+                self.eta.unwrap_or(0.5),
+                self.eta.is_none_or(|eta| (-5.0..=1.5).contains(&eta)),
+                "a fraction (0.72), not a percentage",
+            ),
+        ] {
+            if !(value.is_finite() && good) {
+                return Err(ImportError::Value { line: self.at, quantity, value, needed });
+            }
+        }
+        let most_kg_s = largest_flow_kg_s(self.speed_corrected_rpm);
+        if self.flow_corrected_kg_s > most_kg_s {
+            return Err(ImportError::Flow {
+                line: self.at,
+                flow_corrected_kg_s: self.flow_corrected_kg_s,
+                speed_corrected_rpm: self.speed_corrected_rpm,
+                most_kg_s,
+            });
+        }
+        Ok(())
+    }
+
+    /// A point with only the numbers of its row. Physical values are those at the reference state.
+    pub fn point(&self, reference: ReferenceState, step: usize) -> IdentifiedPoint {
+        IdentifiedPoint {
+            step,
+            kind: StepKind::Point,
+            target: None,
+            speed_rpm: self.speed_corrected_rpm,
+            valve_opening_ratio: f64::NAN,
+            flow_kg_s: self.flow_corrected_kg_s,
+            flow_corrected_kg_s: self.flow_corrected_kg_s,
+            speed_corrected_rpm: self.speed_corrected_rpm,
+            pressure_ratio: self.pressure_ratio,
+            t1_k: reference.t_ref_k,
+            p1_pa: reference.p_ref_pa,
+            eta: self.eta,
+            eta_low: None,
+            eta_high: None,
+            eta_uncertainty: None,
+            h_w_m2k: None,
+            h_low_w_m2k: None,
+            h_high_w_m2k: None,
+            h_uncertainty: None,
+            common: CommonErrors::default(),
+            method: Method::Imported,
+            verdict: if self.eta.is_some() { Verdict::Good } else { Verdict::Unusable },
+            warnings: Vec::new(),
+            window: None,
+            residual_rms_k: None,
+            dt2_k: None,
+            dtc_k: None,
+        }
+    }
+}
+
+/// A map of rows with only four numbers.
+///
+/// # Errors
+/// [`ImportError`] without reference state or points, and for speeds of no turbocharger.
+pub fn map_of_rows(
+    machine: String,
+    rows: &[Row],
+    found: Option<ReferenceState>,
+    given: Option<ReferenceState>,
+) -> Result<CompressorMap, ImportError> {
+    let reference = reference::settle(found, given)?;
+    if rows.is_empty() {
+        return Err(ImportError::Empty);
+    }
+    let fastest_rpm = rows.iter().map(|row| row.speed_corrected_rpm).fold(0.0, f64::max);
+    if fastest_rpm < SLOWEST_TOP_SPEED_RPM {
+        return Err(ImportError::Slow { speed_corrected_rpm: fastest_rpm });
+    }
+    let mut points: Vec<IdentifiedPoint> =
+        rows.iter().enumerate().map(|(step, row)| row.point(reference, step)).collect();
+    points.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
+    let lines = points
+        .chunk_by(|a, b| b.speed_corrected_rpm <= a.speed_corrected_rpm * (1.0 + SAME_LINE_RATIO))
+        .map(|members| {
+            let speeds = || members.iter().map(|point| point.speed_corrected_rpm);
+            let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
+            // Rounding may move the mean of equal numbers away from them.
+            let mean = if low == high { low } else { speeds().sum::<f64>() / members.len() as f64 };
+            line(mean, members.iter().map(|point| on_line(point, mean)).collect())
+        })
+        .collect();
+    Ok(CompressorMap {
+        machine,
+        reference,
+        method: Method::Imported,
+        efficiency: None,
+        lines,
+        surge: Vec::new(),
+        fitted: None,
+    })
+}
+
+/// A line of points by rising flow.
+pub fn line(speed_corrected_rpm: f64, mut points: Vec<MapPoint>) -> SpeedLine {
+    let speeds = || points.iter().map(|point| point.identified.speed_corrected_rpm);
+    let (low, high) = speeds().fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
+    points.sort_by(|a, b| {
+        let by_flow = a.flow_corrected_kg_s.total_cmp(&b.flow_corrected_kg_s);
+        by_flow.then(b.pressure_ratio.total_cmp(&a.pressure_ratio))
+    });
+    SpeedLine { speed_corrected_rpm, speed_spread_rpm: high - low, target_speed_rpm: None, points }
+}
+
+/// A point converted to the speed of its line by similarity.
+fn on_line(point: &IdentifiedPoint, line_speed_rpm: f64) -> MapPoint {
+    let shift_rpm = line_speed_rpm - point.speed_corrected_rpm;
+    let (flow, ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
+    let moved = shift_rpm != 0.0;
+    let (flow_there, ratio_there) =
+        if moved { at_speed(flow, ratio, line_speed_rpm / point.speed_corrected_rpm) } else { (flow, ratio) };
+    MapPoint {
+        flow_corrected_kg_s: flow_there,
+        pressure_ratio: ratio_there,
+        eta: point.eta,
+        identified: point.clone(),
+        shift: moved.then_some(SpeedShift {
+            speed_corrected_rpm: shift_rpm,
+            flow_corrected_kg_s: flow_there - flow,
+            pressure_ratio: ratio_there - ratio,
+        }),
+    }
+}
+
+/// Refuses a file with too many rows.
+///
+/// # Errors
+/// [`ImportError::TooMany`].
+pub fn room_for_one_more(count: usize, at: usize) -> Result<(), ImportError> {
+    if count >= POINT_LIMIT {
+        return Err(ImportError::TooMany { line: at, limit: POINT_LIMIT });
+    }
+    Ok(())
+}

@@ -1,0 +1,364 @@
+//! The place of a table's headings, and whether its speed lines are below each other or side by side.
+
+use crate::table::columns::column::{Column, ColumnError, Machine, column};
+use crate::table::columns::described_columns::Given;
+use crate::table::columns::quantity::Quantity;
+use crate::table::sheet::grid::{Grid, GridRow, is_missing};
+use mapper_core::{ImportError, ImportRemark};
+use mapper_yaml::units::{header_unit, with_units_row};
+
+/// Columns that belong together: all of a table, or those of one speed line of a table with its lines side by side.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Group {
+    pub(crate) columns: Vec<Column>,
+    /// Speed above the columns, rpm.
+    pub(crate) speed_rpm: Option<f64>,
+    /// Whether the columns have no headings.
+    pub(crate) is_bare: bool,
+}
+
+impl Group {
+    /// Position of the speed among the columns.
+    pub(crate) fn speed_column(&self) -> Option<usize> {
+        self.columns
+            .iter()
+            .position(|column| matches!(column.quantity, Quantity::Speed | Quantity::ReducedSpeed))
+    }
+
+    fn has(&self, quantities: &[Quantity]) -> bool {
+        self.columns.iter().any(|column| quantities.contains(&column.quantity))
+    }
+
+    fn has_flow(&self) -> bool {
+        self.has(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow])
+    }
+
+    fn is_measured(&self) -> bool {
+        !self.has(&[Quantity::PressureRatio])
+            && self.has(&[Quantity::P1])
+            && self.has(&[Quantity::P2])
+            && self.has(&[Quantity::T1])
+    }
+
+    fn is_complete(&self) -> bool {
+        self.has_flow() && (self.has(&[Quantity::PressureRatio]) || self.is_measured())
+    }
+}
+
+/// The form of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Layout {
+    pub(crate) groups: Vec<Group>,
+    /// Index of the first row below the headings.
+    pub(crate) first_row: usize,
+    pub(crate) remarks: Vec<ImportRemark>,
+}
+
+impl Layout {
+    /// Whether the points are as measured, not corrected.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.groups.iter().any(Group::is_measured)
+    }
+
+    /// Whether speed and flow are reduced quantities, which need no reference state.
+    pub(crate) fn needs_no_reference(&self) -> bool {
+        self.groups
+            .iter()
+            .all(|group| group.has(&[Quantity::ReducedSpeed]) && group.has(&[Quantity::ReducedFlow]))
+    }
+}
+
+/// The layout of a table; `None` if it has no rows of numbers.
+///
+/// # Errors
+/// [`ImportError`] if the headings do not name flow and pressure ratio, or a unit is unknown, or the map is a turbine's.
+pub(crate) fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
+    if let Some(layout) = numbered(grid, given)? {
+        return Ok(Some(layout));
+    }
+    let mut near: Option<(usize, usize)> = None;
+    for (index, row) in grid.rows.iter().enumerate() {
+        if given.machine == Machine::Compressor && is_turbine_title(row) {
+            return Err(ImportError::Turbine { line: row.at, text: row.text().chars().take(60).collect() });
+        }
+        if let Some(layout) = side_by_side(grid, given, index, row) {
+            return Ok(Some(layout));
+        }
+        let known = match columns(given, &row.cells) {
+            Ok(known) => known,
+            // A unit is only wrong in a row of headings.
+            Err(error) if is_reported(given, row, &error) => return Err(wrong(row, error)),
+            Err(_) => continue,
+        };
+        let group = Group { columns: known, speed_rpm: None, is_bare: false };
+        if group.is_complete() && (!row.is_comment || group.columns.len() >= 3) {
+            return with_heading(grid, given, index, row, group).map(Some);
+        }
+        if group.columns.len() >= 2 && near.is_none_or(|(count, _)| group.columns.len() > count) {
+            near = Some((group.columns.len(), index));
+        }
+    }
+    let heading = near.and_then(|(_, index)| grid.rows.get(index));
+    if let Some(layout) = heading_in_usual_order(grid, given, near) {
+        return Ok(Some(layout));
+    }
+    if let Some(row) = heading.filter(|row| !row.is_comment) {
+        return Err(ImportError::NoColumn {
+            line: row.at,
+            missing: missing(given, row),
+            found: row.cells.join(", ").chars().take(120).collect(),
+        });
+    }
+    bare(grid, given)
+}
+
+/// A heading that names the first columns of the usual order only, above rows of four numbers: its units count.
+fn heading_in_usual_order(grid: &Grid, given: &Given, near: Option<(usize, usize)>) -> Option<Layout> {
+    let mut layout = bare(grid, given).ok().flatten()?;
+    let (_, index) = near?;
+    let group = layout.groups.first_mut()?;
+    let named = columns(given, &grid.rows.get(index)?.cells).ok()?;
+    let in_order = named
+        .iter()
+        .zip(&group.columns)
+        .all(|(named, usual)| named.index == usual.index && named.quantity == usual.quantity);
+    if !in_order || index >= layout.first_row {
+        return None;
+    }
+    for (place, named) in group.columns.iter_mut().zip(named) {
+        *place = named;
+    }
+    Some(layout)
+}
+
+/// Whether a mistake in a row is one of the table: a comment may hold any words.
+fn is_reported(given: &Given, row: &GridRow, error: &ColumnError) -> bool {
+    let of_turbine = matches!(error, ColumnError::Turbine { .. });
+    match row.is_comment {
+        true => of_turbine && is_heading(given, row),
+        false => of_turbine || is_heading(given, row),
+    }
+}
+
+fn wrong(row: &GridRow, error: ColumnError) -> ImportError {
+    match error {
+        ColumnError::Turbine { heading } => ImportError::Turbine { line: row.at, text: heading },
+        error @ ColumnError::Unit { .. } => ImportError::Row { line: row.at, source: Box::new(error) },
+    }
+}
+
+/// A title names a turbine, and no compressor.
+fn is_turbine_title(row: &GridRow) -> bool {
+    let text = row.text().to_lowercase();
+    let numbers = row.cells.iter().filter(|cell| cell.parse::<f64>().is_ok()).count();
+    numbers == 0
+        && (text.contains("turbine") || text.contains("turbina"))
+        && text.contains("map")
+        && !text.contains("compressor")
+}
+
+/// The columns whose headings are understood; of two with the same quantity the first.
+fn columns(given: &Given, cells: &[String]) -> Result<Vec<Column>, ColumnError> {
+    let mut columns: Vec<Column> = Vec::new();
+    for (index, cell) in
+        cells.iter().enumerate().filter(|(_, cell)| cell.contains(char::is_alphabetic) || cell.contains('%'))
+    {
+        if let Some(column) = given.column(index, cell)?
+            && columns.iter().all(|known| known.quantity != column.quantity)
+        {
+            columns.push(column);
+        }
+    }
+    Ok(columns)
+}
+
+/// Whether a row names columns.
+pub(crate) fn is_heading(given: &Given, row: &GridRow) -> bool {
+    let named = |cell: &&String| {
+        cell.contains(char::is_alphabetic) && !matches!(column(0, cell, given.machine), Ok(None))
+    };
+    row.cells.iter().filter(named).count() >= 2
+}
+
+fn missing(given: &Given, row: &GridRow) -> &'static str {
+    let known = columns(given, &row.cells).unwrap_or_default();
+    let group = Group { columns: known, speed_rpm: None, is_bare: false };
+    if group.has_flow() { "pressure ratio (or P1, P2 and T1)" } else { "flow" }
+}
+
+/// The layout below a heading: its units may be in a row of their own; without a speed column each block has its speed in a title.
+fn with_heading(
+    grid: &Grid,
+    given: &Given,
+    index: usize,
+    row: &GridRow,
+    mut group: Group,
+) -> Result<Layout, ImportError> {
+    let mut first_row = index + 1;
+    let names: Vec<&str> = row.cells.iter().map(String::as_str).collect();
+    if let Some(below) = grid.rows.get(first_row) {
+        let units: Vec<&str> = below.cells.iter().map(String::as_str).collect();
+        if let Some(joined) = with_units_row(&names, &units) {
+            group.columns = columns(given, &joined).map_err(|error| wrong(below, error))?;
+            first_row += 1;
+        }
+    }
+    let title_above = index
+        .checked_sub(1)
+        .and_then(|above| grid.rows.get(above))
+        .and_then(|above| speed_of_title(grid, given, above, &group));
+    if group.speed_column().is_none() {
+        let titled =
+            grid.rows.iter().skip(first_row).any(|row| speed_of_title(grid, given, row, &group).is_some());
+        if title_above.is_none() && !titled {
+            return Err(ImportError::NoColumn {
+                line: row.at,
+                missing: "corrected speed",
+                found: row.cells.join(", ").chars().take(120).collect(),
+            });
+        }
+        group.speed_rpm = title_above;
+    }
+    Ok(Layout { groups: vec![group], first_row, remarks: Vec::new() })
+}
+
+/// Lines side by side: pairs of flow and pressure ratio (or X and Y, as digitisers write them), each with its speed above.
+fn side_by_side(grid: &Grid, given: &Given, index: usize, row: &GridRow) -> Option<Layout> {
+    let letters = |cell: &String| matches!(cell.to_lowercase().as_str(), "x" | "y");
+    let filled: Vec<(usize, &String)> =
+        row.cells.iter().enumerate().filter(|(_, cell)| !cell.is_empty()).collect();
+    let by_letter = filled.len() >= 2 && filled.iter().all(|(_, cell)| letters(cell));
+    let quantity = |index: usize, cell: &String| {
+        let letter = match cell.to_lowercase().as_str() {
+            "x" if by_letter => Some(Quantity::Flow),
+            "y" if by_letter => Some(Quantity::PressureRatio),
+            _ => None,
+        };
+        let described = given.column(index, cell).ok().flatten();
+        let by_letter = || given.with_unit(Column::bare(index, letter?)).ok();
+        described.or_else(by_letter)
+    };
+    let mut groups: Vec<Group> = Vec::new();
+    for (index, cell) in &filled {
+        let Some(column) = quantity(*index, cell) else { continue };
+        match groups.last_mut().filter(|group| !group.has(&[column.quantity])) {
+            Some(group) => group.columns.push(column),
+            None => groups.push(Group { columns: vec![column], speed_rpm: None, is_bare: false }),
+        }
+    }
+    if groups.len() < 2
+        || !groups.iter().all(Group::is_complete)
+        || groups.iter().any(|group| group.speed_column().is_some())
+    {
+        return None;
+    }
+    let above = grid.rows.get(index.checked_sub(1)?)?;
+    for group in &mut groups {
+        let columns = group.columns.iter().map(|column| column.index);
+        let mut cells = columns.filter_map(|index| above.cells.get(index)).filter(|cell| !cell.is_empty());
+        group.speed_rpm = cells.find_map(|cell| speed_in(grid, cell));
+    }
+    groups.iter().all(|group| group.speed_rpm.is_some()).then(|| Layout {
+        groups,
+        first_row: index + 1,
+        remarks: Vec::new(),
+    })
+}
+
+/// The speed in the title of a block, rpm: `N = 60000 rpm`, `60 krpm`, or a number alone.
+pub(crate) fn speed_of_title(grid: &Grid, given: &Given, row: &GridRow, group: &Group) -> Option<f64> {
+    if group.speed_column().is_some() || is_heading(given, row) || vane_of_title(grid, given, row).is_some() {
+        return None;
+    }
+    let filled: Vec<&String> = row.cells.iter().filter(|cell| !is_missing(cell)).collect();
+    let numbers = filled.iter().filter(|cell| grid.number(cell).is_some()).count();
+    (numbers <= 1 && filled.len() <= 4).then(|| speed_in(grid, &row.text())).flatten()
+}
+
+/// The vane position in the title of a block of a turbine map: `VGT position 40 %`.
+pub(crate) fn vane_of_title(grid: &Grid, given: &Given, row: &GridRow) -> Option<f64> {
+    if given.machine == Machine::Compressor || is_heading(given, row) {
+        return None;
+    }
+    let text = row.text().replace('%', " %");
+    let is_vane =
+        |word: &str| matches!(given.column(0, word), Ok(Some(column)) if column.quantity == Quantity::Vane);
+    let words: Vec<&str> = text
+        .split(|c: char| c.is_whitespace() || matches!(c, '=' | ':' | '[' | ']' | '(' | ')'))
+        .filter(|word| !word.is_empty())
+        .collect();
+    let numbers: Vec<f64> = words.iter().filter_map(|word| grid.number(word)).collect();
+    let [number] = numbers.as_slice() else { return None };
+    let factor = if words.contains(&"%") { 0.01 } else { 1.0 };
+    (words.len() <= 5 && words.iter().any(|word| is_vane(word))).then_some(factor * number)
+}
+
+/// The one number of a text with its unit of speed; rpm if it names none.
+fn speed_in(grid: &Grid, text: &str) -> Option<f64> {
+    let words = || {
+        text.split(|c: char| c.is_whitespace() || matches!(c, '=' | ':' | '[' | ']' | '(' | ')'))
+            .filter(|word| !word.is_empty())
+    };
+    let mut speeds = words().filter_map(|word| {
+        let digits = word.find(|c: char| c.is_alphabetic()).unwrap_or(word.len());
+        grid.number(&word[..digits]).map(|value| (value, &word[digits..]))
+    });
+    let (value, unit) = speeds.next()?;
+    if speeds.next().is_some() {
+        return None;
+    }
+    let speed = |unit: &str| header_unit(unit).filter(|found| found.kind == mapper_yaml::units::Kind::Speed);
+    let unit = speed(unit).or_else(|| words().find_map(speed));
+    Some(unit.map_or(value, |unit| unit.unit.to_inside(value))).filter(|rpm| *rpm > 0.0)
+}
+
+/// The layout of a table whose columns are described by their numbers.
+fn numbered(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
+    let columns = given.numbered().map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
+    let group = Group { columns, speed_rpm: None, is_bare: false };
+    if !group.is_complete() || group.speed_column().is_none() {
+        return Ok(None);
+    }
+    let is_point = |row: &GridRow| {
+        let number =
+            |column: &Column| row.cells.get(column.index).and_then(|cell| grid.number(cell)).is_some();
+        !row.is_comment && group.columns.iter().all(number)
+    };
+    let first_row = grid.rows.iter().position(is_point);
+    Ok(first_row.map(|first_row| Layout { groups: vec![group], first_row, remarks: Vec::new() }))
+}
+
+/// The layout without headings: corrected rpm, corrected kg/s, pressure ratio, and the efficiency if there is a fourth column.
+fn bare(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
+    let numbers = |row: &GridRow| row.cells.iter().filter(|cell| grid.number(cell).is_some()).count();
+    let first = grid
+        .rows
+        .iter()
+        .position(|row| !row.is_comment && numbers(row) >= 3 && numbers(row) == row.cells.len());
+    let Some(first_row) = first else {
+        return match grid.rows.iter().find(|row| !row.is_comment) {
+            None => Ok(None),
+            Some(row) => Err(ImportError::RowForm {
+                line: row.at,
+                text: row.text().chars().take(60).collect(),
+                form: "a row of numbers or of headings: speed, flow, pressure ratio, efficiency",
+            }),
+        };
+    };
+    let order = [Quantity::Speed, Quantity::Flow, Quantity::PressureRatio, Quantity::Efficiency];
+    let row = grid.rows.get(first_row).map_or(&[][..], |row| row.cells.as_slice());
+    if row.len() != order.len() {
+        let at = grid.rows.get(first_row).map_or(1, |row| row.at);
+        return Err(ImportError::RowForm {
+            line: at,
+            text: row.join(" ").chars().take(60).collect(),
+            form: "four numbers: corrected rpm, corrected kg/s, pressure ratio, efficiency; name the columns in a heading",
+        });
+    }
+    let columns = order.into_iter().enumerate();
+    let columns = columns.map(|(index, quantity)| given.with_unit(Column::bare(index, quantity)));
+    let columns: Result<_, _> = columns.collect();
+    let columns = columns.map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
+    let group = Group { columns, speed_rpm: None, is_bare: true };
+    Ok(Some(Layout { groups: vec![group], first_row, remarks: vec![ImportRemark::NoHeading] }))
+}

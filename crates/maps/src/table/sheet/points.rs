@@ -1,0 +1,168 @@
+//! The points of a table, as written.
+
+use crate::table::columns::column::Column;
+use crate::table::columns::described_columns::Given;
+use crate::table::columns::quantity::Quantity;
+use crate::table::rows_to_lines::room_for_one_more;
+use crate::table::sheet::grid::{Grid, GridRow, is_missing};
+use crate::table::sheet::layout::{self, Layout};
+use mapper_core::{ImportError, ImportRemark, ImportedColumn, ReferenceState};
+
+/// The values of a point by column, as written.
+pub(crate) struct Point<'a> {
+    /// Line of the file, from 1.
+    pub(crate) at: usize,
+    group: &'a layout::Group,
+    /// Speed of the block from its title, rpm.
+    pub(crate) speed: Option<f64>,
+    /// Vane position from the title of the block.
+    pub(crate) vane: Option<f64>,
+    values: Vec<Option<f64>>,
+}
+
+impl Point<'_> {
+    /// A value and its column.
+    pub(crate) fn of(&self, quantity: Quantity) -> Option<(&Column, f64)> {
+        let position = self.group.columns.iter().position(|column| column.quantity == quantity)?;
+        Some((self.group.columns.get(position)?, self.values.get(position).copied().flatten()?))
+    }
+
+    /// A value in SI and rpm, corrected to a reference state.
+    pub(crate) fn value(&self, quantity: Quantity, reference: ReferenceState) -> Option<f64> {
+        let (column, value) = self.of(quantity)?;
+        Some(column.inside(value, reference))
+    }
+}
+
+/// How the format `fitted` marks a node beyond the measured points.
+const EXTRAPOLATED: &str = "extrapolated";
+
+/// The points of a table.
+///
+/// # Errors
+/// [`ImportError`] with the line of a cell that is not a number, or of a row that is cut short.
+pub(crate) fn points<'a>(
+    grid: &Grid,
+    given: &Given,
+    layout: &'a Layout,
+    remarks: &mut Vec<ImportRemark>,
+) -> Result<Vec<Point<'a>>, ImportError> {
+    let mut points = Vec::new();
+    let (mut carried, mut extrapolated, mut vane) = (false, 0, None);
+    for group in &layout.groups {
+        let (mut speed, mut last_speed) = (group.speed_rpm, None);
+        for row in grid.rows.iter().skip(layout.first_row).filter(|row| !row.is_comment) {
+            let cell = |index: usize| row.cells.get(index).map_or("", String::as_str);
+            if group.columns.iter().all(|column| is_missing(cell(column.index)))
+                && row.cells.iter().filter(|cell| !cell.is_empty()).count() != 1
+            {
+                continue;
+            }
+            if let Some(position) = layout::vane_of_title(grid, given, row) {
+                vane = Some(position);
+                continue;
+            }
+            if let Some(title_rpm) = layout::speed_of_title(grid, given, row, group) {
+                speed = Some(title_rpm);
+                continue;
+            }
+            if layout::is_heading(given, row) {
+                continue;
+            }
+            if row.cells.iter().any(|cell| cell == EXTRAPOLATED) {
+                extrapolated += 1;
+                continue;
+            }
+            room_for_one_more(points.len(), row.at)?;
+            let mut values = values(grid, row, group)?;
+            if let Some(place) = group.speed_column().and_then(|position| values.get_mut(position)) {
+                match place {
+                    Some(own) => last_speed = Some(*own),
+                    None => {
+                        carried = true;
+                        *place = last_speed;
+                    }
+                }
+            }
+            points.push(Point { at: row.at, group, speed, vane, values });
+        }
+    }
+    if extrapolated > 0 {
+        remarks.push(ImportRemark::ExtrapolatedNodes { count: extrapolated });
+    }
+    if carried {
+        remarks.push(ImportRemark::SpeedOfRowAbove);
+    }
+    Ok(points)
+}
+
+/// The numbers of a row by column.
+fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Option<f64>>, ImportError> {
+    let mut values = Vec::with_capacity(group.columns.len());
+    for column in &group.columns {
+        let text = row.cells.get(column.index).map_or("", String::as_str);
+        let value = grid.number(text);
+        if value.is_none() && !is_missing(text) {
+            return Err(ImportError::NotANumber {
+                line: row.at,
+                quantity: column.quantity.name().to_owned(),
+                text: text.chars().take(40).collect(),
+            });
+        }
+        values.push(value);
+    }
+    let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
+    // A row without headings has no column to spare, and one between blanks no empty cell: what is cut short is a mistake.
+    let needed = group.columns.iter().map(|column| column.index + 1).max().unwrap_or(0);
+    if group.is_bare && filled != group.columns.len() || grid.by_blanks && filled < needed {
+        let text = row.text().chars().take(60).collect();
+        return Err(ImportError::RowForm { line: row.at, text, form: ROW_FORM });
+    }
+    Ok(values)
+}
+
+/// The form of a row without headings.
+const ROW_FORM: &str = "a row of corrected rpm, corrected kg/s, pressure ratio and efficiency";
+
+/// Whether efficiencies without a unit are percentages: their median is far above 1.
+pub(crate) fn efficiency_in_percent(layout: &Layout, points: &[Point<'_>]) -> bool {
+    let named = layout.groups.iter().flat_map(|group| &group.columns);
+    if named.clone().any(|column| {
+        column.quantity == Quantity::Efficiency && (column.has_unit() || column.heading.is_empty())
+    }) {
+        return false;
+    }
+    let mut etas: Vec<f64> =
+        points.iter().filter_map(|point| point.value(Quantity::Efficiency, ReferenceState::SAE)).collect();
+    etas.sort_by(f64::total_cmp);
+    // No efficiency is above 1, and none of a usable point below 1 %.
+    etas.get(etas.len() / 2).is_some_and(|median| *median > 1.5)
+        && etas.last().is_some_and(|last| *last <= 100.0)
+}
+
+/// The columns with the range of their values; without reference state reduced values stay what they are.
+pub(crate) fn columns(
+    layout: &Layout,
+    points: &[Point<'_>],
+    reference: Option<ReferenceState>,
+) -> Vec<ImportedColumn> {
+    let mut columns: Vec<ImportedColumn> = Vec::new();
+    for column in layout.groups.first().iter().flat_map(|group| &group.columns) {
+        let value = |point: &Point<'_>| {
+            let (column, value) = point.of(column.quantity)?;
+            Some(reference.map_or_else(|| column.plain(value), |reference| column.inside(value, reference)))
+        };
+        let values = points.iter().filter_map(value);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        columns.push(ImportedColumn {
+            heading: column.heading.clone(),
+            number: column.index + 1,
+            quantity: column.quantity.name(),
+            key: column.quantity.key(),
+            unit: column.unit.clone(),
+            low,
+            high,
+        });
+    }
+    columns
+}

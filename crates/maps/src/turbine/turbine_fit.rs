@@ -1,0 +1,214 @@
+//! The smooth surface through a turbine map, with intervals.
+//!
+//! The flow parameter is a nozzle's, `sqrt(1 - ER^-1.1)`, times a polynomial in the logarithm of the expansion ratio, speed and vane
+//! position. The efficiency is a polynomial in the blade-speed ratio, which a map gives but for a constant factor: the speed parameter
+//! over the root of the isentropic drop (Watson and Janota, Turbocharging the Internal Combustion Engine, ch. 5).
+
+use crate::turbine::turbine_surface::{Observation, Place, Surface, Term};
+use mapper_core::{FittedTurbine, FittedTurbineLine, FittedTurbineNode, TurbineMap, TurbineMapPoint};
+use mapper_physics::gas::air::isentropic_exponent;
+use mapper_physics::laws::turbine::SWALLOWING_EXPONENT;
+
+/// Terms of the flow over vane position, speed and ln ER, the most important first.
+const FLOW_TERMS: [Term; 11] = [
+    [0, 0, 0],
+    [1, 0, 0],
+    [0, 0, 1],
+    [0, 1, 0],
+    [2, 0, 0],
+    [0, 0, 2],
+    [1, 0, 1],
+    [0, 1, 1],
+    [1, 1, 0],
+    [0, 2, 0],
+    [0, 0, 3],
+];
+/// Terms of the efficiency over vane position, speed and blade-speed ratio: a parabola first.
+const EFFICIENCY_TERMS: [Term; 11] = [
+    [0, 0, 0],
+    [0, 0, 1],
+    [0, 0, 2],
+    [1, 0, 0],
+    [0, 1, 0],
+    [2, 0, 0],
+    [1, 0, 1],
+    [0, 1, 1],
+    [1, 1, 0],
+    [0, 2, 0],
+    [0, 0, 3],
+];
+/// Inlet temperature of gas stands, 600 degC: the exponent of the gas changes by 4 % between 300 degC and 900 degC.
+const GAS_K: f64 = 873.15;
+/// A constant and its scatter are all that fewer points give.
+const LEAST_POINTS: usize = 4;
+/// Nodes over the expansion ratio.
+const NODES: usize = 21;
+
+/// Why a turbine map cannot be fitted.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum TurbineFitError {
+    /// Too few points.
+    #[error("the turbine map has {points} points; a fit needs at least 4, on lines of different speed")]
+    TooFewPoints {
+        /// Their number.
+        points: usize,
+    },
+}
+
+/// A fitted turbine map.
+#[derive(Debug, Clone)]
+pub struct TurbineFit {
+    flow: Surface,
+    efficiency: Option<Surface>,
+    ends: Vec<LineEnds>,
+}
+
+/// The measured range of a speed line.
+#[derive(Debug, Clone, Copy)]
+struct LineEnds {
+    vane_position: f64,
+    speed: f64,
+    lowest_ratio: f64,
+    highest_ratio: f64,
+}
+
+/// Places beyond the measured ones by less than this share are not called extrapolated: speeds and pressures are held to a percent.
+const END_SLACK: f64 = 0.01;
+
+fn vane(point: &TurbineMapPoint) -> f64 {
+    point.vane_position.unwrap_or(0.0)
+}
+
+/// The logarithm of a nozzle's flow function.
+fn nozzle(expansion_ratio: f64) -> f64 {
+    0.5 * (1.0 - expansion_ratio.powf(SWALLOWING_EXPONENT)).ln()
+}
+
+fn flow_place(vane_position: f64, speed: f64, expansion_ratio: f64) -> Place {
+    [vane_position, speed, expansion_ratio.ln()]
+}
+
+fn efficiency_place(vane_position: f64, speed: f64, expansion_ratio: f64) -> Place {
+    let drop = 1.0 - expansion_ratio.powf(-isentropic_exponent(GAS_K));
+    [vane_position, speed, speed / drop.sqrt()]
+}
+
+impl TurbineFit {
+    /// Fits a map.
+    ///
+    /// # Errors
+    /// [`TurbineFitError`].
+    pub fn new(map: &TurbineMap) -> Result<TurbineFit, TurbineFitError> {
+        let mut flow = Vec::new();
+        let mut efficiency = Vec::new();
+        let mut ends = Vec::new();
+        for (line, points) in map.lines().enumerate() {
+            for point in points {
+                let (speed, ratio) = (point.speed_parameter_rpm_sqrt_k, point.expansion_ratio);
+                let value = point.flow_parameter_kg_sqrt_k_s_kpa.ln() - nozzle(ratio);
+                flow.push(Observation { place: flow_place(vane(point), speed, ratio), value, line });
+                let place = efficiency_place(vane(point), speed, ratio);
+                efficiency.extend(point.efficiency.map(|value| Observation { place, value, line }));
+            }
+            ends.extend(line_ends(points));
+        }
+        let too_few = TurbineFitError::TooFewPoints { points: flow.len() };
+        if flow.len() < LEAST_POINTS {
+            return Err(too_few);
+        }
+        Ok(TurbineFit {
+            flow: Surface::fit(&flow, &FLOW_TERMS).ok_or(too_few)?,
+            efficiency: Surface::fit(&efficiency, &EFFICIENCY_TERMS),
+            ends,
+        })
+    }
+
+    /// The map at a place.
+    pub fn at(&self, vane_position: Option<f64>, speed: f64, expansion_ratio: f64) -> FittedTurbineNode {
+        let vane = vane_position.unwrap_or(0.0);
+        let place = flow_place(vane, speed, expansion_ratio);
+        let (log, half) = (self.flow.value(place) + nozzle(expansion_ratio), self.flow.half_width(place));
+        let place = efficiency_place(vane, speed, expansion_ratio);
+        let efficiency =
+            self.efficiency.as_ref().map(|surface| (surface.value(place), surface.half_width(place)));
+        FittedTurbineNode {
+            expansion_ratio,
+            flow_parameter_kg_sqrt_k_s_kpa: log.exp(),
+            flow_low: (log - half).exp(),
+            flow_high: (log + half).exp(),
+            efficiency: efficiency.map(|(value, _)| value),
+            efficiency_low: efficiency.map(|(value, half)| value - half),
+            efficiency_high: efficiency.map(|(value, half)| value + half),
+            extrapolated: self.is_beyond(vane, speed, expansion_ratio),
+        }
+    }
+
+    /// Standard errors of a measurement at a place: of the flow's logarithm and of the efficiency.
+    pub(crate) fn standard_errors(&self, point: &TurbineMapPoint) -> (f64, Option<f64>) {
+        let (speed, ratio) = (point.speed_parameter_rpm_sqrt_k, point.expansion_ratio);
+        let flow = self.flow.standard_error(flow_place(vane(point), speed, ratio));
+        let place = efficiency_place(vane(point), speed, ratio);
+        (flow, self.efficiency.as_ref().map(|surface| surface.standard_error(place)))
+    }
+
+    /// Whether a place is beyond the measured ones: the ranges of lines at the nearest vane position, linear between their speeds.
+    fn is_beyond(&self, vane_position: f64, speed: f64, expansion_ratio: f64) -> bool {
+        let distance = |ends: &LineEnds| (ends.vane_position - vane_position).abs();
+        let vanes = || self.ends.iter().map(|ends| ends.vane_position);
+        let (low, high) = vanes().fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+        if vane_position < low || vane_position > high {
+            return true;
+        }
+        let nearest = self.ends.iter().map(distance).fold(f64::INFINITY, f64::min);
+        let lines: Vec<&LineEnds> = self.ends.iter().filter(|ends| distance(ends) <= nearest).collect();
+        let below = lines.iter().rev().find(|ends| ends.speed <= speed * (1.0 + END_SLACK));
+        let above = lines.iter().find(|ends| ends.speed >= speed * (1.0 - END_SLACK));
+        let (Some(below), Some(above)) = (below, above) else { return true };
+        let span = above.speed - below.speed;
+        let share = if span > 0.0 { ((speed - below.speed) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let lowest = below.lowest_ratio + share * (above.lowest_ratio - below.lowest_ratio);
+        let highest = below.highest_ratio + share * (above.highest_ratio - below.highest_ratio);
+        expansion_ratio < lowest * (1.0 - END_SLACK) || expansion_ratio > highest * (1.0 + END_SLACK)
+    }
+
+    /// The surface as a table over the measured speeds and evenly spaced expansion ratios.
+    pub fn table(&self, map: &TurbineMap) -> FittedTurbine {
+        let lowest = self.ends.iter().map(|ends| ends.lowest_ratio).fold(f64::INFINITY, f64::min);
+        let highest = self.ends.iter().map(|ends| ends.highest_ratio).fold(0.0, f64::max);
+        let ratio = |node: usize| lowest + (highest - lowest) * node as f64 / (NODES - 1) as f64;
+        let lines = map.lines().zip(&self.ends).map(|(points, ends)| {
+            let vane_position = points.first().and_then(|point| point.vane_position);
+            FittedTurbineLine {
+                vane_position,
+                speed_parameter_rpm_sqrt_k: ends.speed,
+                nodes: (0..NODES).map(|node| self.at(vane_position, ends.speed, ratio(node))).collect(),
+            }
+        });
+        FittedTurbine {
+            lines: lines.collect(),
+            flow_error_rms_ratio: self.flow.left_out_rms,
+            efficiency_error_rms: self.efficiency.as_ref().map(|surface| surface.left_out_rms),
+        }
+    }
+}
+
+fn line_ends(points: &[TurbineMapPoint]) -> Option<LineEnds> {
+    let speed =
+        points.iter().map(|point| point.speed_parameter_rpm_sqrt_k).sum::<f64>() / points.len() as f64;
+    let ratios = || points.iter().map(|point| point.expansion_ratio);
+    Some(LineEnds {
+        vane_position: vane(points.first()?),
+        speed,
+        lowest_ratio: ratios().fold(f64::INFINITY, f64::min),
+        highest_ratio: ratios().fold(0.0, f64::max),
+    })
+}
+
+/// The map with its fitted table.
+///
+/// # Errors
+/// [`TurbineFitError`].
+pub fn fit_turbine(map: TurbineMap) -> Result<TurbineMap, TurbineFitError> {
+    let fitted = TurbineFit::new(&map)?.table(&map);
+    Ok(TurbineMap { fitted: Some(fitted), ..map })
+}

@@ -1,0 +1,254 @@
+//! Recorded boundary conditions as model inputs: averaged in quiet segments, unaveraged after jumps.
+//!
+//! Unlike [`smoothed_inputs`](crate::model_inputs::smoothed_inputs) these keep the noise of means, which is independent between segments, and follow a step
+//! of an input sensor. The search for drift needs both.
+
+use crate::averages::mean_reading::BEFORE_S;
+use crate::averages::schedule::Schedule;
+use crate::averages::time_table::Table;
+use crate::channels::{DRIVERS, boundary_condition};
+use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, measured_valve_response};
+use mapper_core::{Channel, Recording};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::inputs::{Inputs, InputsError, InterpolatedInputs};
+
+/// Time after a jump for which readings are not averaged, s: actuators need some tenths.
+const RAW_S: f64 = 3.0;
+/// Largest lag that is attributed to the valve, s: pneumatic and electric actuators of this size need 0.1 to 1 s, flow meters up to several
+/// seconds. Judgement.
+const SLOWEST_VALVE_S: f64 = 1.5;
+/// Averaging times after that. A loop that holds the speed trims P3 by a per cent within ten seconds of the jump, and a mean must not lag
+/// behind that. It is at least the time step of the model, which would otherwise see single means.
+const AFTER_JUMP: Schedule = Schedule {
+    first_s: RAW_S,
+    lengths_s: &[(8.0, 0.5), (20.0, 1.0), (50.0, 5.0), (f64::INFINITY, 10.0)],
+    shortest_s: 0.1,
+    shortest_ratio: 0.5,
+};
+/// Averaging times without a previous jump.
+const AT_REST: Schedule =
+    Schedule { first_s: 0.0, lengths_s: &[(f64::INFINITY, 10.0)], shortest_s: 0.1, shortest_ratio: 0.5 };
+
+/// Boundary conditions between jumps, never interpolated across a jump.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AveragedInputs {
+    starts_s: Vec<f64>,
+    levels: Vec<InterpolatedInputs>,
+}
+
+impl Inputs for AveragedInputs {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        let level = self.level(t_s);
+        self.levels[level].at(t_s)
+    }
+
+    fn next_kink_s(&self, t_s: f64) -> f64 {
+        let level = self.level(t_s);
+        let next_s = self.starts_s.get(level + 1).copied().unwrap_or(f64::INFINITY);
+        self.levels[level].next_kink_s(t_s).min(next_s)
+    }
+
+    fn is_constant_after(&self, t_s: f64) -> bool {
+        let level = self.level(t_s);
+        self.levels[level].is_constant_after(t_s)
+    }
+}
+
+impl AveragedInputs {
+    /// The inputs of a recording until `end_s`. `jumps` are the times of command changes, rising, s, with the valve opening after each; the
+    /// recorded command may show a change one sample late. `nominal` replaces channels that are not recorded.
+    ///
+    /// # Errors
+    /// [`InputsError`] if jumps do not rise.
+    pub fn read(
+        recording: &Recording,
+        nominal: &BoundaryConditions,
+        jumps: &[(f64, f64)],
+        end_s: f64,
+    ) -> Result<AveragedInputs, InputsError> {
+        let mut inputs = AveragedInputs { starts_s: Vec::new(), levels: Vec::new() };
+        let level = |(start_s, valve_opening_ratio): &(f64, f64)| Level {
+            start_s: *start_s,
+            p3_pa: nominal.p3_pa,
+            valve_opening_ratio: *valve_opening_ratio,
+        };
+        let valve = valve_response(recording, nominal);
+        let command = LaggedCommand::new(jumps.iter().map(level).collect(), Response::lag(0.0), valve);
+        for (index, (start_s, _)) in jumps.iter().enumerate() {
+            let next_s = jumps.get(index + 1).map_or(end_s, |next| next.0);
+            let mut nodes =
+                Nodes { recording, nominal, command: &command, t_s: Vec::new(), rows: Vec::new() };
+            nodes.level(*start_s, next_s, index > 0);
+            inputs.starts_s.push(*start_s);
+            inputs.levels.push(InterpolatedInputs::new(nodes.t_s, nodes.rows)?);
+        }
+        Ok(inputs)
+    }
+
+    fn level(&self, t_s: f64) -> usize {
+        self.starts_s.partition_point(|start_s| *start_s <= t_s).saturating_sub(1)
+    }
+}
+
+/// Response of the valve, from the recording; immediate if unknown, or if it is the flow meter that lags (slower than any valve).
+fn valve_response(recording: &Recording, nominal: &BoundaryConditions) -> Response {
+    let measured =
+        Table::new(recording).and_then(|table| measured_valve_response(&table, recording, nominal.p1_pa));
+    measured.filter(|valve| valve.lag_s < SLOWEST_VALVE_S).unwrap_or(Response::lag(0.0))
+}
+
+struct Nodes<'a> {
+    recording: &'a Recording,
+    nominal: &'a BoundaryConditions,
+    command: &'a LaggedCommand,
+    t_s: Vec<f64>,
+    rows: Vec<BoundaryConditions>,
+}
+
+impl Nodes<'_> {
+    /// Nodes from one jump to the next.
+    fn level(&mut self, start_s: f64, end_s: f64, after_jump: bool) {
+        let raw_end_s = if after_jump { (start_s + RAW_S).min(end_s) } else { start_s };
+        if after_jump {
+            let t_s = self
+                .recording
+                .series
+                .get(&Channel::P3)
+                .map(|series| series.slice(start_s, raw_end_s - BEFORE_S).0.to_vec())
+                .unwrap_or_default();
+            // The first node is at the jump itself, where the valve starts to move.
+            let mut times = vec![start_s];
+            times.extend(t_s.into_iter().filter(|t| *t > start_s));
+            for t_s in times {
+                // Quantities that do not jump keep the mean of the whole segment.
+                let mut row = self.means(start_s, raw_end_s);
+                row.valve_opening_ratio = self.command.valve_opening_ratio(t_s);
+                for channel in [Channel::P3, Channel::P4] {
+                    let read = self.recording.series.get(&channel).and_then(|series| series.interpolate(t_s));
+                    if let (Some(read), Some(value)) = (read, boundary_condition(&mut row, channel)) {
+                        *value = read;
+                    }
+                }
+                self.push(t_s, row);
+            }
+        }
+        let stretches = if after_jump {
+            AFTER_JUMP.stretches(start_s, end_s, 0.0)
+        } else {
+            AT_REST.stretches(start_s, end_s, 0.0)
+        };
+        for (low_s, high_s) in stretches {
+            let row = self.means(low_s, high_s - BEFORE_S);
+            self.push(0.5 * (low_s + high_s), row);
+        }
+    }
+
+    fn push(&mut self, t_s: f64, row: BoundaryConditions) {
+        if self.t_s.last().is_none_or(|last| *last < t_s) {
+            self.t_s.push(t_s);
+            self.rows.push(row);
+        }
+    }
+
+    fn means(&self, start_s: f64, end_s: f64) -> BoundaryConditions {
+        let valve_opening_ratio = self.command.valve_opening_ratio(0.5 * (start_s + end_s));
+        let mut row = BoundaryConditions { valve_opening_ratio, ..*self.nominal };
+        if let Some(p3_pa) = self.recording.series.get(&Channel::P3Command).and_then(|c| c.held(start_s)) {
+            row.p3_pa = p3_pa;
+        }
+        for channel in DRIVERS.into_iter().chain([Channel::TAmb]) {
+            let (Some(series), Some(value)) =
+                (self.recording.series.get(&channel), boundary_condition(&mut row, channel))
+            else {
+                continue;
+            };
+            let values = series.slice(start_s, end_s).1;
+            *value = if values.is_empty() {
+                series.interpolate(0.5 * (start_s + end_s)).unwrap_or(*value)
+            } else {
+                values.iter().sum::<f64>() / values.len() as f64
+            };
+        }
+        row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Series, StepKind, StepMarker};
+    use mapper_physics::laws::orifice;
+
+    /// A loop that holds the speed trims P3 by 2 kPa within some seconds of the jump. The inputs follow to a hundredth of that: the
+    /// interpolation error between two half-second means is 16 Pa (curvature 2 kPa / (2 s)^2, over 8 x 0.5^2 s^2).
+    #[test]
+    fn the_trim_of_a_speed_loop_is_followed() {
+        let jump_s = 20.0;
+        let p3_pa = |t_s: f64| match t_s - jump_s {
+            since_s if since_s < 0.0 => 120e3,
+            since_s => 200e3 + 2e3 * (1.0 - (-since_s / 2.0).exp()),
+        };
+        let t_s: Vec<f64> = (0..=800).map(|sample| 0.1 * f64::from(sample)).collect();
+        let values = t_s.iter().map(|t_s| p3_pa(*t_s)).collect();
+        let recording =
+            Recording { series: [(Channel::P3, Series { t_s, values })].into(), ..Recording::default() };
+        let nominal = BoundaryConditions::default();
+        let inputs = AveragedInputs::read(&recording, &nominal, &[(0.0, 1.0), (jump_s, 0.7)], 80.0).unwrap();
+        for t_s in (0..590).map(|tenth| jump_s + 0.95 + 0.1 * f64::from(tenth)) {
+            let off_pa = inputs.at(t_s).p3_pa - p3_pa(t_s);
+            assert!(off_pa.abs() < 20.0, "{off_pa} Pa off {} s after the jump", t_s - jump_s);
+        }
+    }
+
+    /// The orifice flow through a valve that moves at 0.5 1/s: the inputs have its opening, not the command.
+    #[test]
+    fn a_valve_that_takes_its_time_is_followed() {
+        let opening =
+            |t_s: f64, from: f64, to: f64| from + (to - from) * (0.5 * t_s / (to - from).abs()).min(1.0);
+        let level = |t_s: f64| if ((t_s / 20.0) as u32).is_multiple_of(2) { (1.5, 0.5) } else { (0.5, 1.5) };
+        let truth = |t_s: f64| {
+            let (from, to) = level(t_s);
+            if t_s < 20.0 { to } else { opening(t_s % 20.0, from, to) }
+        };
+        let t_s: Vec<f64> = (0..1600).map(|sample| 0.1 * f64::from(sample)).collect();
+        let series = |value: &dyn Fn(f64) -> f64| Series {
+            values: t_s.iter().map(|t_s| value(*t_s)).collect(),
+            t_s: t_s.clone(),
+        };
+        let flow = |t_s: f64| orifice::flow_kg_s(2.4e-4 * truth(t_s), 160e3, 360.0, 100e3);
+        let step = |index: usize| {
+            let start_s = 20.0 * index as f64;
+            StepMarker {
+                index,
+                kind: StepKind::Point,
+                start_s,
+                end_s: start_s + 20.0,
+                from: None,
+                to: None,
+                p3_pa: 150e3,
+                valve_opening_ratio: level(start_s + 1.0).1,
+            }
+        };
+        let steps: Vec<StepMarker> = (0..8).map(step).collect();
+        let jumps: Vec<(f64, f64)> =
+            steps.iter().map(|step| (step.start_s, step.valve_opening_ratio)).collect();
+        let recording = Recording {
+            series: [
+                (Channel::ShaftSpeed, series(&|_| 120e3)),
+                (Channel::CompressorFlow, series(&flow)),
+                (Channel::P2, series(&|_| 160e3)),
+                (Channel::P3, series(&|_| 150e3)),
+                (Channel::T2, series(&|_| 360.0)),
+            ]
+            .into(),
+            steps,
+            ..Recording::default()
+        };
+        let inputs = AveragedInputs::read(&recording, &BoundaryConditions::default(), &jumps, 160.0).unwrap();
+        for since_s in [0.5, 1.0, 1.5, 2.5, 10.0] {
+            let off = inputs.at(40.0 + since_s).valve_opening_ratio - truth(40.0 + since_s);
+            // A twentieth of the jump: the orifice flow resolves the opening no better while it moves.
+            assert!(off.abs() < 0.05, "{off} off {since_s} s after the jump");
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! Response of P3 and the valve to their commands: a first-order lag and a rate limit. Also the recorded response.
+
+use crate::averages::time_table::Table;
+use mapper_core::{Channel, Recording, StepMarker};
+use mapper_numerics::minimise::minimise;
+use mapper_numerics::statistics::median;
+use mapper_physics::laws::orifice;
+
+/// Change of a command below which it counts as constant.
+const HELD_RATIO: f64 = 1e-6;
+
+/// A commanded level from a given time on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// Time of the change, s.
+    pub start_s: f64,
+    /// Commanded P3, Pa.
+    pub p3_pa: f64,
+    /// Commanded valve opening.
+    pub valve_opening_ratio: f64,
+}
+
+/// Response of an actuator to its command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    /// Time constant of its first-order lag, s, >= 0; 0 follows immediately.
+    pub lag_s: f64,
+    /// Maximum rate, unit of the actuator per second, > 0; infinity for none.
+    pub slew_per_s: f64,
+}
+
+impl Response {
+    /// A lag without a rate limit.
+    pub fn lag(lag_s: f64) -> Response {
+        Response { lag_s, slew_per_s: f64::INFINITY }
+    }
+
+    /// Position `elapsed_s` after it began to move from `from` to `to`.
+    fn approach(self, from: f64, to: f64, elapsed_s: f64) -> f64 {
+        let (jump, elapsed_s) = (to - from, elapsed_s.max(0.0));
+        let limited = self.slew_per_s.is_finite();
+        let ramp_s = if limited { (jump.abs() / self.slew_per_s - self.lag_s).max(0.0) } else { 0.0 };
+        if elapsed_s < ramp_s {
+            from + self.slew_per_s * jump.signum() * elapsed_s
+        } else if self.lag_s > 0.0 {
+            let left = if limited { jump.abs().min(self.slew_per_s * self.lag_s) } else { jump.abs() };
+            to - left * jump.signum() * (-(elapsed_s - ramp_s) / self.lag_s).exp()
+        } else {
+            to
+        }
+    }
+}
+
+/// Response of P3 and the valve to their commands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaggedCommand {
+    levels: Vec<Level>,
+    /// P3 at the start of each level, Pa.
+    at_start_pa: Vec<f64>,
+    /// Opening at the start of each level.
+    opening_at_start: Vec<f64>,
+    /// Response of P3; Pa/s.
+    pub p3: Response,
+    /// Response of the valve; 1/s.
+    pub valve: Response,
+}
+
+impl LaggedCommand {
+    /// The response to `levels` (rising in time, at least one) from steady state.
+    pub fn new(levels: Vec<Level>, p3: Response, valve: Response) -> Self {
+        let at_start = |of: fn(&Level) -> f64, response: Response| {
+            let mut at_start: Vec<f64> = Vec::with_capacity(levels.len());
+            for (index, level) in levels.iter().enumerate() {
+                let value = match index.checked_sub(1) {
+                    None => of(level),
+                    Some(before) => {
+                        let from = &levels[before];
+                        response.approach(at_start[before], of(from), level.start_s - from.start_s)
+                    }
+                };
+                at_start.push(value);
+            }
+            at_start
+        };
+        let at_start_pa = at_start(|level| level.p3_pa, p3);
+        let opening_at_start = at_start(|level| level.valve_opening_ratio, valve);
+        LaggedCommand { levels, at_start_pa, opening_at_start, p3, valve }
+    }
+
+    /// The response to the commands of a recording with at least one step: a level for each step, and one for each further P3 command within
+    /// it, as from a loop that holds the speed.
+    pub fn of_recording(recording: &Recording, p3: Response, valve: Response) -> Self {
+        let levels = recording.steps.iter().flat_map(|step| levels_of_step(recording, step));
+        LaggedCommand::new(levels.collect(), p3, valve)
+    }
+
+    /// The level commanded at `t_s`.
+    pub fn level(&self, t_s: f64) -> usize {
+        self.levels.partition_point(|level| level.start_s <= t_s).saturating_sub(1)
+    }
+
+    /// P3 at `t_s`, Pa.
+    pub fn p3_pa(&self, t_s: f64) -> f64 {
+        let index = self.level(t_s);
+        let level = &self.levels[index];
+        self.p3.approach(self.at_start_pa[index], level.p3_pa, t_s - level.start_s)
+    }
+
+    /// Valve opening at `t_s`.
+    pub fn valve_opening_ratio(&self, t_s: f64) -> f64 {
+        let index = self.level(t_s);
+        let level = &self.levels[index];
+        self.valve.approach(self.opening_at_start[index], level.valve_opening_ratio, t_s - level.start_s)
+    }
+
+    /// Time after which a jump of P3 is almost complete, s.
+    pub fn p3_settles_s(&self, from_pa: f64, to_pa: f64) -> f64 {
+        (to_pa - from_pa).abs() / self.p3.slew_per_s + 6.0 * self.p3.lag_s
+    }
+
+    /// Commanded levels.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+}
+
+/// The first level of a step, and the later levels of a loop that holds the speed.
+pub(crate) fn levels_of_step(recording: &Recording, step: &StepMarker) -> Vec<Level> {
+    let (mut start_s, mut p3_pa) = (step.start_s, step.p3_pa);
+    let level = |start_s, p3_pa| Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio };
+    let mut levels = vec![level(start_s, p3_pa)];
+    let Some(command) = recording.series.get(&Channel::P3Command) else { return levels };
+    let (t_s, values) = command.slice(step.start_s, step.end_s);
+    // The first sample may precede the change, and a change is later than the sample before it.
+    for (pair_s, value) in t_s.windows(2).zip(values.iter().skip(1)) {
+        // The read-back of a constant command varies in its last digits.
+        let moved = p3_pa.is_nan() || !alike(*value, p3_pa);
+        if moved && value.is_finite() && pair_s[0] > start_s {
+            (start_s, p3_pa) = (pair_s[0], *value);
+            levels.push(level(start_s, p3_pa));
+        }
+    }
+    levels
+}
+
+/// Whether two commands are the same.
+pub(crate) fn alike(value: f64, other: f64) -> bool {
+    (value / other - 1.0).abs() <= HELD_RATIO
+}
+
+/// Responses tried before the fine search: lags, and rates in jumps of the median size per second.
+const LOOKS: usize = 24;
+const RATES: [f64; 9] = [0.2, 0.35, 0.6, 1.0, 1.7, 3.0, 5.0, 9.0, 16.0];
+/// Reduction of the squared residuals, in their mean square, from which a rate limit is accepted: ten standard deviations of white noise, five of
+/// coloured noise over the half second of a ramp. A limit that is not there costs nothing, since fast rates are a lag alone.
+const LIMITED: f64 = 100.0;
+
+/// Time constant of the measured P3 relative to its command, s, and its standard error; `None` without jumps or P3.
+///
+/// Minimises the squared residual of the first seconds after each jump; the level after it is free, so that no offset enters.
+pub fn measured_lag_s(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<(f64, f64)> {
+    let values = table.column(Channel::P3)?;
+    let jumps = p3_jumps(recording, noise_sigma);
+    let cost = |lag_s: f64| {
+        let at_once = Response::lag(0.0);
+        let command = LaggedCommand::of_recording(recording, Response::lag(lag_s), at_once);
+        cost_of(table, values, &jumps, |t_s| command.p3_pa(t_s)) / (noise_sigma * noise_sigma).max(1e-9)
+    };
+    if jumps.is_empty() {
+        return None;
+    }
+    let (lag_s, _) = best_lag(cost)?;
+    // Curvature of the cost gives the error.
+    let away_s = 0.02 * lag_s;
+    let curvature = (cost(lag_s + away_s) + cost(lag_s - away_s) - 2.0 * cost(lag_s)) / (away_s * away_s);
+    let error_s = if curvature > 0.0 { (2.0 / curvature).sqrt() } else { lag_s };
+    Some((lag_s, error_s))
+}
+
+/// Response of the measured P3 to its command, with a rate limit if the recording supports one; `None` without jumps or P3.
+pub fn measured_p3_response(table: &Table, recording: &Recording, noise_sigma: f64) -> Option<Response> {
+    let values = table.column(Channel::P3)?;
+    let jumps = p3_jumps(recording, noise_sigma);
+    let sizes = recording.steps.windows(2).map(|pair| (pair[1].p3_pa - pair[0].p3_pa).abs());
+    measured_response(table, values, &jumps, sizes.collect(), |response| {
+        let command = LaggedCommand::of_recording(recording, response, Response::lag(0.0));
+        move |t_s| command.p3_pa(t_s)
+    })
+}
+
+/// Response of the valve to its command, from flow and pressures: orifice flow is proportional to its area, and the volume before it fills in
+/// milliseconds. `None` without jumps of the valve, flow, P2 or T2. A lag of the flow meter counts as one of the valve.
+pub fn measured_valve_response(table: &Table, recording: &Recording, nominal_p1_pa: f64) -> Option<Response> {
+    let flow = table.column(Channel::CompressorFlow)?;
+    let (p2, t2) = (table.column(Channel::P2)?, table.column(Channel::T2)?);
+    let p1 = table.column(Channel::P1);
+    let openings: Vec<f64> = (0..table.t_s.len())
+        .map(|i| {
+            let p1_pa = p1.map_or(nominal_p1_pa, |p1| p1[i]);
+            flow[i] / orifice::flow_kg_s(1.0, p2[i], t2[i], p1_pa).max(1e-9)
+        })
+        .collect();
+    let moved = |pair: &[StepMarker]| (pair[1].valve_opening_ratio - pair[0].valve_opening_ratio).abs();
+    let jumps: Vec<f64> =
+        recording.steps.windows(2).filter(|pair| moved(pair) > 0.02).map(|pair| pair[1].start_s).collect();
+    // Converted to openings, using their mean over all settled ends.
+    let mut areas: Vec<f64> = recording
+        .steps
+        .iter()
+        .filter_map(|step| {
+            let range = table.range(step.end_s - 0.3 * (step.end_s - step.start_s), step.end_s);
+            Some(median(openings[range].iter().filter(|x| x.is_finite()))? / step.valve_opening_ratio)
+        })
+        .filter(|area| area.is_finite() && *area > 0.0)
+        .collect();
+    areas.sort_by(f64::total_cmp);
+    let area_m2 = *areas.get(areas.len() / 2)?;
+    let openings: Vec<f64> = openings.iter().map(|x| x / area_m2).collect();
+    let sizes = recording.steps.windows(2).map(moved).filter(|size| *size > 0.02);
+    measured_response(table, &openings, &jumps, sizes.collect(), |response| {
+        let command = LaggedCommand::of_recording(recording, Response::lag(0.0), response);
+        move |t_s| command.valve_opening_ratio(t_s)
+    })
+}
+
+/// Starts of the steps with a jump of P3.
+fn p3_jumps(recording: &Recording, noise_sigma: f64) -> Vec<f64> {
+    let jumped = |pair: &&[StepMarker]| (pair[1].p3_pa - pair[0].p3_pa).abs() > 10.0 * noise_sigma.max(1.0);
+    recording.steps.windows(2).filter(jumped).map(|pair| pair[1].start_s).collect()
+}
+
+/// Time before and after a jump over which a response is compared, s.
+const AROUND_S: (f64, f64) = (3.0, 12.0);
+
+/// Squared residuals of the seconds around each jump, with a free level.
+fn cost_of(table: &Table, values: &[f64], jumps: &[f64], predicted: impl Fn(f64) -> f64) -> f64 {
+    let mut total = 0.0;
+    for jump_s in jumps {
+        let range = table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1);
+        let rest: Vec<f64> =
+            range.filter(|i| values[*i].is_finite()).map(|i| values[i] - predicted(table.t_s[i])).collect();
+        let mean = rest.iter().sum::<f64>() / rest.len().max(1) as f64;
+        total += rest.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
+    }
+    total
+}
+
+/// The lag with minimum cost, and that cost.
+fn best_lag(cost: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
+    // Logarithmic, from 1 ms to 60 s. Coarse search first: the cost has a single minimum only for first-order responses.
+    let (shortest, longest) = (1e-3f64.ln(), 60f64.ln());
+    let place = |i: usize| shortest + (longest - shortest) * i as f64 / LOOKS as f64;
+    let costs: Vec<f64> = (0..=LOOKS).map(|i| cost(place(i).exp())).collect();
+    let best = (0..=LOOKS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(LOOKS)));
+    let lag_s = minimise(low, high, 1e-6, |x| cost(x.exp())).at.exp();
+    Some((lag_s, cost(lag_s)))
+}
+
+fn measured_response<Prediction: Fn(f64) -> f64>(
+    table: &Table,
+    values: &[f64],
+    jumps: &[f64],
+    sizes: Vec<f64>,
+    follow: impl Fn(Response) -> Prediction,
+) -> Option<Response> {
+    let size = median(&sizes).filter(|size| *size > 0.0)?;
+    if jumps.is_empty() {
+        return None;
+    }
+    let around = |jump_s: &f64| table.range(jump_s - AROUND_S.0, jump_s + AROUND_S.1).len();
+    let samples = jumps.iter().map(around).sum::<usize>().max(1) as f64;
+    let at_rate = |slew_per_s: f64| {
+        let cost = |lag_s: f64| cost_of(table, values, jumps, follow(Response { lag_s, slew_per_s }));
+        best_lag(cost).map(|(lag_s, cost)| (cost, Response { lag_s, slew_per_s }))
+    };
+    let alone = at_rate(f64::INFINITY)?;
+    let coarse = RATES.iter().filter_map(|rate| at_rate(rate * size));
+    let (_, coarse) = coarse.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    // Jumps that the limit does not touch give the cost a minimum of their own: a sweep comes first.
+    let (low, high) = ((coarse.slew_per_s / 1.8).ln(), (coarse.slew_per_s * 1.8).ln());
+    let place = |i: usize| low + (high - low) * i as f64 / LOOKS as f64;
+    let cost = |rate: f64| at_rate(rate.exp()).map_or(f64::INFINITY, |(cost, _)| cost);
+    let costs: Vec<f64> = (0..=LOOKS).map(|i| cost(place(i))).collect();
+    let best = (0..=LOOKS).min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
+    let (low, high) = (place(best.saturating_sub(1)), place((best + 1).min(LOOKS)));
+    let limited = at_rate(minimise(low, high, 1e-4, cost).at.exp());
+    let seen = limited.filter(|(cost, _)| alone.0 - cost > LIMITED * cost / samples);
+    Some(seen.unwrap_or(alone).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Series, StepKind};
+
+    fn step(start_s: f64, end_s: f64, p3_pa: f64) -> StepMarker {
+        let (index, kind) = (0, StepKind::Point);
+        StepMarker { index, kind, start_s, end_s, from: None, to: None, p3_pa, valve_opening_ratio: 0.7 }
+    }
+
+    /// Samples every half second; the loop commands at 12 s, seen at 12.5 s.
+    fn recording() -> Recording {
+        let t_s: Vec<f64> = (0..=40).map(|i| f64::from(i) * 0.5).collect();
+        let command = |t: &f64| match *t {
+            t if t <= 10.0 => 150e3,
+            t if t <= 12.0 => 200e3,
+            _ => 201e3,
+        };
+        let values = t_s.iter().map(command).collect();
+        Recording {
+            series: [(Channel::P3Command, Series { t_s, values })].into(),
+            steps: vec![step(0.0, 10.0, 150e3), step(10.0, 20.0, 200e3)],
+            ..Recording::default()
+        }
+    }
+
+    #[test]
+    fn what_a_loop_says_within_a_step_is_a_level_of_its_own() {
+        let command = LaggedCommand::of_recording(&recording(), Response::lag(0.3), Response::lag(0.0));
+        let levels: Vec<_> = command.levels().iter().map(|level| (level.start_s, level.p3_pa)).collect();
+        assert_eq!(levels, [(0.0, 150e3), (10.0, 200e3), (12.0, 201e3)]);
+    }
+
+    /// Jumps of 100 kPa at 80 kPa/s and a lag of 0.2 s; the valve moves by 0.5 at 0.4 1/s: the fit recovers these values.
+    #[test]
+    fn a_limited_rate_is_read_off_the_recording_and_a_plain_lag_is_none() {
+        let steps: Vec<StepMarker> = (0..6)
+            .map(|i| {
+                let start_s = 20.0 * f64::from(i);
+                let up = f64::from(i % 2);
+                StepMarker {
+                    valve_opening_ratio: 0.6 + 0.5 * up,
+                    ..step(start_s, start_s + 20.0, 150e3 + 100e3 * up)
+                }
+            })
+            .collect();
+        let truth = (Response { lag_s: 0.2, slew_per_s: 80e3 }, Response { lag_s: 0.1, slew_per_s: 0.4 });
+        let read = |p3: Response, valve: Response| {
+            let mut recording = Recording { steps: steps.clone(), ..Recording::default() };
+            let command = LaggedCommand::of_recording(&recording, p3, valve);
+            let t_s: Vec<f64> = (0..1200).map(|i| 0.1 * f64::from(i)).collect();
+            let mut put = |channel, value: &dyn Fn(f64) -> f64| {
+                let values = t_s.iter().map(|t| value(*t)).collect();
+                recording.series.insert(channel, Series { t_s: t_s.clone(), values });
+            };
+            put(Channel::P3, &|t| command.p3_pa(t));
+            put(Channel::P2, &|_| 160e3);
+            put(Channel::T2, &|_| 360.0);
+            put(Channel::CompressorFlow, &|t| {
+                orifice::flow_kg_s(2.4e-4 * command.valve_opening_ratio(t), 160e3, 360.0, 100e3)
+            });
+            let table = Table::new(&recording).unwrap();
+            let p3 = measured_p3_response(&table, &recording, 80.0).unwrap();
+            (p3, measured_valve_response(&table, &recording, 100e3).unwrap())
+        };
+        let (p3, valve) = read(truth.0, truth.1);
+        for (found, truth) in [(p3, truth.0), (valve, truth.1)] {
+            assert!((found.lag_s / truth.lag_s - 1.0).abs() < 0.05, "{found:?}");
+            assert!((found.slew_per_s / truth.slew_per_s - 1.0).abs() < 0.02, "{found:?}");
+        }
+        let (p3, valve) = read(Response::lag(0.7), Response::lag(0.3));
+        assert!(p3.slew_per_s.is_infinite() && valve.slew_per_s.is_infinite());
+        assert!((p3.lag_s - 0.7).abs() < 1e-3 && (valve.lag_s - 0.3).abs() < 1e-3);
+    }
+}

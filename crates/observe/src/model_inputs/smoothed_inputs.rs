@@ -1,0 +1,170 @@
+//! The recorded boundary conditions as model inputs, without their noise.
+//!
+//! P3 is its command with a first-order lag, whose time constant is fitted to the measured P3, plus a smooth remainder. Other quantities may
+//! jump with P3 (P4 does, because of the flow): regression gives that share, and the remainder is smooth. A jump is never smoothed over.
+
+use crate::averages::time_table::Table;
+use crate::channels::{DRIVERS, boundary_condition};
+use crate::declared::Declared;
+use crate::model_inputs::lagged_command::{LaggedCommand, Response};
+use crate::model_inputs::smoother::{Course, smooth};
+use mapper_core::{Channel, Recording};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::inputs::Inputs;
+
+/// A recorded quantity without its noise: a smooth part, plus a share of P3's own time history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Driver {
+    /// The smooth part.
+    pub course: Course,
+    /// Change for each pascal of P3.
+    pub along_p3: f64,
+}
+
+/// Recorded boundary conditions over time, without their noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SmoothedInputs {
+    /// P3 according to its command.
+    pub command: LaggedCommand,
+    /// Starts of the steps, s: changes by a loop within a step are too small to interrupt an integration.
+    jumps_s: Vec<f64>,
+    p3_rest: Course,
+    /// Every other boundary condition by its channel.
+    drivers: Vec<(Channel, Driver)>,
+    nominal: BoundaryConditions,
+}
+
+/// Uncertainty of an input from the recording alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InputNoise {
+    /// Standard deviation of its time history, in its unit.
+    pub sigma: f64,
+    /// Correlation time of the error, s.
+    pub correlation_s: f64,
+}
+
+impl SmoothedInputs {
+    /// Takes the inputs from a recording, with the given responses of P3 and the valve. The campaign's values replace channels that are not
+    /// recorded.
+    pub fn read(
+        table: &Table,
+        recording: &Recording,
+        declared: &Declared,
+        (p3, valve): (Response, Response),
+    ) -> SmoothedInputs {
+        let command = LaggedCommand::of_recording(recording, p3, valve);
+        let along: Vec<f64> = table.t_s.iter().map(|t| command.p3_pa(*t)).collect();
+        let jumps_s: Vec<f64> = recording.steps.iter().map(|step| step.start_s).collect();
+        let smoothed = |channel: Channel, values: &[f64]| {
+            smooth(&table.t_s, values, declared.noise_sigma(channel), declared.noise_colour, &jumps_s)
+        };
+        let p3_rest = table.column(Channel::P3).and_then(|values| {
+            let rest: Vec<f64> = values.iter().zip(&along).map(|(p3, a)| p3 - a).collect();
+            smoothed(Channel::P3, &rest)
+        });
+        let driver = |channel: Channel| {
+            let values = table.column(channel)?;
+            let along_p3 = share_along(table, values, (&command, &along), declared.noise_sigma(channel));
+            let rest: Vec<f64> = values.iter().zip(&along).map(|(v, a)| v - along_p3 * a).collect();
+            Some((channel, Driver { course: smoothed(channel, &rest)?, along_p3 }))
+        };
+        let others = DRIVERS.into_iter().filter(|channel| *channel != Channel::P3);
+        SmoothedInputs {
+            p3_rest: p3_rest.unwrap_or_else(|| Course::constant(0.0)),
+            drivers: others.chain([Channel::TAmb]).filter_map(driver).collect(),
+            nominal: declared.nominal,
+            jumps_s,
+            command,
+        }
+    }
+
+    /// Uncertainty of each of [`DRIVERS`] in addition to its fixed offset; `None` for those that are not recorded.
+    pub fn noise(&self) -> [Option<InputNoise>; DRIVERS.len()] {
+        DRIVERS.map(|channel| {
+            let course = match channel {
+                Channel::P3 => &self.p3_rest,
+                _ => &self.drivers.iter().find(|(other, _)| *other == channel)?.1.course,
+            };
+            Some(InputNoise { sigma: course.sigma, correlation_s: course.correlation_s })
+        })
+    }
+}
+
+impl Inputs for SmoothedInputs {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        let by_command_pa = self.command.p3_pa(t_s);
+        let mut boundary = BoundaryConditions {
+            p3_pa: by_command_pa + self.p3_rest.at(t_s),
+            valve_opening_ratio: self.command.valve_opening_ratio(t_s),
+            ..self.nominal
+        };
+        for (channel, driver) in &self.drivers {
+            if let Some(value) = boundary_condition(&mut boundary, *channel) {
+                *value = driver.course.at(t_s) + driver.along_p3 * by_command_pa;
+            }
+        }
+        boundary
+    }
+
+    fn next_kink_s(&self, t_s: f64) -> f64 {
+        let after = self.jumps_s.partition_point(|jump_s| *jump_s <= t_s);
+        self.jumps_s.get(after).copied().unwrap_or(f64::INFINITY)
+    }
+
+    fn is_constant_after(&self, _t_s: f64) -> bool {
+        false
+    }
+}
+
+/// Length of the segments before and after a jump that give its height, s.
+const BESIDE_S: f64 = 8.0;
+
+/// Change of `values` per pascal of P3, from their jumps at P3's jumps; 0 if they do not follow it. `along` is P3 according to its command.
+fn share_along(
+    table: &Table,
+    values: &[f64],
+    (command, along): (&LaggedCommand, &[f64]),
+    noise_sigma: f64,
+) -> f64 {
+    let (mut sum_xy, mut sum_xx, mut pairs) = (0.0, 0.0, Vec::new());
+    for pair in command.levels().windows(2) {
+        let jump_s = pair[1].start_s;
+        let settled_s = jump_s + command.p3_settles_s(pair[0].p3_pa, pair[1].p3_pa);
+        // Changes by a speed-holding loop right after a jump are not separate jumps.
+        if pair[0].start_s > jump_s - BESIDE_S {
+            continue;
+        }
+        let height = |values: &[f64]| {
+            let before = line_at(table, values, jump_s - BESIDE_S, jump_s, jump_s)?;
+            Some(line_at(table, values, settled_s, settled_s + BESIDE_S, jump_s)? - before)
+        };
+        let (Some(change), Some(height_pa)) = (height(values), height(along)) else { continue };
+        pairs.push((height_pa, change));
+        sum_xy += height_pa * change;
+        sum_xx += height_pa * height_pa;
+    }
+    if sum_xx <= 0.0 || pairs.len() < 3 {
+        return 0.0;
+    }
+    let share = sum_xy / sum_xx;
+    let scatter = pairs.iter().map(|(x, y)| (y - share * x).powi(2)).sum::<f64>() / (pairs.len() - 1) as f64;
+    // The noise is the lower limit.
+    let error = (scatter.max(noise_sigma * noise_sigma * 0.1) / sum_xx).sqrt();
+    if share.abs() > 6.0 * error { share } else { 0.0 }
+}
+
+/// A line through the values between two times, evaluated at `at_s`.
+fn line_at(table: &Table, values: &[f64], start_s: f64, end_s: f64, at_s: f64) -> Option<f64> {
+    let range = table.range(start_s, end_s);
+    let (mut n, mut st, mut sv, mut stt, mut stv) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (t, v) in table.t_s[range.clone()].iter().zip(&values[range]).filter(|(_, v)| v.is_finite()) {
+        let t = t - at_s;
+        n += 1.0;
+        st += t;
+        sv += v;
+        stt += t * t;
+        stv += t * v;
+    }
+    let determinant = n * stt - st * st;
+    (n >= 8.0 && determinant > 0.0).then(|| (stt * sv - st * stv) / determinant)
+}

@@ -1,0 +1,343 @@
+//! Estimates when each step's command reached the rig, and the scatter of the sample times. A run in real time can be late because of a disk,
+//! a busy computer or a slow controller.
+//!
+//! The recorded command gives the time to within one sample. The remaining error shows in the measured P3, which changes by tens of kPa a
+//! second after a jump. An equal delay of all jumps belongs to the actuator and stays in its response; different delays belong to the run.
+
+use crate::averages::time_table::Table;
+use crate::model_inputs::lagged_command::{LaggedCommand, Level, Response, alike, levels_of_step};
+use mapper_core::{Channel, Recording, StepMarker};
+use mapper_numerics::minimise::minimise;
+use mapper_numerics::statistics::{median, robust_sigma};
+use std::ops::Range;
+
+/// Maximum delay of a command behind its step's start, s; a later one belongs to another change.
+const LATE_MAX_S: f64 = 2.0;
+/// Maximum sample spacing of a command that still dates its change, s.
+const SEEN_LATE_MAX_S: f64 = 1.0;
+/// Time before a jump over which the level of P3 is taken, s.
+const STILL_S: f64 = 3.0;
+/// Thresholds for a moved P3: standard deviations of its scatter, and share of the jump.
+const MOVED_SIGMAS: f64 = 6.0;
+const MOVED_RATIO: f64 = 0.02;
+/// Time before and after a jump of P3 that is used to date it, s.
+const AROUND_S: (f64, f64) = (1.0, 3.0);
+/// The jumps are dated separately if they differ by more than these, in errors and in s.
+const APART_ERRORS: f64 = 3.0;
+const APART_S: f64 = 3e-3;
+/// Scatter of the sample times below which it is neglected, s.
+const SCATTER_MIN_S: f64 = 1e-3;
+/// Minimum rate of P3 for dating samples, in noise sigmas a second.
+const RUNS_PER_S: f64 = 50.0;
+
+/// The recording with each step starting at the last sample before its command changed, so that it includes its whole transient.
+pub fn with_command_times(recording: &Recording) -> Recording {
+    let mut corrected = recording.clone();
+    for index in 0..corrected.steps.len() {
+        let (before_s, start_s) =
+            (recording.steps[index].start_s, command_s(recording, &recording.steps[index]));
+        corrected.steps[index].start_s = start_s;
+        // Keep adjacent steps adjacent.
+        if let Some(last) = index.checked_sub(1).map(|last| &mut corrected.steps[last])
+            && last.end_s >= before_s - 1e-9
+        {
+            last.end_s = start_s;
+        }
+    }
+    corrected
+}
+
+fn command_s(recording: &Recording, step: &StepMarker) -> f64 {
+    let commands = [(Channel::P3Command, step.p3_pa), (Channel::ValveCommand, step.valve_opening_ratio)];
+    let late = |(channel, commanded): (Channel, f64)| {
+        let command = recording.series.get(&channel)?;
+        let before = command.held(step.start_s)?;
+        let (t_s, values) = command.slice(step.start_s, (step.start_s + LATE_MAX_S).min(step.end_s));
+        let still = values.iter().take_while(|value| alike(**value, before)).count();
+        let then = values.get(still)?;
+        (still > 0 && !alike(before, commanded) && alike(*then, commanded)).then(|| t_s[still - 1])
+    };
+    let late_s = commands.into_iter().find_map(late).map(|late_s| late_s.max(step.start_s));
+    late_s.or_else(|| seen_late_s(recording, step)).unwrap_or(step.start_s)
+}
+
+/// If a log has the command only at its samples, a step begins with the first sample of the new command. The rig may have received it at any
+/// time since the sample before. Measured P3 has then moved by that first sample.
+fn seen_late_s(recording: &Recording, step: &StepMarker) -> Option<f64> {
+    let (command, p3) = (recording.series.get(&Channel::P3Command)?, recording.series.get(&Channel::P3)?);
+    let first = command.t_s.partition_point(|t_s| *t_s < step.start_s);
+    let place = first.checked_sub(1)?;
+    let (before_s, before_pa) = (command.t_s[place], command.values[place]);
+    let after_pa = command.values.get(first).copied().filter(|_| command.t_s[first] == step.start_s)?;
+    let jump_pa = after_pa - before_pa;
+    if alike(before_pa, after_pa) || step.start_s - before_s > SEEN_LATE_MAX_S {
+        return None;
+    }
+    // Movement of P3 at a constant command, noise included.
+    let still = p3.slice(step.start_s - STILL_S, before_s + 1e-9).1;
+    let level_pa = median(still.iter().filter(|value| value.is_finite()))?;
+    let scatter_pa = robust_sigma(still.iter().map(|value| value - level_pa))?;
+    let seen_pa = p3
+        .held(step.start_s)
+        .filter(|_| p3.t_s.binary_search_by(|t_s| t_s.total_cmp(&step.start_s)).is_ok())?;
+    let moved_pa = (seen_pa - level_pa) * jump_pa.signum();
+    (moved_pa > MOVED_SIGMAS * scatter_pa && moved_pa > MOVED_RATIO * jump_pa.abs()).then_some(before_s)
+}
+
+/// Times found from the measured P3.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Times {
+    /// When each step's command reached the rig, s.
+    pub starts_s: Vec<f64>,
+    /// Scatter of the samples' own times, one standard deviation, s.
+    pub scatter_s: f64,
+}
+
+impl Times {
+    /// Estimates the times of a recording [with command-based step starts](with_command_times) whose P3 follows its command with this response.
+    pub fn read(table: &Table, recording: &Recording, p3: Response, noise_sigma: f64) -> Times {
+        let steps = &recording.steps;
+        let mut times = Times { starts_s: steps.iter().map(|step| step.start_s).collect(), scatter_s: 0.0 };
+        let Some(values) = table.column(Channel::P3) else { return times };
+        let jumps = Jump::of_recording(table, recording, p3, noise_sigma);
+        let found: Vec<(f64, f64)> = jumps.iter().map(|jump| jump.shift_s(table, values)).collect();
+        let Some(common_s) = median(found.iter().map(|(shift_s, _)| *shift_s)) else { return times };
+        let mean_square = |of: &dyn Fn(&(f64, f64)) -> f64| {
+            (found.iter().map(|one| of(one).powi(2)).sum::<f64>() / found.len() as f64).sqrt()
+        };
+        let apart = mean_square(&|(shift_s, error_s)| (shift_s - common_s) / error_s);
+        if apart > APART_ERRORS && mean_square(&|(shift_s, _)| shift_s - common_s) > APART_S {
+            for (jump, (shift_s, _)) in jumps.iter().zip(&found) {
+                times.starts_s[jump.step] += shift_s;
+            }
+        }
+        times.scatter_s = scatter_s(table, values, &jumps, &found);
+        times
+    }
+
+    /// The recording with its steps starting when their commands reached the rig.
+    pub fn timed(&self, recording: &Recording) -> Recording {
+        let mut timed = recording.clone();
+        for (step, start_s) in timed.steps.iter_mut().zip(&self.starts_s) {
+            step.start_s = *start_s;
+        }
+        timed
+    }
+}
+
+/// A jump of P3 at the start of a step.
+struct Jump {
+    step: usize,
+    levels: Vec<Level>,
+    /// Position of the step's first level.
+    at: usize,
+    p3: Response,
+    noise_sigma: f64,
+    interval_s: f64,
+    samples: Range<usize>,
+}
+
+impl Jump {
+    fn of_recording(table: &Table, recording: &Recording, p3: Response, noise_sigma: f64) -> Vec<Jump> {
+        let steps = &recording.steps;
+        let jump = |step: usize| {
+            let (before, marker) = (&steps[step - 1], &steps[step]);
+            let mut levels = levels_of_step(recording, before);
+            let at = levels.len();
+            levels.extend(levels_of_step(recording, marker));
+            let from_pa = levels[at - 1].p3_pa;
+            let samples = table.range(marker.start_s - AROUND_S.0, marker.start_s + AROUND_S.1);
+            ((marker.p3_pa - from_pa).abs() > 100.0 * noise_sigma && samples.len() > 10).then_some(Jump {
+                step,
+                levels,
+                at,
+                p3,
+                noise_sigma,
+                interval_s: table.interval_s,
+                samples,
+            })
+        };
+        (1..steps.len()).filter_map(jump).collect()
+    }
+
+    /// P3 according to its command, delayed by this time.
+    fn command(&self, shift_s: f64) -> LaggedCommand {
+        let mut levels = self.levels.clone();
+        levels[self.at].start_s += shift_s;
+        LaggedCommand::new(levels, self.p3, Response::lag(0.0))
+    }
+
+    /// Residual of the measured P3, minus its mean, so that no offset enters.
+    fn rest(&self, table: &Table, values: &[f64], shift_s: f64) -> Vec<f64> {
+        let command = self.command(shift_s);
+        let rest: Vec<f64> = self.samples.clone().map(|i| values[i] - command.p3_pa(table.t_s[i])).collect();
+        let seen = || rest.iter().filter(|rest| rest.is_finite());
+        let mean = seen().sum::<f64>() / seen().count().max(1) as f64;
+        rest.iter().map(|rest| rest - mean).collect()
+    }
+
+    /// Rate of P3 at each sample, Pa/s.
+    fn slopes(&self, table: &Table, shift_s: f64) -> Vec<f64> {
+        let (command, by_s) = (self.command(shift_s), 1e-3);
+        let start_s = self.levels[self.at].start_s + shift_s;
+        let slope = |t_s: f64| (command.p3_pa(t_s + by_s) - command.p3_pa(t_s)) / by_s;
+        self.samples.clone().map(|i| if table.t_s[i] > start_s { slope(table.t_s[i]) } else { 0.0 }).collect()
+    }
+
+    /// Delay of the command relative to its sample, and its error, s.
+    fn shift_s(&self, table: &Table, values: &[f64]) -> (f64, f64) {
+        let cost = |shift_s: f64| {
+            let rest = self.rest(table, values, shift_s);
+            rest.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest).sum::<f64>()
+        };
+        // The command came between two samples, and acts within a sample of that.
+        let (low_s, high_s) = (-0.5 * self.interval_s, 2.0 * self.interval_s);
+        let shift_s = minimise(low_s, high_s, 1e-5, cost).at;
+        let information: f64 = self.slopes(table, shift_s).iter().map(|slope| slope * slope).sum();
+        (shift_s, self.noise_sigma / information.max(1e-12).sqrt())
+    }
+}
+
+/// Scatter of the sample times, from irregular P3 after jumps: each sample compared with its two neighbours, so that smooth differences (such
+/// as another response than the assumed one) cancel.
+fn scatter_s(table: &Table, values: &[f64], jumps: &[Jump], found: &[(f64, f64)]) -> f64 {
+    let (mut sum, mut weights, mut chi, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for (jump, (shift_s, _)) in jumps.iter().zip(found) {
+        let (rest, slopes) = (jump.rest(table, values, *shift_s), jump.slopes(table, *shift_s));
+        let noise_sigma = jump.noise_sigma;
+        for (rest, slopes) in rest.windows(3).zip(slopes.windows(3)) {
+            if slopes.iter().any(|slope| slope.abs() < RUNS_PER_S * noise_sigma) {
+                continue;
+            }
+            let late_s = |i: usize| -rest[i] / slopes[i];
+            let uneven_s = late_s(1) - 0.5 * (late_s(0) + late_s(2));
+            let variance = |i: usize, share: f64| (share * noise_sigma / slopes[i]).powi(2);
+            let noise = variance(0, 0.5) + variance(1, 1.0) + variance(2, 0.5);
+            if uneven_s.is_finite() {
+                let weight = 1.0 / noise;
+                sum += weight * (uneven_s * uneven_s - noise);
+                weights += 1.5 * weight;
+                chi += uneven_s * uneven_s / noise;
+                count += 1.0;
+            }
+        }
+    }
+    // Neighbours share samples: twice the scatter of independent ones.
+    let chance = count + 5.0 * 2.0 * f64::sqrt(2.0 * count);
+    let scatter_s = f64::sqrt(f64::max(sum / f64::max(weights, 1e-30), 0.0));
+    if count > 0.0 && chi > chance && scatter_s > SCATTER_MIN_S { scatter_s } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Series, StepKind};
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
+
+    const NOISE_PA: f64 = 80.0;
+    const LAG: Response = Response { lag_s: 0.3, slew_per_s: f64::INFINITY };
+
+    /// Twelve steps of 20 s between 150 and 200 kPa at 10 Hz, with the given delay of each command and time error of each sample.
+    fn recorded(late_s: &[f64; 12], scatter_s: f64) -> Recording {
+        let mut random = Pcg64::seed_from_u64(4);
+        let steps: Vec<StepMarker> = (0..12)
+            .map(|index| {
+                let (kind, start_s, up) = (StepKind::Point, 20.0 * index as f64, (index % 2) as f64);
+                StepMarker {
+                    index,
+                    kind,
+                    start_s,
+                    end_s: start_s + 20.0,
+                    from: None,
+                    to: None,
+                    p3_pa: 150e3 + 50e3 * up,
+                    valve_opening_ratio: 0.7,
+                }
+            })
+            .collect();
+        let levels: Vec<Level> = steps
+            .iter()
+            .zip(late_s)
+            .map(|(step, late_s)| {
+                let (start_s, p3_pa) = (step.start_s + late_s, step.p3_pa);
+                Level { start_s, p3_pa, valve_opening_ratio: step.valve_opening_ratio }
+            })
+            .collect();
+        let truth = LaggedCommand::new(levels, LAG, Response::lag(0.0));
+        let t_s: Vec<f64> = (0..2400).map(|i| f64::from(i) / 10.0).collect();
+        // A driver reports the command at once; the next sample shows it.
+        let commanded = t_s.iter().map(|t| truth.levels()[truth.level(t - 1e-9)].p3_pa).collect();
+        let read = t_s
+            .iter()
+            .map(|t| {
+                let (off, noise): (f64, f64) = (random.sample(StandardNormal), random.sample(StandardNormal));
+                truth.p3_pa(t + scatter_s * off) + NOISE_PA * noise + 150.0
+            })
+            .collect();
+        let series = [
+            (Channel::P3, Series { t_s: t_s.clone(), values: read }),
+            (Channel::P3Command, Series { t_s, values: commanded }),
+        ];
+        Recording { series: series.into(), steps, ..Recording::default() }
+    }
+
+    fn read(recording: &Recording) -> (Recording, Times) {
+        let aligned = with_command_times(recording);
+        let table = Table::new(&aligned).unwrap();
+        let times = Times::read(&table, &aligned, LAG, NOISE_PA);
+        (aligned, times)
+    }
+
+    #[test]
+    fn a_run_in_simulated_time_is_left_as_it_is() {
+        let recording = recorded(&[0.0; 12], 0.0);
+        let (aligned, times) = read(&recording);
+        assert_eq!(aligned, recording);
+        assert_eq!(times.scatter_s, 0.0);
+        assert_eq!(times.timed(&aligned), recording);
+    }
+
+    /// A logger's table: no step marks, the new command in the first row after the jump.
+    #[test]
+    fn a_command_that_was_seen_a_sample_late_is_put_before_it() {
+        let recording = recorded(&[0.0; 12], 0.0);
+        let mut seen = recording.clone();
+        for index in 1..12 {
+            seen.steps[index].start_s += 0.1;
+            seen.steps[index - 1].end_s = recording.steps[index - 1].end_s;
+        }
+        let (aligned, times) = read(&seen);
+        assert_eq!(times.timed(&aligned).steps, recording.steps);
+        // If P3 has not moved by that sample, the command came with it.
+        let mut with_it = seen.clone();
+        let p3 = with_it.series.get_mut(&Channel::P3).unwrap();
+        p3.t_s.iter_mut().for_each(|t_s| *t_s = (*t_s * 10.0).round() / 10.0 + 0.1);
+        let (aligned, _) = read(&with_it);
+        let starts =
+            |recording: &Recording| recording.steps.iter().map(|step| step.start_s).collect::<Vec<_>>();
+        assert_eq!(starts(&aligned), starts(&seen));
+    }
+
+    #[test]
+    fn the_start_of_late_steps_is_read_from_command_and_p3() {
+        let late_s = [0.0, 0.412, 0.02, 0.07, 0.0, 0.133, 0.25, 0.04, 0.01, 0.09, 0.055, 0.003];
+        for scatter_s in [0.0, 0.012] {
+            let recording = recorded(&late_s, scatter_s);
+            let (aligned, times) = read(&recording);
+            assert_eq!(aligned.steps[1].start_s, 20.4, "the last sample before the change");
+            assert_eq!(aligned.steps[0].end_s, 20.4);
+            // A dozen samples of each jump determine its time.
+            let error_s = (2.0 * scatter_s).max(3e-3);
+            for (index, late_s) in late_s.iter().enumerate().skip(1) {
+                let off_s = times.starts_s[index] - (recording.steps[index].start_s + late_s);
+                assert!(off_s.abs() < error_s, "{scatter_s}: step {index} by {off_s}");
+            }
+            let found_s = times.scatter_s;
+            let right =
+                if scatter_s == 0.0 { found_s == 0.0 } else { (found_s / scatter_s - 1.0).abs() < 0.35 };
+            assert!(right, "{found_s} for {scatter_s}");
+        }
+    }
+}

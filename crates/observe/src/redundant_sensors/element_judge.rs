@@ -1,0 +1,294 @@
+//! Judges which of several sensors of a channel has an offset or a lag, is stuck or gives no data, over a whole recording.
+//!
+//! Each sensor is compared with the weighted mean of the others in use. The worst one beyond its limit is left out, and the remaining ones are
+//! judged again, as long as more than half remain. With two, the wrong one cannot be identified. A stuck or silent sensor is identified by its
+//! own readings.
+
+use crate::redundant_sensors::element_blocks::Blocks;
+use crate::redundant_sensors::element_fault::Fault;
+use mapper_core::{Channel, NoiseColour, RedundantSensors, Series};
+use mapper_numerics::coloured_noise::ColouredNoise;
+use mapper_numerics::statistics::mean;
+use mapper_physics::laws::thermocouple;
+
+/// Share of fault-free recordings in which a sensor is left out for its offset; half of the permitted false alarms.
+pub(crate) const FALSE_ALARMS_RATIO: f64 = 0.005;
+/// Number of parts of the recording, each judged by its mean difference: an offset that starts in the middle shows in full in the last part.
+const PARTS: usize = 4;
+/// Minimum number of blocks for a decision.
+const MIN_BLOCKS: usize = 10;
+/// Share of the recording without a reading above which a sensor is silent, if another one has readings.
+const SILENT_RATIO: f64 = 0.5;
+/// Time and number of samples for which a reading repeats to the last digit before it counts as stuck, s.
+const FROZEN_S: f64 = 20.0;
+const FROZEN_SAMPLES: usize = 20;
+/// Share of samples that must differ from the one before for a live sensor: a coarse digit repeats often.
+const ALIVE_RATIO: f64 = 0.2;
+/// Band of block noise within which a reading counts as constant, standard deviations; chance exceeds it in 1e-8 of blocks.
+const STILL_SIGMAS: f64 = 6.0;
+/// Minimum movement of the others meanwhile, in widths of that band, and its duration in blocks (20 s): a slow probe has completed half of the
+/// change by then.
+const MOVED_BANDS: f64 = 4.0;
+const MOVED_BLOCKS: usize = 10;
+/// Difference of lags that is always acceptable, s: at the slopes of a usual window it is smaller than a sensor's offset.
+const LAG_S: f64 = 0.5;
+/// Accuracy of a lag computed from the tip diameter, ratio: tips are not spheres, and the flow is unknown here.
+const LAG_RATIO: f64 = 0.5;
+/// Standard errors above which a lag is significant.
+const LAG_SIGMAS: f64 = 6.0;
+/// Factor on the regression's standard errors, which assume independent residuals; those of blocks are slightly correlated.
+const DEPENDENT_RESIDUALS: f64 = 2.0;
+/// Ratio of slopes to their noise above which a lag can be seen.
+const MOVING_SIGMAS: f64 = 5.0;
+/// Typical outlet pipe, flow and temperature: lags of declared diameters are only compared with each other.
+const USUAL_PIPE_M: f64 = 0.035;
+const USUAL_FLOW_KG_S: f64 = 0.05;
+const USUAL_T2_K: f64 = 350.0;
+
+/// Result for the sensors of one channel, by their positions from 0.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Judgement {
+    /// Those to be left out, with the reason and the number of sensors compared.
+    pub(crate) left_out: Vec<(usize, Fault, usize)>,
+    /// The worst difference among the remaining ones, if the wrong one cannot be identified.
+    pub(crate) contradiction: Option<(usize, Fault)>,
+}
+
+impl Judgement {
+    pub(crate) fn uses(&self, index: usize) -> bool {
+        !self.left_out.iter().any(|(out, ..)| *out == index)
+    }
+
+    fn in_use(&self, count: usize) -> Vec<usize> {
+        (0..count).filter(|index| self.uses(*index)).collect()
+    }
+}
+
+/// Number of offset differences judged in a channel of `sensors` sensors: two sensors have one.
+pub(crate) fn comparisons(sensors: usize) -> usize {
+    if sensors > 2 { sensors } else { 1 }
+}
+
+/// Judges the sensors of a channel. `limit_sigmas`: maximum offset of one.
+pub(crate) fn judge(
+    channel: Channel,
+    sensors: &[Option<&Series>],
+    declared: &RedundantSensors,
+    colour: NoiseColour,
+    limit_sigmas: f64,
+) -> Judgement {
+    let mut judgement = Judgement::default();
+    let Some(blocks) = Blocks::new(channel, sensors) else { return judgement };
+    let colour = ColouredNoise::new(colour.first_order_share_ratio, colour.time_constant_s);
+    let judge = Judge { sensors, declared, blocks: &blocks, colour, limit_sigmas };
+    judge.silent(&mut judgement);
+    judge.stuck(&mut judgement);
+    let most_out = sensors.len().saturating_sub(1) / 2;
+    loop {
+        let in_use = judgement.in_use(sensors.len());
+        let differences = in_use.iter().filter_map(|index| judge.difference(*index, &in_use));
+        let Some(worst) = differences.filter(|found| found.severity > 1.0).max_by(Difference::by_severity)
+        else {
+            return judgement;
+        };
+        if in_use.len() < 3 || judgement.left_out.len() >= most_out {
+            judgement.contradiction = Some((worst.index, worst.fault));
+            return judgement;
+        }
+        judgement.left_out.push((worst.index, worst.fault, in_use.len() - 1));
+    }
+}
+
+struct Judge<'a> {
+    sensors: &'a [Option<&'a Series>],
+    declared: &'a RedundantSensors,
+    blocks: &'a Blocks,
+    colour: ColouredNoise,
+    limit_sigmas: f64,
+}
+
+/// Difference of a sensor from the others; a severity above 1 is too much.
+struct Difference {
+    index: usize,
+    severity: f64,
+    fault: Fault,
+}
+
+impl Difference {
+    fn by_severity(&self, other: &Difference) -> std::cmp::Ordering {
+        self.severity.total_cmp(&other.severity)
+    }
+}
+
+impl Judge<'_> {
+    fn silent(&self, judgement: &mut Judgement) {
+        let read = |means: &Vec<f64>| means.iter().filter(|mean| mean.is_finite()).count();
+        let counts: Vec<usize> = self.blocks.means.iter().map(read).collect();
+        let most = counts.iter().copied().max().unwrap_or(0);
+        for (index, count) in counts.iter().enumerate() {
+            let missing_ratio = 1.0 - *count as f64 / most.max(1) as f64;
+            if missing_ratio > SILENT_RATIO {
+                judgement.left_out.push((index, Fault::Silent { missing_ratio }, counts.len() - 1));
+            }
+        }
+    }
+
+    fn stuck(&self, judgement: &mut Judgement) {
+        let in_use = judgement.in_use(self.sensors.len());
+        let mut found = Vec::new();
+        for index in &in_use {
+            let others: Vec<usize> = in_use.iter().copied().filter(|other| other != index).collect();
+            if others.is_empty() {
+                continue;
+            }
+            let still = self.frozen(*index, &others).or_else(|| self.unmoved(*index, &others));
+            found.extend(still.map(|fault| (*index, fault, others.len())));
+        }
+        // If all are constant, nothing changed.
+        if found.len() < in_use.len() {
+            judgement.left_out.extend(found);
+        }
+    }
+
+    /// A reading that repeats to the last digit while all others change.
+    fn frozen(&self, index: usize, others: &[usize]) -> Option<Fault> {
+        let series = self.sensors[index]?;
+        let (mut start, mut longest) = (0, (0, 0));
+        for i in 1..=series.values.len() {
+            if series.values.get(i) != series.values.get(start) {
+                if i - 1 - start > longest.1 - longest.0 {
+                    longest = (start, i - 1);
+                }
+                start = i;
+            }
+        }
+        let (from_s, to_s) = (*series.t_s.get(longest.0)?, *series.t_s.get(longest.1)?);
+        let reading = *series.values.get(longest.0)?;
+        let alive = |other: &usize| {
+            let values = self.sensors[*other].map(|series| series.slice(from_s, to_s).1).unwrap_or_default();
+            let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
+            changes as f64 > ALIVE_RATIO * values.len() as f64
+        };
+        let long = to_s - from_s >= FROZEN_S && longest.1 - longest.0 >= FROZEN_SAMPLES;
+        (long && others.iter().all(alive)).then_some(Fault::Stuck { from_s, reading })
+    }
+
+    /// A reading that stays within its noise while the others move far and stay there.
+    fn unmoved(&self, index: usize, others: &[usize]) -> Option<Fault> {
+        let band = STILL_SIGMAS * self.block_sigma(index).max(f64::MIN_POSITIVE);
+        let own = &self.blocks.means[index];
+        let reference = self.blocks.weighted(&self.declared.weights(|other| others.contains(&other)));
+        let mut start: Option<usize> = None;
+        let mut away = 0;
+        for block in 0..own.len() {
+            if !(own[block].is_finite() && reference[block].is_finite()) {
+                continue;
+            }
+            match start {
+                Some(first) if (own[block] - own[first]).abs() <= band => {
+                    away += usize::from((reference[block] - reference[first]).abs() > MOVED_BANDS * band);
+                    if away >= MOVED_BLOCKS {
+                        let from_s = self.blocks.start_s + first as f64 * self.blocks.length_s;
+                        return Some(Fault::Stuck { from_s, reading: own[first] });
+                    }
+                }
+                _ => (start, away) = (Some(block), 0),
+            }
+        }
+        None
+    }
+
+    /// Noise of the mean of a block.
+    fn block_sigma(&self, index: usize) -> f64 {
+        let variance = self.colour.variance_of_mean(self.blocks.samples[index], self.blocks.length_s);
+        self.declared.elements[index].declared.noise_sigma * variance.sqrt()
+    }
+
+    /// Difference of a sensor from the others in use.
+    fn difference(&self, index: usize, in_use: &[usize]) -> Option<Difference> {
+        let weights = self.declared.weights(|other| other != index && in_use.contains(&other));
+        let reference = self.blocks.weighted(&weights);
+        let slope = self.blocks.slope_s(index);
+        let own = &self.blocks.means[index];
+        let rows: Vec<(f64, f64, f64)> = (0..own.len())
+            .map(|block| (own[block] - reference[block], slope[block], reference[block]))
+            .filter(|(difference, slope, _)| difference.is_finite() && slope.is_finite())
+            .collect();
+        if rows.len() < MIN_BLOCKS {
+            return None;
+        }
+        let lag = self.lag(index, &weights, &rows);
+        let (by, sigmas) = self.offset(index, &weights, &rows, lag.map_or(0.0, |lag| lag.lag_s));
+        let off =
+            Difference { index, severity: sigmas / self.limit_sigmas, fault: Fault::Off { by, sigmas } };
+        let slow =
+            lag.map(|Lag { lag_s, severity }| Difference { index, severity, fault: Fault::Slow { lag_s } });
+        Some(slow.filter(|slow| slow.severity > off.severity).unwrap_or(off))
+    }
+
+    /// Lag of a sensor relative to the others: first-order lags give `x - r = -tau x'` for any gas temperature.
+    fn lag(&self, index: usize, weights: &[f64], rows: &[(f64, f64, f64)]) -> Option<Lag> {
+        let count = rows.len() as f64;
+        let mean_difference = mean(rows.iter().map(|row| row.0))?;
+        let mean_slope = mean(rows.iter().map(|row| row.1))?;
+        let (mut square, mut product) = (0.0, 0.0);
+        for (difference, slope, _) in rows {
+            square += (slope - mean_slope).powi(2);
+            product += (slope - mean_slope) * (difference - mean_difference);
+        }
+        let noise = self.block_sigma(index) * std::f64::consts::FRAC_1_SQRT_2 / self.blocks.length_s;
+        if square <= 0.0 || (square / count).sqrt() < MOVING_SIGMAS * noise {
+            return None;
+        }
+        let lag_s = -product / square;
+        let residual = |(difference, slope, _): &(f64, f64, f64)| {
+            (difference - mean_difference + lag_s * (slope - mean_slope)).powi(2)
+        };
+        let variance = rows.iter().map(residual).sum::<f64>() / count;
+        let standard_error_s = DEPENDENT_RESIDUALS * (variance / square).sqrt();
+        let declared_s = |index: usize| {
+            let diameter_m = self.declared.elements[index].probe_diameter_m;
+            thermocouple::time_constant_s(diameter_m, USUAL_PIPE_M, USUAL_FLOW_KG_S, USUAL_T2_K)
+        };
+        let others_s: f64 =
+            weights.iter().enumerate().map(|(other, weight)| weight * declared_s(other)).sum();
+        let expected_s = declared_s(index) - others_s;
+        let limit_s = LAG_S + LAG_RATIO * declared_s(index).max(others_s);
+        Some(Lag { lag_s, severity: (lag_s - expected_s).abs() / limit_s.max(LAG_SIGMAS * standard_error_s) })
+    }
+
+    /// Largest difference among the parts of the recording, and the same in its declared standard deviations.
+    fn offset(&self, index: usize, weights: &[f64], rows: &[(f64, f64, f64)], lag_s: f64) -> (f64, f64) {
+        let parts = PARTS.min(rows.len() / MIN_BLOCKS).max(1);
+        let mut worst = (0.0, 0.0);
+        for part in rows.chunks(rows.len().div_ceil(parts)) {
+            let by =
+                mean(part.iter().map(|(difference, slope, _)| difference + lag_s * slope)).unwrap_or(0.0);
+            let level = mean(part.iter().map(|row| row.2)).unwrap_or(0.0);
+            let length_s = part.len() as f64 * self.blocks.length_s;
+            let variance = |other: usize| {
+                let declared = &self.declared.elements[other].declared;
+                let fixed = declared.offset_sigma.hypot(declared.gain_sigma_ratio * level);
+                // For a sensor without a declared offset, use the noise of a sample as its scale.
+                let fixed = if fixed > 0.0 { fixed } else { declared.noise_sigma };
+                let samples = part.len() * self.blocks.samples[other];
+                fixed.powi(2) + declared.noise_sigma.powi(2) * self.colour.variance_of_mean(samples, length_s)
+            };
+            let others = weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0);
+            let sigma =
+                (variance(index) + others.map(|(other, w)| w * w * variance(other)).sum::<f64>()).sqrt();
+            // Without any declaration nothing is decided.
+            let sigmas = if sigma > 0.0 { by.abs() / sigma } else { 0.0 };
+            if sigmas > worst.1 {
+                worst = (by, sigmas);
+            }
+        }
+        worst
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Lag {
+    lag_s: f64,
+    severity: f64,
+}

@@ -1,0 +1,8 @@
+//! Compressor maps for the model, in closed form or as speed lines, with similarity laws and limits of flow.
+
+pub mod characteristic;
+pub mod closed_form_map;
+pub mod efficiency_shape;
+pub mod inlet_limit;
+pub mod similarity;
+pub mod tabulated_map;

@@ -1,0 +1,171 @@
+//! The turbine (vanes fixed): swallowing, heat to the housing, expansion.
+//!
+//! Closed forms of the virtual laboratory for the paper's turbine. Domain: P3 above P4 (the caller checks), expansion ratios up
+//! to about 4, gas treated as air. The efficiency is total to static and a parabola over the blade-speed ratio (e.g. Watson and
+//! Janota, Turbocharging the Internal Combustion Engine, ch. 5), limited to 0.05 far from its best.
+
+use crate::gas::air::{self, GAS_CONSTANT_J_KGK};
+use crate::gas::fast_power::power;
+use crate::laws::nusselt;
+use crate::machine::params::{BoundaryConditions, TurbineParams};
+
+/// State of the ISA day to which the swallowing curve is corrected.
+const FLOW_REFERENCE_K: f64 = 288.15;
+const FLOW_REFERENCE_PA: f64 = 101_325.0;
+/// Exponent of the swallowing curve `1 - (P3/P4)^-1.1`.
+pub const SWALLOWING_EXPONENT: f64 = -1.1;
+
+/// Terms that depend only on the boundary conditions; computed once while these are constant.
+#[derive(Debug, Clone, Copy)]
+pub struct TurbineInlet {
+    params: TurbineParams,
+    t3_k: f64,
+    /// Gas flow, kg/s.
+    pub flow_kg_s: f64,
+    ln_expansion_ratio: f64,
+    /// `1 - (P3/P4)^(-R/cp(T3))`, the isentropic drop over T3'.
+    isentropic_drop_ratio: f64,
+    cp3_j_kgk: f64,
+    /// Heat-transfer coefficient for a wall of viscosity 1 Pa s; the wall's own viscosity enters with ^-0.14.
+    h_unit_wall_w_m2k: f64,
+}
+
+/// The turbine at one housing temperature and speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurbineState {
+    /// Before the wheel (station 3'), K.
+    pub t3_prime_k: f64,
+    /// At the outlet (station 4), K.
+    pub t4_k: f64,
+    /// Heat from gas to metal, W.
+    pub heat_w: f64,
+    /// Power to the shaft, W.
+    pub power_w: f64,
+    /// Heat-transfer coefficient, W/(m2 K).
+    pub h_w_m2k: f64,
+    /// Efficiency, total to static, fraction.
+    pub efficiency: f64,
+    /// Blade speed over spouting velocity.
+    pub blade_speed_ratio: f64,
+}
+
+impl TurbineInlet {
+    /// Prepares the turbine for boundary conditions with `p3_pa > p4_pa`.
+    #[inline]
+    pub fn new(params: &TurbineParams, boundary: &BoundaryConditions) -> Self {
+        let expansion_ratio = boundary.p3_pa / boundary.p4_pa;
+        let ln_expansion_ratio = expansion_ratio.ln();
+        let flow_kg_s = params.choked_flow_kg_s
+            * (1.0 - (SWALLOWING_EXPONENT * ln_expansion_ratio).exp()).sqrt()
+            * (boundary.p3_pa / FLOW_REFERENCE_PA)
+            / (boundary.t3_k / FLOW_REFERENCE_K).sqrt();
+        let cp3_j_kgk = air::heat_capacity_j_kgk(boundary.t3_k);
+        // A wall as viscous as the gas gives the plain correlation; scale that to a wall of 1 Pa s.
+        let h_unit_wall_w_m2k = nusselt::coefficient_w_m2k(
+            params.nusselt_coefficient,
+            params.nusselt_exponent,
+            params.inlet_diameter_m,
+            flow_kg_s,
+            boundary.t3_k,
+            boundary.t3_k,
+        ) * air::viscosity_pa_s(boundary.t3_k).powf(nusselt::WALL_EXPONENT);
+        TurbineInlet {
+            params: *params,
+            t3_k: boundary.t3_k,
+            flow_kg_s,
+            ln_expansion_ratio,
+            isentropic_drop_ratio: isentropic_drop_ratio(ln_expansion_ratio, cp3_j_kgk),
+            cp3_j_kgk,
+            h_unit_wall_w_m2k,
+        }
+    }
+
+    /// The turbine with a housing at `tt_k` and a shaft at `shaft_speed_rad_s`.
+    ///
+    /// `T4 = T3' - eta_t T3' (1 - (P3/P4)^(-R/cp(T3)))`, `W_t = m_t cp(T3) (T3' - T4)`, efficiency a parabola over
+    /// blade-speed ratio.
+    #[inline]
+    pub fn at(&self, tt_k: f64, shaft_speed_rad_s: f64) -> TurbineState {
+        let params = &self.params;
+        let h_w_m2k = self.h_unit_wall_w_m2k * power(air::viscosity_pa_s(tt_k), -nusselt::WALL_EXPONENT);
+        let conductance_w_k = h_w_m2k * params.internal_area_m2;
+        let transfer_units = conductance_w_k / (self.flow_kg_s * self.cp3_j_kgk);
+        let t3_prime_k = (self.t3_k + transfer_units * tt_k) / (1.0 + transfer_units);
+        let cp_prime = air::heat_capacity_j_kgk(t3_prime_k);
+        let spouting_velocity_m_s =
+            (2.0 * cp_prime * t3_prime_k * isentropic_drop_ratio(self.ln_expansion_ratio, cp_prime)).sqrt();
+        let blade_speed_ratio = shaft_speed_rad_s * params.wheel_radius_m / spouting_velocity_m_s;
+        let away = (blade_speed_ratio - params.peak_blade_speed_ratio) / params.peak_blade_speed_ratio;
+        let efficiency = (params.peak_efficiency * (1.0 - 0.8 * away * away)).max(0.05);
+        let drop_k = efficiency * t3_prime_k * self.isentropic_drop_ratio;
+        TurbineState {
+            t3_prime_k,
+            t4_k: t3_prime_k - drop_k,
+            heat_w: conductance_w_k * (t3_prime_k - tt_k),
+            power_w: self.flow_kg_s * self.cp3_j_kgk * drop_k,
+            h_w_m2k,
+            efficiency,
+            blade_speed_ratio,
+        }
+    }
+}
+
+/// `1 - ER^(-R/cp)`: the isentropic temperature drop over the inlet temperature.
+#[inline]
+fn isentropic_drop_ratio(ln_expansion_ratio: f64, cp_j_kgk: f64) -> f64 {
+    1.0 - (-GAS_CONSTANT_J_KGK / cp_j_kgk * ln_expansion_ratio).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::params::Params;
+
+    /// A turbine without heat loss and with efficiency 1 at every blade-speed ratio that a test can reach.
+    fn inlet(expansion_ratio: f64, t3_k: f64) -> TurbineInlet {
+        let params =
+            TurbineParams { internal_area_m2: 0.0, peak_efficiency: 1.0, ..Params::default().turbine };
+        let p4_pa = 110e3;
+        let boundary = BoundaryConditions {
+            p3_pa: expansion_ratio * p4_pa,
+            t3_k,
+            p4_pa,
+            ..BoundaryConditions::default()
+        };
+        TurbineInlet::new(&params, &boundary)
+    }
+
+    /// The turbine at its best blade-speed ratio.
+    fn at_best(inlet: &TurbineInlet) -> TurbineState {
+        let per_rad_s = inlet.at(400.0, 1.0).blade_speed_ratio;
+        inlet.at(400.0, inlet.params.peak_blade_speed_ratio / per_rad_s)
+    }
+
+    /// NACA report 1135, gamma = 1.4: at p/p0 = 0.5283 the isentropic temperature is 0.8333 T0. Air of 300 K has 1.3997.
+    #[test]
+    fn an_ideal_expansion_follows_the_isentropic_tables() {
+        let state = at_best(&inlet(1.0 / 0.5283, 300.0));
+        assert!((state.efficiency - 1.0).abs() < 1e-12);
+        assert!((state.t4_k / 300.0 - 0.8333).abs() < 3e-4, "{} K", state.t4_k);
+        assert_eq!(state.heat_w, 0.0);
+    }
+
+    /// Air tables (Moran and Shapiro, table A-22): from 773.15 K (h = 792.5 kJ/kg, pr = 41.95) to a third of the pressure the
+    /// isentropic end is at pr = 13.98, h = 581.3 kJ/kg. The constant cp of the inlet costs 1 %.
+    #[test]
+    fn the_power_of_hot_gas_is_its_drop_of_enthalpy() {
+        let hot = inlet(3.0, 773.15);
+        let state = at_best(&hot);
+        let drop_j_kg = state.power_w / hot.flow_kg_s;
+        assert!((drop_j_kg / 211.2e3 - 1.0).abs() < 0.01, "{drop_j_kg} J/kg");
+    }
+
+    /// Choked, on the ISA day, it swallows its declared flow; hotter gas in proportion to 1/sqrt(T3).
+    #[test]
+    fn the_swallowing_curve_is_corrected_to_the_isa_day() {
+        let choked = inlet(1e6, FLOW_REFERENCE_K);
+        let corrected_kg_s = choked.flow_kg_s * FLOW_REFERENCE_PA / (1e6 * 110e3);
+        assert!((corrected_kg_s / Params::default().turbine.choked_flow_kg_s - 1.0).abs() < 1e-6);
+        assert!((inlet(2.0, 1152.6).flow_kg_s / inlet(2.0, FLOW_REFERENCE_K).flow_kg_s - 0.5).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,213 @@
+//! Every parameter of the lumped turbocharger model, with Appendix A's values as default.
+
+use crate::gas::air::Air;
+pub use crate::machine::boundary::BoundaryConditions;
+use mapper_core::{EfficiencyDefinition, InletConvection, ReferenceState};
+use serde::{Deserialize, Serialize};
+
+/// The machine: geometry, masses, conductances, probe. Effects and fits change these parameters, never the equations.
+///
+/// Defaults are those of Burke et al., Appendix A, as completed in the model's description (`docs/reference/model.md`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Params {
+    /// Compressor side.
+    pub compressor: CompressorParams,
+    /// Turbine side.
+    pub turbine: TurbineParams,
+    /// Bearing housing and oil.
+    pub bearing: BearingParams,
+    /// Shaft inertia, kg m2, > 0.
+    pub shaft_inertia_kgm2: f64,
+    /// Back-pressure valve and the volume before it.
+    pub outlet: OutletParams,
+    /// Diameter of the T2 probe's tip, m; 0 is an ideal probe (eqs. 11-12).
+    pub t2_probe_diameter_m: f64,
+    /// Share chi of the way from gas to housing that the T2 probe's stem pulls its tip: it tends to T2 + chi (Tc - T2); 0.
+    pub t2_probe_stem_ratio: f64,
+    /// Recovery r of the T2 probe: it tends to T2 - (1 - r) v^2/(2 cp), v in the outlet pipe; 1.
+    pub t2_probe_recovery_ratio: f64,
+    /// Bearing friction c: c omega^2 is taken from the shaft, W s^2/rad^2, >= 0; Appendix A has none.
+    pub bearing_friction_w_s2: f64,
+    /// Multiplies the convection of both housings to the cell, >= 0; 1.
+    pub external_convection_ratio: f64,
+    /// View factor times area of the radiation from turbine to compressor housing, m2, >= 0; Appendix A has none.
+    pub radiation_area_m2: f64,
+}
+
+/// Compressor housing and wheel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CompressorParams {
+    /// Internal area that exchanges heat with the gas, A_c, m2.
+    pub internal_area_m2: f64,
+    /// Share of `internal_area_m2` before compression, alpha_A, 0..1 (eqs. 1 and 3).
+    pub alpha_area_ratio: f64,
+    /// Inlet pipe diameter, m: characteristic length of the Nusselt correlation before the wheel if `inlet_convection` is
+    /// `own`.
+    pub inlet_diameter_m: f64,
+    /// Model of h before the wheel; not used if `alpha_area_ratio` is 0.
+    pub inlet_convection: InletConvection,
+    /// Multiplies h before the wheel, > 0; 1.
+    pub inlet_h_ratio: f64,
+    /// Outlet pipe diameter: characteristic length of the Nusselt correlation, m.
+    pub outlet_diameter_m: f64,
+    /// Wheel diameter at the exit, m; tip speed of the map.
+    pub wheel_diameter_m: f64,
+    /// Nusselt correlation `Nu = a Re^b Pr^(1/3) (mu/mu_skin)^0.14`: a.
+    pub nusselt_coefficient: f64,
+    /// Nusselt correlation: b.
+    pub nusselt_exponent: f64,
+    /// Mass of the housing, kg.
+    pub housing_mass_kg: f64,
+    /// External area, m2.
+    pub external_area_m2: f64,
+    /// External emissivity, 0..1, ratio to a black body.
+    pub emissivity_ratio: f64,
+    /// Multiplies h if the metal is hotter than the gas it touches (T1 before, T2' after compression), > 0; 1.
+    pub hot_metal_h_ratio: f64,
+    /// Conductance from the housing to the gas between the T1 probe and the wheel, in addition to `alpha_area_ratio`, W/K; 0.
+    pub inlet_conductance_w_k: f64,
+    /// Multiplies the map's efficiency, > 0; 1.
+    pub efficiency_scale_ratio: f64,
+    /// Multiplies the map's flow, > 0; 1. The efficiency is the map's at the multiplied flow.
+    pub flow_scale_ratio: f64,
+    /// Part r of the flow that recirculates, hot, from the wheel's exit to its inlet: the wheel, and with it the map, has
+    /// (1 + r) times the flow that leaves the compressor; 0.
+    pub recirculation_ratio: f64,
+    /// Water in the air of the compressor side, kg per kg of dry air, >= 0; 0.
+    pub humidity_kg_kg: f64,
+    /// Definition of the map's efficiency, and of every efficiency of this model; the paper's if it is left out.
+    #[serde(default = "paper")]
+    pub efficiency: EfficiencyDefinition,
+    /// Fraction phi of the housing's heat capacity that touches the gas and has its own temperature, 0..1; 0 is one node.
+    pub inner_capacity_ratio: f64,
+    /// Conductance G between that inner wall and the rest, W/K, > 0; not used if the housing is one node.
+    pub inner_conductance_w_k: f64,
+}
+
+/// Turbine housing and wheel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TurbineParams {
+    /// Internal area that exchanges heat with the gas, A_t, m2.
+    pub internal_area_m2: f64,
+    /// Inlet pipe diameter: characteristic length of the Nusselt correlation, m.
+    pub inlet_diameter_m: f64,
+    /// Radius of the wheel's inlet, m; blade speed of the blade-speed ratio.
+    pub wheel_radius_m: f64,
+    /// Nusselt correlation `Nu = a Re^b Pr^(1/3) (mu/mu_skin)^0.14`: a.
+    pub nusselt_coefficient: f64,
+    /// Nusselt correlation: b.
+    pub nusselt_exponent: f64,
+    /// Mass of the housing, kg.
+    pub housing_mass_kg: f64,
+    /// External area, m2.
+    pub external_area_m2: f64,
+    /// External emissivity, 0..1, ratio to a black body.
+    pub emissivity_ratio: f64,
+    /// Flow the turbine swallows at large expansion ratio, corrected to 288.15 K and 101.325 kPa, kg/s.
+    pub choked_flow_kg_s: f64,
+    /// Best efficiency of the turbine, 0..1.
+    pub peak_efficiency: f64,
+    /// Blade-speed ratio of the best efficiency.
+    pub peak_blade_speed_ratio: f64,
+}
+
+/// Bearing housing between the two.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BearingParams {
+    /// Thermal conductivity of the bearing housing, W/(m K).
+    pub conductivity_w_mk: f64,
+    /// Section area of the bearing housing, m2.
+    pub section_area_m2: f64,
+    /// Length of the bearing housing, m; half of it lies on each side of the oil.
+    pub length_m: f64,
+    /// Conductance from the bearing housing to the oil, W/K.
+    pub oil_conductance_w_k: f64,
+}
+
+/// Back-pressure valve and the volume between compressor and valve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutletParams {
+    /// Volume between compressor outlet and valve, m3.
+    pub volume_m3: f64,
+    /// Valve area at opening 1, m2.
+    pub valve_area_m2: f64,
+    /// Discharge coefficient of the valve.
+    pub discharge_coefficient: f64,
+}
+
+/// Eq. 2 of the paper.
+fn paper() -> EfficiencyDefinition {
+    EfficiencyDefinition::KappaOfT1
+}
+
+impl CompressorParams {
+    /// The air that is compressed.
+    pub fn air(&self) -> Air {
+        Air { humidity_kg_kg: self.humidity_kg_kg, efficiency: self.efficiency }
+    }
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Params {
+            compressor: CompressorParams {
+                internal_area_m2: 29e-3,
+                alpha_area_ratio: 0.0,
+                inlet_diameter_m: 40e-3,
+                inlet_convection: InletConvection::Shared,
+                inlet_h_ratio: 1.0,
+                outlet_diameter_m: 35e-3,
+                wheel_diameter_m: 52e-3,
+                nusselt_coefficient: 0.004,
+                nusselt_exponent: 1.13,
+                housing_mass_kg: 0.93,
+                external_area_m2: 79e-3,
+                emissivity_ratio: 0.1,
+                hot_metal_h_ratio: 1.0,
+                inlet_conductance_w_k: 0.0,
+                efficiency_scale_ratio: 1.0,
+                flow_scale_ratio: 1.0,
+                recirculation_ratio: 0.0,
+                humidity_kg_kg: 0.0,
+                efficiency: paper(),
+                inner_capacity_ratio: 0.0,
+                inner_conductance_w_k: 20.0,
+            },
+            turbine: TurbineParams {
+                internal_area_m2: 24e-3,
+                inlet_diameter_m: 40e-3,
+                wheel_radius_m: 0.0235,
+                nusselt_coefficient: 0.038,
+                nusselt_exponent: 0.662,
+                housing_mass_kg: 3.15,
+                external_area_m2: 80e-3,
+                emissivity_ratio: 0.6,
+                choked_flow_kg_s: 0.078,
+                peak_efficiency: 0.75,
+                peak_blade_speed_ratio: 0.65,
+            },
+            bearing: BearingParams {
+                conductivity_w_mk: 47.5,
+                section_area_m2: 7e-4,
+                length_m: 45e-3,
+                oil_conductance_w_k: 8.0,
+            },
+            shaft_inertia_kgm2: 16e-6,
+            outlet: OutletParams { volume_m3: 0.78e-3, valve_area_m2: 0.4e-3, discharge_coefficient: 0.6 },
+            t2_probe_diameter_m: 0.0,
+            t2_probe_stem_ratio: 0.0,
+            t2_probe_recovery_ratio: 1.0,
+            bearing_friction_w_s2: 0.0,
+            external_convection_ratio: 1.0,
+            radiation_area_m2: 0.0,
+        }
+    }
+}
+
+/// The model's own reference state (SAE J922).
+pub const MODEL_REFERENCE: ReferenceState = ReferenceState::SAE;

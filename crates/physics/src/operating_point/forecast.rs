@@ -1,0 +1,270 @@
+//! Forecast of one step on the nominal machine, with its thermal memory, for plan and sequence.
+
+use crate::machine::params::BoundaryConditions;
+use crate::operating_point::settled::{settled_count, with_bands};
+use crate::simulation::model::{Model, State};
+use crate::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, SimulationError, Simulator, Watch};
+use mapper_core::{Predicted, SettleBands, WindowRule};
+
+/// Interval of a forecast's samples, s.
+const SAMPLE_S: f64 = 0.5;
+/// Maximum number of samples of a forecast; steps of more than 10 000 s are sampled more coarsely.
+const SAMPLE_LIMIT: f64 = 20_000.0;
+
+/// One instant of a forecast step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ForecastRow {
+    /// Time after the jump, s.
+    pub t_s: f64,
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Compressor flow, kg/s.
+    pub flow_kg_s: f64,
+    /// Inlet total temperature, K.
+    pub t1_k: f64,
+    /// Inlet total pressure, Pa.
+    pub p1_pa: f64,
+    /// Outlet total pressure, Pa.
+    pub p2_pa: f64,
+    /// Reading of the outlet probe, K.
+    pub t2_k: f64,
+    /// Compressor housing, K.
+    pub tc_k: f64,
+    /// The model's own efficiency, fraction.
+    pub efficiency: f64,
+    /// The model's own heat-transfer coefficient, W/(m2 K).
+    pub h_w_m2k: f64,
+}
+
+/// A step of the nominal machine.
+#[derive(Debug, Clone)]
+pub struct StepForecast {
+    /// Its rows from the jump to the end; the last one is always the end.
+    pub rows: Vec<ForecastRow>,
+    /// Interval of the rows, s.
+    pub interval_s: f64,
+    /// The machine at the end.
+    pub end: State,
+    /// Highest shaft speed during the step, rpm.
+    pub highest_speed_rpm: f64,
+    /// Highest reading of the outlet probe during the step, K. Before the first row the probe still shows the previous point.
+    pub highest_t2_k: f64,
+    /// Longest time beyond the surge line, s.
+    pub longest_surge_s: f64,
+    /// The machine at each row.
+    states: Vec<State>,
+    /// Intervals beyond the surge line, s.
+    surges_s: Vec<(f64, f64)>,
+}
+
+/// The machine after `duration_s` at `boundary`.
+///
+/// # Errors
+/// [`SimulationError`] if the simulation fails.
+pub fn hold(
+    model: &Model,
+    state: State,
+    boundary: &BoundaryConditions,
+    duration_s: f64,
+) -> Result<State, SimulationError> {
+    let mut simulator = Simulator::new(model, 0.0, state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
+    simulator.run_to(duration_s, boundary, [], |_, _, _| {}, |_| {})?;
+    Ok(simulator.state())
+}
+
+/// The machine at its first point after `warm_up_s` there, from housings at ambient temperature; `first` is the
+/// point's steady state.
+///
+/// # Errors
+/// [`SimulationError`] if the simulation fails.
+pub fn warmed_up(
+    model: &Model,
+    first: State,
+    boundary: &BoundaryConditions,
+    warm_up_s: f64,
+) -> Result<State, SimulationError> {
+    let ambient_k = boundary.ambient_temperature_k;
+    hold(model, State { tc_k: ambient_k, tt_k: ambient_k, ..first }, boundary, warm_up_s)
+}
+
+/// The step of `dwell_s` from `state` at `boundary`.
+///
+/// # Errors
+/// [`SimulationError`] if the simulation fails.
+pub fn forecast_step(
+    model: &Model,
+    state: State,
+    boundary: &BoundaryConditions,
+    dwell_s: f64,
+) -> Result<StepForecast, SimulationError> {
+    let mut simulator = Simulator::new(model, 0.0, state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
+    let mut rows: Vec<ForecastRow> = Vec::new();
+    let mut states: Vec<State> = Vec::new();
+    let (mut surge_since_s, mut surges_s) = (None, Vec::new());
+    let interval_s = SAMPLE_S.max(dwell_s / SAMPLE_LIMIT);
+    let count = (dwell_s / interval_s).floor() as usize;
+    let times = (0..=count).map(|i| i as f64 * interval_s).filter(|t| *t < dwell_s).chain([dwell_s]);
+    simulator.run_to(
+        dwell_s,
+        boundary,
+        times,
+        |t_s, state, outputs| {
+            states.push(*state);
+            rows.push(ForecastRow {
+                t_s,
+                speed_rpm: state.shaft_speed_rpm(),
+                flow_kg_s: outputs.flow_kg_s,
+                t1_k: boundary.t1_k,
+                p1_pa: boundary.p1_pa,
+                p2_pa: state.p2_pa,
+                t2_k: outputs.t2_probe_k,
+                tc_k: state.tc_k,
+                efficiency: outputs.efficiency,
+                h_w_m2k: outputs.h_w_m2k,
+            });
+        },
+        |event| match event.crossing {
+            Crossing::SurgeEntered => surge_since_s = Some(event.t_s),
+            Crossing::SurgeLeft => surges_s.push((surge_since_s.take().unwrap_or(0.0), event.t_s)),
+            Crossing::OverspeedEntered | Crossing::OverspeedLeft => {}
+        },
+    )?;
+    if let Some(since_s) = surge_since_s {
+        surges_s.push((since_s, dwell_s));
+    }
+    Ok(StepForecast::of(rows, states, surges_s, interval_s, simulator.state()))
+}
+
+impl StepForecast {
+    fn of(
+        rows: Vec<ForecastRow>,
+        states: Vec<State>,
+        surges_s: Vec<(f64, f64)>,
+        interval_s: f64,
+        end: State,
+    ) -> Self {
+        let highest =
+            |value: fn(&ForecastRow) -> f64| rows.iter().map(value).fold(f64::NEG_INFINITY, f64::max);
+        StepForecast {
+            highest_speed_rpm: highest(|row| row.speed_rpm),
+            highest_t2_k: highest(|row| row.t2_k),
+            longest_surge_s: surges_s.iter().map(|(from_s, to_s)| to_s - from_s).fold(0.0, f64::max),
+            end,
+            interval_s,
+            rows,
+            states,
+            surges_s,
+        }
+    }
+
+    /// The same step, ended at one of its rows; `None` without a row at `dwell_s`.
+    pub fn ended_at(&self, dwell_s: f64) -> Option<StepForecast> {
+        let last = self.rows.partition_point(|row| row.t_s < dwell_s - 1e-9);
+        let end = self.rows.get(last).filter(|row| row.t_s <= dwell_s + 1e-9)?;
+        let before_end = self.surges_s.iter().filter(|(from_s, _)| *from_s < end.t_s);
+        let surges_s = before_end.map(|(from_s, to_s)| (*from_s, to_s.min(end.t_s))).collect();
+        let (rows, states) = (self.rows.get(..=last)?.to_vec(), self.states.get(..=last)?.to_vec());
+        let end = *states.last()?;
+        Some(StepForecast::of(rows, states, surges_s, self.interval_s, end))
+    }
+
+    /// Time at which the operating point has settled, s after the jump; `None` if it has not settled before the
+    /// last interval. [`crate::operating_point::settled`] defines settling.
+    pub fn settle_s(&self, bands: &SettleBands) -> Option<f64> {
+        type Signal = fn(&ForecastRow) -> f64;
+        let signals = with_bands::<Signal>(
+            |row| row.speed_rpm,
+            |row| row.flow_kg_s,
+            |row| row.p2_pa / row.p1_pa,
+            bands,
+        );
+        let settled = signals
+            .into_iter()
+            .map(|(_, signal, allowed_ratio)| {
+                settled_count(self.rows.iter().rev().map(signal), allowed_ratio, 0.0)
+            })
+            .min()?;
+        (settled > 1).then(|| self.rows.get(self.rows.len() - settled)).flatten().map(|row| row.t_s)
+    }
+
+    /// The rows from `start_s` to `end_s` after the jump.
+    pub fn window(&self, (start_s, end_s): (f64, f64)) -> &[ForecastRow] {
+        // Half an interval of slack for rounding.
+        let slack_s = 0.5 * self.interval_s;
+        let first = self.rows.partition_point(|row| row.t_s <= start_s - slack_s);
+        let behind = self.rows.partition_point(|row| row.t_s < end_s + slack_s);
+        self.rows.get(first..behind).unwrap_or_default()
+    }
+
+    /// The expected results of the step, without the errors of an identification. Without a jump (the first step of a
+    /// campaign) the gradients are missing.
+    pub fn predicted(&self, rule: &WindowRule, bands: &SettleBands, has_jump: bool) -> Predicted {
+        // An empty step has no results.
+        let (end, dwell_s) = (self.rows.last(), self.rows.last().map_or(0.0, |row| row.t_s));
+        let settle_s = self.settle_s(bands);
+        let window = if has_jump { self.window(rule.of_step_s(settle_s, dwell_s)) } else { &[] };
+        let change = |value: fn(&ForecastRow) -> f64| Some(value(window.last()?) - value(window.first()?));
+        Predicted {
+            dt2_k: change(|row| row.t2_k),
+            dtc_k: change(|row| row.tc_k),
+            sigma_eta: None,
+            sigma_h_rel: None,
+            bias_eta: None,
+            bias_h_rel: None,
+            flow_kg_s: end.map_or(0.0, |row| row.flow_kg_s),
+            pressure_ratio: end.map_or(1.0, |row| row.p2_pa / row.p1_pa),
+            t2_k: end.map_or(0.0, |row| row.t2_k),
+            settle_s,
+            minutes: dwell_s / 60.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::steady::hold_speed;
+
+    #[test]
+    fn a_machine_that_rests_has_settled_at_once_and_gains_nothing() {
+        let model = Model::nominal();
+        let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
+        let rest = hold_speed(&model, 110e3, &boundary).unwrap();
+        let forecast = forecast_step(&model, rest.state, &rest.boundary, 120.0).unwrap();
+        let predicted = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), true);
+        assert_eq!(predicted.settle_s, Some(0.0));
+        // The integration's tolerance of 1e-6 at 400 K.
+        assert!(predicted.dtc_k.unwrap().abs() < 1e-2 && predicted.dt2_k.unwrap().abs() < 1e-2);
+        let first = forecast.predicted(&WindowRule::Auto, &SettleBands::default(), false);
+        assert_eq!((first.dt2_k, first.dtc_k), (None, None), "no jump, no gradient");
+    }
+
+    #[test]
+    fn a_step_that_is_ended_early_is_the_shorter_step() {
+        let model = Model::nominal();
+        let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
+        let slow = hold_speed(&model, 60e3, &boundary).unwrap();
+        let fast = hold_speed(&model, 130e3, &boundary).unwrap();
+        let long = forecast_step(&model, slow.state, &fast.boundary, 120.0).unwrap();
+        let short = forecast_step(&model, slow.state, &fast.boundary, 37.0).unwrap();
+        let ended = long.ended_at(37.0).unwrap();
+        assert_eq!((ended.rows.len(), ended.rows.last().unwrap().t_s), (short.rows.len(), 37.0));
+        // The integration's tolerance is 1e-6.
+        for (a, b) in [(ended.end.tc_k, short.end.tc_k), (ended.end.tt_k, short.end.tt_k)] {
+            assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
+        }
+        assert!((ended.highest_t2_k / short.highest_t2_k - 1.0).abs() < 1e-5);
+        assert!(long.ended_at(37.2).is_none(), "no such row");
+    }
+
+    #[test]
+    fn a_window_holds_its_ends() {
+        let model = Model::nominal();
+        let boundary = BoundaryConditions { valve_opening_ratio: 0.7, ..BoundaryConditions::default() };
+        let rest = hold_speed(&model, 110e3, &boundary).unwrap();
+        let forecast = forecast_step(&model, rest.state, &rest.boundary, 120.0).unwrap();
+        let window = forecast.window((10.0, 110.0));
+        assert_eq!((window[0].t_s, window[window.len() - 1].t_s), (10.0, 110.0));
+        assert!(forecast.window((130.0, 140.0)).is_empty());
+    }
+}

@@ -1,0 +1,92 @@
+//! Response of the shaft speed to P3 around a steady state, used to tune a speed controller.
+//!
+//! The shaft is `J w dw/dt = W_t(P3, w) - W_c(w) - W_f(w)` (eq. 12). Linearised around a steady state with the gas path
+//! steady, its gain is `dN/dP3` from one steady state to the next and its time constant `J w (dw/dP3) / (dW_t/dP3)`.
+
+use crate::laws::turbine::TurbineInlet;
+use crate::machine::params::BoundaryConditions;
+use crate::rig::instruments::NOMINAL_P3_LAG_S;
+use crate::simulation::model::{Model, rad_s_of_rpm};
+use crate::simulation::steady::{SteadyError, hold_speed};
+use mapper_core::SpeedResponse;
+
+/// Relative step of the differences: far above the tolerance of steady states, far below any curvature.
+const STEP_RATIO: f64 = 1e-3;
+
+/// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored. `None` if the machine has no steady state there,
+/// or one that more pressure slows down.
+pub fn speed_response(model: &Model, speed_rpm: f64, boundary: &BoundaryConditions) -> Option<SpeedResponse> {
+    differences(model, speed_rpm, boundary).ok().filter(|response| {
+        [response.rpm_per_pa, response.p3_per_power, response.time_constant_s]
+            .iter()
+            .all(|value| value.is_finite() && *value > 0.0)
+    })
+}
+
+fn differences(
+    model: &Model,
+    speed_rpm: f64,
+    boundary: &BoundaryConditions,
+) -> Result<SpeedResponse, SteadyError> {
+    let held = hold_speed(model, speed_rpm, boundary)?;
+    let faster_rpm = speed_rpm * (1.0 + STEP_RATIO);
+    let p3_pa = held.boundary.p3_pa;
+    let rpm_per_pa =
+        (faster_rpm - speed_rpm) / (hold_speed(model, faster_rpm, boundary)?.boundary.p3_pa - p3_pa);
+    let power_w = |p3_pa: f64| {
+        let inlet = TurbineInlet::new(&model.params.turbine, &BoundaryConditions { p3_pa, ..held.boundary });
+        inlet.at(held.state.tt_k, held.state.shaft_speed_rad_s).power_w
+    };
+    let w_per_pa = (power_w(p3_pa * (1.0 + STEP_RATIO)) - power_w(p3_pa)) / (p3_pa * STEP_RATIO);
+    let rad_s_per_pa = rad_s_of_rpm(rpm_per_pa);
+    let shaft_s = model.params.shaft_inertia_kgm2 * held.state.shaft_speed_rad_s * rad_s_per_pa / w_per_pa;
+    Ok(SpeedResponse {
+        rpm_per_pa,
+        p3_per_power: power_w(p3_pa) / (p3_pa * w_per_pa),
+        time_constant_s: shaft_s + NOMINAL_P3_LAG_S,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, Simulator, Watch};
+
+    /// The integrated model after a small step of P3, with housings of constant temperature: the speed follows the gain, and
+    /// reaches 63 % of the way in the shaft's time constant.
+    #[test]
+    fn the_integrated_machine_answers_as_stated() {
+        for (speed_rpm, valve_opening_ratio) in [(50e3, 0.7), (110e3, 1.0), (150e3, 2.0)] {
+            let mut model = Model::nominal();
+            // Housings of a tonne: only the shaft moves.
+            model.params.compressor.housing_mass_kg = 1e3;
+            model.params.turbine.housing_mass_kg = 1e3;
+            let boundary = BoundaryConditions { valve_opening_ratio, ..BoundaryConditions::default() };
+            let response = speed_response(&model, speed_rpm, &boundary).unwrap();
+            let held = hold_speed(&model, speed_rpm, &boundary).unwrap();
+            let step_pa = 0.002 * held.boundary.p3_pa;
+            let stepped = BoundaryConditions { p3_pa: held.boundary.p3_pa + step_pa, ..held.boundary };
+            let shaft_s = response.time_constant_s - NOMINAL_P3_LAG_S;
+            let mut simulator =
+                Simulator::new(&model, 0.0, held.state, DEFAULT_RELATIVE_TOLERANCE, Watch::default());
+            let mut rise_rpm = Vec::new();
+            let times = [shaft_s, 20.0 * shaft_s + 5.0];
+            simulator
+                .run_to(
+                    times[1],
+                    &stepped,
+                    times,
+                    |_, state, _| rise_rpm.push(state.shaft_speed_rpm() - speed_rpm),
+                    |_| {},
+                )
+                .unwrap();
+            let (early, late) = (rise_rpm[0], rise_rpm[1]);
+            // The gain includes the housings, which change the turbine's power by some per cent.
+            let gain = late / (response.rpm_per_pa * step_pa);
+            assert!((0.85..1.1).contains(&gain), "{speed_rpm} {gain}");
+            // P2 follows the valve's volume in some tens of milliseconds: not quite first order.
+            let share = early / late;
+            assert!((0.5..0.75).contains(&share), "{speed_rpm} {share}");
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! The interface between the model and effects: properties of a rig that the nominal model does not have.
+
+use crate::machine::hooks::{Hooks, TooManyExtraStates};
+use crate::rig::instruments::Instruments;
+use crate::simulation::model::Model;
+use mapper_core::with_unit;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// A machine with its instruments: everything an effect can change.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    /// The machine.
+    pub model: Model,
+    /// Sensors and the actuator of P3.
+    pub instruments: Instruments,
+}
+
+impl Rig {
+    /// A machine with ideal sensors and the declared actuator.
+    pub fn new(model: Model) -> Self {
+        Rig { model, instruments: Instruments::default() }
+    }
+
+    /// Adds something that is not a parameter.
+    ///
+    /// # Errors
+    /// [`TooManyExtraStates`].
+    pub fn hook(&mut self, hooks: impl Hooks + 'static) -> Result<(), TooManyExtraStates> {
+        self.model.hooks.push(Arc::new(hooks))
+    }
+}
+
+/// The parts of a rig in which a gap can originate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Submodel {
+    /// Response of P3 to its command.
+    Actuator,
+    /// Flow that the turbine swallows.
+    TurbineFlow,
+    /// Speed from the balance of powers.
+    Shaft,
+    /// Flow from speed and pressure ratio.
+    CompressorFlow,
+    /// The meter of the compressor's flow.
+    FlowMeter,
+    /// Volume and back-pressure valve.
+    Outlet,
+    /// Gas temperature through the compressor.
+    CompressorGas,
+    /// Probe before the compressor.
+    T1Probe,
+    /// Probe behind the compressor.
+    T2Probe,
+    /// Probe in the compressor housing.
+    TcProbe,
+    /// Pressure sensor behind the compressor.
+    P2Sensor,
+    /// Metal of the compressor.
+    CompressorHousing,
+    /// Metal of the turbine.
+    TurbineHousing,
+}
+
+impl Submodel {
+    /// All of them, in the order of the flow.
+    pub const ALL: [Submodel; 13] = [
+        Submodel::Actuator,
+        Submodel::TurbineFlow,
+        Submodel::Shaft,
+        Submodel::CompressorFlow,
+        Submodel::FlowMeter,
+        Submodel::Outlet,
+        Submodel::CompressorGas,
+        Submodel::T1Probe,
+        Submodel::T2Probe,
+        Submodel::TcProbe,
+        Submodel::P2Sensor,
+        Submodel::CompressorHousing,
+        Submodel::TurbineHousing,
+    ];
+
+    /// Its name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Submodel::Actuator => "actuator",
+            Submodel::TurbineFlow => "turbine_flow",
+            Submodel::Shaft => "shaft",
+            Submodel::CompressorFlow => "compressor_flow",
+            Submodel::FlowMeter => "flow_meter",
+            Submodel::Outlet => "outlet",
+            Submodel::CompressorGas => "compressor_gas",
+            Submodel::T1Probe => "t1_probe",
+            Submodel::T2Probe => "t2_probe",
+            Submodel::TcProbe => "tc_probe",
+            Submodel::P2Sensor => "p2_sensor",
+            Submodel::CompressorHousing => "compressor_housing",
+            Submodel::TurbineHousing => "turbine_housing",
+        }
+    }
+}
+
+/// A parameter that sets the strength of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectParameter {
+    /// Name within the effect; the effect's own id if it has only one parameter.
+    pub name: Cow<'static, str>,
+    /// Unit, `1` for ratios.
+    pub unit: Cow<'static, str>,
+    /// Smallest valid value.
+    pub low: f64,
+    /// Largest valid value.
+    pub high: f64,
+    /// Value without effect.
+    pub neutral: f64,
+    /// Distance from neutral at which the effect is clearly visible: the first step of a search.
+    pub typical_step: f64,
+}
+
+/// A row of a table of effects.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EffectInfo {
+    /// Its name: lower case, digits and `_`.
+    pub id: Cow<'static, str>,
+    /// Its display name.
+    pub name: Cow<'static, str>,
+    /// A one-line description.
+    pub description: Cow<'static, str>,
+    /// The equation, in the symbols of `docs/reference/model.md`.
+    pub equation: Cow<'static, str>,
+    /// Source of the equation.
+    pub source: Cow<'static, str>,
+    /// Its submodel.
+    pub submodel: Submodel,
+    /// Submodels in which its gap may also appear: neighbours that share a balance with it.
+    pub also_shows_in: Vec<Submodel>,
+    /// Its parameters, at least one.
+    pub parameters: Vec<EffectParameter>,
+}
+
+impl EffectInfo {
+    /// Names of its parameters for messages.
+    fn parameter_names(&self) -> String {
+        let names: Vec<&str> = self.parameters.iter().map(|parameter| parameter.name.as_ref()).collect();
+        names.join(", ")
+    }
+
+    /// Whether its gap may appear in the submodel of this name.
+    pub fn shows_in(&self, submodel_name: &str) -> bool {
+        std::iter::once(&self.submodel).chain(&self.also_shows_in).any(|place| place.name() == submodel_name)
+    }
+}
+
+/// The values of an effect's parameters, one for each and within its range, accessed by name.
+#[derive(Debug, Clone, Copy)]
+pub struct NamedValues<'a> {
+    info: &'a EffectInfo,
+    values: &'a [f64],
+}
+
+impl<'a> NamedValues<'a> {
+    /// `values` are in the order of the effect's parameters.
+    ///
+    /// # Errors
+    /// [`EffectError`] if a value is missing, out of range or not finite.
+    pub fn new(info: &'a EffectInfo, values: &'a [f64]) -> Result<Self, EffectError> {
+        let id = || info.id.clone().into_owned();
+        if values.len() != info.parameters.len() {
+            return Err(EffectError::Count { id: id(), names: info.parameter_names(), given: values.len() });
+        }
+        for (parameter, value) in info.parameters.iter().zip(values) {
+            let EffectParameter { low, high, .. } = *parameter;
+            if !(low..=high).contains(value) {
+                let (name, unit) = (parameter.name.clone().into_owned(), parameter.unit.clone().into_owned());
+                return Err(EffectError::OutOfRange { id: id(), name, value: *value, unit, low, high });
+            }
+        }
+        Ok(NamedValues { info, values })
+    }
+
+    /// The value of a parameter, in its unit.
+    ///
+    /// # Errors
+    /// [`EffectError::NoParameter`].
+    pub fn get(&self, name: &str) -> Result<f64, EffectError> {
+        self.iter().find(|(parameter, _)| parameter.name == name).map(|(_, value)| value).ok_or_else(|| {
+            EffectError::NoParameter {
+                id: self.info.id.clone().into_owned(),
+                name: name.to_owned(),
+                names: self.info.parameter_names(),
+            }
+        })
+    }
+
+    /// Each parameter with its value.
+    pub fn iter(&self) -> impl Iterator<Item = (&'a EffectParameter, f64)> {
+        self.info.parameters.iter().zip(self.values.iter().copied())
+    }
+
+    /// Whether every value is neutral.
+    pub fn is_neutral(&self) -> bool {
+        self.iter().all(|(parameter, value)| parameter.neutral == value)
+    }
+}
+
+/// A property that a rig may have.
+///
+/// It changes parameters of the model and of the instruments once, before a run; anything else it
+/// adds as [`Hooks`]. At neutral values it changes nothing.
+pub trait Effect: std::fmt::Debug + Send + Sync {
+    /// Its description.
+    fn info(&self) -> &EffectInfo;
+
+    /// Adds it to a rig.
+    ///
+    /// # Errors
+    /// [`EffectError::Room`] if the rig has no room for its hidden temperatures;
+    /// [`EffectError::NoParameter`] if it uses a parameter that it does not declare.
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError>;
+}
+
+/// Why an effect cannot be added to a rig.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EffectError {
+    /// Too few or too many values.
+    #[error("effect `{id}` has the parameters {names}, and {given} values were given: give one for each")]
+    Count {
+        /// The effect.
+        id: String,
+        /// Names of its parameters.
+        names: String,
+        /// Number of values.
+        given: usize,
+    },
+    /// An invalid value.
+    #[error(
+        "{name} = {} of effect `{id}` is not between {low} and {}",
+        with_unit(value, unit),
+        with_unit(high, unit)
+    )]
+    OutOfRange {
+        /// The effect.
+        id: String,
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// Its unit.
+        unit: String,
+        /// Smallest value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+    },
+    /// A parameter that the effect does not have: a bug in the effect.
+    #[error("effect `{id}` has no parameter `{name}`; it has {names}")]
+    NoParameter {
+        /// The effect.
+        id: String,
+        /// The requested name.
+        name: String,
+        /// Names of its parameters.
+        names: String,
+    },
+    /// No room for hidden temperatures.
+    #[error(transparent)]
+    Room(#[from] TooManyExtraStates),
+}
+
+/// Adds `effect` to `rig`, after the effects already there; effects compose in any number and order.
+///
+/// # Errors
+/// [`EffectError`] if a value is missing, out of range or not finite, or there are too many hidden temperatures. The rig
+/// is then unchanged.
+pub fn add(rig: &mut Rig, effect: &dyn Effect, values: &[f64]) -> Result<(), EffectError> {
+    effect.prepare(&NamedValues::new(effect.info(), values)?, rig)
+}
+
+/// `nominal` with all `effects` at their values.
+///
+/// # Errors
+/// As [`add`].
+pub fn compose<'a>(
+    nominal: &Rig,
+    effects: impl IntoIterator<Item = (&'a dyn Effect, &'a [f64])>,
+) -> Result<Rig, EffectError> {
+    let mut rig = nominal.clone();
+    for (effect, values) in effects {
+        add(&mut rig, effect, values)?;
+    }
+    Ok(rig)
+}

@@ -1,0 +1,8 @@
+//! The rig around the machine: effects, sensor faults, instruments, and the interface of simulated backends.
+
+pub mod backend_plugin;
+pub mod effect;
+pub mod effect_kind;
+pub mod instruments;
+pub mod nominal_rig;
+pub mod sensor_fault;

@@ -1,0 +1,314 @@
+//! The catalogue of known sensor faults: channel, kind, prior size, and range for a search by runs of the model.
+//!
+//! Identification and drift test the faults that add to a reading ([`SensorFault::error_per_unit`]). The diagnosis of gaps and logs without
+//! steps run the model with a fault as an [`Effect`] ([`effects`], [`log_effects`]). A fault may be common to several channels: thermocouples
+//! share a reference junction, pressure transducers a barometer or a supply.
+
+use crate::rig::effect::{Effect, EffectError, EffectInfo, EffectParameter, NamedValues, Rig, Submodel};
+use mapper_core::Channel;
+use std::fmt;
+use std::sync::Arc;
+
+/// Form of the error of a reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FaultKind {
+    /// A thermocouple tends from the gas towards its wall: share of the way.
+    TowardsWall,
+    /// The reading follows with a lag, s. T2 has two in series: a sheath of this diameter, m, as in eqs. 11 and 12, and the element in it.
+    Lag,
+    /// An error proportional to the reading; for temperatures, to the difference from [`CALIBRATED_AT_K`]. Ratio.
+    Gain,
+    /// The same error in every reading, in the channel's unit (K, Pa, kg/s, rpm).
+    Offset,
+    /// Zero at the start of the run, the full size at its end, and proportional to the time between: unit of the channel, but a ratio to the
+    /// reading for flow and speed.
+    Drift,
+    /// The reading repeats one value, for longer than noise allows, s.
+    Frozen,
+}
+
+/// A fault of one or several sensors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensorFault {
+    /// The channels with the same error.
+    pub channels: &'static [Channel],
+    /// Form of the error.
+    pub kind: FaultKind,
+    /// Prior size of such faults, one standard deviation, in the unit of `kind`. It is some ten times the declared error of calibrated
+    /// sensors, so that an ordinary error does not count as a fault. The odds of a fault depend on it only logarithmically.
+    pub sigma: f64,
+    /// Size in a search by runs of the model; empty if there is none.
+    sizes: &'static [Size],
+    /// Whether only logs without steps search for it: a stand holds the inlet of the turbine constant, and declares its probes.
+    only_in_logs: bool,
+}
+
+/// A size in a search: name and unit, range, and first step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Size(&'static str, &'static str, f64, f64, f64);
+
+/// Temperature at which a thermocouple's gain error is zero, K: 20 degC, the reference temperature of ISO 1.
+pub const CALIBRATED_AT_K: f64 = 293.15;
+
+const TEMPERATURE_K: f64 = 3.0;
+const HOT_GAS_K: f64 = 10.0;
+const PRESSURE_PA: f64 = 3e3;
+const RATIO: f64 = 0.05;
+const LAG_S: f64 = 2.0;
+/// Noise repeats a value in two or three samples of a coarse logger, not for seconds.
+const FROZEN_S: f64 = 5.0;
+const ELEMENT_LAG: Size = Size("element_lag", "s", 0.0, 30.0, 1.0);
+
+const fn fault(channels: &'static [Channel], kind: FaultKind, sigma: f64) -> SensorFault {
+    SensorFault { channels, kind, sigma, sizes: &[], only_in_logs: false }
+}
+
+const fn searched(
+    channels: &'static [Channel],
+    kind: FaultKind,
+    sigma: f64,
+    sizes: &'static [Size],
+) -> SensorFault {
+    SensorFault { sizes, ..fault(channels, kind, sigma) }
+}
+
+const fn in_logs(
+    channels: &'static [Channel],
+    kind: FaultKind,
+    sigma: f64,
+    sizes: &'static [Size],
+) -> SensorFault {
+    SensorFault { only_in_logs: true, ..searched(channels, kind, sigma, sizes) }
+}
+
+/// All faults considered.
+pub const CATALOGUE: [SensorFault; 48] = {
+    use Channel::{CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, Tc, Tt, TurbineFlow};
+    use FaultKind::{Drift, Frozen, Gain, Lag, Offset, TowardsWall};
+    [
+        searched(&[T1], Offset, TEMPERATURE_K, &[Size("t1_offset", "K", -20.0, 20.0, 1.5)]),
+        searched(&[T2], Offset, TEMPERATURE_K, &[Size("t2_offset", "K", -20.0, 20.0, 1.5)]),
+        searched(&[Tc], Offset, TEMPERATURE_K, &[Size("tc_offset", "K", -30.0, 30.0, 2.0)]),
+        fault(&[T1, T2, Tc], Offset, TEMPERATURE_K),
+        fault(&[T2], Gain, RATIO),
+        fault(&[Tc], Gain, RATIO),
+        fault(&[T1, T2, Tc], Gain, RATIO),
+        fault(&[T1], Drift, TEMPERATURE_K),
+        fault(&[T2], Drift, TEMPERATURE_K),
+        fault(&[Tc], Drift, TEMPERATURE_K),
+        fault(&[T1, T2, Tc], Drift, TEMPERATURE_K),
+        fault(&[P1], Offset, PRESSURE_PA),
+        searched(&[P2], Offset, PRESSURE_PA, &[Size("p2_offset", "Pa", -20e3, 20e3, 800.0)]),
+        fault(&[P1, P2], Offset, PRESSURE_PA),
+        fault(&[P1], Gain, RATIO),
+        fault(&[P2], Gain, RATIO),
+        fault(&[P1, P2], Gain, RATIO),
+        fault(&[P1], Drift, PRESSURE_PA),
+        fault(&[P2], Drift, PRESSURE_PA),
+        fault(&[P1, P2], Drift, PRESSURE_PA),
+        fault(&[CompressorFlow], Offset, 2e-3),
+        searched(&[CompressorFlow], Gain, RATIO, &[Size("flowmeter_gain", "1", 0.7, 1.3, 0.03)]),
+        fault(&[CompressorFlow], Drift, RATIO),
+        fault(&[ShaftSpeed], Gain, RATIO),
+        fault(&[ShaftSpeed], Drift, RATIO),
+        fault(&[ShaftSpeed], Offset, 1e3),
+        fault(&[TurbineFlow], Drift, RATIO),
+        fault(&[P3], Drift, PRESSURE_PA),
+        fault(&[T3], Drift, TEMPERATURE_K),
+        fault(&[P4], Drift, PRESSURE_PA),
+        fault(&[T4], Drift, TEMPERATURE_K),
+        fault(&[Tt], Drift, TEMPERATURE_K),
+        searched(&[CompressorFlow], Lag, LAG_S, &[Size("flowmeter_lag", "s", 0.0, 30.0, 2.0)]),
+        searched(&[T2], TowardsWall, 0.1, &[Size("stem_conduction", "1", 0.0, 0.5, 0.05)]),
+        in_logs(&[T2], Lag, LAG_S, &[Size("sheath_diameter", "m", 0.0, 0.012, 0.0015), ELEMENT_LAG]),
+        in_logs(&[T4], Lag, LAG_S, &[Size("t4_lag", "s", 0.0, 30.0, 1.0)]),
+        in_logs(&[T3], Lag, LAG_S, &[Size("t3_lag", "s", 0.0, 30.0, 1.0)]),
+        in_logs(&[T4], Offset, HOT_GAS_K, &[Size("t4_offset", "K", -60.0, 60.0, 5.0)]),
+        in_logs(&[T3], Offset, HOT_GAS_K, &[Size("t3_offset", "K", -60.0, 60.0, 5.0)]),
+        in_logs(&[TurbineFlow], Gain, RATIO, &[Size("turbine_flow_gain", "1", 0.6, 1.5, 0.05)]),
+        in_logs(&[TurbineFlow], Lag, LAG_S, &[Size("turbine_flow_lag", "s", 0.0, 30.0, 1.0)]),
+        fault(&[ShaftSpeed], Frozen, FROZEN_S),
+        fault(&[CompressorFlow], Frozen, FROZEN_S),
+        fault(&[P1], Frozen, FROZEN_S),
+        fault(&[T1], Frozen, FROZEN_S),
+        fault(&[P2], Frozen, FROZEN_S),
+        fault(&[T2], Frozen, FROZEN_S),
+        fault(&[Tc], Frozen, FROZEN_S),
+    ]
+};
+
+/// Sensors of the compressor.
+const OF_COMPRESSOR: [Channel; 7] = {
+    use Channel::{CompressorFlow, P1, P2, ShaftSpeed, T1, T2, Tc};
+    [ShaftSpeed, CompressorFlow, P1, T1, P2, T2, Tc]
+};
+
+/// Faults of the compressor's sensors that add to a reading in proportion to their size.
+pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
+    use FaultKind::{Drift, Gain, Offset, TowardsWall};
+    CATALOGUE.iter().filter(|fault| {
+        matches!(fault.kind, Offset | Gain | Drift | TowardsWall)
+            && fault.channels.iter().all(|channel| OF_COMPRESSOR.contains(channel))
+    })
+}
+
+/// Error of a reading by a gain error of 1.
+pub fn gain_error(channel: Channel, reading: f64) -> f64 {
+    let is_temperature = matches!(channel, Channel::T1 | Channel::T2 | Channel::Tc);
+    if is_temperature { reading - CALIBRATED_AT_K } else { reading }
+}
+
+/// All drifts, of both sides.
+pub fn drifts() -> impl Iterator<Item = &'static SensorFault> {
+    CATALOGUE.iter().filter(|fault| fault.kind == FaultKind::Drift)
+}
+
+/// Longest time for which noise lets a channel repeat one value, s; infinite for a channel without noise that is known.
+pub fn repeats_s(channel: Channel) -> f64 {
+    let frozen = |fault: &&SensorFault| fault.kind == FaultKind::Frozen && fault.channels == [channel];
+    CATALOGUE.iter().find(frozen).map_or(f64::INFINITY, |fault| fault.sigma)
+}
+
+/// Effects for the effect library, by kind: the faults that a diagnosis of a stand searches for.
+pub fn effects() -> Vec<Arc<dyn Effect>> {
+    let mut faults: Vec<SensorFault> = searched_for().filter(|fault| !fault.only_in_logs).collect();
+    faults.sort_by_key(|fault| fault.kind);
+    faults.into_iter().map(FaultEffect::of).collect()
+}
+
+/// Further effects for logs without steps, of the compressor's sensors or the turbine's.
+pub fn log_effects(compressor: bool) -> Vec<Arc<dyn Effect>> {
+    let of_side = |fault: &SensorFault| OF_COMPRESSOR.contains(&fault.channels[0]) == compressor;
+    searched_for().filter(|fault| fault.only_in_logs && of_side(fault)).map(FaultEffect::of).collect()
+}
+
+fn searched_for() -> impl Iterator<Item = SensorFault> {
+    CATALOGUE.into_iter().filter(|fault| !fault.sizes.is_empty())
+}
+
+impl SensorFault {
+    /// Error of a channel's reading by a fault of size 1; 0 for kinds that do not add to a reading. `housing_k`: Tc. `run_ratio`: time since
+    /// the start of the run over its length.
+    pub fn error_per_unit(&self, channel: Channel, reading: f64, housing_k: f64, run_ratio: f64) -> f64 {
+        if !self.channels.contains(&channel) {
+            return 0.0;
+        }
+        let relative = matches!(channel, Channel::CompressorFlow | Channel::ShaftSpeed);
+        match self.kind {
+            FaultKind::Offset => 1.0,
+            FaultKind::Gain => gain_error(channel, reading),
+            FaultKind::Drift if relative => run_ratio * reading,
+            FaultKind::Drift => run_ratio,
+            FaultKind::TowardsWall => housing_k - reading,
+            FaultKind::Lag | FaultKind::Frozen => 0.0,
+        }
+    }
+
+    /// The fault as a row of an effect library.
+    fn info(&self) -> EffectInfo {
+        let channel = self.channels[0];
+        let (description, equation, source) = match self.kind {
+            FaultKind::Gain => ("reads high or low in proportion", "y = s x", "calibration of the sensor"),
+            FaultKind::Lag => ("follows with a lag", "dy/dt = (x - y)/tau", "first-order sensor"),
+            FaultKind::TowardsWall => (
+                "has a stem that conducts: the tip is drawn towards the housing",
+                "T_tip tends to T2 + chi (Tc - T2)",
+                "fin of a thermowell, lumped to its tip: Incropera, Fundamentals of Heat and Mass Transfer, 3.6",
+            ),
+            FaultKind::Offset | FaultKind::Drift | FaultKind::Frozen => {
+                ("reads high or low by a constant", "y = x + b", "calibration of the sensor")
+            }
+        };
+        let (submodel, neighbour) = match channel {
+            Channel::T1 => (Submodel::T1Probe, Some(Submodel::CompressorGas)),
+            Channel::T2 => (Submodel::T2Probe, None),
+            Channel::Tc => (Submodel::TcProbe, Some(Submodel::CompressorHousing)),
+            Channel::P2 => (Submodel::P2Sensor, Some(Submodel::Outlet)),
+            Channel::CompressorFlow => (Submodel::FlowMeter, Some(Submodel::CompressorFlow)),
+            _ => (Submodel::TurbineHousing, None),
+        };
+        let constant = matches!(self.kind, FaultKind::Offset | FaultKind::Gain);
+        let parameter = |&Size(name, unit, low, high, step): &Size| {
+            let neutral = if self.kind == FaultKind::Gain { 1.0 } else { 0.0 };
+            EffectParameter { name: name.into(), unit: unit.into(), low, high, neutral, typical_step: step }
+        };
+        EffectInfo {
+            id: if let [Size(id, ..)] = self.sizes { *id } else { "sheathed_probe" }.into(),
+            name: self.to_string().into(),
+            description: format!("the sensor of {channel} {description}").into(),
+            equation: equation.into(),
+            source: source.into(),
+            submodel,
+            // A constant error also looks like one of a balance in which the reading stands.
+            also_shows_in: neighbour.filter(|_| constant).into_iter().collect(),
+            parameters: self.sizes.iter().map(parameter).collect(),
+        }
+    }
+}
+
+/// A fault as an effect.
+#[derive(Debug)]
+struct FaultEffect {
+    info: EffectInfo,
+    fault: SensorFault,
+}
+
+impl FaultEffect {
+    fn of(fault: SensorFault) -> Arc<dyn Effect> {
+        Arc::new(FaultEffect { info: fault.info(), fault })
+    }
+}
+
+impl Effect for FaultEffect {
+    fn info(&self) -> &EffectInfo {
+        &self.info
+    }
+
+    fn prepare(&self, values: &NamedValues<'_>, rig: &mut Rig) -> Result<(), EffectError> {
+        let mut size = 0.0;
+        for Size(name, unit, ..) in self.fault.sizes {
+            let value = values.get(name)?;
+            match (self.fault.kind, *unit) {
+                (FaultKind::Lag, "m") => rig.model.params.t2_probe_diameter_m += value,
+                _ => size = value,
+            }
+        }
+        let path = rig.instruments.path_mut(self.fault.channels[0]);
+        match self.fault.kind {
+            FaultKind::Gain => path.gain_ratio *= size,
+            FaultKind::Lag => path.lag_s += size,
+            FaultKind::TowardsWall => rig.model.params.t2_probe_stem_ratio += size,
+            FaultKind::Offset | FaultKind::Drift | FaultKind::Frozen => path.offset += size,
+        }
+        Ok(())
+    }
+}
+
+/// `offset of T2`.
+impl fmt::Display for SensorFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            FaultKind::Offset => "offset",
+            FaultKind::Gain => "gain error",
+            FaultKind::Drift => "drift",
+            FaultKind::Lag if self.sizes.len() > 1 => "sheathed probe",
+            FaultKind::Lag => "lag",
+            FaultKind::TowardsWall => {
+                return write!(f, "conduction along the {} probe", self.channel_names());
+            }
+            FaultKind::Frozen => "frozen reading",
+        };
+        write!(f, "{kind} of {}", self.channel_names())
+    }
+}
+
+impl SensorFault {
+    /// The channels in a sentence.
+    pub fn channel_names(&self) -> String {
+        let names: Vec<String> = self.channels.iter().map(ToString::to_string).collect();
+        match names.as_slice() {
+            [rest @ .., last] if !rest.is_empty() => format!("{} and {last} together", rest.join(", ")),
+            _ => names.join(""),
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! The turbocharger model over time: integrator, boundary conditions, outputs, steady states, and runs on recorded inputs.
+
+pub mod driven;
+pub mod inputs;
+pub mod model;
+pub mod outputs;
+pub mod rodas5p;
+pub mod rosenbrock;
+pub mod simulate;
+pub mod steady;

@@ -1,0 +1,241 @@
+//! The steady state at a given speed, and the turbine pressure that holds it.
+
+use crate::machine::params::BoundaryConditions;
+use crate::machine::state::MAX_EXTRA;
+use crate::simulation::model::{BoundaryError, Model, Outputs, State, rad_s_of_rpm};
+use mapper_numerics::root::root_between;
+use nalgebra::{SMatrix, SVector};
+
+/// Temperatures in equilibrium: both housings, the inner wall, hidden ones.
+const HEAT_NODES: usize = 3 + MAX_EXTRA;
+type Temperatures = SVector<f64, HEAT_NODES>;
+
+/// A steady state with all outputs of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyState {
+    /// Boundary conditions, with the P3 that holds the speed.
+    pub boundary: BoundaryConditions,
+    /// The state; the probe's tip has the gas temperature.
+    pub state: State,
+    /// Outputs at the state.
+    pub outputs: Outputs,
+}
+
+impl SteadyState {
+    /// Corrected flow over the surge flow at equal corrected speed, minus one; negative beyond the surge line.
+    pub fn surge_margin_ratio(&self, model: &Model) -> f64 {
+        let speed_rpm = self.state.shaft_speed_rpm();
+        let corrected_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, self.boundary.t1_k);
+        self.outputs.flow_corrected_kg_s / model.map.surge_point(corrected_rpm).0 - 1.0
+    }
+}
+
+/// Why no steady state was found.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SteadyError {
+    /// The boundary conditions are not valid.
+    #[error(transparent)]
+    Boundary(#[from] BoundaryError),
+    /// The valve passes less than the compressor delivers at any pressure, or the other way round.
+    #[error(
+        "at {speed_rpm:.0} rpm no outlet pressure makes the compressor deliver what the valve (opening {valve_opening_ratio}) passes"
+    )]
+    NoFlowBalance {
+        /// Shaft speed, rpm.
+        speed_rpm: f64,
+        /// Valve opening.
+        valve_opening_ratio: f64,
+    },
+    /// No turbine inlet pressure up to `highest_pa` drives the compressor at this speed.
+    #[error(
+        "no turbine inlet pressure between {lowest_pa:.0} and {highest_pa:.0} Pa gives the {power_w:.0} W that {speed_rpm:.0} rpm takes at valve opening {valve_opening_ratio}"
+    )]
+    NoPowerBalance {
+        /// Shaft speed, rpm.
+        speed_rpm: f64,
+        /// Valve opening.
+        valve_opening_ratio: f64,
+        /// Power that compressor and bearings take, W.
+        power_w: f64,
+        /// Lowest pressure tried, Pa.
+        lowest_pa: f64,
+        /// Highest pressure tried, Pa.
+        highest_pa: f64,
+    },
+    /// The housings' temperatures did not settle.
+    #[error(
+        "the housing temperatures at {speed_rpm:.0} rpm, valve opening {valve_opening_ratio}, do not settle"
+    )]
+    NoHeatBalance {
+        /// Shaft speed, rpm.
+        speed_rpm: f64,
+        /// Valve opening.
+        valve_opening_ratio: f64,
+    },
+}
+
+/// Highest pressure tried, relative to P4.
+const HIGHEST_EXPANSION_RATIO: f64 = 20.0;
+/// Largest residual heat flow of a housing, W: far below 1e-6 of any shaft power.
+const HEAT_TOLERANCE_W: f64 = 1e-9;
+
+/// The steady state at `speed_rpm` under `boundary`, whose `p3_pa` is ignored and computed.
+///
+/// Nested: outlet pressure from flow balance, P3 from power balance, temperatures by Newton's method.
+///
+/// # Errors
+/// [`SteadyError`] with the balance that cannot be met.
+pub fn hold_speed(
+    model: &Model,
+    speed_rpm: f64,
+    boundary: &BoundaryConditions,
+) -> Result<SteadyState, SteadyError> {
+    let mut boundary = *boundary;
+    boundary.p3_pa = boundary.p4_pa * 1.5;
+    boundary.check()?;
+    if !(speed_rpm.is_finite() && speed_rpm > 0.0) {
+        return Err(BoundaryError::NotPhysical { name: "shaft speed", value: speed_rpm, unit: "rpm" }.into());
+    }
+    let no_heat_balance =
+        SteadyError::NoHeatBalance { speed_rpm, valve_opening_ratio: boundary.valve_opening_ratio };
+    let balance =
+        |temperatures: Temperatures| -> Result<(Temperatures, BoundaryConditions, State), SteadyError> {
+            let (boundary, state) = gas_path_at_rest(model, speed_rpm, &boundary, temperatures)?;
+            let prepared = model.prepare(&boundary);
+            let outputs = prepared.evaluate(&state);
+            let heat_w = Temperatures::from([
+                prepared.compressor_housing_balance_w(&state, &outputs),
+                prepared.turbine_housing_balance_w(&state, &outputs),
+                prepared.inner_wall_balance_w(&outputs),
+                // Rates of hidden temperatures, as heat flows of a node of 1 kJ/K.
+                1e3 * outputs.added.extra_rates_k_s[0],
+                1e3 * outputs.added.extra_rates_k_s[1],
+            ]);
+            Ok((heat_w, boundary, state))
+        };
+    let extra_states = model.hooks.extra_states();
+    let moves = [true, true, model.has_inner_wall(), extra_states > 0, extra_states > 1];
+    let first_k = boundary.t1_k + 30.0;
+    let turbine_k = 0.5 * (boundary.t3_k + boundary.ambient_temperature_k);
+    let mut temperatures = Temperatures::from([first_k, turbine_k, first_k, first_k, first_k]);
+    let (mut heat_w, mut at_rest, mut state) = balance(temperatures)?;
+    for _ in 0..60 {
+        if heat_w.amax() < HEAT_TOLERANCE_W {
+            let outputs = model.prepare(&at_rest).evaluate(&state);
+            state.t2_tip_k = outputs.t2_probe_target_k;
+            let outputs = model.prepare(&at_rest).evaluate(&state);
+            return Ok(SteadyState { boundary: at_rest, state, outputs });
+        }
+        // Forward differences of the balances, which are smooth in the temperatures; constant temperatures stay.
+        let step_k = 1e-4;
+        let mut slopes = SMatrix::<f64, HEAT_NODES, HEAT_NODES>::identity();
+        for node in (0..HEAT_NODES).filter(|node| moves[*node]) {
+            let mut moved = temperatures;
+            moved[node] += step_k;
+            let (by_node, ..) = balance(moved)?;
+            slopes.set_column(node, &((by_node - heat_w) / step_k));
+        }
+        let Some(step) = slopes.lu().solve(&-heat_w).filter(|step| step.iter().all(|step| step.is_finite()))
+        else {
+            return Err(no_heat_balance);
+        };
+        let before = (heat_w, temperatures);
+        let mut share = (80.0 / step.amax()).min(1.0);
+        loop {
+            temperatures = (before.1 + step * share).map(|temperature| temperature.clamp(200.0, 1500.0));
+            (heat_w, at_rest, state) = balance(temperatures)?;
+            if heat_w.norm() < before.0.norm() || share < 1e-3 {
+                break;
+            }
+            share *= 0.5;
+        }
+        if temperatures == before.1 {
+            // The balances are within rounding.
+            if heat_w.amax() < 1e-6 {
+                heat_w = Temperatures::zeros();
+                continue;
+            }
+            return Err(no_heat_balance);
+        }
+    }
+    Err(no_heat_balance)
+}
+
+/// P2 from flow balance and P3 from power balance, at given speed and housing temperatures.
+fn gas_path_at_rest(
+    model: &Model,
+    speed_rpm: f64,
+    boundary: &BoundaryConditions,
+    temperatures: Temperatures,
+) -> Result<(BoundaryConditions, State), SteadyError> {
+    let valve_opening_ratio = boundary.valve_opening_ratio;
+    let mut boundary = *boundary;
+    let tt_k = temperatures[1];
+    let at = |p2_pa: f64| State {
+        inner_k: temperatures[2],
+        extra_k: [temperatures[3], temperatures[4]],
+        ..State::new(rad_s_of_rpm(speed_rpm), p2_pa, temperatures[0], tt_k, boundary.t1_k)
+    };
+    let prepared = model.prepare(&boundary);
+    let corrected_rpm = model.map.reference().corrected_speed_rpm(speed_rpm, boundary.t1_k);
+    let (_, surge_pr) = model.map.surge_point(corrected_rpm);
+    // Far enough beyond the surge line for the flow to have vanished.
+    let highest_pa = boundary.p1_pa * (1.0 + 2.0 * (surge_pr - 1.0).max(1e-3));
+    let p2_pa = root_between(boundary.p1_pa, highest_pa, 0.0, |p2_pa| {
+        let outputs = prepared.evaluate(&at(p2_pa));
+        outputs.flow_kg_s - outputs.valve_flow_kg_s + outputs.added.outlet_flow_kg_s
+    })
+    .ok_or(SteadyError::NoFlowBalance { speed_rpm, valve_opening_ratio })?;
+    let state = at(p2_pa);
+    let outputs = prepared.evaluate(&state);
+    let power_w = outputs.compressor_power_w + outputs.friction_power_w - outputs.added.shaft_power_w;
+    let (lowest_pa, highest_pa) = (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * HIGHEST_EXPANSION_RATIO);
+    let p3_pa = root_between(lowest_pa, highest_pa, 0.0, |p3_pa| {
+        let turbine = crate::laws::turbine::TurbineInlet::new(
+            &model.params.turbine,
+            &BoundaryConditions { p3_pa, ..boundary },
+        );
+        turbine.at(tt_k, state.shaft_speed_rad_s).power_w - power_w
+    })
+    .ok_or(SteadyError::NoPowerBalance {
+        speed_rpm,
+        valve_opening_ratio,
+        power_w,
+        lowest_pa,
+        highest_pa,
+    })?;
+    boundary.p3_pa = p3_pa;
+    Ok((boundary, state))
+}
+
+/// Range of speeds that [`settle_under`] searches, rpm.
+const SETTLE_SPEEDS_RPM: (f64, f64) = (5_000.0, 400_000.0);
+
+/// The steady state that the machine runs up to from below under `boundary`, its `p3_pa` included.
+///
+/// The lowest speed whose own P3 is the given one, found on a geometric grid of 5 % and refined to rounding.
+///
+/// # Errors
+/// [`SteadyError`] if the boundary conditions are not valid or no speed from 5 to 400 krpm balances them.
+pub fn settle_under(model: &Model, boundary: &BoundaryConditions) -> Result<SteadyState, SteadyError> {
+    boundary.check()?;
+    let excess_pa = |speed_rpm: f64| {
+        hold_speed(model, speed_rpm, boundary).map_or(f64::NAN, |held| held.boundary.p3_pa - boundary.p3_pa)
+    };
+    let mut low_rpm = SETTLE_SPEEDS_RPM.0;
+    while low_rpm < SETTLE_SPEEDS_RPM.1 {
+        let high_rpm = low_rpm * 1.05;
+        if excess_pa(high_rpm) >= 0.0 {
+            let speed_rpm = root_between(low_rpm, high_rpm, 0.0, excess_pa).unwrap_or(low_rpm);
+            return hold_speed(model, speed_rpm, boundary);
+        }
+        low_rpm = high_rpm;
+    }
+    Err(SteadyError::NoPowerBalance {
+        speed_rpm: SETTLE_SPEEDS_RPM.1,
+        valve_opening_ratio: boundary.valve_opening_ratio,
+        power_w: f64::NAN,
+        lowest_pa: boundary.p4_pa,
+        highest_pa: boundary.p3_pa,
+    })
+}

@@ -1,0 +1,186 @@
+//! The jump graph: points, and between them every jump with what it is expected to give and what forbids it.
+//!
+//! An edge takes a simulation. A plan therefore checks the jumps it makes, from the states it makes them in, and takes
+//! those that are not allowed out of the search; the whole graph, with its `n (n - 1)` simulations, is made only when it
+//! is asked for.
+
+use crate::request::{PlanError, PlanRequest};
+use crate::targets::reachable;
+use crate::thermal_memory::forecast::{Forecast, forecast};
+use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S, readable, temperature};
+use mapper_physics::simulation::steady::SteadyState;
+use petgraph::graph::DiGraph;
+
+/// Why a jump is not allowed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Rejection {
+    /// Too long beyond the surge line.
+    #[error("it stays {longest_s:.1} s beyond the surge line; {allowed_s:.1} s are allowed")]
+    Surge {
+        /// Longest stretch, s.
+        longest_s: f64,
+        /// Allowed, s.
+        allowed_s: f64,
+    },
+    /// The shaft overshoots its limit.
+    #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
+    Overspeed {
+        /// Highest speed on the way, rpm.
+        highest_rpm: f64,
+        /// Limit, rpm.
+        limit_rpm: f64,
+    },
+    /// The outlet gets too hot.
+    #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
+    OutletTemperature {
+        /// Highest on the way, K.
+        highest_k: f64,
+        /// Limit, K.
+        limit_k: f64,
+    },
+    /// The turbine inlet is too hot.
+    #[error("T3 is {}; its limit is {}", temperature(*.t3_k), temperature(*.limit_k))]
+    TurbineInletTemperature {
+        /// T3, K.
+        t3_k: f64,
+        /// Limit, K.
+        limit_k: f64,
+    },
+    /// The housing would move too far.
+    #[error("the housing moves by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K")]
+    HousingGradient {
+        /// Change in the window, K.
+        gradient_k: f64,
+        /// Limit, K.
+        limit_k: f64,
+    },
+    /// The rig cannot change P3 before the window begins.
+    #[error("P3 takes {needed_s:.1} s to its new value; the window begins after {available_s:.1} s")]
+    Slew {
+        /// Time P3 takes, s.
+        needed_s: f64,
+        /// Time until the window, s.
+        available_s: f64,
+    },
+}
+
+/// An edge: what a jump from the steady state of one point to another is expected to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JumpForecast {
+    /// Start of the jump.
+    pub from: OperatingPoint,
+    /// Destination of the jump.
+    pub to: OperatingPoint,
+    /// What it is expected to give.
+    pub predicted: Predicted,
+    /// Longest stretch beyond the surge line, s.
+    pub longest_surge_s: f64,
+    /// Highest shaft speed on the way, rpm.
+    pub highest_speed_rpm: f64,
+    /// Highest outlet temperature on the way, K.
+    pub highest_t2_k: f64,
+    /// Turbine inlet total pressure that the jump commands, Pa.
+    pub p3_pa: f64,
+    /// Change of the turbine inlet pressure, Pa (signed).
+    pub p3_change_pa: f64,
+    /// All that forbids it; empty for an admissible jump.
+    pub rejections: Vec<Rejection>,
+}
+
+/// All that forbids a step that was forecast.
+pub(crate) fn rejections(
+    request: &PlanRequest<'_>,
+    forecast: &Forecast,
+    p3_change_pa: f64,
+    t3_k: f64,
+    dwell_s: f64,
+) -> Vec<Rejection> {
+    let limits = &request.limits;
+    let mut found = Vec::new();
+    if forecast.longest_surge_s > SURGE_ALLOWED_S {
+        found.push(Rejection::Surge { longest_s: forecast.longest_surge_s, allowed_s: SURGE_ALLOWED_S });
+    }
+    if forecast.highest_speed_rpm > limits.speed_max_rpm {
+        found.push(Rejection::Overspeed {
+            highest_rpm: forecast.highest_speed_rpm,
+            limit_rpm: limits.speed_max_rpm,
+        });
+    }
+    if let Some(limit_k) = limits.t2_max_k.filter(|limit_k| forecast.highest_t2_k > *limit_k) {
+        found.push(Rejection::OutletTemperature { highest_k: forecast.highest_t2_k, limit_k });
+    }
+    if let Some(limit_k) = limits.t3_max_k.filter(|limit_k| t3_k > *limit_k) {
+        found.push(Rejection::TurbineInletTemperature { t3_k, limit_k });
+    }
+    let gradient_k = forecast.predicted.dtc_k.unwrap_or(0.0).abs();
+    if let Some(limit_k) = limits.housing_gradient_max_k.filter(|limit_k| gradient_k > *limit_k) {
+        found.push(Rejection::HousingGradient { gradient_k, limit_k });
+    }
+    if let Some(slew_pa_s) = limits.p3_slew_max_pa_s() {
+        let (available_s, _) = request.window.of_step_s(forecast.predicted.settle_s, dwell_s);
+        let needed_s = p3_change_pa.abs() / slew_pa_s;
+        if needed_s > available_s {
+            found.push(Rejection::Slew { needed_s, available_s });
+        }
+    }
+    found
+}
+
+pub(crate) fn jump(
+    request: &PlanRequest<'_>,
+    (from, start): (OperatingPoint, &SteadyState),
+    (to, target): (OperatingPoint, &SteadyState),
+) -> Result<JumpForecast, PlanError> {
+    let dwell_s = request.timing.dwell.fixed_or_usual_s();
+    let forecast = forecast(request, start.state, &target.boundary, dwell_s, true)
+        .map_err(|source| PlanError::Forecast { to, source })?;
+    let p3_change_pa = target.boundary.p3_pa - start.boundary.p3_pa;
+    Ok(JumpForecast {
+        from,
+        to,
+        predicted: forecast.predicted,
+        longest_surge_s: forecast.longest_surge_s,
+        highest_speed_rpm: forecast.highest_speed_rpm,
+        highest_t2_k: forecast.highest_t2_k,
+        p3_pa: target.boundary.p3_pa,
+        p3_change_pa,
+        rejections: rejections(request, &forecast, p3_change_pa, target.boundary.t3_k, dwell_s),
+    })
+}
+
+/// One edge: what the jump from the steady state of `from` gives, and what forbids it.
+///
+/// # Errors
+/// [`PlanError`] where one of the points cannot be reached, or the simulation fails.
+pub fn explain_jump(
+    request: &PlanRequest<'_>,
+    from: OperatingPoint,
+    to: OperatingPoint,
+) -> Result<JumpForecast, PlanError> {
+    let targets = reachable(request, &[from, to])?;
+    match targets.as_slice() {
+        [start, target] => jump(request, (from, start), (to, target)),
+        _ => Err(PlanError::NoPoints),
+    }
+}
+
+/// Nodes: points in listed order. Edges: all jumps, those that are not allowed with their reasons.
+///
+/// One simulation an edge: meant for tens of points.
+///
+/// # Errors
+/// As [`explain_jump`].
+pub fn jump_graph(request: &PlanRequest<'_>) -> Result<DiGraph<OperatingPoint, JumpForecast>, PlanError> {
+    let targets = reachable(request, request.points)?;
+    let mut graph = DiGraph::with_capacity(targets.len(), targets.len() * targets.len());
+    let nodes: Vec<_> = request.points.iter().map(|point| graph.add_node(*point)).collect();
+    for (i, start) in targets.iter().enumerate() {
+        for (j, target) in targets.iter().enumerate() {
+            if i != j {
+                let edge = jump(request, (request.points[i], start), (request.points[j], target))?;
+                graph.add_edge(nodes[i], nodes[j], edge);
+            }
+        }
+    }
+    Ok(graph)
+}

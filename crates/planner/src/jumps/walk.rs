@@ -1,0 +1,114 @@
+//! The steps of an order in full, simulated one after the other.
+
+use crate::jumps::graph::rejections;
+use crate::jumps::visits::Visit;
+use crate::request::{PlanError, PlanRequest};
+use crate::thermal_memory::forecast::{Forecast, Resting, errors_together, forecast};
+use mapper_core::{OperatingPoint, PlanStep, VisitOrder};
+use mapper_physics::operating_point::forecast::{hold, warmed_up};
+use mapper_physics::simulation::model::State;
+use mapper_physics::simulation::steady::SteadyState;
+
+/// Drift of T2 and of the housing below which conventional mapping takes its reading, K/min: a fifth of the 0.5 K/min that a settled
+/// point may have (`steady`), since noise makes some readings pass too early (`campaigns/stabilised.rhai`).
+pub const STABLE_DRIFT_K_MIN: f64 = 0.1;
+/// Interval at which conventional mapping looks at the drift, s.
+const LOOK_S: f64 = 10.0;
+/// Longest wait of conventional mapping at a point, s: an hour, four times what Burke et al. state.
+const LONGEST_WAIT_S: f64 = 3600.0;
+
+/// A jump of a plan that is not allowed.
+pub(crate) struct Forbidden {
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    pub(crate) reasons: String,
+}
+
+/// The steps, and the jumps among them that are not allowed.
+pub(crate) struct Walk {
+    pub(crate) steps: Vec<PlanStep>,
+    pub(crate) forbidden: Vec<Forbidden>,
+    pub(crate) resting: Option<Resting>,
+}
+
+/// Simulates the visits to `points` (with their steady states), `dwell_s` each, and predicts the errors of all of them.
+pub(crate) fn walk(
+    request: &PlanRequest<'_>,
+    points: &[OperatingPoint],
+    targets: &[SteadyState],
+    visits: &[Visit],
+    dwell_s: f64,
+) -> Result<Walk, PlanError> {
+    let mut steps: Vec<PlanStep> = Vec::with_capacity(visits.len());
+    let (mut rows, mut forbidden) = (Vec::new(), Vec::new());
+    let mut start_s = request.timing.warm_up_s;
+    let mut now: Option<(State, usize)> = None;
+    for visit in visits {
+        let (to, target) = (points[visit.index], &targets[visit.index]);
+        let fail = |source| PlanError::Forecast { to, source };
+        let state = match now {
+            Some((state, _)) => state,
+            None => warmed_up(request.model, target.state, &target.boundary, request.timing.warm_up_s)
+                .map_err(fail)?,
+        };
+        let dwell_s = match request.order {
+            VisitOrder::Conventional => stable_after_s(request, to, state, target)?.max(dwell_s),
+            _ => dwell_s,
+        };
+        let Forecast { predicted, end, rows: of_step, .. } = {
+            let made = forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?;
+            if let Some((_, from)) = now {
+                let p3_change_pa = target.boundary.p3_pa - targets[from].boundary.p3_pa;
+                let reasons = rejections(request, &made, p3_change_pa, target.boundary.t3_k, dwell_s);
+                if !reasons.is_empty() {
+                    let reasons = reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
+                    forbidden.push(Forbidden { from, to: visit.index, reasons });
+                }
+            }
+            made
+        };
+        steps.push(PlanStep {
+            index: steps.len(),
+            kind: visit.kind,
+            from: now.map(|(_, from)| points[from]),
+            to,
+            p3_pa: target.boundary.p3_pa,
+            t3_k: target.boundary.t3_k,
+            oil_temperature_k: target.boundary.oil_temperature_k,
+            dwell_s,
+            start_s,
+            predicted,
+        });
+        start_s += dwell_s;
+        now = Some((end, visit.index));
+        rows.push(of_step);
+    }
+    let predicted = steps.iter_mut().map(|step| &mut step.predicted);
+    let resting = if forbidden.is_empty() { errors_together(request, &rows, predicted) } else { None };
+    Ok(Walk { steps, forbidden, resting })
+}
+
+/// Time until T2 and the housing drift by less than [`STABLE_DRIFT_K_MIN`], s.
+fn stable_after_s(
+    request: &PlanRequest<'_>,
+    to: OperatingPoint,
+    start: State,
+    target: &SteadyState,
+) -> Result<f64, PlanError> {
+    let prepared = request.model.prepare(&target.boundary);
+    let reading = |state: &State| (prepared.evaluate(state).t2_probe_k, state.tc_k);
+    let (mut state, mut waited_s) = (start, 0.0);
+    while waited_s < LONGEST_WAIT_S {
+        let (t2_k, tc_k) = reading(&state);
+        state = hold(request.model, state, &target.boundary, LOOK_S)
+            .map_err(|source| PlanError::Forecast { to, source })?;
+        waited_s += LOOK_S;
+        let now = reading(&state);
+        let drift_k_min = 60.0 / LOOK_S * (now.0 - t2_k).abs().max((now.1 - tc_k).abs());
+        // The first look is at the jump itself.
+        if waited_s > LOOK_S && drift_k_min < STABLE_DRIFT_K_MIN {
+            break;
+        }
+    }
+    Ok(waited_s)
+}

@@ -1,0 +1,68 @@
+//! Promising successors of a point.
+//!
+//! A nearly best assignment of successors, as if the housing settled at each point, prices points. The value of a jump beyond
+//! the prices of both ends shows how well it fits into a good order; its value alone would always name the same few
+//! extreme points.
+
+use crate::ordering::objective::Objective;
+use crate::thermal_memory::chain::Chain;
+use crate::upper_bound::auction::prices;
+use mapper_numerics::statistics::nearest_rank;
+use rand::RngExt;
+use rand_pcg::Pcg64Mcg;
+
+/// Successors that are kept of each point.
+const KEPT: usize = 10;
+/// Above this many points no candidates are kept: the table of weights grows with the square.
+pub(crate) const MAX_POINTS: usize = 4000;
+/// A jump that is not allowed is at worst this many times the usual: the assignment needs finite weights.
+const MIN_VALUE: f64 = -1e9;
+
+/// The best successors of each point of a chain.
+pub(crate) struct Candidates {
+    successors: Vec<Vec<usize>>,
+}
+
+impl Candidates {
+    pub(crate) fn of<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Self {
+        let n = given.len();
+        let mut successors = vec![Vec::new(); chain.len()];
+        if !(4..=MAX_POINTS).contains(&n) {
+            return Candidates { successors };
+        }
+        let mut weight = Vec::with_capacity(n * n);
+        for &from in given {
+            let state = chain.settled(from);
+            weight.extend(given.iter().map(|&to| {
+                if from == to {
+                    return MIN_VALUE;
+                }
+                objective.value(chain, from, to, chain.step(from, to, state).0).max(MIN_VALUE)
+            }));
+        }
+        let sizes: Vec<f64> = weight.iter().copied().filter(|weight| *weight > 0.5 * MIN_VALUE).collect();
+        let size = |share| nearest_rank(&sizes, share).unwrap_or(0.0);
+        let (smallest, largest) = (size(0.02), size(0.98));
+        let spread = (largest - smallest).max(1e-9);
+        let prices = prices(n, &weight, (0.2 * spread, 2e-3 * spread));
+        for (i, &from) in given.iter().enumerate() {
+            let mut rated: Vec<(f64, usize)> = (0..n)
+                .filter(|j| *j != i)
+                .map(|j| (prices.profit[i] + prices.price[j] - weight[n * i + j], given[j]))
+                .collect();
+            if rated.len() > KEPT {
+                rated.select_nth_unstable_by(KEPT, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                rated.truncate(KEPT);
+            }
+            rated.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            successors[from] = rated.into_iter().map(|(_, to)| to).collect();
+        }
+        Candidates { successors }
+    }
+
+    /// A successor of `from`; `None` without candidates.
+    pub(crate) fn draw(&self, from: usize, random: &mut Pcg64Mcg) -> Option<usize> {
+        let successors = &self.successors[from];
+        (!successors.is_empty()).then(|| successors[random.random_range(0..successors.len())])
+    }
+}

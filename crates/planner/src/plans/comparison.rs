@@ -1,0 +1,35 @@
+//! The same points by the other orders, and by conventional mapping.
+
+use crate::plans::plan::make_plan;
+use crate::request::{PlanError, PlanRequest};
+use mapper_core::{Dwell, Plan, Timing, VisitOrder};
+use mapper_numerics::parallel;
+
+/// Plans of the same points by every order but that of `plan`, with its dwell; conventional mapping without repeats, at each point
+/// until T2 and the housing drift by less than [`STABLE_DRIFT_K_MIN`](crate::STABLE_DRIFT_K_MIN). Orders that a limit forbids are
+/// left out.
+///
+/// # Errors
+/// [`PlanError`] if a simulation fails.
+pub fn other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<Plan>, PlanError> {
+    let others: Vec<VisitOrder> =
+        VisitOrder::ALL.into_iter().filter(|order| order.name() != plan.objective).collect();
+    let dwell_s = plan.steps.first().map_or(0.0, |step| step.dwell_s);
+    let make = |order: &VisitOrder| {
+        let conventional = *order == VisitOrder::Conventional;
+        let dwell = Dwell::Fixed(if conventional { 0.0 } else { dwell_s });
+        make_plan(&PlanRequest {
+            order: *order,
+            timing: Timing { dwell, ..request.timing },
+            repeats: request.repeats.filter(|_| !conventional),
+            return_to_first: request.return_to_first && !conventional,
+            appended: None,
+            bound: false,
+            ..request.clone()
+        })
+    };
+    parallel::map(&others, make)
+        .into_iter()
+        .filter(|made| !matches!(made, Err(PlanError::NoAdmissibleOrder(_))))
+        .collect()
+}

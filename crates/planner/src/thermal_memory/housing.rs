@@ -1,0 +1,266 @@
+//! The housing reduced to what ordering needs: what each point does to the two housing temperatures within a dwell.
+//!
+//! From point to point the temperatures (Tc, Tt) and the speed the shaft comes from answer almost linearly. Six
+//! simulations of the full model per point, from states spread over what a campaign reaches, fix
+//! `1, c, t, w, c^2` (c, t, w: Tc, Tt and the from-speed scaled to -1..1) for the gradient in the window and for both
+//! temperatures at the step's end. A step of the search is then three short sums. How far that is from the full
+//! simulation is measured on every plan and printed with it.
+
+use crate::request::{PlanError, PlanRequest};
+use crate::thermal_memory::chain::Chain;
+use crate::thermal_memory::forecast::forecast;
+use mapper_core::OperatingPoint;
+use mapper_numerics::parallel;
+use mapper_physics::operating_point::forecast::warmed_up;
+use mapper_physics::simulation::model::State;
+use mapper_physics::simulation::steady::SteadyState;
+use std::collections::HashSet;
+
+/// States that differ by less, K, lead to gradients that differ by less than any sensor sees.
+const ALIKE_K: f64 = 0.01;
+
+/// Scaled (c, t, w) of three of the six starts; the other three are their mirror images.
+const DESIGN: [[f64; 3]; 3] = [[-1.0, -1.0, -1.0], [0.2, -0.6, -1.0], [0.6, 0.0, 1.0]];
+
+/// `k[0] + k[1] c + k[2] t + k[3] w + k[4] c^2`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Surface(pub(crate) [f64; 5]);
+
+impl Surface {
+    #[inline]
+    pub(crate) fn at(&self, c: f64, t: f64, w: f64) -> f64 {
+        let k = &self.0;
+        k[0] + (k[1] + k[4] * c) * c + k[2] * t + k[3] * w
+    }
+
+    /// Through values at the design's starts and their mirror images: the odd part is exact, the even part a line in c^2
+    /// by least squares.
+    pub(crate) fn through(values: [[f64; 2]; 3]) -> Self {
+        let odd = values.map(|[a, b]| 0.5 * (a - b));
+        let even = values.map(|[a, b]| 0.5 * (a + b));
+        let [k1, k2, k3] = solve3(DESIGN, odd);
+        let squares = DESIGN.map(|[c, ..]| c * c);
+        let mean = |x: [f64; 3]| (x[0] + x[1] + x[2]) / 3.0;
+        let (mean_x, mean_y) = (mean(squares), mean(even));
+        let slope = (0..3).map(|i| (squares[i] - mean_x) * (even[i] - mean_y)).sum::<f64>()
+            / squares.iter().map(|x| (x - mean_x).powi(2)).sum::<f64>();
+        Surface([mean_y - slope * mean_x, k1, k2, k3, slope])
+    }
+
+    /// Smallest and largest value over a box of c and t at one w.
+    pub(crate) fn range(&self, c: (f64, f64), t: (f64, f64), w: f64) -> (f64, f64) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let bend = -self.0[1] / (2.0 * self.0[4]);
+        let inside = (bend > c.0 && bend < c.1).then_some(bend);
+        for c in [Some(c.0), Some(c.1), inside].into_iter().flatten() {
+            for t in [t.0, t.1] {
+                let value = self.at(c, t, w);
+                (low, high) = (low.min(value), high.max(value));
+            }
+        }
+        (low, high)
+    }
+}
+
+/// Cramer's rule; the design's determinant is fixed and not 0.
+fn solve3(m: [[f64; 3]; 3], y: [f64; 3]) -> [f64; 3] {
+    let det = |m: [[f64; 3]; 3]| {
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+            + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+    };
+    let whole = det(m);
+    std::array::from_fn(|column| {
+        let mut replaced = m;
+        for row in 0..3 {
+            replaced[row][column] = y[row];
+        }
+        det(replaced) / whole
+    })
+}
+
+/// What a dwell at one point does.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Response {
+    pub(crate) gradient_k: Surface,
+    /// Scaled Tc and Tt at the end.
+    pub(crate) end: [Surface; 2],
+    /// Scaled speed that the next step comes from.
+    pub(crate) speed: f64,
+    /// The steady state, scaled.
+    settled: [f64; 2],
+    /// What the first step of a campaign leaves, scaled.
+    first: [f64; 2],
+}
+
+/// From the smallest to the largest.
+pub(crate) type Interval = (f64, f64);
+
+/// The scaled Tc and Tt that a dwell at a point can end in.
+pub(crate) type StateBox = (Interval, Interval);
+
+/// The reduced machine.
+#[derive(Debug, Clone)]
+pub(crate) struct Housing {
+    pub(crate) responses: Vec<Response>,
+    forbidden: HashSet<(usize, usize)>,
+    gradient_max_k: f64,
+    alike: [f64; 2],
+    /// Whether orders end where they begin.
+    pub(crate) returns: bool,
+}
+
+/// Middle and half width of what is reached.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    middle: [f64; 3],
+    half: [f64; 3],
+}
+
+impl Scale {
+    fn of(targets: &[SteadyState]) -> Self {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for state in targets.iter().map(|target| target.state) {
+            for (i, value) in [state.tc_k, state.tt_k, state.shaft_speed_rad_s].into_iter().enumerate() {
+                (low[i], high[i]) = (low[i].min(value), high[i].max(value));
+            }
+        }
+        Scale {
+            middle: [0, 1, 2].map(|i| 0.5 * (low[i] + high[i])),
+            // A grid of one point still needs a width.
+            half: [0, 1, 2].map(|i| (0.5 * (high[i] - low[i])).max(1.0)),
+        }
+    }
+
+    fn scaled(&self, state: &State) -> [f64; 3] {
+        let values = [state.tc_k, state.tt_k, state.shaft_speed_rad_s];
+        std::array::from_fn(|i| (values[i] - self.middle[i]) / self.half[i])
+    }
+}
+
+impl Housing {
+    /// Simulates steps of `dwell_s` to all points.
+    pub(crate) fn of(
+        request: &PlanRequest<'_>,
+        points: &[OperatingPoint],
+        targets: &[SteadyState],
+        dwell_s: f64,
+    ) -> Result<Self, PlanError> {
+        let scale = Scale::of(targets);
+        let ends = ends(targets).ok_or(PlanError::NoPoints)?;
+        let aims: Vec<(OperatingPoint, &SteadyState)> = points.iter().copied().zip(targets).collect();
+        let one = |(to, target): &(OperatingPoint, &SteadyState)| {
+            response(request, target, dwell_s, &scale, ends)
+                .map_err(|source| PlanError::Forecast { to: *to, source })
+        };
+        Ok(Housing {
+            responses: parallel::try_map(&aims, one)?,
+            forbidden: HashSet::new(),
+            gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
+            alike: [ALIKE_K / scale.half[0], ALIKE_K / scale.half[1]],
+            returns: false,
+        })
+    }
+
+    /// Takes a jump out of the search.
+    pub(crate) fn forbid(&mut self, from: usize, to: usize) {
+        self.forbidden.insert((from, to));
+    }
+
+    /// Largest allowed gradient, K.
+    pub(crate) fn gradient_max_k(&self) -> f64 {
+        self.gradient_max_k
+    }
+}
+
+/// The slowest and the fastest of some points.
+fn ends(targets: &[SteadyState]) -> Option<[&SteadyState; 2]> {
+    let by_speed =
+        |a: &&SteadyState, b: &&SteadyState| a.state.shaft_speed_rad_s.total_cmp(&b.state.shaft_speed_rad_s);
+    Some([targets.iter().min_by(by_speed)?, targets.iter().max_by(by_speed)?])
+}
+
+/// The states from which each point is simulated, spread over what a campaign reaches.
+fn starts(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 3] {
+    DESIGN.map(|design| {
+        [1.0, -1.0].map(|sign| {
+            let [c, t, w] = design.map(|x| sign * x);
+            let gas = if w < 0.0 { slowest } else { fastest };
+            State {
+                tc_k: scale.middle[0] + c * scale.half[0],
+                tt_k: scale.middle[1] + t * scale.half[1],
+                ..gas.state
+            }
+        })
+    })
+}
+
+fn response(
+    request: &PlanRequest<'_>,
+    target: &SteadyState,
+    dwell_s: f64,
+    scale: &Scale,
+    [slowest, fastest]: [&SteadyState; 2],
+) -> Result<Response, mapper_physics::simulation::simulate::SimulationError> {
+    let mut gradient_k = [[0.0; 2]; 3];
+    let mut end = [[[0.0; 2]; 3]; 2];
+    for (i, pair) in starts(scale, [slowest, fastest]).into_iter().enumerate() {
+        for (j, state) in pair.into_iter().enumerate() {
+            let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
+            gradient_k[i][j] = forecast.predicted.dtc_k.unwrap_or(0.0);
+            let left = scale.scaled(&forecast.end);
+            end[0][i][j] = left[0];
+            end[1][i][j] = left[1];
+        }
+    }
+    let first_step_s = request.timing.warm_up_s + dwell_s;
+    let first = scale.scaled(&warmed_up(request.model, target.state, &target.boundary, first_step_s)?);
+    let settled = scale.scaled(&target.state);
+    Ok(Response {
+        gradient_k: Surface::through(gradient_k),
+        end: end.map(Surface::through),
+        speed: settled[2],
+        settled: [settled[0], settled[1]],
+        first: [first[0], first[1]],
+    })
+}
+
+impl Chain for Housing {
+    type State = [f64; 2];
+
+    fn len(&self) -> usize {
+        self.responses.len()
+    }
+
+    fn first(&self, to: usize) -> [f64; 2] {
+        self.responses[to].first
+    }
+
+    #[inline]
+    fn step(&self, from: usize, to: usize, [c, t]: [f64; 2]) -> (f64, [f64; 2]) {
+        let (response, w) = (&self.responses[to], self.responses[from].speed);
+        (response.gradient_k.at(c, t, w), [response.end[0].at(c, t, w), response.end[1].at(c, t, w)])
+    }
+
+    fn settled(&self, at: usize) -> [f64; 2] {
+        self.responses[at].settled
+    }
+
+    #[inline]
+    fn alike(&self, a: [f64; 2], b: [f64; 2]) -> bool {
+        (a[0] - b[0]).abs() < self.alike[0] && (a[1] - b[1]).abs() < self.alike[1]
+    }
+
+    #[inline]
+    fn admissible(&self, from: usize, to: usize) -> bool {
+        self.forbidden.is_empty() || !self.forbidden.contains(&(from, to))
+    }
+
+    fn returns(&self) -> bool {
+        self.returns
+    }
+
+    fn gradient_max_k(&self) -> f64 {
+        self.gradient_max_k
+    }
+}

@@ -1,0 +1,170 @@
+//! Maps a recording's topics and fields onto the rig's channels, and adds data that the recording does not contain.
+
+use crate::format::ELEMENTS_TOPIC;
+use crate::logs::LogOptions;
+use mapper_core::{
+    CHANNELS, Channel, DeclaredUncertainty, Element, Group, MAX_ELEMENTS, NoiseColour, RedundantSensors,
+    ReferenceState,
+};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Maps a recording's topics and fields onto channels. SI inside; written with units in YAML.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ChannelMap {
+    /// Topic, field and unit of each channel.
+    pub channels: BTreeMap<Channel, ChannelSource>,
+    /// Topic, field and unit of each sensor of the channels that have several; such a channel need not be listed in
+    /// `channels`: its reading is then computed from theirs.
+    pub elements: BTreeMap<Element, ChannelSource>,
+    /// Channels with a constant known value that the recording does not contain; SI, in the channel's unit.
+    pub constants: BTreeMap<Channel, f64>,
+    /// Machine data for the identification without a campaign.
+    pub machine: Option<MachineConstants>,
+    /// Reference state of corrected quantities.
+    pub reference: Option<ReferenceState>,
+    /// Window of identification within each step.
+    pub window: Option<WindowLimits>,
+    /// Declared uncertainty of the sensors.
+    pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
+    /// Declared uncertainty of each sensor of the channels that have several; `sensors` then has that of the combined reading.
+    pub redundant: BTreeMap<Channel, RedundantSensors>,
+    /// How the sensors' noise is correlated in time.
+    pub noise_colour: Option<NoiseColour>,
+    /// Reference of gauge pressures.
+    pub ambient_pressure: Option<AmbientPressure>,
+    /// Settings for reading a log of another program, if they cannot be detected.
+    pub log: LogOptions,
+    /// File and text it was read from, so that messages can point into it.
+    pub(crate) text: Option<(PathBuf, String)>,
+    pub(crate) native: bool,
+}
+
+/// The reference of gauge pressures.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AmbientPressure {
+    /// A known value.
+    Constant(Barometer),
+    /// A column of the log.
+    Source(ChannelSource),
+}
+
+/// A constant ambient pressure with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Barometer {
+    /// Pa.
+    pub pressure_pa: f64,
+    /// One standard deviation, Pa.
+    pub sigma_pa: f64,
+}
+
+/// Word for an unknown ambient pressure.
+pub(crate) const UNKNOWN_WORD: &str = "unknown";
+/// Pressure of the standard atmosphere at sea level, Pa.
+const STANDARD_PA: f64 = 101_325.0;
+/// Uncertainty of a barometer's reading, Pa: the weather changes it by some hectopascal while a test runs.
+const READ_PA: f64 = 100.0;
+/// Uncertainty of the pressure at a known altitude, Pa: the weather of the middle latitudes.
+const WEATHER_PA: f64 = 1e3;
+/// Uncertainty of the pressure at an unknown place, Pa: weather, and altitudes of up to some 500 m.
+const UNKNOWN_PA: f64 = 3e3;
+
+impl Barometer {
+    /// The reading of a barometer.
+    pub fn read(pressure_pa: f64) -> Self {
+        Barometer { pressure_pa, sigma_pa: READ_PA }
+    }
+
+    /// The standard atmosphere (ISO 2533) at an altitude below 11 km.
+    pub fn at_altitude(altitude_m: f64) -> Self {
+        // Temperature at sea level, its gradient, and gravity over the gas constant and the gradient.
+        let (sea_level_k, gradient_k_m, exponent) = (288.15, 6.5e-3, 5.255_88);
+        let ratio = (1.0 - gradient_k_m * altitude_m / sea_level_k).max(0.0);
+        Barometer { pressure_pa: STANDARD_PA * ratio.powf(exponent), sigma_pa: WEATHER_PA }
+    }
+
+    /// Nothing is known.
+    pub fn unknown() -> Self {
+        Barometer { pressure_pa: STANDARD_PA, sigma_pa: UNKNOWN_PA }
+    }
+}
+
+/// One field of one topic.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelSource {
+    /// Topic, e.g. `/rig/compressor`, or group of a log; empty for any group of a log.
+    pub topic: String,
+    /// Field of the topic's messages.
+    pub field: String,
+    /// Unit of the field; `None` to take it from the recording.
+    pub unit: Option<String>,
+    /// Whether it is a gauge pressure.
+    pub gauge: bool,
+}
+
+/// Machine data for the identification.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MachineConstants {
+    /// Internal area of the compressor that exchanges heat with the gas, m2, > 0.
+    pub compressor_internal_area_m2: f64,
+    /// Share of that area before compression, alpha_A, 0..1.
+    pub alpha_area_ratio: f64,
+    /// Diameter of the compressor's inlet pipe, m, > 0; only for static taps.
+    pub compressor_inlet_diameter_m: Option<f64>,
+    /// Diameter of the compressor's outlet pipe, m, > 0; only for static taps.
+    pub compressor_outlet_diameter_m: Option<f64>,
+    /// Diameter of the T2 probe's tip, m; 0 is an ideal probe.
+    pub t2_probe_diameter_m: f64,
+}
+
+/// A window after the start of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowLimits {
+    /// Start after the start of the step, s, >= 0.
+    pub start_s: f64,
+    /// End after the start of the step, s, > `start_s`.
+    pub end_s: f64,
+}
+
+impl ChannelMap {
+    /// The map of this program's own recordings.
+    pub fn native() -> ChannelMap {
+        let source = |row: &mapper_core::ChannelInfo| ChannelSource {
+            topic: row.group.topic().to_owned(),
+            field: row.field.to_owned(),
+            unit: Some(row.dimension.unit().to_owned()),
+            gauge: false,
+        };
+        let channels = CHANNELS.iter().map(|row| (row.channel, source(row))).collect();
+        let several = |row: &'static mapper_core::ChannelInfo| {
+            (1..=MAX_ELEMENTS).map(|number| {
+                let element = Element { channel: row.channel, number };
+                let unit = Some(row.dimension.unit().to_owned());
+                (
+                    element,
+                    ChannelSource {
+                        topic: ELEMENTS_TOPIC.to_owned(),
+                        field: element.field(),
+                        unit,
+                        gauge: false,
+                    },
+                )
+            })
+        };
+        let measured = CHANNELS.iter().filter(|row| row.group != Group::Command);
+        let elements = measured.flat_map(several).collect();
+        ChannelMap { channels, elements, native: true, ..ChannelMap::default() }
+    }
+
+    /// Whether a channel's pressure is read over the ambient pressure.
+    pub fn is_gauge(&self, channel: Channel) -> bool {
+        let elements = self.elements.iter().filter(|(element, _)| element.channel == channel);
+        let own = self.channels.get(&channel).into_iter();
+        own.chain(elements.map(|(_, source)| source)).any(|source| source.gauge)
+    }
+
+    /// Whether this is [`ChannelMap::native`]: missing channels are then expected.
+    pub fn is_native(&self) -> bool {
+        self.native
+    }
+}

@@ -1,0 +1,144 @@
+//! Checks readings against the units of the channel map, before anything is computed from them.
+
+use crate::channel_mapping::channel_map_mistakes::Complaints;
+use crate::logs::plausible::{AMBIENT_PA, fits, fitting_units, looks_like_gauge};
+use crate::logs::units::{kind_of, unit};
+use crate::logs::{Kind, Unit};
+use crate::{AmbientPressure, ChannelSource};
+use mapper_core::{Channel, Series};
+use mapper_numerics::statistics::quantile;
+use mapper_yaml::{FindingKind, steps};
+
+/// Share of the readings left out at each end: spikes do not indicate a wrong unit.
+const OUTER: f64 = 0.02;
+
+/// The readings of a channel.
+pub(crate) struct Readings<'a> {
+    pub(crate) channel: Channel,
+    pub(crate) source: &'a ChannelSource,
+    pub(crate) unit: &'static Unit,
+    /// SI, gauge pressures made absolute.
+    pub(crate) series: &'a Series,
+    /// Typical ambient pressure, Pa; `None` if unknown.
+    pub(crate) ambient_pa: Option<f64>,
+}
+
+/// Reports a channel whose readings are impossible in their unit and possible in another one. Readings
+/// that are impossible in every unit indicate a sensor fault, not a mistake of the map.
+pub(crate) fn check(readings: &Readings<'_>, complaints: &mut Complaints) {
+    let Readings { channel, source, unit: unit_used, series, ambient_pa } = *readings;
+    let Some((low, high)) = range(series) else { return };
+    if fits(channel, low, high) {
+        return;
+    }
+    // Offset added to the readings.
+    let over_pa = if source.gauge { ambient_pa.unwrap_or(f64::NAN) } else { 0.0 };
+    let written = |inside: f64| unit_used.from_inside(inside - over_pa);
+    let (written_low, written_high) = (written(low), written(high));
+    let mut right: Vec<String> = Vec::new();
+    if looks_like_gauge(channel, low, high) && !source.gauge {
+        right.push("as pressures over the ambient pressure they would be plausible: write `gauge: true` and `ambient_pressure`".to_owned());
+    }
+    if source.gauge && fits(channel, low - over_pa, high - over_pa) {
+        right.push("as absolute pressures they would be plausible: leave `gauge: true` out".to_owned());
+    }
+    for other in fitting_units(channel, written_low, written_high, over_pa) {
+        let shown = shown_unit(kind_of(channel));
+        let at = |value: f64| {
+            short(shown.map_or(other.to_inside(value), |shown| shown.from_inside(other.to_inside(value))))
+        };
+        let symbol = shown.map_or(channel.unit(), Unit::symbol);
+        right.push(format!(
+            "as {} they would be {} to {} {symbol}: write `unit: {}`",
+            other.symbol(),
+            at(written_low),
+            at(written_high),
+            other.symbol()
+        ));
+    }
+    if right.is_empty() {
+        return;
+    }
+    let has_unit = source.unit.is_some();
+    let place = steps!["channels", channel.symbol(), if has_unit { "unit" } else { "field" }];
+    let over = if source.gauge { " over the ambient pressure" } else { "" };
+    let message = format!(
+        "the readings of `{}` lie between {} and {} {}{over}, which is impossible for {channel}, {}",
+        source.field,
+        short(written_low),
+        short(written_high),
+        unit_used.symbol(),
+        channel.info().description
+    );
+    let remedy = format!("{}; or leave {channel} out", right.join("; "));
+    complaints.add(FindingKind::Implausible, &place, message, remedy);
+}
+
+/// Reports an ambient pressure that occurs nowhere on earth: gauge pressures are added to it.
+pub(crate) fn check_ambient(
+    ambient: &AmbientPressure,
+    column: Option<&Series>,
+    unit_used: Option<&'static Unit>,
+    complaints: &mut Complaints,
+) {
+    let (least, most) = AMBIENT_PA;
+    let allowed = format!("it lies between {:.0} and {:.0} kPa", least / 1e3, most / 1e3);
+    match (ambient, column.and_then(range)) {
+        (AmbientPressure::Constant(barometer), _) if !(least..=most).contains(&barometer.pressure_pa) => {
+            let message = format!(
+                "the ambient pressure is {} kPa, which is impossible",
+                short(barometer.pressure_pa / 1e3)
+            );
+            let remedy = format!("{allowed}: write what the barometer read");
+            complaints.add(FindingKind::Implausible, &steps!["ambient_pressure"], message, remedy);
+        }
+        (AmbientPressure::Source(source), Some((low, high))) if low < least || high > most => {
+            let written = |inside: f64| unit_used.map_or(inside, |unit| unit.from_inside(inside));
+            let symbol = unit_used.map_or("Pa", Unit::symbol);
+            let message = format!(
+                "the readings of `{}` lie between {} and {} {symbol}, which is impossible for the ambient pressure",
+                source.field,
+                short(written(low)),
+                short(written(high))
+            );
+            let fitting = |unit: &&'static Unit| {
+                unit.to_inside(written(low)) >= least && unit.to_inside(written(high)) <= most
+            };
+            let right: Vec<String> = Kind::Pressure
+                .units()
+                .iter()
+                .filter(fitting)
+                .map(|unit| format!("write `unit: {}`", unit.symbol()))
+                .collect();
+            let or = if right.is_empty() { "" } else { "; or " };
+            let remedy = format!(
+                "{allowed}: {}{or}name another column, or write what the barometer read",
+                right.join(" or ")
+            );
+            complaints.add(FindingKind::Implausible, &steps!["ambient_pressure", "field"], message, remedy);
+        }
+        _ => {}
+    }
+}
+
+/// Smallest and largest reading without the outer ones.
+fn range(series: &Series) -> Option<(f64, f64)> {
+    let values: Vec<f64> = series.values.iter().copied().filter(|value| value.is_finite()).collect();
+    Some((quantile(&values, OUTER)?, quantile(&values, 1.0 - OUTER)?))
+}
+
+/// A common unit for such values.
+fn shown_unit(kind: Kind) -> Option<&'static Unit> {
+    let symbol = match kind {
+        Kind::Temperature => "degC",
+        Kind::Pressure => "kPa",
+        Kind::MassFlow => "g/s",
+        Kind::Speed => "rpm",
+        _ => return None,
+    };
+    unit(kind, symbol).ok()
+}
+
+fn short(value: f64) -> String {
+    if value.abs() >= 100.0 { format!("{value:.0}") } else { format!("{value:.3}") }
+}

@@ -1,0 +1,326 @@
+//! Reading a log of another program by a channel map.
+
+use crate::channel_mapping::channel_map_mistakes::Complaints;
+use crate::channel_mapping::mapped_topics::{Reads, source_of};
+use crate::logs::units::{kind_of, remedy, unit};
+use crate::logs::{Kind, Layout, LogFile, Reference, Row, Unit, header_unit};
+use crate::samples::log_blocks::Blocks;
+use crate::samples::log_clock::{LogClock, Restart};
+use crate::samples::series_builder::SeriesBuilder;
+use crate::{AmbientPressure, ChannelMap, ChannelSource, ReadOptions, ReadWarning, RecordError};
+use mapper_core::Channel;
+use mapper_yaml::{FindingKind, Step, closest, steps};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Time 0 of a log on the clock of [`SeriesBuilder`]: logs may begin before it.
+const ZERO_NS: u64 = 1 << 62;
+
+/// Result of reading a log.
+#[derive(Debug, Default)]
+pub(crate) struct ReadLog {
+    pub(crate) builders: BTreeMap<Reads, SeriesBuilder>,
+    /// Ambient pressure, Pa.
+    pub(crate) ambient: Option<SeriesBuilder>,
+    pub(crate) ambient_unit: Option<&'static Unit>,
+    pub(crate) units: BTreeMap<Reads, &'static Unit>,
+    pub(crate) zero_ns: u64,
+    /// Time 0 in nanoseconds since 1970, if the log gives it.
+    pub(crate) start_time_ns: Option<u64>,
+    pub(crate) warnings: Vec<ReadWarning>,
+    pub(crate) averaged: bool,
+    /// Values that are kept.
+    kept: u64,
+}
+
+/// Use of a wanted column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Target {
+    Reads(Reads),
+    Ambient,
+}
+
+struct Wanted {
+    target: Target,
+    column: usize,
+    unit: &'static Unit,
+}
+
+/// Reads the mapped columns.
+pub(crate) fn read_log(
+    file: &LogFile,
+    map: &ChannelMap,
+    options: &ReadOptions,
+) -> Result<ReadLog, RecordError> {
+    let (format, mut log) = options.logs.open(file, &map.log)?;
+    let layout = log.layout().clone();
+    let wanted = wanted(map, &layout)?;
+    // Each column once, in the order of the layout: several channels may read one.
+    let mut columns: Vec<usize> = wanted.iter().map(|wanted| wanted.column).collect();
+    columns.sort_unstable();
+    columns.dedup();
+    let of_group = |group: usize| -> Vec<usize> {
+        columns
+            .iter()
+            .copied()
+            .filter(|column| layout.columns.get(*column).is_some_and(|c| c.group == group))
+            .collect()
+    };
+    let members: Vec<Vec<usize>> = (0..layout.groups.len()).map(of_group).collect();
+    // Index of each wanted column among the values of its group.
+    let places: Vec<Vec<(usize, Target, &'static Unit)>> = members
+        .iter()
+        .map(|members| {
+            let place = |wanted: &Wanted| {
+                let at = members.iter().position(|column| *column == wanted.column)?;
+                Some((at, wanted.target, wanted.unit))
+            };
+            wanted.iter().filter_map(place).collect()
+        })
+        .collect();
+    let mut read = ReadLog {
+        zero_ns: ZERO_NS,
+        start_time_ns: layout.start_time_ns,
+        warnings: contradictions(map, &layout, &wanted),
+        ambient_unit: wanted.iter().find(|wanted| wanted.target == Target::Ambient).map(|found| found.unit),
+        units: wanted
+            .iter()
+            .filter_map(|wanted| match wanted.target {
+                Target::Reads(reads) => Some((reads, wanted.unit)),
+                Target::Ambient => None,
+            })
+            .collect(),
+        ..ReadLog::default()
+    };
+    let mut blocks: Vec<Blocks> = members.iter().map(|_| Blocks::default()).collect();
+    let mut clocks: Vec<LogClock> = members.iter().map(|_| LogClock::default()).collect();
+    let mut rows = 0u64;
+    let mut take_row = |row: Row<'_>| {
+        rows += 1;
+        if rows > options.max_messages {
+            let message = format!("it has more than {} rows; cut it into shorter logs", options.max_messages);
+            return Err(file.content(format.name, message));
+        }
+        if read.kept > options.max_values {
+            let message = format!(
+                "its mapped columns hold more than {} values; map fewer columns, or cut it into shorter logs",
+                options.max_values
+            );
+            return Err(file.content(format.name, message));
+        }
+        let of_group = (clocks.get_mut(row.group), blocks.get_mut(row.group), places.get(row.group));
+        let (Some(clock), Some(blocks), Some(places)) = of_group else { return Ok(()) };
+        let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
+        let took = clock.push(row.t_s, row.values, &mut |t_s, values| blocks.push(t_s, values, &mut keep));
+        took.map_err(|restart| file.content(format.name, restart_words(restart, &layout, row.group)))
+    };
+    log.rows(&columns, &mut take_row)?;
+    for ((clock, blocks), places) in clocks.iter_mut().zip(&mut blocks).zip(&places) {
+        let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
+        clock.finish(&mut |t_s, values| blocks.push(t_s, values, &mut keep));
+        if clock.strays > 0 {
+            read.warnings.push(ReadWarning::StrayTimes { count: clock.strays, first_s: clock.stray_s });
+        }
+        blocks.finish(&mut |t_s, values| read.take(places, t_s, values));
+        read.averaged |= blocks.averages();
+    }
+    Ok(read)
+}
+
+impl ReadLog {
+    fn take(&mut self, places: &[(usize, Target, &'static Unit)], t_s: f64, values: &[f64]) {
+        let time_ns = ZERO_NS.saturating_add_signed((t_s * 1e9).round() as i64);
+        for (at, target, unit) in places {
+            // An empty cell is not a sample: slow columns share rows with fast ones.
+            let Some(value) = values.get(*at).copied().filter(|value| value.is_finite()) else { continue };
+            let builder = match target {
+                Target::Reads(reads) => self.builders.entry(*reads).or_default(),
+                Target::Ambient => self.ambient.get_or_insert_default(),
+            };
+            builder.push(time_ns, unit.to_inside(value));
+            self.kept += 1;
+        }
+    }
+}
+
+/// The remedy for a clock that starts again.
+fn restart_words(restart: Restart, layout: &Layout, group: usize) -> String {
+    let Restart { row, from_s, to_s } = restart;
+    let group = layout.groups.get(group).filter(|group| !group.name.is_empty());
+    let of = group.map_or_else(String::new, |group| format!(" of `{}`", group.name));
+    format!(
+        "the clock{of} goes back from {from_s} s to {to_s} s in row {row} of the data, as where two runs stand in one file: cut it \
+         there and give the parts as logs of their own, or name another clock with `time`"
+    )
+}
+
+/// The columns that the map names, with their units; or all mistakes of the map for this log.
+fn wanted(map: &ChannelMap, layout: &Layout) -> Result<Vec<Wanted>, RecordError> {
+    let mut complaints = Complaints::default();
+    let mut list = Vec::new();
+    let channels = map.channels.iter().map(|(channel, source)| (Reads::Channel(*channel), source));
+    let elements = map.elements.iter().map(|(element, source)| (Reads::Element(*element), source));
+    for (reads, source) in channels.chain(elements) {
+        let channel = reads.channel();
+        let at = |key: &str| steps!["channels", channel.symbol(), key].to_vec();
+        let found = column_of(layout, source, &at, &mut complaints).and_then(|column| {
+            Some((column, unit_of(layout, column, source, Some(channel), &at, &mut complaints)?))
+        });
+        list.extend(found.map(|(column, unit)| Wanted { target: Target::Reads(reads), column, unit }));
+    }
+    if let Some(AmbientPressure::Source(source)) = &map.ambient_pressure {
+        let at = |key: &str| steps!["ambient_pressure", key].to_vec();
+        let found = column_of(layout, source, &at, &mut complaints)
+            .and_then(|column| Some((column, unit_of(layout, column, source, None, &at, &mut complaints)?)));
+        list.extend(found.map(|(column, unit)| Wanted { target: Target::Ambient, column, unit }));
+    }
+    complaints.result(map)?;
+    Ok(list)
+}
+
+/// Contradictions between the units of the map and the log.
+fn contradictions(map: &ChannelMap, layout: &Layout, wanted: &[Wanted]) -> Vec<ReadWarning> {
+    let contradiction = |wanted: &Wanted| {
+        let Target::Reads(reads) = wanted.target else { return None };
+        let recorded = layout.columns.get(wanted.column)?.unit.clone()?;
+        let known = header_unit(&recorded);
+        let agrees = known.is_some_and(|known| known.unit.converts_like(wanted.unit));
+        let mapped = source_of(map, reads)?.unit.clone()?;
+        (!agrees).then(|| ReadWarning::UnitContradiction { channel: reads.channel(), mapped, recorded })
+    };
+    wanted.iter().filter_map(contradiction).collect()
+}
+
+fn column_of(
+    layout: &Layout,
+    source: &ChannelSource,
+    at: &dyn Fn(&str) -> Vec<Step>,
+    complaints: &mut Complaints,
+) -> Option<usize> {
+    let columns = layout.find(&source.topic, &source.field);
+    if let [column] = columns.as_slice() {
+        return Some(*column);
+    }
+    if !source.topic.is_empty() && !layout.groups.iter().any(|group| group.name == source.topic) {
+        let names: Vec<&str> =
+            layout.groups.iter().map(|group| group.name.as_str()).filter(|name| !name.is_empty()).collect();
+        let remedy = if names.is_empty() {
+            "the log has one group without a name: leave `topic` out".to_owned()
+        } else {
+            format!("its groups are {}", names.join(", "))
+        };
+        complaints.add(
+            FindingKind::WrongValue,
+            &at("topic"),
+            format!("the log has no group `{}`", source.topic),
+            remedy,
+        );
+        return None;
+    }
+    let message;
+    let remedy;
+    if columns.is_empty() {
+        let names: Vec<&str> = layout.columns.iter().map(|column| column.name.as_str()).collect();
+        message = format!("the log has no column `{}`", source.field);
+        let guess = closest(&source.field, &names).map(|name| format!("did you mean `{name}`? "));
+        let shown: Vec<&str> = names.iter().copied().take(30).collect();
+        let more = if names.len() > shown.len() {
+            format!(" and {} more", names.len() - shown.len())
+        } else {
+            String::new()
+        };
+        remedy = format!("{}its columns are {}{more}", guess.unwrap_or_default(), shown.join(", "));
+    } else {
+        let groups: Vec<&str> = columns
+            .iter()
+            .filter_map(|column| layout.groups.get(layout.columns.get(*column)?.group))
+            .map(|group| group.name.as_str())
+            .collect();
+        message = format!("the log has `{}` in several groups", source.field);
+        remedy = format!("name one with `topic`: {}", groups.join(", "));
+    }
+    complaints.add(FindingKind::WrongValue, &at("field"), message, remedy);
+    None
+}
+
+/// The unit of the map, or else that of the log. `channel` is `None` for the ambient pressure.
+fn unit_of(
+    layout: &Layout,
+    column: usize,
+    source: &ChannelSource,
+    channel: Option<Channel>,
+    at: &dyn Fn(&str) -> Vec<Step>,
+    complaints: &mut Complaints,
+) -> Option<&'static Unit> {
+    let kind = channel.map_or(Kind::Pressure, kind_of);
+    let name = channel.map_or("the ambient pressure", Channel::symbol);
+    let recorded = layout.columns.get(column).and_then(|column| column.unit.as_deref());
+    if let Some((message, remedy)) = recorded.and_then(|text| wrong_reference(name, text, source, channel)) {
+        complaints.add(FindingKind::Unit, &at("field"), message, remedy);
+        return None;
+    }
+    // The values of the map were checked when it was read.
+    if let Some(written) = &source.unit {
+        return unit(kind, written).ok();
+    }
+    let Some(recorded) = recorded else {
+        let message = format!("neither the channel map nor the log gives the unit of {name}");
+        let example = channel.map_or("kPa", |channel| channel.unit());
+        complaints.add(FindingKind::Unit, &at("field"), message, format!("add e.g. `unit: {example}`"));
+        return None;
+    };
+    let known = header_unit(recorded);
+    match known.filter(|known| known.kind == kind) {
+        Some(known) => Some(known.unit),
+        None => match unit(kind, recorded) {
+            Ok(unit) => Some(unit),
+            Err(error) => {
+                let message =
+                    format!("the log gives {name} in `{recorded}`, which is not a unit of {}", kind.name());
+                complaints.add(
+                    FindingKind::Unit,
+                    &at("field"),
+                    message,
+                    format!("{}; write `unit`", remedy(kind, &error)),
+                );
+                None
+            }
+        },
+    }
+}
+
+/// If the log and the map give different references of a pressure: a message and the remedy.
+fn wrong_reference(
+    name: &str,
+    recorded: &str,
+    source: &ChannelSource,
+    channel: Option<Channel>,
+) -> Option<(String, String)> {
+    let known = header_unit(recorded).filter(|known| known.kind == Kind::Pressure)?;
+    let (over, remedy) = match (known.reference, source.gauge, channel) {
+        (Reference::Gauge, _, None) => (
+            "over the ambient pressure",
+            "name a column of the absolute ambient pressure, or write its value",
+        ),
+        (Reference::Gauge, false, Some(_)) => {
+            ("over the ambient pressure", "write `gauge: true`, and `ambient_pressure`")
+        }
+        (Reference::Absolute, true, _) => ("over vacuum", "leave `gauge: true` out"),
+        _ => return None,
+    };
+    Some((format!("the log gives {name} in {recorded}, a pressure {over}"), remedy.to_owned()))
+}
+
+/// Whether a file that starts with these bytes is MCAP, or too short to be anything else; an empty file is neither.
+pub(crate) fn is_mcap(head: &[u8]) -> bool {
+    head.starts_with(b"\x89MCAP") || !head.is_empty() && head.len() < 5 && b"\x89MCAP".starts_with(head)
+}
+
+/// The file as a log, if it is not MCAP and there are log formats.
+pub(crate) fn log_of_path(path: &Path, options: &ReadOptions) -> Result<Option<LogFile>, RecordError> {
+    if options.logs.0.is_empty() {
+        return Ok(None);
+    }
+    let file = LogFile::of_path(path);
+    Ok((!is_mcap(&file.head(8)?)).then_some(file))
+}

@@ -1,0 +1,260 @@
+//! One pass over a recording: finds the recoverable data and forwards them.
+
+use crate::mcap::batch::{Batch, Item, Opened};
+use crate::mcap::chunk::{ChunkError, Unpacker};
+use crate::mcap::framing::{Frame, FrameReader, split_record};
+use crate::mcap::records::{
+    ChannelDefinition, MAGIC, op, parse_attachment, parse_channel, parse_message, parse_metadata,
+    parse_schema,
+};
+use crate::mcap::sink::Sink;
+use crate::{DamagedPart, ReadOptions, ReadWarning, RecordError};
+use std::collections::BTreeMap;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Larger schemas are skipped, which limits the memory that many of them could take.
+const SCHEMA_LIMIT_BYTES: usize = 1 << 20;
+
+/// Maximum total size of topic definitions and schemas; later ones are skipped.
+const DEFINITIONS_LIMIT_BYTES: usize = 64 << 20;
+
+/// Number of damaged chunks and records that are listed; further ones are only counted.
+const LISTED_DAMAGE: u64 = 100;
+
+/// Results of a pass in addition to the forwarded data.
+#[derive(Default)]
+pub(crate) struct Scanned {
+    pub(crate) warnings: Vec<ReadWarning>,
+    /// Every topic the file defines, the index at its end included.
+    definitions: BTreeMap<u16, ChannelDefinition>,
+    schemas: BTreeMap<u16, Vec<u8>>,
+    /// Messages that came before a definition of their topic.
+    undefined: BTreeMap<u16, u64>,
+    /// Records of any kind, damaged ones included.
+    records: u64,
+    damaged: u64,
+    /// Bytes of all definitions and schemas.
+    defined_bytes: usize,
+}
+
+/// Reads a recording into a fresh sink. If a damaged chunk contained the definition of a topic, and the index at the
+/// file's end still has it, a second pass uses that one.
+pub(crate) fn scan<S: Sink>(
+    path: &Path,
+    open: &dyn Fn() -> io::Result<Box<dyn Read>>,
+    options: &ReadOptions,
+    new_sink: impl Fn() -> S,
+) -> Result<(S, Scanned), RecordError> {
+    let mut sink = new_sink();
+    let first = pass(path, open, options, &BTreeMap::new(), &mut sink)?;
+    if !first.undefined.keys().any(|id| first.definitions.contains_key(id)) {
+        return Ok((sink, first));
+    }
+    let mut sink = new_sink();
+    let second = pass(path, open, options, &first.definitions, &mut sink)?;
+    Ok((sink, second))
+}
+
+fn pass<S: Sink>(
+    path: &Path,
+    open: &dyn Fn() -> io::Result<Box<dyn Read>>,
+    options: &ReadOptions,
+    known: &BTreeMap<u16, ChannelDefinition>,
+    sink: &mut S,
+) -> Result<Scanned, RecordError> {
+    let failed = |source| RecordError::Read { path: path.to_owned(), source };
+    let mut source = open().map_err(failed)?;
+    let mut magic = Vec::new();
+    source.by_ref().take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
+    if magic != MAGIC {
+        return Err(RecordError::NotMcap { path: path.to_owned(), found: describe(&magic) });
+    }
+    known.values().for_each(|definition| sink.define(definition));
+    let mut scanned = Scanned { definitions: known.clone(), ..Scanned::default() };
+    let mut frames = FrameReader::new(source, MAGIC.len() as u64);
+    let (mut unpacker, mut batch) = (Unpacker::new(), Batch::default());
+    let mut end = MAGIC.len() as u64;
+    loop {
+        let frame = frames.next_frame().map_err(failed)?;
+        let joins = matches!(&frame, Frame::Record { opcode: op::CHUNK, body, .. } if Batch::takes(body));
+        // A message index follows its chunk; every other record is handled after the chunks before it.
+        let index = matches!(&frame, Frame::Record { opcode: op::MESSAGE_INDEX, .. });
+        if !(joins || index) || batch.is_full() {
+            scanned.batch(&mut batch, options, sink);
+        }
+        match frame {
+            Frame::Record { opcode: op::FOOTER, .. } => break,
+            // No record has opcode 0: the file ends in zeros, as it may after a power failure.
+            Frame::Record { offset, opcode: 0, .. } | Frame::Truncated { offset } => {
+                scanned.warnings.push(ReadWarning::Truncated { offset });
+                break;
+            }
+            Frame::End => {
+                scanned.warnings.push(ReadWarning::Truncated { offset: end });
+                break;
+            }
+            Frame::Record { offset, opcode: op::CHUNK, body } if joins => {
+                end = offset + 9 + body.len() as u64;
+                batch.push(offset, body);
+            }
+            Frame::Record { offset, opcode: op::CHUNK, body } => {
+                end = offset + 9 + body.len() as u64;
+                scanned.chunk(offset, body, options, &mut unpacker, sink);
+            }
+            Frame::Record { offset, opcode, body } => {
+                end = offset + 9 + body.len() as u64;
+                scanned.record(offset, opcode, body, options, sink);
+            }
+        }
+        if scanned.records > options.max_messages {
+            scanned.warnings.push(ReadWarning::TooManyMessages { limit: options.max_messages });
+            break;
+        }
+        if sink.kept() > options.max_values {
+            scanned.warnings.push(ReadWarning::TooManyValues { limit: options.max_values });
+            break;
+        }
+    }
+    if scanned.damaged > LISTED_DAMAGE {
+        scanned.warnings.push(ReadWarning::MoreDamage { count: scanned.damaged - LISTED_DAMAGE });
+    }
+    let count = scanned.undefined.values().sum();
+    if count > 0 {
+        scanned.warnings.push(ReadWarning::UndefinedChannel { count });
+    }
+    Ok(scanned)
+}
+
+impl Scanned {
+    fn damage(&mut self, warning: ReadWarning) {
+        self.damaged += 1;
+        if self.damaged <= LISTED_DAMAGE {
+            self.warnings.push(warning);
+        }
+    }
+
+    /// Whether this many bytes of definitions still fit.
+    fn has_room(&mut self, bytes: usize) -> bool {
+        let together = self.defined_bytes.saturating_add(bytes);
+        let fits = together <= DEFINITIONS_LIMIT_BYTES;
+        if fits {
+            self.defined_bytes = together;
+        }
+        fits
+    }
+
+    /// Chunks that are read in parallel.
+    fn batch<S: Sink>(&mut self, batch: &mut Batch, options: &ReadOptions, sink: &mut S) {
+        let known = |channel_id| self.definitions.contains_key(&channel_id);
+        for Opened { offset, items } in batch.open(sink, known, options.max_chunk_bytes) {
+            match items {
+                Ok(items) => items.into_iter().for_each(|item| self.item(offset, item, options, sink)),
+                Err(source) => self.damage(ReadWarning::DamagedChunk { offset, source }),
+            }
+        }
+    }
+
+    fn item<S: Sink>(
+        &mut self,
+        offset: u64,
+        item: Item<S::SinkMessage>,
+        options: &ReadOptions,
+        sink: &mut S,
+    ) {
+        match item {
+            Item::Record { opcode, body } => self.record(offset, opcode, &body, options, sink),
+            Item::Cut if self.goes_on(options, sink) => {
+                self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
+            }
+            Item::Cut => {}
+            Item::Message { channel_id, log_time_ns, message } => {
+                self.records += 1;
+                if let Some(message) = message.filter(|_| self.goes_on(options, sink)) {
+                    sink.take(channel_id, log_time_ns, message);
+                }
+            }
+        }
+    }
+
+    /// Whether there is room for more.
+    fn goes_on(&self, options: &ReadOptions, sink: &impl Sink) -> bool {
+        self.records <= options.max_messages && sink.kept() <= options.max_values
+    }
+
+    fn chunk<S: Sink>(
+        &mut self,
+        offset: u64,
+        body: &[u8],
+        options: &ReadOptions,
+        unpacker: &mut Unpacker,
+        sink: &mut S,
+    ) {
+        let mut rest = match unpacker.unpack(body, options.max_chunk_bytes) {
+            Ok(content) => content,
+            Err(error) => {
+                self.damage(ReadWarning::DamagedChunk { offset, source: error });
+                return;
+            }
+        };
+        while !rest.is_empty() && self.goes_on(options, sink) {
+            let Some((opcode, body, after)) = split_record(rest) else {
+                self.damage(ReadWarning::DamagedChunk { offset, source: ChunkError::CutRecord });
+                return;
+            };
+            self.record(offset, opcode, body, options, sink);
+            rest = after;
+        }
+    }
+
+    fn record<S: Sink>(&mut self, offset: u64, opcode: u8, body: &[u8], options: &ReadOptions, sink: &mut S) {
+        self.records += 1;
+        if !self.goes_on(options, sink) {
+            return;
+        }
+        let whole = match opcode {
+            op::MESSAGE => {
+                parse_message(body).map(|(id, log_time_ns, data)| match self.definitions.contains_key(&id) {
+                    true => sink
+                        .read(id, data)
+                        .into_iter()
+                        .for_each(|message| sink.take(id, log_time_ns, message)),
+                    false => *self.undefined.entry(id).or_default() += 1,
+                })
+            }
+            op::SCHEMA => parse_schema(body).map(|(id, data)| {
+                let new = data.len() <= SCHEMA_LIMIT_BYTES && !self.schemas.contains_key(&id);
+                if new && self.has_room(data.len()) {
+                    self.schemas.insert(id, data.to_owned());
+                }
+            }),
+            op::CHANNEL => parse_channel(body).map(|(mut definition, schema_id)| {
+                let schema_bytes = self.schemas.get(&schema_id).map_or(0, Vec::len);
+                if self.definitions.contains_key(&definition.id) || !self.has_room(body.len() + schema_bytes)
+                {
+                    return;
+                }
+                definition.schema = self.schemas.get(&schema_id).cloned().unwrap_or_default();
+                sink.define(&definition);
+                self.definitions.insert(definition.id, definition);
+            }),
+            op::METADATA => parse_metadata(body).map(|(name, pairs)| sink.metadata(name, pairs)),
+            op::ATTACHMENT => parse_attachment(body).map(|(name, data)| sink.attachment(name, data)),
+            _ => Some(()),
+        };
+        if whole.is_none() {
+            let part = match opcode {
+                op::MESSAGE => DamagedPart::Message,
+                op::SCHEMA => DamagedPart::Schema,
+                op::CHANNEL => DamagedPart::Topic,
+                op::METADATA => DamagedPart::Metadata,
+                _ => DamagedPart::Attachment,
+            };
+            self.damage(ReadWarning::DamagedRecord { offset, part });
+        }
+    }
+}
+
+fn describe(magic: &[u8]) -> String {
+    if magic.is_empty() { "nothing: it is empty".to_owned() } else { format!("`{}`", magic.escape_ascii()) }
+}

@@ -1,0 +1,101 @@
+//! Clocks that were set while they recorded. The times after that are moved back to where they belong, so that no two readings of
+//! one channel share a time and no step of the run is lost.
+
+use crate::ReadWarning;
+use crate::channel_mapping::mapped_topics::Reads;
+use crate::samples::rig_sink::Placed;
+use crate::samples::series_builder::{Break, SeriesBuilder};
+use crate::step_detection::steps::StepMessage;
+use mapper_core::Event;
+use std::collections::BTreeMap;
+
+/// Breaks of several channels belong to one step of the clock if no more messages than this lie between them: the fastest topic sends
+/// as many while the slowest sends one.
+const NEAR: u64 = 1000;
+
+/// Clocks of channels and markers may differ by this much, ns.
+const TOLERANCE_NS: u64 = 2_000_000_000;
+
+/// Interval of a channel that has only one sample before the break, ns: the rate of this program's recordings.
+const USUAL_INTERVAL_NS: u64 = 100_000_000;
+
+type Builders = BTreeMap<Reads, SeriesBuilder>;
+
+/// Repairs times after a clock was set back: every channel goes back at the same place of the file by the same amount. A topic
+/// that is merely late, or a file with one topic after the other, has no such place.
+pub(crate) fn repair_set_back(
+    builders: &mut Builders,
+    steps: &mut [Placed<StepMessage>],
+    events: &mut [Placed<Event>],
+    warnings: &mut Vec<ReadWarning>,
+) {
+    let Some(reference) = builders.values().max_by_key(|builder| builder.len()) else { return };
+    for found in reference.breaks().to_vec() {
+        let same = |other: &&Break| {
+            other.position.abs_diff(found.position) <= NEAR
+                && other.back_ns.abs_diff(found.back_ns) <= TOLERANCE_NS
+        };
+        let on_both_sides = |builder: &&SeriesBuilder| {
+            let (first, last) = builder.positions();
+            first < found.position && found.position < last
+        };
+        let breaks: Vec<Option<Break>> = builders
+            .values()
+            .filter(on_both_sides)
+            .map(|builder| {
+                builder.breaks().iter().find(same).filter(|found| builder.goes_on_from(found)).copied()
+            })
+            .collect();
+        let Some(breaks) = breaks.into_iter().collect::<Option<Vec<Break>>>().filter(|all| !all.is_empty())
+        else {
+            continue;
+        };
+        let back_ns = breaks.iter().map(|one| one.back_ns).max().unwrap_or(0);
+        let shift_ns = back_ns + found.interval_ns.unwrap_or(USUAL_INTERVAL_NS);
+        let from = breaks.iter().map(|one| one.position).min().unwrap_or(found.position);
+        for builder in builders.values_mut() {
+            builder.move_later(from, shift_ns);
+        }
+        move_messages(steps, from, shift_ns);
+        move_messages(events, from, shift_ns);
+        warnings.push(ReadWarning::ClockSet { by_s: -(shift_ns as f64) / 1e9 });
+    }
+}
+
+fn move_messages<T>(messages: &mut [Placed<T>], from: u64, shift_ns: u64) {
+    for message in messages.iter_mut().filter(|message| message.position >= from) {
+        message.log_time_ns = message.log_time_ns.saturating_add(shift_ns);
+    }
+}
+
+/// Repairs times after a clock was set forward, in recordings whose step markers have the time of the run as well.
+pub(crate) fn repair_set_forward(
+    builders: &mut Builders,
+    steps: &mut [Placed<StepMessage>],
+    start_time_ns: u64,
+    warnings: &mut Vec<ReadWarning>,
+) {
+    let ahead_ns = |step: &Placed<StepMessage>| {
+        let run_ns = (step.message.t_s * 1e9) as i128;
+        i64::try_from(i128::from(step.log_time_ns) - i128::from(start_time_ns) - run_ns).unwrap_or(0)
+    };
+    let near = |step: &Placed<StepMessage>| ahead_ns(step).unsigned_abs() <= TOLERANCE_NS;
+    if !steps.first().is_some_and(near) {
+        return;
+    }
+    for at in 1..steps.len() {
+        let (Some(before), Some(step)) = (steps.get(at - 1), steps.get(at)) else { continue };
+        let by_ns = u64::try_from(ahead_ns(step)).unwrap_or(0);
+        if by_ns <= TOLERANCE_NS {
+            continue;
+        }
+        let (from_ns, to_ns) = (before.log_time_ns, step.log_time_ns);
+        for builder in builders.values_mut() {
+            builder.close_gap(from_ns, to_ns, by_ns, TOLERANCE_NS);
+        }
+        for step in steps.iter_mut().skip(at) {
+            step.log_time_ns = step.log_time_ns.saturating_sub(by_ns);
+        }
+        warnings.push(ReadWarning::ClockSet { by_s: by_ns as f64 / 1e9 });
+    }
+}

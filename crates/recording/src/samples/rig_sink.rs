@@ -1,0 +1,258 @@
+//! Takes samples, steps and events out of a recording, and ignores truth.
+
+use crate::channel_mapping::mapped_topics::{MappedTopic, Reads, map_topic};
+use crate::format::{
+    CAMPAIGN_NAME, EVENT_TOPIC, FORMAT_KEY, METADATA_NAME, PLAN_NAME, PROVENANCE_TOPIC, START_KEY, STEP_TOPIC,
+};
+use crate::logs::Unit;
+use crate::mcap::message::{FieldValue, read_fields};
+use crate::mcap::records::ChannelDefinition;
+use crate::mcap::sink::Sink;
+use crate::samples::series_builder::SeriesBuilder;
+use crate::step_detection::steps::StepMessage;
+use crate::writing::provenance::{OriginMessage, read_origins};
+use crate::{ChannelMap, FormatVersion, ReadWarning, RecordError};
+use mapper_core::Event;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// The role of a topic for this reader.
+enum Topic {
+    /// With the index of each of its outputs among the series.
+    Mapped(MappedTopic, Vec<usize>),
+    Step,
+    Event,
+    Provenance,
+}
+
+impl Topic {
+    fn name(&self) -> &str {
+        match self {
+            Topic::Mapped(mapped, _) => &mapped.topic,
+            Topic::Step => STEP_TOPIC,
+            Topic::Event => EVENT_TOPIC,
+            Topic::Provenance => PROVENANCE_TOPIC,
+        }
+    }
+}
+
+/// The content of a message.
+pub(crate) enum SinkMessage {
+    /// A value for each output of its topic, in internal units.
+    Samples(Vec<FieldValue>),
+    Step(StepMessage),
+    /// With the bytes of the message, as below.
+    Origins(OriginMessage, usize),
+    Event(Event, usize),
+    /// Unreadable.
+    Damaged,
+}
+
+/// A message with its place in the file.
+#[derive(Debug)]
+pub(crate) struct Placed<T> {
+    /// Number of the message.
+    pub(crate) position: u64,
+    pub(crate) log_time_ns: u64,
+    pub(crate) message: T,
+}
+
+/// See the module.
+pub(crate) struct RigSink<'a> {
+    path: &'a Path,
+    map: &'a ChannelMap,
+    topics: BTreeMap<u16, Topic>,
+    pub(crate) topic_names: BTreeSet<String>,
+    /// The topics to read, in the order in which the file defines them.
+    series: Vec<(Reads, SeriesBuilder)>,
+    /// Unit of each field that was mapped.
+    pub(crate) units: BTreeMap<Reads, &'static Unit>,
+    pub(crate) steps: Vec<Placed<StepMessage>>,
+    pub(crate) events: Vec<Placed<Event>>,
+    pub(crate) origins: Vec<(u64, OriginMessage)>,
+    pub(crate) metadata: BTreeMap<String, String>,
+    pub(crate) format: Option<FormatVersion>,
+    pub(crate) start_time_ns: Option<u64>,
+    pub(crate) plan_json: Option<Vec<u8>>,
+    pub(crate) campaign_text: Option<String>,
+    pub(crate) warnings: Vec<ReadWarning>,
+    pub(crate) failure: Option<RecordError>,
+    damaged: BTreeMap<String, u64>,
+    kept: u64,
+    /// Messages so far.
+    position: u64,
+}
+
+impl<'a> RigSink<'a> {
+    pub(crate) fn new(path: &'a Path, map: &'a ChannelMap) -> Self {
+        RigSink {
+            path,
+            map,
+            topics: BTreeMap::new(),
+            topic_names: BTreeSet::new(),
+            series: Vec::new(),
+            units: BTreeMap::new(),
+            steps: Vec::new(),
+            events: Vec::new(),
+            origins: Vec::new(),
+            metadata: BTreeMap::new(),
+            format: None,
+            start_time_ns: None,
+            plan_json: None,
+            campaign_text: None,
+            warnings: Vec::new(),
+            failure: None,
+            damaged: BTreeMap::new(),
+            kept: 0,
+            position: 0,
+        }
+    }
+
+    /// Warnings about messages that could not be read.
+    pub(crate) fn damaged_messages(&self) -> impl Iterator<Item = ReadWarning> + '_ {
+        self.damaged
+            .iter()
+            .map(|(topic, count)| ReadWarning::DamagedMessages { topic: topic.clone(), count: *count })
+    }
+
+    /// The non-empty series.
+    pub(crate) fn take_builders(&mut self) -> BTreeMap<Reads, SeriesBuilder> {
+        std::mem::take(&mut self.series).into_iter().filter(|(_, builder)| !builder.is_empty()).collect()
+    }
+
+    /// The series that collects the samples of a channel or sensor; several topics may have the same one.
+    fn builder(&mut self, reads: Reads) -> usize {
+        let known = self.series.iter().position(|(known, _)| *known == reads);
+        known.unwrap_or_else(|| {
+            self.series.push((reads, SeriesBuilder::default()));
+            self.series.len() - 1
+        })
+    }
+
+    fn mapped(&mut self, definition: &ChannelDefinition) -> Option<Topic> {
+        match map_topic(self.path, self.map, definition, &mut self.warnings) {
+            Ok(mapped) => {
+                let outputs = mapped.iter().flat_map(|topic| &topic.outputs);
+                self.units.extend(outputs.map(|(_, reads, unit)| (*reads, *unit)));
+                let mapped = mapped?;
+                let builders = mapped.outputs.iter().map(|(_, reads, _)| self.builder(*reads)).collect();
+                Some(Topic::Mapped(mapped, builders))
+            }
+            Err(error) => {
+                self.failure.get_or_insert(error);
+                None
+            }
+        }
+    }
+}
+
+impl Sink for RigSink<'_> {
+    type SinkMessage = SinkMessage;
+
+    fn define(&mut self, definition: &ChannelDefinition) {
+        self.topic_names.insert(definition.topic.clone());
+        let topic = match definition.topic.as_str() {
+            STEP_TOPIC => Some(Topic::Step),
+            EVENT_TOPIC => Some(Topic::Event),
+            PROVENANCE_TOPIC => Some(Topic::Provenance),
+            _ => self.mapped(definition),
+        };
+        let Some(topic) = topic else { return };
+        if definition.encoding != "json" {
+            let (topic, encoding) = (definition.topic.clone(), definition.encoding.clone());
+            self.warnings.push(ReadWarning::UnknownEncoding { topic, encoding });
+            return;
+        }
+        self.topics.insert(definition.id, topic);
+    }
+
+    fn read(&self, channel_id: u16, data: &[u8]) -> Option<SinkMessage> {
+        let content = match self.topics.get(&channel_id)? {
+            Topic::Mapped(mapped, _) => {
+                let mut values = Vec::new();
+                read_fields(data, &mapped.fields, &mut values).then(|| {
+                    let inside = |(index, _, unit): &(usize, Reads, &'static Unit)| match values.get(*index) {
+                        Some(FieldValue::Number(value)) => FieldValue::Number(unit.to_inside(*value)),
+                        Some(other) => *other,
+                        None => FieldValue::Absent,
+                    };
+                    SinkMessage::Samples(mapped.outputs.iter().map(inside).collect())
+                })
+            }
+            Topic::Step => serde_json::from_slice(data).map(SinkMessage::Step).ok(),
+            Topic::Provenance => read_origins(data).map(|origins| SinkMessage::Origins(origins, data.len())),
+            Topic::Event => {
+                serde_json::from_slice(data).map(|event| SinkMessage::Event(event, data.len())).ok()
+            }
+        };
+        Some(content.unwrap_or(SinkMessage::Damaged))
+    }
+
+    fn take(&mut self, channel_id: u16, log_time_ns: u64, content: SinkMessage) {
+        let Some(topic) = self.topics.get(&channel_id) else { return };
+        self.position += 1;
+        let position = self.position;
+        match (content, topic) {
+            (SinkMessage::Samples(values), Topic::Mapped(_, builders)) => {
+                for (value, builder) in values.iter().zip(builders) {
+                    let Some((_, builder)) = self.series.get_mut(*builder) else { continue };
+                    match value {
+                        FieldValue::Number(value) => builder.push_at(position, log_time_ns, *value),
+                        FieldValue::Other => {
+                            builder.push_at(position, log_time_ns, f64::NAN);
+                            builder.not_numbers += 1;
+                        }
+                        FieldValue::Absent => continue,
+                    }
+                    self.kept += 1;
+                }
+            }
+            (SinkMessage::Step(step), _) => {
+                self.kept += values_of(size_of::<StepMessage>());
+                self.steps.push(Placed { position, log_time_ns, message: step });
+            }
+            (SinkMessage::Origins(origins, bytes), _) => {
+                self.kept += values_of(bytes);
+                self.origins.push((log_time_ns, origins));
+            }
+            (SinkMessage::Event(event, bytes), _) => {
+                self.kept += values_of(size_of::<Event>() + bytes);
+                self.events.push(Placed { position, log_time_ns, message: event });
+            }
+            (SinkMessage::Damaged | SinkMessage::Samples(_), topic) => {
+                *self.damaged.entry(topic.name().to_owned()).or_default() += 1;
+            }
+        }
+    }
+
+    fn kept(&self) -> u64 {
+        self.kept
+    }
+
+    fn metadata(&mut self, name: String, mut pairs: BTreeMap<String, String>) {
+        if name != METADATA_NAME || self.format.is_some() {
+            return;
+        }
+        let mut take = |key| pairs.remove(key).and_then(|text| text.parse().ok());
+        let format = take(FORMAT_KEY).and_then(|version| u32::try_from(version).ok()).map(FormatVersion);
+        let start_time_ns: Option<u64> = take(START_KEY);
+        if let Some(found) = format.filter(|found| *found > FormatVersion::CURRENT) {
+            let path = self.path.to_owned();
+            self.failure.get_or_insert(RecordError::NewerFormat { path, found });
+        }
+        (self.format, self.start_time_ns, self.metadata) = (format, start_time_ns, pairs);
+    }
+
+    fn attachment(&mut self, name: String, data: &[u8]) {
+        match name.as_str() {
+            PLAN_NAME => self.plan_json = Some(data.to_owned()),
+            CAMPAIGN_NAME => self.campaign_text = Some(String::from_utf8_lossy(data).into_owned()),
+            _ => {}
+        }
+    }
+}
+
+/// Number of values of a series, with their times, that take the same memory.
+fn values_of(bytes: usize) -> u64 {
+    u64::try_from(bytes / 16 + 1).unwrap_or(u64::MAX)
+}

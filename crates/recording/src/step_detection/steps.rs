@@ -1,0 +1,308 @@
+//! The steps of a recording: from its markers, or from changes of the commands.
+
+use crate::ReadWarning;
+use mapper_core::{Channel, Group, OperatingPoint, Series, StepKind, StepMarker};
+use mapper_numerics::statistics::median;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// Changes of commands no further apart than this belong to one jump, s. Pressure and valve of a jump are set one
+/// after the other, and a ramp is a chain of changes.
+const JUMP_GAP_S: f64 = 1.0;
+
+/// Relative change below which a command counts as unchanged: the read-back of a constant command varies in its last digits.
+const COMMAND_TOLERANCE_RATIO: f64 = 1e-6;
+
+/// P3 that moves by more than this share within [`JUMP_GAP_S`] is a jump: a speed controller takes longer for less.
+const FAST_RATIO: f64 = 0.01;
+
+/// A chain of slow changes of P3 is a jump by a slow rig if it moves P3 by more than this share. Otherwise a speed
+/// controller made it.
+const SLOW_RATIO: f64 = 0.02;
+
+/// A message on `/step`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(crate) struct StepMessage {
+    #[serde(flatten, with = "mapper_core::test_plan::step_number::entry")]
+    index: usize,
+    kind: StepKind,
+    phase: Phase,
+    pub(crate) t_s: f64,
+    p3_pa: Option<f64>,
+    valve: Option<f64>,
+    from: Option<OperatingPoint>,
+    to: Option<OperatingPoint>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Phase {
+    Start,
+    End,
+    Abandoned,
+}
+
+/// Steps from their markers. A step without an end ends where the next one starts, or with the last sample.
+pub(crate) fn steps_from_markers(
+    messages: impl Iterator<Item = StepMessage>,
+    last_sample_s: f64,
+    warnings: &mut Vec<ReadWarning>,
+) -> Vec<StepMarker> {
+    let mut steps: Vec<StepMarker> = Vec::new();
+    let mut open = false;
+    for message in messages {
+        match message.phase {
+            Phase::Start => {
+                if let Some(unfinished) = steps.last_mut().filter(|_| open) {
+                    unfinished.end_s = message.t_s;
+                }
+                open = true;
+                steps.push(StepMarker {
+                    index: message.index,
+                    kind: message.kind,
+                    start_s: message.t_s,
+                    end_s: f64::NAN,
+                    from: message.from,
+                    to: message.to,
+                    p3_pa: message.p3_pa.unwrap_or(f64::NAN),
+                    valve_opening_ratio: message.valve.unwrap_or(f64::NAN),
+                });
+            }
+            Phase::Abandoned => {
+                if open && steps.last().is_some_and(|step| step.index == message.index) {
+                    steps.pop();
+                    open = false;
+                }
+            }
+            Phase::End => {
+                let of_open = |step: &&mut StepMarker| open && step.index == message.index;
+                if let Some(step) = steps.last_mut().filter(of_open) {
+                    step.end_s = message.t_s;
+                    open = false;
+                }
+            }
+        }
+    }
+    if let Some(unfinished) = steps.last_mut().filter(|_| open) {
+        unfinished.end_s = last_sample_s.max(unfinished.start_s);
+        let (index, end_s) = (unfinished.index, unfinished.end_s);
+        warnings.push(ReadWarning::UnfinishedStep { index, end_s });
+    }
+    steps
+}
+
+/// Steps from changes of the commanded pressure and valve: each lasts from one jump to the next. The time before
+/// the first jump is the first step, so that a hold at the first point is its beginning.
+pub(crate) fn steps_from_commands(
+    series: &BTreeMap<Channel, Series>,
+    span_s: Option<(f64, f64)>,
+    warnings: &mut Vec<ReadWarning>,
+) -> Vec<StepMarker> {
+    let Some((first_s, last_s)) = span_s else { return Vec::new() };
+    let commands = [Channel::P3Command, Channel::ValveCommand].map(|channel| (channel, series.get(&channel)));
+    if commands.iter().all(|(_, command)| command.is_none()) {
+        warnings.push(ReadWarning::NoCommands);
+        return Vec::new();
+    }
+    let missing = commands.iter().filter(|(_, command)| command.is_none());
+    warnings.extend(missing.map(|(channel, _)| ReadWarning::MissingCommand { channel: *channel }));
+
+    // Start of each step, and the time at which its commands have reached their values.
+    let mut jumps_s: Vec<(f64, f64)> = vec![(first_s, first_s)];
+    jumps_s.extend(jumps(commands[0].1, commands[1].1));
+    let ends_s = jumps_s.iter().skip(1).map(|(start_s, _)| last_before_s(series, *start_s)).chain([last_s]);
+    jumps_s
+        .iter()
+        .zip(ends_s)
+        .enumerate()
+        .map(|(index, ((start_s, settled_s), end_s))| {
+            let held = |command: Option<&Series>| command.and_then(|c| held_number(c, *settled_s));
+            // For a rig without a P3 command: the P3 that it reached.
+            let reached = || {
+                let p3 = series.get(&Channel::P3)?;
+                median(p3.slice(0.5 * (start_s + end_s), end_s).1.iter().filter(|pa| pa.is_finite()))
+            };
+            StepMarker {
+                index,
+                kind: StepKind::Point,
+                start_s: *start_s,
+                end_s,
+                from: None,
+                to: None,
+                p3_pa: commands[0].1.map_or_else(reached, |_| held(commands[0].1)).unwrap_or(f64::NAN),
+                valve_opening_ratio: held(commands[1].1).unwrap_or(f64::NAN),
+            }
+        })
+        .collect()
+}
+
+/// Start and end of each jump of the commands, s.
+fn jumps(p3: Option<&Series>, valve: Option<&Series>) -> Vec<(f64, f64)> {
+    let p3_changes = p3.map(changes).unwrap_or_default();
+    let valve_changes = valve.map(changes).unwrap_or_default();
+    let mut times_s: Vec<f64> = p3_changes.iter().chain(&valve_changes).map(|change| change.t_s).collect();
+    times_s.sort_by(f64::total_cmp);
+    let chains = times_s.chunk_by(|before_s, t_s| t_s - before_s <= JUMP_GAP_S);
+    chains.filter_map(|chain| jump_of_chain(chain, &p3_changes, &valve_changes)).collect()
+}
+
+/// The jump in a chain of changes, which may begin with changes by a controller.
+fn jump_of_chain(chain: &[f64], p3_changes: &[Change], valve_changes: &[Change]) -> Option<(f64, f64)> {
+    let (first_s, last_s) = (*chain.first()?, *chain.last()?);
+    let within = |changes: &[Change], from_s: f64, to_s: f64| -> Vec<Change> {
+        let from = changes.partition_point(|change| change.t_s < from_s);
+        let to = changes.partition_point(|change| change.t_s <= to_s);
+        changes.get(from..to).unwrap_or_default().to_vec()
+    };
+    let moved_ratio = |from_s: f64, to_s: f64| match within(p3_changes, from_s, to_s).as_slice() {
+        [first, .., last] => (last.after / first.before - 1.0).abs(),
+        [only] => (only.after / only.before - 1.0).abs(),
+        [] => 0.0,
+    };
+    // Only its first moments count, or the trim before a jump would become its start.
+    let fast_over =
+        |from_s: f64, share: f64| moved_ratio(from_s, from_s + share * JUMP_GAP_S) > share * FAST_RATIO;
+    let fast = chain.iter().copied().find(|t_s| {
+        !within(valve_changes, *t_s, *t_s).is_empty() || fast_over(*t_s, 0.25) && fast_over(*t_s, 1.0)
+    });
+    let slow = (moved_ratio(first_s, last_s) > SLOW_RATIO).then_some(first_s);
+    Some((fast.or(slow)?, last_s))
+}
+
+/// Time of the last measured sample before `change_s`, or `change_s` if there is none.
+///
+/// A command is seen at a sample. The recording does not show whether that sample was taken before or after the change,
+/// so it belongs to neither step's end.
+fn last_before_s(series: &BTreeMap<Channel, Series>, change_s: f64) -> f64 {
+    let measured = series.iter().filter(|(channel, _)| channel.info().group != Group::Command);
+    let before_s = |series: &Series| {
+        let before = series.t_s.partition_point(|t_s| *t_s < change_s);
+        before.checked_sub(1).map(|index| series.t_s[index])
+    };
+    measured.filter_map(|(_, series)| before_s(series)).reduce(f64::max).unwrap_or(change_s)
+}
+
+/// A command that takes a new value.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    t_s: f64,
+    before: f64,
+    after: f64,
+}
+
+fn changes(command: &Series) -> Vec<Change> {
+    let mut current: Option<f64> = None;
+    let mut changes = Vec::new();
+    for (t_s, value) in command.t_s.iter().zip(&command.values).filter(|(_, value)| value.is_finite()) {
+        let before = current
+            .filter(|held| (value - held).abs() > COMMAND_TOLERANCE_RATIO * value.abs().max(held.abs()));
+        changes.extend(before.map(|before| Change { t_s: *t_s, before, after: *value }));
+        if before.is_some() || current.is_none() {
+            current = Some(*value);
+        }
+    }
+    changes
+}
+
+/// The latest number at or before a time, or else the first one.
+fn held_number(command: &Series, t_s: f64) -> Option<f64> {
+    let after = command.t_s.partition_point(|t| *t <= t_s);
+    let finite = |value: &&f64| value.is_finite();
+    command.values[..after].iter().rfind(finite).or_else(|| command.values.iter().find(finite)).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn commands(rows: &[(f64, f64, f64)]) -> BTreeMap<Channel, Series> {
+        let t_s: Vec<f64> = rows.iter().map(|row| row.0).collect();
+        let column = |pick: fn(&(f64, f64, f64)) -> f64| Series {
+            t_s: t_s.clone(),
+            values: rows.iter().map(pick).collect(),
+        };
+        BTreeMap::from([
+            (Channel::P3Command, column(|row| row.1)),
+            (Channel::ValveCommand, column(|row| row.2)),
+        ])
+    }
+
+    /// Version 1 of the format has `index` from 0, version 2 `step` from 1.
+    #[test]
+    fn marks_of_both_versions_are_the_same_steps() {
+        let message = |name: &str, number: usize, phase: &str, t_s: f64| -> StepMessage {
+            let text = format!(
+                r#"{{"{name}":{number},"kind":"point","phase":"{phase}","t_s":{t_s},"p3_pa":1e5,"valve":0.5}}"#
+            );
+            serde_json::from_str(&text).unwrap()
+        };
+        let steps = |name: &str, first: usize| {
+            let marks = (0..3).flat_map(|place| {
+                let start_s = 10.0 * place as f64;
+                [("start", start_s), ("end", start_s + 9.0)]
+                    .map(|(phase, t_s)| message(name, first + place, phase, t_s))
+            });
+            steps_from_markers(marks, 29.0, &mut Vec::new())
+        };
+        let (old, new) = (steps("index", 0), steps("step", 1));
+        assert_eq!(
+            old.iter().map(|step| (step.index, step.end_s)).collect::<Vec<_>>(),
+            [(0, 9.0), (1, 19.0), (2, 29.0)]
+        );
+        let places = |steps: &[StepMarker]| {
+            steps.iter().map(|step| (step.index, step.start_s, step.end_s)).collect::<Vec<_>>()
+        };
+        assert_eq!(places(&old), places(&new));
+    }
+
+    #[test]
+    fn a_jump_of_pressure_and_valve_a_moment_apart_is_one_step() {
+        let rows = [
+            (0.0, 1.5e5, 0.5),
+            (10.0, 1.5e5, 0.5),
+            (20.0, 2.0e5, 0.5),
+            (20.8, 2.0e5, 0.7),
+            (25.0, f64::NAN, 0.7),
+            (30.0, 2.0e5 * (1.0 + 1e-9), 0.7),
+            (40.0, 1.5e5, 0.7),
+            (50.0, 1.5e5, 0.7),
+        ];
+        let mut warnings = Vec::new();
+        let steps = steps_from_commands(&commands(&rows), Some((0.0, 50.0)), &mut warnings);
+        let found: Vec<_> =
+            steps.iter().map(|s| (s.start_s, s.end_s, s.p3_pa, s.valve_opening_ratio)).collect();
+        assert_eq!(found, [(0.0, 20.0, 1.5e5, 0.5), (20.0, 40.0, 2.0e5, 0.7), (40.0, 50.0, 1.5e5, 0.7)]);
+        assert!(warnings.is_empty());
+    }
+
+    /// The speed controller trims P3 each second, up to the next jump, which follows within a second.
+    #[test]
+    fn a_loop_that_trims_the_pressure_makes_no_steps() {
+        let trims = (3..40).map(|second| (f64::from(second), 1.5e5 * (1.0 + 2e-4 * f64::from(second)), 0.5));
+        let mut rows = vec![(0.0, 1.5e5, 0.5)];
+        rows.extend(trims);
+        rows.extend([(39.9, 2.0e5, 0.7), (45.0, 2.001e5, 0.7), (60.0, 2.001e5, 0.7)]);
+        let steps = steps_from_commands(&commands(&rows), Some((0.0, 60.0)), &mut Vec::new());
+        let starts_s: Vec<_> = steps.iter().map(|step| step.start_s).collect();
+        assert_eq!(starts_s, [0.0, 39.9]);
+    }
+
+    #[test]
+    fn a_slow_ramp_is_one_jump() {
+        let ramp = (0..=60).map(|i| (20.0 + 0.5 * f64::from(i), 1.5e5 + 500.0 * f64::from(i), 0.5));
+        let mut rows = vec![(0.0, 1.5e5, 0.5)];
+        rows.extend(ramp);
+        rows.push((90.0, 1.8e5, 0.5));
+        let steps = steps_from_commands(&commands(&rows), Some((0.0, 90.0)), &mut Vec::new());
+        let found: Vec<_> = steps.iter().map(|step| (step.start_s, step.p3_pa)).collect();
+        // The value at 20 s is the previous one.
+        assert_eq!(found, [(0.0, 1.5e5), (20.5, 1.8e5)]);
+    }
+
+    #[test]
+    fn without_commands_there_are_no_steps_and_a_warning() {
+        let mut warnings = Vec::new();
+        assert!(steps_from_commands(&BTreeMap::new(), Some((0.0, 1.0)), &mut warnings).is_empty());
+        assert_eq!(warnings, [ReadWarning::NoCommands]);
+    }
+}

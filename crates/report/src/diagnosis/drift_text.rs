@@ -1,0 +1,95 @@
+//! Drift as text.
+
+use crate::formatting::{number, table};
+use mapper_core::half_width_95;
+use mapper_diagnose::drift::{Alternative, Cause, DriftReport, RateOrStep, RepeatGroup};
+use std::fmt::Write;
+
+/// The drift diagnosis as text.
+pub fn drift_text(report: &DriftReport) -> String {
+    let mut text = format!("{}\n", report.reason);
+    for drift in &report.drifts {
+        let per_hour = if matches!(drift.size, RateOrStep::RatePerH(_)) { " per hour" } else { "" };
+        let _ = writeln!(
+            text,
+            "{}: {} to {}{per_hour} (95 %), onset from {:.0} s to {:.0} s of the campaign{}.",
+            drift.cause,
+            drift.cause.show(drift.low),
+            drift.cause.show(drift.high),
+            drift.onset_low_s,
+            drift.onset_high_s,
+            likely(&drift.alternatives).map(|others| format!("; or {others}")).unwrap_or_default()
+        );
+    }
+    if report.drifts.is_empty()
+        && let Some(others) = likely(&report.alone)
+    {
+        let _ = writeln!(text, "Not excluded: {others}.");
+    }
+    for group in &report.groups {
+        let _ = write!(text, "\nFrom {} to {}\n{}\n", group.from, group.to, group_table(group));
+    }
+    if !report.detection_limits.is_empty() {
+        text.push_str("\nSmallest steady drift over the campaign that can be detected:");
+        for limit in &report.detection_limits {
+            let _ = match limit.unit {
+                "1" => write!(text, " {} {:.2} %,", limit.cause, 100.0 * limit.change),
+                _ if limit.cause == Cause::BearingFriction => {
+                    write!(text, " {} {},", limit.cause, limit.cause.show(limit.change))
+                }
+                unit if limit.change < 1e-3 => write!(text, " {} {:.1e} {unit},", limit.cause, limit.change),
+                unit => write!(text, " {} {:.3} {unit},", limit.cause, limit.change),
+            };
+        }
+        text.pop();
+        text.push_str(".\n");
+    }
+    text
+}
+
+/// The most probable alternatives, no drift included, with their probabilities; `None` if no alternative is probable enough.
+fn likely(alternatives: &[Alternative]) -> Option<String> {
+    let named = |other: &Alternative| {
+        let cause = other.cause.map_or_else(|| "no drift".to_owned(), Cause::name);
+        format!("{cause} {:.0} %", 100.0 * other.probability)
+    };
+    // Half a per cent would be rounded to zero.
+    let likely_alternatives = alternatives.iter().filter(|other| (5e-3..0.5).contains(&other.probability));
+    let words: Vec<String> = likely_alternatives.take(4).map(named).collect();
+    (!words.is_empty()).then(|| words.join(", "))
+}
+
+fn group_table(group: &RepeatGroup) -> comfy_table::Table {
+    let symbols: Vec<&str> =
+        group.visits.first().map(|visit| visit.channels.keys().copied().collect()).unwrap_or_default();
+    let mut heads: Vec<String> =
+        ["t s", "eta %", "+/- points", "h W/(m2 K)", "+/- W/(m2 K)"].map(str::to_owned).to_vec();
+    heads.extend(symbols.iter().map(|symbol| match symbol.starts_with("m_") {
+        true => format!("d {symbol} g/s"),
+        false => format!("d {symbol}"),
+    }));
+    let mut table = table::with_heads(&heads);
+    for visit in &group.visits {
+        let mut row = vec![
+            format!("{:.0}", visit.t_s),
+            number::number(visit.eta.map(|eta| 100.0 * eta), 2),
+            number::number(visit.sigma_eta.map(|sigma| 100.0 * half_width_95(sigma)), 2),
+            number::number(visit.h_w_m2k, 0),
+            number::number(visit.sigma_h_w_m2k.map(half_width_95), 0),
+        ];
+        row.extend(symbols.iter().map(|symbol| {
+            // Relative to the first visit, corrected for boundary conditions.
+            let first = group.visits.first().and_then(|first| first.channels.get(symbol));
+            let change = visit
+                .channels
+                .get(symbol)
+                .zip(first)
+                .map(|(now, first)| now.end_less_model - first.end_less_model);
+            // Flows in g/s.
+            let (scale, decimals) = if symbol.starts_with("m_") { (1e3, 3) } else { (1.0, 2) };
+            number::number(change.map(|change| scale * change), decimals)
+        }));
+        table.add_row(row);
+    }
+    table
+}

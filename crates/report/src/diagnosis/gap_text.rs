@@ -1,0 +1,338 @@
+//! A diagnosis as a page for a terminal.
+
+use crate::diagnosis::gap_next::next_text;
+use crate::formatting::number::four_figures;
+use mapper_core::{step_number, with_unit};
+use mapper_diagnose::gap::findings::report::{
+    Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
+};
+use mapper_diagnose::gap::reference::baseline_assumptions::Since;
+use std::collections::BTreeMap;
+
+/// Maximum number of causes shown.
+const CAUSES: usize = 5;
+/// Maximum number of places shown.
+const PLACES: usize = 5;
+
+/// The page.
+pub fn gap_text(diagnosis: &Diagnosis) -> String {
+    let mut text = format!("{}\n", headline(diagnosis));
+    if let Some(nearest) = nearest(diagnosis) {
+        text += &format!("{nearest}\n");
+    }
+    if let Some(since) = &diagnosis.since {
+        text += &not_judged(since);
+    }
+    if diagnosis.verdict != Verdict::WithinTolerance {
+        for sensor in &diagnosis.off_at_rest {
+            text += &format!("{sensor}: subtracted before the diagnosis\n");
+        }
+    }
+    if !diagnosis.r#where.is_empty() {
+        text += "\nwhere\n";
+        for place in diagnosis.r#where.iter().take(PLACES) {
+            text += &format!(
+                "  {:20} {:>3.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}\n",
+                place.submodel,
+                100.0 * place.share,
+                place.sigma,
+                place.channel,
+                place.phase,
+                place.region,
+                four_figures(place.size),
+                place.unit,
+            );
+        }
+    }
+    if !diagnosis.smallest_seen.is_empty() {
+        text += &smallest_seen(&diagnosis.smallest_seen);
+    }
+    text += "\nwhich\n";
+    for candidate in diagnosis.candidates.iter().take(CAUSES) {
+        text += &format!("  {:>5.1} %  {}\n", 100.0 * candidate.probability, cause(candidate));
+        for set in &candidate.equivalent {
+            text += &format!("           is indistinguishable from {}\n", set.join(" + "));
+        }
+    }
+    text += &format!("  {:>5.1} %  nothing beyond tolerance\n", 100.0 * diagnosis.probability_none);
+    text += &format!("  {:>5.1} %  a cause outside the catalogue\n", 100.0 * diagnosis.probability_outside);
+    text += &laws(diagnosis);
+    text += &how_far(diagnosis);
+    text += &next_text(diagnosis);
+    if !diagnosis.assumed.is_empty() {
+        text += "\nassumed\n";
+        for assumption in &diagnosis.assumed {
+            text += &format!("  {assumption}\n");
+        }
+    }
+    if !diagnosis.warnings.is_empty() {
+        text += "\nbefore you believe it\n";
+        for warning in &diagnosis.warnings {
+            text += &format!("  {warning}\n");
+        }
+    }
+    text
+}
+
+/// Below this probability a closure term closes a gap without being its cause.
+const NOT_THE_TRUTH: f64 = 0.05;
+
+/// The missing term and the closure term for it.
+fn laws(diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    if let (Some(force), Some(place)) = (diagnosis.forces.first(), diagnosis.r#where.first())
+        && force.submodel == place.submodel
+    {
+        let (low, high) =
+            force.steps.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [value, ..]| {
+                (low.min(*value), high.max(*value))
+            });
+        text += &format!(
+            "\nmissing\n  {}: {} .. {} over the steps\n",
+            force.force,
+            four_figures(low),
+            with_unit(four_figures(high), &force.unit)
+        );
+    }
+    for law in &diagnosis.laws {
+        text += &format!(
+            "\nlaw\n  {}\n  {:.0} %; {} on held-out steps\n",
+            law.sentence,
+            100.0 * law.probability,
+            removed(law)
+        );
+        if law.probability < NOT_THE_TRUTH {
+            text += "  its residual is more than noise: its form is not the true one\n";
+        }
+        for other in &law.equivalent {
+            text += &format!("  indistinguishable from: {other}\n");
+        }
+        if let Some(file) = &law.rhai {
+            text += &format!("  written to {file}: give it with --effect\n");
+        }
+    }
+    text
+}
+
+/// The effect of a closure term on the gap, in words.
+fn removed(law: &Law) -> String {
+    match law.worse.as_slice() {
+        [] => format!("removes {:.0} % of the gap", 100.0 * law.shrink),
+        worse => format!("the gap does not shrink: {} gets worse", worse.join(", ")),
+    }
+}
+
+/// One sentence: the most probable answer.
+pub fn headline(diagnosis: &Diagnosis) -> String {
+    let first = diagnosis.candidates.first();
+    let since = diagnosis.since.as_ref().map(|since| since.recording.as_str());
+    let seen = since.map_or_else(|| "is seen".to_owned(), |since| format!("has changed since {since}"));
+    match (diagnosis.verdict, first) {
+        (Verdict::WithinTolerance, _) if !diagnosis.off_at_rest.is_empty() => format!(
+            "{}; with that subtracted nothing beyond the declared tolerances {seen}",
+            diagnosis.off_at_rest.join(", ")
+        ),
+        (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
+            "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({:.0} %)",
+            named(first),
+            100.0 * first.probability
+        ),
+        (Verdict::WithinTolerance, _) => format!("nothing beyond the declared tolerances {seen}"),
+        (Verdict::Explained, Some(first)) => {
+            let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
+            let what =
+                since.map_or_else(|| "the gap".to_owned(), |since| format!("what changed since {since}"));
+            format!("{} {verb} {what}", named(first))
+        }
+        _ => {
+            let of = since.map_or_else(String::new, |since| format!(" of what changed since {since}"));
+            let outside = format!(
+                "a cause outside the catalogue is the most probable{of} ({:.1} %)",
+                100.0 * diagnosis.probability_outside
+            );
+            law_found(diagnosis).map_or_else(|| outside.clone(), |law| format!("{outside}: {}", law.sentence))
+        }
+    }
+}
+
+/// Effects in both recordings, which are not judged, if a reference recording was given.
+fn not_judged(since: &Since) -> String {
+    let residuals = since.lacking.iter().map(|(channel, residual)| {
+        let (scale, unit) = in_people_s_unit(&residual.unit);
+        format!("{channel} {}", with_unit(four_figures(scale * residual.size), unit))
+    });
+    format!(
+        "only the change since {} is reported; the residual already present there is not judged: {}\n",
+        since.recording,
+        residuals.collect::<Vec<_>>().join(", ")
+    )
+}
+
+/// Pressures have many pascals.
+fn in_people_s_unit(unit: &str) -> (f64, &str) {
+    if unit == "Pa" { (1e-3, "kPa") } else { (1.0, unit) }
+}
+
+/// The effect of the library that is closest to an unmodelled cause.
+fn nearest(diagnosis: &Diagnosis) -> Option<String> {
+    let first = diagnosis.candidates.first()?;
+    match diagnosis.verdict {
+        Verdict::PartlyExplained => Some(format!(
+            "nearest in the catalogue: {}, which leaves more than the declared tolerances",
+            named(first)
+        )),
+        Verdict::Unexplained => Some("no effect of the catalogue comes near".to_owned()),
+        Verdict::WithinTolerance | Verdict::Explained => None,
+    }
+}
+
+/// Effects by their names, with ids and onset times.
+pub fn named(candidate: &Candidate) -> String {
+    let one = |(id, name): (&String, &String)| match candidate.onsets.get(id) {
+        Some(onset) if onset.grows => format!("{name} ({id}) growing from step {}", step_number(onset.step)),
+        Some(onset) => format!("{name} ({id}) from step {} on", step_number(onset.step)),
+        None => format!("{name} ({id})"),
+    };
+    candidate.effects.iter().zip(&candidate.names).map(one).collect::<Vec<_>>().join(" + ")
+}
+
+/// A cause with its parameters.
+pub fn cause(candidate: &Candidate) -> String {
+    let parameters: Vec<String> = candidate.parameters.iter().map(|(name, e)| parameter(name, e)).collect();
+    format!("{}: {}", named(candidate), parameters.join(", "))
+}
+
+fn parameter(name: &str, estimate: &Estimate) -> String {
+    let written = with_unit(four_figures(estimate.value), &estimate.unit);
+    let (low, high) = (four_figures(estimate.low), four_figures(estimate.high));
+    let size = if written == estimate.size { String::new() } else { format!(", {}", estimate.size) };
+    format!("{name} = {written} ({low} .. {high}){size}")
+}
+
+/// The smallest detectable size of each effect.
+fn smallest_seen(effects: &[SmallestSeen]) -> String {
+    let mut text =
+        "\nan effect would have been named, in 95 of 100 recordings like this one, from\n".to_owned();
+    for seen in effects {
+        let size = seen.size.as_deref().unwrap_or("no size within its range");
+        text += &format!("  {:40} {size}\n", format!("{} ({})", seen.name, seen.effect));
+    }
+    text
+}
+
+/// Share of the gap from which a step is named: that of five equal steps.
+const NAMED_SHARE: f64 = 0.2;
+
+/// Number of steps that support the cause, and the step that dominates the gap.
+fn carried_by(gap: &mapper_diagnose::gap::findings::report::Gap) -> String {
+    let all = gap.held_out_steps.len();
+    if all == 0 {
+        return String::new();
+    }
+    let mut text = format!("  {} of {all} steps show a gap", gap.steps_with_gap);
+    if let Some(step) = gap.largest_step.filter(|_| gap.largest_share >= NAMED_SHARE) {
+        text +=
+            &format!("; step {} alone carries {:.0} % of it", step_number(step), 100.0 * gap.largest_share);
+    }
+    text + "\n"
+}
+
+fn how_far(diagnosis: &Diagnosis) -> String {
+    let gap = &diagnosis.gap;
+    if let Some(law) = law_found(diagnosis) {
+        return how_far_by(diagnosis, law, gap.folds.iter().map(Vec::len).sum());
+    }
+    let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+    let mut text = match gap.folds.len() {
+        0 | 1 => "\nhow far, on the steps that were fitted: too few to hold any out\n".to_owned(),
+        folds => format!(
+            "\nhow far, each of {} steps by a fit that did not see it ({folds} folds, each over all speeds and openings)\n",
+            gap.held_out_steps.len()
+        ),
+    };
+    if named && gap.worse.is_empty() {
+        text += &format!(
+            "  {:.1} % of the gap removed; of steps like these {:.0} .. {:.0} %\n",
+            100.0 * gap.shrink,
+            (100.0 * gap.shrink_low).floor(),
+            (100.0 * gap.shrink_high).ceil()
+        );
+        text += &carried_by(gap);
+    } else if !gap.worse.is_empty() {
+        text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
+    }
+    text += &by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 });
+    if named {
+        text += &strained(gap);
+        text += &points(&gap.points);
+    }
+    text
+}
+
+/// If tolerances can replace the cause without a larger residual: the tolerance that would have to exceed its prior.
+fn strained(gap: &Gap) -> String {
+    let Some(strained) = gap.strained.as_ref().filter(|_| gap.shrink < STANDS_IN) else {
+        return String::new();
+    };
+    format!(
+        "  tolerances can stand in for the cause, beyond what is declared: {} by {:.1} sigma\n",
+        strained.what, strained.sigmas
+    )
+}
+
+/// A cause that removes less than this share of the residual after tolerances can be replaced by them.
+const STANDS_IN: f64 = 0.5;
+
+/// The gap reduction of a closure term that resembles no effect of the library.
+fn how_far_by(diagnosis: &Diagnosis, law: &Law, steps: usize) -> String {
+    let seen = match law.held_out_steps {
+        0 => "on the steps that were fitted: too few to hold any out".to_owned(),
+        held => format!("on {held} of {steps} steps, used neither to find the law nor to fit it"),
+    };
+    format!("\nhow far, {seen}\n  {}\n", removed(law))
+        + by_channel(diagnosis, &law.channels, "with the law", 3).as_str()
+}
+
+/// The residual of each channel in the first so many columns.
+fn by_channel(
+    diagnosis: &Diagnosis,
+    channels: &BTreeMap<String, ChannelGap>,
+    with: &str,
+    columns: usize,
+) -> String {
+    let mut text = format!("  {:4}", "");
+    let bare = if diagnosis.since.is_some() { "as healthy" } else { "nominal" };
+    for head in [bare, "tolerances fitted", with].iter().take(columns) {
+        text += &format!(" {head:>18}");
+    }
+    text += "\n";
+    for (channel, row) in channels {
+        let (scale, unit) = in_people_s_unit(&row.unit);
+        text += &format!("  {channel:4}");
+        for value in [row.nominal, row.before, row.after].iter().take(columns) {
+            text += &format!(" {:>18}", four_figures(scale * value));
+        }
+        text += &format!(" {unit}\n");
+    }
+    text
+}
+
+/// The effect of the cause on efficiency and heat transfer at equal speed and pressures.
+fn points(points: &[PointGap]) -> String {
+    let largest = |of: fn(&PointGap) -> f64| {
+        let changes = points.iter().map(of).filter(|d| d.is_finite());
+        changes.fold(0.0f64, |most, d| if d.abs() > most.abs() { d } else { most })
+    };
+    let eta_points = 100.0 * largest(|p| p.eta_after - p.eta_before);
+    let h_w_m2k = largest(|p| p.h_after_w_m2k - p.h_before_w_m2k);
+    let eta = if eta_points.abs() < 0.005 {
+        "does not touch the efficiency".to_owned()
+    } else {
+        format!("changes the efficiency by up to {eta_points:+.2} points")
+    };
+    let h =
+        if h_w_m2k.abs() < 0.5 { "nor h".to_owned() } else { format!("h by up to {h_w_m2k:+.0} W/(m2 K)") };
+    let joined = if eta_points.abs() < 0.005 && h_w_m2k.abs() >= 0.5 { "but changes " } else { "" };
+    let nor = if eta_points.abs() >= 0.005 && h_w_m2k.abs() < 0.5 { "not h".to_owned() } else { h };
+    format!("  at equal speed and pressures the cause {eta}, {joined}{nor}\n")
+}

@@ -1,0 +1,238 @@
+//! The cause of a deviation on one side of a machine, for a terminal and a report.
+
+use crate::formatting::table;
+use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, Which, Word};
+use std::fmt::Write;
+
+/// Maximum number of causes shown in addition to the undecided ones.
+const FURTHER_ROWS: usize = 3;
+/// Causes less likely than this are not shown.
+const NOT_WORTH: f64 = 0.005;
+
+/// The verdict, the causes, the residual that no fit examined, the question and its limits.
+pub fn why_text(found: &Diagnosis) -> String {
+    let first = found.judged.first().copied().unwrap_or("");
+    // Writing to a String cannot fail.
+    let mut text = format!(
+        "Why: the {} side against the campaign's machine, driven by measured {}; judged: {}.\n\n",
+        found.side.name(),
+        found.driven_by.join(", "),
+        found.judged.join(", ")
+    );
+    let _ = writeln!(text, "{}\n", headline(found));
+    causes(&mut text, found);
+    let _ = writeln!(
+        text,
+        "fitted    {first} is off by {:.2} K rms without a cause, by {:.2} K with what is named",
+        found.before_k, found.after_k
+    );
+    match &found.held_out {
+        Some(held_out) => phases(&mut text, held_out, first),
+        None => text.push_str("held out  nothing: the fitted part is a single phase\n"),
+    }
+    if let Some(beyond) = &found.beyond {
+        let _ = writeln!(text, "behind    {}\n          {}", behind(beyond), verdict(beyond, found.word));
+    }
+    if found.side == Which::Turbine {
+        unknowns(&mut text, found);
+    }
+    if !found.asked.is_empty() {
+        let sizes =
+            found.asked.iter().filter_map(|seen| Some(format!("{} {}", seen.effect, seen.size.as_deref()?)));
+        let sizes = sizes.collect::<Vec<_>>().join(", ");
+        let _ = writeln!(
+            text,
+            "\nAsked, with the smallest size that a log like this one shows in 95 of 100: {sizes}."
+        );
+    }
+    if !found.not_asked.is_empty() {
+        text.push_str("\nNot asked, for this side cannot say:\n");
+        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+        for effect in &found.not_asked {
+            match reasons.iter_mut().find(|(reason, _)| *reason == effect.reason) {
+                Some((_, effects)) => effects.push(&effect.effect),
+                None => reasons.push((&effect.reason, vec![&effect.effect])),
+            }
+        }
+        for (reason, effects) in reasons {
+            let _ = writeln!(text, "  {}: {reason}", effects.join(", "));
+        }
+    }
+    text
+}
+
+fn headline(found: &Diagnosis) -> String {
+    let open = &found.causes[..found.open.min(found.causes.len())];
+    match found.word {
+        Word::Named => format!(
+            "{} explains it ({}).",
+            open.first().map_or_else(String::new, |cause| begun(&cause.names.join(" and "))),
+            open.first().map_or_else(String::new, |cause| percent(cause.probability))
+        ),
+        Word::NotDistinguished => format!(
+            "{} explain it equally well and are indistinguishable.",
+            begun(&open.iter().map(|cause| cause.names.join(" and ")).collect::<Vec<_>>().join("; or "))
+        ),
+        Word::NotBorneOut => format!(
+            "No cause is named: {} would explain what was fitted, but phases that it did not see get no better.",
+            open.first().map_or_else(String::new, |cause| cause.names.join(" and "))
+        ),
+        Word::WithinTolerance => format!(
+            "Nothing is seen beyond the usual uncertainty of such a machine (no cause: {}).",
+            percent(found.probability_none)
+        ),
+        Word::Outside => format!(
+            "Nothing of the catalogue explains it: something outside it acts here ({}). The residual of the nearest cause is below.",
+            percent(found.probability_outside)
+        ),
+    }
+}
+
+/// With a capital first letter.
+fn begun(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn causes(text: &mut String, found: &Diagnosis) {
+    let shown = |(place, cause): &(usize, &Cause)| {
+        *place < found.open
+            || *place == 0
+            || (*place < found.open + FURTHER_ROWS && cause.probability > NOT_WORTH)
+    };
+    let heads = ["cause", "probability", "size", "95 % interval", "left, K"].map(str::to_owned);
+    let mut rows = table::with_heads(&heads);
+    for (_, cause) in found.causes.iter().enumerate().filter(shown) {
+        let each = |of: &dyn Fn(&mapper_diagnose::gap::findings::report::Estimate) -> String| {
+            cause.parameters.values().map(of).collect::<Vec<_>>().join("; ")
+        };
+        let interval = each(&|e| {
+            let scale = if e.unit == "m" { 1e3 } else { 1.0 };
+            let unit = if e.unit == "m" {
+                "mm"
+            } else if e.unit == "1" {
+                ""
+            } else {
+                &e.unit
+            };
+            format!("{} .. {} {unit}", significant(scale * e.low), significant(scale * e.high))
+                .trim_end()
+                .to_owned()
+        });
+        let end = if cause.at_the_end.is_empty() { "" } else { " (end of its range)" };
+        rows.add_row([
+            cause.effects.join(" + "),
+            percent(cause.probability),
+            each(&|e| e.size.clone()) + end,
+            interval,
+            cause.left_k.first().map_or_else(String::new, |k| format!("{k:.2}")),
+        ]);
+    }
+    let _ = writeln!(text, "{rows}\n");
+    if found.causes[..found.open.min(found.causes.len())].iter().any(|cause| !cause.at_the_end.is_empty()) {
+        text.push_str(
+            "A size at the end of its range is more than such an effect can be: rather something that the catalogue has not.\n\n",
+        );
+    }
+}
+
+/// No log makes a cause certain.
+fn percent(probability: f64) -> String {
+    match 100.0 * probability {
+        p if p > 99.0 => "over 99 %".to_owned(),
+        p if p < 1.0 => "below 1 %".to_owned(),
+        p => format!("{p:.0} %"),
+    }
+}
+
+/// Three figures.
+fn significant(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let decimals = (2 - value.abs().log10().floor() as i32).max(0);
+    format!("{value:.*}", decimals as usize)
+}
+
+fn phases(text: &mut String, held_out: &HeldOut, channel: &str) {
+    let _ = writeln!(
+        text,
+        "held out  {channel} of each phase by fits to the others: {:.2} K rms without a cause, {:.2} K with what these choose;\n          \
+         taken off a phase: {:.2} K on average ({:.2} .. {:.2}, {} phases)",
+        held_out.before_k,
+        held_out.after_k,
+        held_out.shrink_k,
+        held_out.shrink_low_k,
+        held_out.shrink_high_k,
+        held_out.phases.len()
+    );
+    let named = held_out.phases.iter().any(|phase| !phase.chosen.is_empty());
+    if named && held_out.after_k >= held_out.before_k {
+        text.push_str(
+            "          no shrink is claimed: on phases that it did not see the cause does not help\n",
+        );
+    } else if named && held_out.shrink_low_k <= 0.0 {
+        text.push_str("          so few phases do not show by themselves that it is more than chance\n");
+    }
+    for phase in &held_out.phases {
+        let chosen =
+            if phase.chosen.is_empty() { String::new() } else { format!("  {}", phase.chosen.join(" + ")) };
+        let _ = writeln!(
+            text,
+            "          {:6.1} .. {:5.1} s, {:3.0} to {:3.0} krpm: {:6.2} -> {:5.2} K{chosen}",
+            phase.from_s,
+            phase.until_s,
+            phase.from_rpm / 1e3,
+            phase.until_rpm / 1e3,
+            phase.before_k,
+            phase.after_k
+        );
+    }
+}
+
+fn behind(beyond: &Beyond) -> String {
+    format!(
+        "{:.1} to {:.1} s, {} readings that were not fitted: {:.2} K rms without a cause, {:.2} K with; expected {:.2} K ({:.2} .. {:.2});\n          \
+         intervals hold {:.0} % of the readings",
+        beyond.from_s,
+        beyond.until_s,
+        beyond.rows,
+        beyond.before_k,
+        beyond.after_k,
+        beyond.expected_k,
+        beyond.expected_low_k,
+        beyond.expected_high_k,
+        100.0 * beyond.inside_ratio
+    )
+}
+
+fn verdict(beyond: &Beyond, word: Word) -> &'static str {
+    match (beyond.after_k > beyond.expected_high_k, word) {
+        (false, _) => "the residual is within what the fitted part predicts",
+        (true, Word::Named | Word::NotDistinguished) => {
+            "more is left than this cause lets expect: something else acts there too, or it is another one"
+        }
+        (true, _) => {
+            "more is left than the fitted part lets expect: something acts there that showed nowhere before"
+        }
+    }
+}
+
+fn unknowns(text: &mut String, found: &Diagnosis) {
+    let heads = ["unknown", "value", "95 % interval", "unit", "known from", "what it is"].map(str::to_owned);
+    let mut rows = table::with_heads(&heads);
+    for column in rows.column_iter_mut().skip(3) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Left);
+    }
+    for unknown in &found.unknowns {
+        rows.add_row([
+            unknown.name.to_owned(),
+            format!("{:.3}", unknown.value),
+            format!("{:.3} .. {:.3}", unknown.low, unknown.high),
+            unknown.unit.to_owned(),
+            if unknown.identified { "the log" } else { "beforehand" }.to_owned(),
+            unknown.description.to_owned(),
+        ]);
+    }
+    let _ = writeln!(text, "\n{rows}");
+}

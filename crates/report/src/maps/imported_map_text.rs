@@ -1,0 +1,99 @@
+//! How a map file was understood, as text.
+
+use crate::formatting::table;
+use mapper_core::{ImportRemark, ImportedColumn, ImportedMap, MapPoint};
+use std::fmt::Write;
+
+/// The columns, the speed lines, and sentences on what was assumed.
+pub fn imported_map_text(found: &ImportedMap) -> String {
+    let map = &found.map;
+    let mut text = String::new();
+    text.push_str(&columns_text(&found.columns, "rpm, kg/s, Pa, K and as fractions"));
+    let heads = ["corrected rpm", "points", "flow kg/s", "pressure ratio", "efficiency %"];
+    let mut lines = table::with_heads(&heads.map(str::to_owned));
+    for line in &map.lines {
+        let range = |value: fn(&MapPoint) -> Option<f64>, factor: f64, digits: usize| {
+            let values = line.points.iter().filter_map(value);
+            let (low, high) =
+                values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+            if low > high {
+                "-".to_owned()
+            } else {
+                format!("{:.digits$} to {:.digits$}", factor * low, factor * high)
+            }
+        };
+        lines.add_row(vec![
+            format!("{:.0}", line.speed_corrected_rpm),
+            line.points.len().to_string(),
+            range(|point| Some(point.flow_corrected_kg_s), 1.0, 4),
+            range(|point| Some(point.pressure_ratio), 1.0, 3),
+            range(|point| point.eta, 100.0, 1),
+        ]);
+    }
+    let _ = writeln!(text, "{lines}\n\nCorrected to {}.", map.reference);
+    let _ = match map.efficiency {
+        Some(definition) => writeln!(text, "Efficiency: {}.", definition.description()),
+        None => writeln!(text, "The file does not name the definition of its efficiency."),
+    };
+    for remark in &found.remarks {
+        let _ = writeln!(text, "{}", import_remark_text(*remark));
+    }
+    text
+}
+
+/// The columns of a table with their ranges in `units`; empty if there are none.
+pub(crate) fn columns_text(columns: &[ImportedColumn], units: &str) -> String {
+    if columns.is_empty() {
+        return String::new();
+    }
+    let mut rows = table::with_heads(&["heading", "quantity", "unit", "from", "to"].map(str::to_owned));
+    for column in columns {
+        rows.add_row(vec![
+            column.heading.clone(),
+            column.quantity.to_owned(),
+            if column.unit.is_empty() { "none named".to_owned() } else { column.unit.clone() },
+            significant(column.low),
+            significant(column.high),
+        ]);
+    }
+    format!("{rows}\n\nFrom and to are in {units}.\n\n")
+}
+
+fn significant(value: f64) -> String {
+    let digits = if value.abs() >= 100.0 { 0 } else { 4 };
+    format!("{value:.digits$}")
+}
+
+/// A sentence on what was assumed.
+pub fn import_remark_text(remark: ImportRemark) -> String {
+    match remark {
+        ImportRemark::NoHeading => {
+            "The columns have no headings; taken as rpm, kg/s, pressure ratio and efficiency.".to_owned()
+        }
+        ImportRemark::EfficiencyInPercent => {
+            "The efficiencies are taken as percentages, from their size.".to_owned()
+        }
+        ImportRemark::SpeedOfRowAbove => "Rows without a speed have that of the row above.".to_owned(),
+        ImportRemark::FlowUnitAssumed => {
+            "The file names no unit of flow; kg/s was taken. If it has lb/s, give `--with flow=lb/s`.".to_owned()
+        }
+        ImportRemark::SpeedParameterAssumed => {
+            "The speeds have no unit; they were taken as rpm/K^0.5, from their size. If they are corrected speeds, give `--with speed=rpm`."
+                .to_owned()
+        }
+        ImportRemark::DesignSpeed { rpm } => {
+            format!("The relative speeds of the file were multiplied by {rpm} rpm.")
+        }
+        ImportRemark::NoEfficiency => "The file has no efficiencies.".to_owned(),
+        ImportRemark::ReducedQuantities { reference } => {
+            format!("Reduced speed and flow were corrected to {reference}; give `--reference` for another state.")
+        }
+        ImportRemark::Measured => {
+            "The points are as measured; they were corrected. Their efficiency is the apparent one: it includes heat transfer."
+                .to_owned()
+        }
+        ImportRemark::ExtrapolatedNodes { count } => {
+            format!("{count} extrapolated nodes of a fitted map were left out.")
+        }
+    }
+}

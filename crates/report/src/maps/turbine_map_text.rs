@@ -1,0 +1,103 @@
+//! Turbine maps as text: how a file was understood, the fit, the comparison of two.
+
+use crate::formatting::number::number;
+use crate::formatting::table;
+use crate::maps::imported_map_text::{columns_text, import_remark_text};
+use mapper_core::{FittedTurbine, ImportedTurbine, TurbineMap, TurbineMapPoint};
+use mapper_maps::TurbineComparison;
+use std::fmt::Write;
+
+/// The columns, the speed lines, and sentences on what was assumed.
+pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
+    let mut text =
+        columns_text(&found.columns, "rpm or rpm/K^0.5, kg/s or kg K^0.5/(s kPa), and as fractions");
+    let heads = ["vanes", "rpm/K^0.5", "points", "flow kg K^0.5/(s kPa)", "expansion ratio", "efficiency %"];
+    let mut lines = table::with_heads(&heads.map(str::to_owned));
+    for line in found.map.lines() {
+        let range = |value: fn(&TurbineMapPoint) -> Option<f64>, factor: f64, digits: usize| {
+            let values = line.iter().filter_map(value);
+            let (low, high) =
+                values.fold((f64::INFINITY, f64::NEG_INFINITY), |r, v| (r.0.min(v), r.1.max(v)));
+            let shown = |value: f64| format!("{:.digits$}", factor * value);
+            if low > high { "-".to_owned() } else { format!("{} to {}", shown(low), shown(high)) }
+        };
+        lines.add_row(vec![
+            number(line.first().and_then(|point| point.vane_position), 3),
+            number(line.first().map(|point| point.speed_parameter_rpm_sqrt_k), 0),
+            line.len().to_string(),
+            range(|point| Some(point.flow_parameter_kg_sqrt_k_s_kpa), 1.0, 5),
+            range(|point| Some(point.expansion_ratio), 1.0, 3),
+            range(|point| point.efficiency, 100.0, 1),
+        ]);
+    }
+    let _ = writeln!(
+        text,
+        "{lines}\n\nThe map of a turbine: speed and flow are reduced by the state at its inlet."
+    );
+    for remark in &found.remarks {
+        let _ = writeln!(text, "{}", import_remark_text(*remark));
+    }
+    text
+}
+
+/// A row for each line and the error at lines that the fit does not know.
+pub fn turbine_fit_text(map: &TurbineMap, fitted: &FittedTurbine) -> String {
+    let heads = ["vanes", "rpm/K^0.5", "expansion ratio", "flow", "+/- %", "best efficiency %", "+/- points"];
+    let mut rows = table::with_heads(&heads.map(str::to_owned));
+    for line in &fitted.lines {
+        let measured = || line.nodes.iter().filter(|node| !node.extrapolated);
+        let Some((first, last)) = measured().next().zip(measured().next_back()) else { continue };
+        let best = measured().max_by(|a, b| {
+            a.efficiency.unwrap_or(f64::NEG_INFINITY).total_cmp(&b.efficiency.unwrap_or(f64::NEG_INFINITY))
+        });
+        let half = best.and_then(|node| Some(node.efficiency_high? - node.efficiency?));
+        rows.add_row(vec![
+            number(line.vane_position, 3),
+            format!("{:.0}", line.speed_parameter_rpm_sqrt_k),
+            format!("{:.2} to {:.2}", first.expansion_ratio, last.expansion_ratio),
+            format!("{:.5}", last.flow_parameter_kg_sqrt_k_s_kpa),
+            format!("{:.1}", 100.0 * (last.flow_high / last.flow_parameter_kg_sqrt_k_s_kpa - 1.0)),
+            number(best.and_then(|node| node.efficiency).map(|eta| 100.0 * eta), 1),
+            number(half.map(|half| 100.0 * half), 1),
+        ]);
+    }
+    let mut text = format!("{rows}\n\nFlow in kg K^0.5/(s kPa) at the highest measured expansion ratio. ");
+    let _ = write!(
+        text,
+        "{} points. Inner lines that the fit does not know are {:.1} % of flow",
+        map.points.len(),
+        100.0 * fitted.flow_error_rms_ratio
+    );
+    let _ = match fitted.efficiency_error_rms {
+        Some(rms) => writeln!(text, " and {:.1} points of efficiency from it, rms.", 100.0 * rms),
+        None => writeln!(text, " from it, rms."),
+    };
+    text
+}
+
+/// Sentences on the differences between two maps.
+pub fn turbine_comparison_text(comparison: &TurbineComparison) -> String {
+    let percent = |value: Option<f64>| number(value.map(|value| 100.0 * value), 2);
+    let mut rows = table::with_heads(&["", "mean", "rms", "differs at % of points"].map(str::to_owned));
+    for (name, mean, rms, share) in [
+        (
+            "flow %",
+            comparison.flow_difference_mean_ratio,
+            comparison.flow_difference_rms_ratio,
+            comparison.flow_differs_ratio,
+        ),
+        (
+            "efficiency points",
+            comparison.efficiency_difference_mean,
+            comparison.efficiency_difference_rms,
+            comparison.efficiency_differs_ratio,
+        ),
+    ] {
+        rows.add_row(vec![name.to_owned(), percent(mean), percent(rms), format!("{:.0}", 100.0 * share)]);
+    }
+    format!(
+        "{rows}\n\nSecond minus first at {} points of the second map; {} are beyond the first and were not compared.\n",
+        comparison.points.len(),
+        comparison.not_compared
+    )
+}

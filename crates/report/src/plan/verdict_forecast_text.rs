@@ -1,0 +1,39 @@
+//! The forecast of verdicts as lines for a terminal.
+
+use crate::formatting::duration::duration;
+use mapper_core::{Advice, CampaignChange, VerdictForecast, half_width_95};
+
+/// The expected verdicts in a line, and below it a line for each change that improves them; empty without a forecast.
+pub fn verdict_forecast_text(forecast: Option<VerdictForecast>, advice: &[Advice]) -> String {
+    let Some(forecast) = forecast else { return String::new() };
+    let mut text = format!("Expected: {}\n", verdicts(&forecast));
+    if forecast.near_limit {
+        text += "These steps contain hardly enough information on alpha_A, probe and heating/cooling ratio: all points may\n\
+                 turn out doubtful (`rests_on_declaration`).\n";
+    }
+    if forecast.surely_good() < forecast.points && advice.is_empty() {
+        text += "Neither a longer dwell nor a longer soak makes more of them good; add points, or hold what is known\n\
+                 (`identification.joint`).\n";
+    }
+    for Advice { change, forecast: after } in advice {
+        let more = duration(after.duration_s - forecast.duration_s);
+        text += &format!("  {} (+{more}): {}\n", change_text(*change), verdicts(after));
+    }
+    text
+}
+
+fn verdicts(forecast: &VerdictForecast) -> String {
+    let VerdictForecast { points, good, .. } = forecast;
+    let error = forecast.eta_standard_error.filter(|_| *good > 0);
+    let error = error.map_or_else(String::new, |sigma| {
+        format!(", efficiency +/- {:.2} points (95 %)", 100.0 * half_width_95(sigma))
+    });
+    format!("{good} of {points} points good{error}")
+}
+
+fn change_text(change: CampaignChange) -> String {
+    match change {
+        CampaignChange::DwellS(dwell_s) => format!("`timing: {{dwell: {dwell_s:.0} s}}`"),
+        CampaignChange::SoakS(soak_s) => format!("`zero: {{soak: {:.0} min}}`", soak_s / 60.0),
+    }
+}

@@ -1,0 +1,106 @@
+//! The uncertainty budgets of the points, as tables for the report and as a file.
+
+use crate::formatting::markdown::{self, Align};
+use mapper_core::{PointBudgets, UncertaintyBudget, step_number};
+use std::fmt::Write;
+
+/// Head of the file: one row for each source of each number of each point.
+pub const BUDGET_COLUMNS: [&str; 13] = [
+    "step",
+    "quantity",
+    "value",
+    "source",
+    "standard_uncertainty",
+    "unit",
+    "sensitivity",
+    "contribution",
+    "degrees_of_freedom",
+    "combined_standard_uncertainty",
+    "effective_degrees_of_freedom",
+    "coverage_factor",
+    "expanded_uncertainty",
+];
+
+/// The rows of the file. An empty cell of degrees of freedom means that the uncertainty is known exactly.
+pub fn budget_rows(budgets: &[PointBudgets]) -> Vec<[String; 13]> {
+    let number = |value: f64| format!("{value:e}");
+    let freedom = |value: Option<f64>| value.map(|value| format!("{value:.1}")).unwrap_or_default();
+    let mut rows = Vec::new();
+    for point in budgets {
+        let numbers = [
+            ("eta", point.eta.as_ref()),
+            ("h_w_m2k", point.h_w_m2k.as_ref()),
+            ("pressure_ratio", Some(&point.pressure_ratio)),
+        ];
+        for (quantity, budget) in numbers {
+            let Some(budget) = budget else { continue };
+            rows.extend(budget.rows.iter().map(|row| {
+                [
+                    step_number(point.step).to_string(),
+                    quantity.to_owned(),
+                    number(budget.value),
+                    row.source.clone(),
+                    number(row.standard_uncertainty),
+                    row.unit.clone(),
+                    number(row.sensitivity),
+                    number(row.contribution),
+                    freedom(row.degrees_of_freedom),
+                    number(budget.combined_standard_uncertainty()),
+                    freedom(budget.degrees_of_freedom),
+                    format!("{:.2}", budget.coverage_factor),
+                    number(budget.expanded_uncertainty),
+                ]
+            }));
+        }
+    }
+    rows
+}
+
+/// The section of the report: contributions to the efficiency of every point, and to its pressure ratio. Empty without budgets.
+pub(crate) fn budget_section(budgets: &[PointBudgets]) -> String {
+    let etas: Vec<(usize, &UncertaintyBudget)> =
+        budgets.iter().filter_map(|point| Some((point.step, point.eta.as_ref()?))).collect();
+    let ratios: Vec<(usize, &UncertaintyBudget)> =
+        budgets.iter().map(|point| (point.step, &point.pressure_ratio)).collect();
+    if etas.is_empty() {
+        return String::new();
+    }
+    let mut text = "\n## Uncertainty budget\n\nContributions to the standard uncertainty by source, in the form of the GUM: standard uncertainty of the \
+                    source times sensitivity. They combine as the root of the sum of squares; U is k times that, with a coverage of 95 %. \
+                    `budget.csv` has standard uncertainties, sensitivities and degrees of freedom, also of h.\n"
+        .to_owned();
+    for (title, unit, scale, digits, budgets) in
+        [("Efficiency", "points", 100.0, 2, etas), ("Pressure ratio", "1e-3", 1e3, 2, ratios)]
+    {
+        let _ = writeln!(text, "\n### {title}, {unit}\n");
+        text.push_str(&table(&budgets, scale, digits));
+    }
+    text
+}
+
+/// One row for each source, one column for each step.
+fn table(budgets: &[(usize, &UncertaintyBudget)], scale: f64, digits: usize) -> String {
+    let mut sources: Vec<&str> = Vec::new();
+    for row in budgets.iter().flat_map(|(_, budget)| &budget.rows) {
+        if !sources.contains(&row.source.as_str()) {
+            sources.push(&row.source);
+        }
+    }
+    let mut heads = vec!["step".to_owned()];
+    heads.extend(sources.iter().map(|source| (*source).to_owned()));
+    heads.extend(["combined".to_owned(), "k".to_owned(), "U".to_owned()]);
+    let cell = |value: f64| format!("{:.digits$}", scale * value);
+    let rows = budgets.iter().map(|(step, budget)| {
+        let of = |source: &&str| {
+            let row = budget.rows.iter().find(|row| row.source == *source);
+            row.map_or_else(|| "-".to_owned(), |row| cell(row.contribution.abs()))
+        };
+        let mut cells = vec![step_number(*step).to_string()];
+        cells.extend(sources.iter().map(of));
+        cells.push(cell(budget.combined_standard_uncertainty()));
+        cells.push(format!("{:.2}", budget.coverage_factor));
+        cells.push(cell(budget.expanded_uncertainty));
+        cells
+    });
+    markdown::table(&heads, Align::Right, rows)
+}

@@ -1,0 +1,41 @@
+//! The share of the points' intervals that is common to all of them, in a sentence.
+
+use crate::formatting::display::Display;
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::{IdentifiedPoint, Verdict, half_width_95};
+use mapper_numerics::statistics::median;
+
+/// One sentence for the slowest speed and the others, since offsets count by one over the square of the speed; `None` if no
+/// point has an interval with a common part.
+pub fn shared_errors_text<'a>(
+    points: impl Iterator<Item = &'a IdentifiedPoint>,
+    units: &DisplayUnits,
+) -> Option<String> {
+    let display = Display::new(units);
+    let usable: Vec<&IdentifiedPoint> = points
+        .filter(|point| point.verdict != Verdict::Unusable && point.eta_low.is_some())
+        .filter(|point| !point.common.eta_changes.is_empty())
+        .collect();
+    let speed = |point: &IdentifiedPoint| point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
+    let slowest_rpm = usable.iter().map(|point| speed(point)).reduce(f64::min)?;
+    // The speed along a line varies by a few per cent at most.
+    let (slow, fast): (Vec<&IdentifiedPoint>, Vec<&IdentifiedPoint>) =
+        usable.iter().copied().partition(|point| speed(point) <= 1.05 * slowest_rpm);
+    let of = |points: &[&IdentifiedPoint]| {
+        let half = |value: fn(&IdentifiedPoint) -> Option<f64>| {
+            median(points.iter().filter_map(|point| value(point))).map(|x| 100.0 * x)
+        };
+        let all = half(|point| Some(0.5 * (point.eta_high? - point.eta_low?)))?;
+        let common = half(|point| Some(half_width_95(point.common.eta_standard_error())))?;
+        Some(format!("{common:.2} of +/- {all:.2} points"))
+    };
+    let first = format!("{} at {} {}", of(&slow)?, display.speed(slowest_rpm), units.speed);
+    let parts = match of(&fast) {
+        Some(rest) => format!("{first} and {rest} above"),
+        None => first,
+    };
+    Some(format!(
+        "Common to all points (offsets, gains and what the method shares, which hit or miss them together): {parts}; in \
+         quadrature, the rest is each point's own. The map's files carry both parts."
+    ))
+}

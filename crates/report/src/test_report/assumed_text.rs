@@ -1,0 +1,61 @@
+//! Sizes of the machine that a campaign assumes, and the files of a first campaign.
+
+use crate::formatting::wrapped::wrapped;
+use mapper_campaign::{AssumedSize, Campaign};
+use std::path::Path;
+
+/// Width of the text, columns.
+const COLUMNS: usize = 80;
+
+/// The assumed sizes in one sentence; `None` if the campaign gives all of them.
+pub fn assumed_sentence(campaign: &Campaign) -> Option<String> {
+    let sizes = &campaign.machine.assumed;
+    if sizes.is_empty() {
+        return None;
+    }
+    let named: Vec<String> = sizes.iter().map(named).collect();
+    let wheel_mm = 1e3 * campaign.machine.params.compressor.wheel_diameter_m;
+    Some(format!(
+        "assumed, from the machine of Burke et al. scaled to a wheel of {} mm: {}",
+        significant(wheel_mm),
+        named.join(", ")
+    ))
+}
+
+/// [`assumed_sentence`] with a line for each 80 columns; empty if there is none.
+pub fn assumed_text(campaign: &Campaign) -> String {
+    assumed_sentence(campaign).map_or_else(String::new, |sentence| wrapped(&sentence, COLUMNS, 2))
+}
+
+/// The files of a first campaign, and the next commands.
+pub fn first_campaign_text(
+    campaign: &Path,
+    map: &Path,
+    channels: Option<&Path>,
+    points: usize,
+    assumed: &[AssumedSize],
+) -> String {
+    let mut text =
+        format!("campaign   {} ({points} points)\nmap        {}\n", campaign.display(), map.display());
+    if let Some(channels) = channels {
+        text += &format!("channels   {}\n", channels.display());
+    }
+    let words = format!(
+        "{} sizes of the machine are assumed from its wheel: they are listed in the campaign as comments. Correct the ones that you know.",
+        assumed.len()
+    );
+    text += &format!("\n{}\n", wrapped(&words, COLUMNS, 0).trim_end());
+    text += &format!("Next: mapper check {}\n", campaign.display());
+    text
+}
+
+fn named(size: &AssumedSize) -> String {
+    let unit = if size.unit.is_empty() { String::new() } else { format!(" {}", size.unit) };
+    format!("{} {}{unit}", size.key, significant(size.value))
+}
+
+/// Three significant digits, without trailing zeros.
+fn significant(value: f64) -> String {
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
+}

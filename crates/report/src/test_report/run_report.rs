@@ -1,0 +1,353 @@
+//! The test report of a run, as Markdown.
+
+use crate::formatting::display::Display;
+use crate::formatting::duration::duration;
+use crate::formatting::markdown::{self, Align};
+use crate::point_results::budget_table::budget_section;
+use crate::point_results::disagreement::disagreement_text;
+use crate::point_results::lines_of_points::verdict_sentence;
+use crate::point_results::point_table::{point_cells, point_groups, point_heads};
+use crate::point_results::point_warnings::doubts;
+use crate::point_results::points::score_text;
+use crate::point_results::shared_errors::shared_errors_text;
+use crate::test_report::assumed_text::assumed_sentence;
+use crate::test_report::conditions::{CONDITION_HEADS, condition_rows};
+use crate::test_report::ending_text::PointsOrigin;
+use crate::test_report::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, instrument_rows};
+use crate::test_report::key_figures::key_figures;
+use crate::test_report::repeated_jumps::repeated_jumps_text;
+use crate::test_report::surge_text::surge_text;
+use crate::test_report::zero_text::{ZERO_HEADS, zero_rows, zero_words};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::{
+    Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, PointBudgets,
+    Recording, ReferenceState, terminal_text,
+};
+use mapper_identify::{TwoParameter, ZeroOutcome};
+use mapper_maps::RepeatedJump;
+use mapper_observe::FusedChannel;
+use mapper_recording::score::{ScoreSummary, ScoredMark, ScoredPoint};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Content of a test report.
+pub struct RunReport<'a> {
+    /// Name of the machine.
+    pub machine: &'a str,
+    /// Rig, conditions, calibration, display units; `None` for a log without a campaign.
+    pub campaign: Option<&'a Campaign>,
+    /// The executed plan; `None` if there is none.
+    pub plan: Option<&'a Plan>,
+    /// Date of the test, as displayed; `None` if unknown.
+    pub tested_at: Option<&'a str>,
+    /// Program, version and commit.
+    pub program: &'a str,
+    /// The map; `None` if there is none.
+    pub map: Option<&'a CompressorMap>,
+    /// The readings, as identified.
+    pub recording: &'a Recording,
+    /// Uncertainty of each channel used in the identification.
+    pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
+    /// The identified recordings; empty for a run, whose directory has its recording.
+    pub sources: &'a [ReportSource],
+    /// How the run ended, or how the points were made.
+    pub origin: PointsOrigin,
+    /// Further remarks: on the recording, the method and the map.
+    pub remarks: &'a [String],
+    /// Reference state of corrected quantities.
+    pub reference: ReferenceState,
+    /// Definition of the efficiencies.
+    pub efficiency: EfficiencyDefinition,
+    /// How the points were identified.
+    pub method: Method,
+    /// Declared share of the internal area before compression.
+    pub alpha_area_ratio: f64,
+    /// Events during the run.
+    pub events: &'a [Event],
+    /// Identified points, repeats included.
+    pub points: &'a [ScoredPoint],
+    /// Jumps that were made more than once.
+    pub repeats: &'a [RepeatedJump],
+    /// Results of the two-parameter method for the same steps, if another method was used.
+    pub two_parameter: &'a [TwoParameter],
+    /// Result of the isothermal zero.
+    pub zero: &'a ZeroOutcome,
+    /// Result for channels with several sensors.
+    pub sensors: &'a [FusedChannel],
+    /// Uncertainty budgets of the points.
+    pub budgets: &'a [PointBudgets],
+    /// Deviations of the points from the simulator's truth; `None` on a real rig.
+    pub score: Option<&'a ScoreSummary>,
+    /// Result of the search for surge; `None` if there was none.
+    pub surge: Option<SurgeReport<'a>>,
+    /// Whether a picture of the map is next to the report as `map.svg`.
+    pub has_picture: bool,
+}
+
+/// A recording that points were identified from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReportSource {
+    /// Its file.
+    pub file: String,
+    /// Time of its start in nanoseconds since 1970-01-01 UTC; 0 if unknown.
+    pub start_time_ns: u64,
+    /// Duration from the first sample to the last, s.
+    pub duration_s: f64,
+    /// Steps marked or found in it.
+    pub steps: usize,
+}
+
+/// Result of the search for surge.
+#[derive(Clone, Copy)]
+pub struct SurgeReport<'a> {
+    /// Marks in order of speed.
+    pub marks: &'a [ScoredMark],
+    /// Lines on which no mark was found.
+    pub remarks: &'a [String],
+    /// How often the compressor went into surge.
+    pub surges: usize,
+}
+
+/// The report as Markdown. Names and messages from outside are in it, and no HTML.
+pub fn run_report(report: &RunReport<'_>) -> String {
+    markdown::without_html(&terminal_text(&markdown_report(report)))
+}
+
+fn markdown_report(report: &RunReport<'_>) -> String {
+    let RunReport {
+        machine,
+        campaign,
+        sources,
+        ref origin,
+        remarks,
+        events,
+        points,
+        repeats,
+        two_parameter,
+        sensors,
+        score,
+        surge,
+        has_picture,
+        recording,
+        ..
+    } = *report;
+    let units = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
+    let display = Display::new(&units);
+    // Writing to a String cannot fail, here and below.
+    let mut text = format!("# Compressor map of {machine}\n\n");
+    if let Some(disagreement) = disagreement_text(points, two_parameter, &units) {
+        let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
+    }
+    let verdict = verdict_sentence(points.iter().map(|scored| &scored.point));
+    let _ = writeln!(text, "**{verdict}** {}\n", origin.sentence());
+    if let Some(words) = key_figures(report.map, points, campaign, report.plan) {
+        let _ = writeln!(text, "{words}\n");
+    }
+    for remark in remarks {
+        let _ = writeln!(text, "- {remark}");
+    }
+    if !remarks.is_empty() {
+        text.push('\n');
+    }
+    if has_picture {
+        text.push_str("![map](map.svg)\n\n");
+    }
+    text.push_str("## Conditions\n\n");
+    text.push_str(&facts(&condition_facts(report)));
+    let rows = condition_rows(campaign, recording, &display);
+    if !rows.is_empty() {
+        text.push_str("\nRead at the ends of the steps:\n\n");
+        text.push_str(&markdown::table(&CONDITION_HEADS, Align::Left, &rows));
+    }
+    text.push('\n');
+    if !sources.is_empty() {
+        // Steps are counted through all recordings.
+        let before = sources.iter().scan(0, |sum, source| Some(std::mem::replace(sum, *sum + source.steps)));
+        let rows: Vec<[String; 4]> =
+            sources.iter().zip(before).map(|(source, before)| source_row(source, before)).collect();
+        text.push_str(&markdown::table(&["recording", "begins", "lasts", "steps"], Align::Left, &rows));
+        text.push('\n');
+    }
+    if let Some(campaign) = campaign {
+        let rows = instrument_rows(campaign, report.used, &display);
+        let _ = writeln!(text, "## Instruments\n\n{INSTRUMENT_WORDS}\n");
+        text.push_str(&markdown::table(&INSTRUMENT_HEADS, Align::Left, &rows));
+        text.push('\n');
+    }
+    if !sensors.is_empty() {
+        let lines: String = sensors.iter().map(|fused| format!("- {fused}\n")).collect();
+        let _ = writeln!(
+            text,
+            "## Several sensors\n\nFused by their declared uncertainty (one standard deviation).\n\n{lines}"
+        );
+    }
+    if let Some(score) = score {
+        let _ = writeln!(text, "{}", score_text(score));
+    }
+    points_section(&mut text, &units, report);
+    text.push_str(&budget_section(report.budgets));
+    if let Some(SurgeReport { marks, remarks, surges }) = surge {
+        let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &units));
+    }
+    if let Some(words) = zero_words(report.zero) {
+        let _ = writeln!(text, "\n## Isothermal zero\n\n{words}\n");
+        text.push_str(&markdown::table(&ZERO_HEADS, Align::Left, zero_rows(report.zero, &display)));
+    }
+    if !repeats.is_empty() {
+        let sentences = repeated_jumps_text(repeats, &Display::new(&units));
+        let _ = write!(
+            text,
+            "\n## Drift\n\nRepeats are kept out of the map. Fixed offsets cancel in what changes between them.\n\n{}",
+            sentences.lines().map(|line| format!("- {line}\n")).collect::<String>()
+        );
+    }
+    text.push_str("\n## Events\n\n");
+    if events.is_empty() {
+        text.push_str("None.\n");
+    }
+    for event in events {
+        let _ = writeln!(text, "- {:.1} s: {}", event.t_s, event.message);
+    }
+    let _ = write!(text, "\n## Provenance\n\n{}", facts(&provenance_facts(report)));
+    text
+}
+
+/// A formatted time since 1970-01-01 UTC, ns; `None` for 0: simulated time starts there, and so does a log that knows
+/// only seconds, which is not a date.
+pub fn instant(ns: u64) -> Option<String> {
+    let seconds = i64::try_from(ns / 1_000_000_000).ok().filter(|seconds| *seconds > 0)?;
+    Some(jiff::Timestamp::from_second(seconds).ok()?.strftime("%Y-%m-%d %H:%M:%S UTC").to_string())
+}
+
+fn source_row(source: &ReportSource, before: usize) -> [String; 4] {
+    [
+        source.file.clone(),
+        instant(source.start_time_ns).unwrap_or_else(|| "not stated".to_owned()),
+        duration(source.duration_s),
+        match source.steps {
+            0 => "none".to_owned(),
+            steps => format!("{} to {}", before + 1, before + steps),
+        },
+    ]
+}
+
+fn facts(rows: &[(&'static str, String)]) -> String {
+    let rows = rows.iter().map(|(what, value)| [(*what).to_owned(), value.clone()]);
+    markdown::table(&["", ""], Align::Left, rows)
+}
+
+/// Who tested what, where and when, and the declared conditions of rig and cell: name and value in words.
+pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+    let mut rows = vec![("tested", report.tested_at.unwrap_or("not stated").to_owned())];
+    rows.extend(report.campaign.map(campaign_rows).unwrap_or_default());
+    if report.score.is_some()
+        && let Some((_, rig)) = rows.iter_mut().find(|(what, _)| *what == "rig")
+    {
+        rig.push_str(" (simulated)");
+    }
+    rows.push(("reference state of corrected quantities", report.reference.to_string()));
+    rows.push(("definition of efficiency", report.efficiency.description()));
+    rows.extend(report.campaign.map(|campaign| ("gas", gas(campaign))));
+    rows
+}
+
+/// The compressed gas, with its humidity.
+fn gas(campaign: &Campaign) -> String {
+    let water_g_kg = 1e3 * campaign.machine.params.compressor.humidity_kg_kg;
+    match campaign.report.humidity_ratio {
+        Some(_) => format!("air, {water_g_kg:.1} g of water per kg of dry air"),
+        None => "air, taken as dry: no humidity is given".to_owned(),
+    }
+}
+
+/// Method and settings behind the numbers: name and value in words.
+pub fn provenance_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+    let mut rows = vec![("program", report.program.to_owned())];
+    rows.push(("identification", format!("{}, alpha_A = {}", report.method, report.alpha_area_ratio)));
+    rows.extend(report.campaign.map(|campaign| ("campaign", campaign.name.clone())));
+    if let Some((campaign, plan)) = report.campaign.zip(report.plan) {
+        rows.push(("duration", whole_duration(campaign, plan)));
+        rows.push(("order", plan.objective.clone()));
+        rows.push(("seed", plan.seed.to_string()));
+        rows.push(("campaign SHA-256", plan.made_from.campaign_sha256.clone()));
+        rows.push(("model SHA-256", plan.made_from.model_sha256.clone()));
+    }
+    rows
+}
+
+fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
+    let (display, report) = (Display::new(&campaign.display), &campaign.report);
+    let missing = || "not stated".to_owned();
+    let mut rows = vec![
+        ("machine", campaign.machine.name.clone()),
+        ("serial number", campaign.machine.serial_number.clone().unwrap_or_else(missing)),
+        ("operator", report.operator.clone().unwrap_or_else(missing)),
+        ("test cell", report.test_cell.clone().unwrap_or_else(missing)),
+        ("rig", campaign.backend.name.clone()),
+        (
+            "barometer",
+            report
+                .barometer_pa
+                .map_or_else(missing, |pa| format!("{} {}", display.pressure(pa), campaign.display.pressure)),
+        ),
+        (
+            "relative humidity",
+            report.humidity_ratio.map_or_else(missing, |ratio| format!("{:.0} %", 100.0 * ratio)),
+        ),
+    ];
+    rows.extend(assumed_sentence(campaign).map(|sentence| ("sizes of the machine", sentence)));
+    if let Some(k) = report.cell_temperature_k {
+        rows.push(("cell", format!("{} {}", display.temperature(k), campaign.display.temperature)));
+    }
+    let follows = campaign.follow_outlet;
+    for (what, holds) in
+        [("turbine inlet temperature", follows.turbine_inlet), ("oil temperature", follows.oil)]
+    {
+        if holds {
+            rows.push((what, "held at the compressor's outlet temperature".to_owned()));
+        }
+    }
+    rows
+}
+
+/// Soak and steps, as counted by `mapper check` and `mapper plan`.
+fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
+    match campaign.zero {
+        Some(soak) => format!(
+            "{}, {} of it at rest",
+            duration(soak.duration_s + plan.duration_s()),
+            duration(soak.duration_s)
+        ),
+        None => duration(plan.duration_s()),
+    }
+}
+
+fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_>) {
+    let display = Display::new(units);
+    let points = || report.points.iter().map(|scored| &scored.point);
+    text.push_str(
+        "## Points by speed line\n\nIntervals are 95 %: noise, declared sensor offsets, and what moving flow is estimated to cost \
+         the method. T2, P2 and T3 are means over the last 2 s of the step, when the gas is settled and the housing is not.\n\n",
+    );
+    if let Some(shared) = shared_errors_text(points(), units) {
+        let _ = writeln!(text, "{shared}\n");
+    }
+    for group in point_groups(report.map, points(), &display) {
+        let rows = group
+            .points
+            .iter()
+            .map(|point| point_cells(report.recording, point, &display).map(|cell| cell.text));
+        let _ = writeln!(text, "### {}\n", group.caption);
+        text.push_str(&markdown::table(&point_heads(&display), Align::Right, rows));
+        text.push('\n');
+    }
+    text.push_str("## Doubts and remarks\n\n");
+    let doubts = doubts(points());
+    for doubt in &doubts {
+        let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message);
+    }
+    if doubts.is_empty() {
+        text.push_str("None.\n");
+    }
+}

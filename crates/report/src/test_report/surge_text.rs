@@ -1,0 +1,130 @@
+//! Measured surge-side ends, in words and as a table.
+
+use crate::formatting::display::Display;
+use crate::formatting::markdown::{self, Align};
+use crate::formatting::number::{number, percent};
+use crate::formatting::table::with_heads;
+use crate::formatting::wrapped::wrapped;
+use mapper_campaign::campaign::DisplayUnits;
+use mapper_core::{SurgeFoundBy, SurgeMark, half_width_95};
+use mapper_recording::score::ScoredMark;
+
+/// Default width of a terminal, columns.
+const COLUMNS: usize = 80;
+
+/// Marks of a search for surge, lines without a mark, and the number of surge events; Markdown.
+pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units: &DisplayUnits) -> String {
+    let display = Display::new(units);
+    let table = markdown::table(&surge_heads(marks, &display), Align::Right, surge_rows(marks, &display));
+    let remarks_text: String =
+        surge_remarks(remarks, surges).iter().map(|remark| format!("\n{remark}\n")).collect();
+    format!("{table}{remarks_text}")
+}
+
+/// The number of surge events, and the lines without a mark, a sentence each.
+pub fn surge_remarks(remarks: &[String], surges: usize) -> Vec<String> {
+    std::iter::once(times(surges))
+        .chain(remarks.iter().map(|remark| format!("Not found at {remark}.")))
+        .collect()
+}
+
+/// Columns of [`surge_rows`].
+pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
+    let mut heads = vec![
+        display.speed_head("corrected speed"),
+        display.flow_head("surge flow, corrected"),
+        "+/- % (95 %)".to_owned(),
+        "PR".to_owned(),
+        "+/- (95 %)".to_owned(),
+        "nearest point above it, %".to_owned(),
+        "openings".to_owned(),
+        "found by".to_owned(),
+    ];
+    if with_truth(marks) {
+        heads.push("off the truth, %".to_owned());
+    }
+    heads
+}
+
+/// The same for a terminal of 80 columns. `truth`: whether to show the deviations of the marks from it.
+pub fn surge_columns_text(
+    marks: &[ScoredMark],
+    remarks: &[String],
+    surges: usize,
+    units: &DisplayUnits,
+    truth: bool,
+) -> String {
+    let shown = |scored: &ScoredMark| match truth {
+        true => *scored,
+        false => ScoredMark { truth_flow_corrected_kg_s: None, ..*scored },
+    };
+    let marks: Vec<ScoredMark> = marks.iter().map(shown).collect();
+    let marks = marks.as_slice();
+    let display = Display::new(units);
+    let mut heads = [&units.speed, &units.flow, "+/- %", "PR", "+/-", "nearest %", "openings", "found by"]
+        .map(str::to_owned)
+        .to_vec();
+    if with_truth(marks) {
+        heads.push("off %".to_owned());
+    }
+    let mut table = with_heads(&heads);
+    for row in surge_rows(marks, &display) {
+        table.add_row(row);
+    }
+    let lines: String = table
+        .to_string()
+        .lines()
+        .map(|line| format!("{}\n", line.strip_prefix(' ').unwrap_or(line).trim_end()))
+        .collect();
+    let words = "Surge-side ends that were sought: corrected speed and flow, half widths of 95 % intervals, how far above it the \
+                 nearest point was, openings that were tried.";
+    let mut text = format!("{}\n{lines}\n", wrapped(words, COLUMNS, 0));
+    if with_truth(marks) {
+        text.push_str("off: from the simulator's truth.\n");
+    }
+    for remark in surge_remarks(remarks, surges) {
+        text.push_str(&wrapped(&remark, COLUMNS, 2));
+    }
+    text
+}
+
+fn with_truth(marks: &[ScoredMark]) -> bool {
+    marks.iter().any(|scored| scored.truth_flow_corrected_kg_s.is_some())
+}
+
+/// A row for each mark, in order of speed.
+pub fn surge_rows(marks: &[ScoredMark], display: &Display) -> Vec<Vec<String>> {
+    let row = |ScoredMark { mark, truth_flow_corrected_kg_s }: &ScoredMark| {
+        let flow_kg_s = mark.flow_corrected_kg_s;
+        let mut row = vec![
+            display.speed(mark.speed_corrected_rpm),
+            display.flow(flow_kg_s),
+            percent(Some(half_width_95(mark.flow_total_standard_error_kg_s()) / flow_kg_s), 1),
+            number(Some(mark.pressure_ratio), 3),
+            number(Some(half_width_95(mark.pressure_ratio_standard_error)), 3),
+            percent(Some(mark.closest_flow_corrected_kg_s / flow_kg_s - 1.0), 1),
+            mark.steps.to_string(),
+            found_by(mark).to_owned(),
+        ];
+        if with_truth(marks) {
+            row.push(percent(truth_flow_corrected_kg_s.map(|truth| flow_kg_s / truth - 1.0), 2));
+        }
+        row
+    };
+    marks.iter().map(row).collect()
+}
+
+fn times(surges: usize) -> String {
+    match surges {
+        0 => "The compressor did not go into surge on the way.".to_owned(),
+        1 => "The compressor went into surge once on the way; the valve opened at once.".to_owned(),
+        more => format!("The compressor went into surge {more} times on the way; the valve opened at once."),
+    }
+}
+
+fn found_by(mark: &SurgeMark) -> &'static str {
+    match mark.found_by {
+        SurgeFoundBy::Precursor => "variation",
+        SurgeFoundBy::Surge => "surge",
+    }
+}

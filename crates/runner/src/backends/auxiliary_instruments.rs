@@ -1,0 +1,357 @@
+//! A rig and its auxiliary instruments as one backend: only the rig receives commands, and no instrument delays the run.
+//!
+//! Each reading keeps the time at which it was taken, so a channel has the rate of its source: at other times its column is NaN.
+//! A reading that arrives after later rig samples is appended behind them, and keeps its own time as its source time.
+
+use crate::backends::reader_link::{Answer, ReaderLink};
+use crate::run_control::merged_batches::append;
+use mapper_core::{
+    Backend, BackendError, Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality,
+    RigDescription, SampleBatch, Setpoints, TruthColumn,
+};
+use std::time::{Duration, Instant};
+
+/// Time offset of a late reading behind the last sample that was passed on, s.
+const BEHIND_S: f64 = 1e-6;
+/// Maximum number of readings of one instrument that wait for rig samples; an instrument that sends more is lost.
+const MAX_WAITING: usize = 100_000;
+
+/// An auxiliary instrument.
+pub struct Reader {
+    /// Display name.
+    pub name: String,
+    /// Its backend.
+    pub backend: Box<dyn Backend>,
+    /// Channels that it provides.
+    pub channels: Vec<Channel>,
+}
+
+struct Source {
+    name: String,
+    channels: Vec<Channel>,
+    link: ReaderLink,
+    /// Run time minus the instrument's own time, s.
+    offset_s: f64,
+    /// In run time: readings that are later than the rig's last sample.
+    waiting: SampleBatch,
+    /// The instrument is no longer read.
+    lost: bool,
+}
+
+/// See the module.
+pub struct RigWithInstruments {
+    description: RigDescription,
+    rig: Box<dyn Backend>,
+    sources: Vec<Source>,
+    next_sequence: u64,
+    /// Time of the last sample that was passed on, and of the rig's own last one, s.
+    last_s: Option<f64>,
+    rig_last_s: Option<f64>,
+}
+
+/// An auxiliary instrument failed.
+#[derive(Debug, thiserror::Error)]
+#[error("the reader `{name}`: {words}")]
+struct ReaderFailed {
+    name: String,
+    words: String,
+}
+
+impl RigWithInstruments {
+    /// `rig` with the auxiliary instruments `readers`. In simulated time each instrument is polled together with the rig. Otherwise each
+    /// has its own thread, and `deadline` to connect.
+    ///
+    /// # Errors
+    /// [`BackendError::Lost`] if no thread can be started.
+    pub fn new(
+        rig: Box<dyn Backend>,
+        readers: Vec<Reader>,
+        deadline: Duration,
+    ) -> Result<Self, BackendError> {
+        let own = rig.describe();
+        let simulated_time =
+            own.simulated_time && readers.iter().all(|reader| reader.backend.describe().simulated_time);
+        let taken: Vec<Channel> = readers.iter().flat_map(|reader| reader.channels.clone()).collect();
+        let mut channels: Vec<Channel> =
+            own.channels.iter().copied().filter(|channel| !taken.contains(channel)).collect();
+        channels.extend(taken);
+        channels.sort();
+        let source = |reader: Reader| {
+            Ok(Source {
+                name: reader.name,
+                channels: reader.channels,
+                link: ReaderLink::new(reader.backend, simulated_time, deadline)?,
+                offset_s: 0.0,
+                waiting: SampleBatch::default(),
+                lost: false,
+            })
+        };
+        Ok(RigWithInstruments {
+            description: RigDescription { channels, simulated_time, ..own },
+            rig,
+            sources: readers.into_iter().map(source).collect::<Result<_, BackendError>>()?,
+            next_sequence: 0,
+            last_s: None,
+            rig_last_s: None,
+        })
+    }
+
+    /// Merges the rig's samples with the readings up to them.
+    fn together(&mut self, rig: SampleBatch) -> SampleBatch {
+        let last_s = rig.t_s.last().copied().or(self.rig_last_s);
+        self.rig_last_s = last_s;
+        let mut parts: Vec<SampleBatch> = Vec::new();
+        for source in &mut self.sources {
+            let due = last_s.map_or(0, |last_s| source.waiting.t_s.partition_point(|t_s| *t_s <= last_s));
+            let later = split(&mut source.waiting, due);
+            let mut part = std::mem::replace(&mut source.waiting, later);
+            move_behind(&mut part, self.last_s);
+            parts.push(part);
+        }
+        let mut t_s: Vec<f64> = parts.iter().flat_map(|part| part.t_s.iter().copied()).collect();
+        t_s.extend(&rig.t_s);
+        t_s.sort_by(f64::total_cmp);
+        t_s.dedup();
+        let taken = |channel: &Channel| self.sources.iter().any(|source| source.channels.contains(channel));
+        let mut whole = SampleBatch { first_sequence: self.next_sequence, ..SampleBatch::default() };
+        // Only the rig provides truth.
+        whole.truth = truth_at(&rig, &t_s);
+        put(&mut whole, rig, &t_s, &|channel| !taken(&channel));
+        for (source, part) in self.sources.iter().zip(parts) {
+            put(&mut whole, part, &t_s, &|channel| source.channels.contains(&channel));
+        }
+        // A channel without a reading has a column of NaN.
+        for channel in &self.description.channels {
+            if whole.column(*channel).is_none() {
+                whole.columns.push(ChannelColumn { channel: *channel, values: vec![f64::NAN; t_s.len()] });
+            }
+        }
+        whole.columns.sort_by_key(|column| column.channel);
+        whole.events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        self.next_sequence += t_s.len() as u64;
+        self.last_s = t_s.last().copied().or(self.last_s);
+        whole.t_s = t_s;
+        whole
+    }
+
+    /// Disconnects all instruments that were connected.
+    fn disconnect(&mut self) {
+        // Errors while disconnecting are ignored: the rig is released anyway.
+        self.sources.iter_mut().for_each(|source| drop(source.link.disarm()));
+    }
+}
+
+impl Source {
+    /// Takes an answer of the instrument, converted to run time. Its events go into `events` as notes.
+    fn take(&mut self, answer: Answer, until_s: f64, events: &mut Vec<Event>) {
+        let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
+        match answer {
+            Ok(mut batch) => {
+                let offset_s = self.offset_s;
+                batch.t_s.iter_mut().for_each(|t_s| *t_s += offset_s);
+                for from in &mut batch.provenance {
+                    from.source_t_s.iter_mut().for_each(|t_s| *t_s += offset_s);
+                }
+                for event in std::mem::take(&mut batch.events) {
+                    let t_s = (event.t_s + offset_s).clamp(0.0, until_s.max(0.0));
+                    let message = format!("{}: {}", self.name, event.message);
+                    // An event of an instrument is not a trip of the rig.
+                    events.push(Event { t_s, kind: EventKind::Note, message });
+                }
+                // Readings from before the start of the run are dropped.
+                let early = batch.t_s.partition_point(|t_s| *t_s < 0.0);
+                let batch = split(&mut batch, early);
+                if is_whole(&batch, self.waiting.t_s.last().copied())
+                    && self.waiting.t_s.len() + batch.t_s.len() <= MAX_WAITING
+                {
+                    append(&mut self.waiting, batch);
+                    return;
+                }
+                self.lost = true;
+                events.push(note(format!(
+                    "the reader `{}` sends what cannot be used; it is read no more",
+                    self.name
+                )));
+            }
+            Err(error) => {
+                self.lost = true;
+                events.push(note(format!("the reader `{}` is read no more: {error}", self.name)));
+            }
+        }
+    }
+}
+
+impl Backend for RigWithInstruments {
+    fn describe(&self) -> RigDescription {
+        self.description.clone()
+    }
+
+    /// Arms the instruments first: the rig stays untouched if one of them is unavailable.
+    fn arm(&mut self) -> Result<(), BackendError> {
+        let mut armed_at = Vec::with_capacity(self.sources.len());
+        for index in 0..self.sources.len() {
+            let Some(source) = self.sources.get_mut(index) else { break };
+            if let Err(error) = source.link.arm() {
+                let source = Box::new(ReaderFailed { name: source.name.clone(), words: error.to_string() });
+                self.disconnect();
+                return Err(BackendError::Lost { t_s: 0.0, source });
+            }
+            (source.waiting, source.lost) = (SampleBatch::default(), false);
+            armed_at.push(Instant::now());
+        }
+        if let Err(error) = self.rig.arm() {
+            self.disconnect();
+            return Err(error);
+        }
+        // In simulated time all sources start at 0.
+        let now = Instant::now();
+        for (source, at) in self.sources.iter_mut().zip(armed_at) {
+            let since_s = now.duration_since(at).as_secs_f64();
+            source.offset_s = if self.description.simulated_time { 0.0 } else { -since_s };
+        }
+        (self.next_sequence, self.last_s, self.rig_last_s) = (0, None, None);
+        Ok(())
+    }
+
+    fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
+        self.rig.set(setpoints)
+    }
+
+    fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
+        for source in self.sources.iter_mut().filter(|source| !source.lost) {
+            source.link.ask(until_s - source.offset_s);
+        }
+        let rig = self.rig.poll(until_s)?;
+        let mut events = Vec::new();
+        for source in self.sources.iter_mut().filter(|source| !source.lost) {
+            while let Some(answer) = source.link.answer() {
+                source.take(answer, until_s, &mut events);
+                if source.lost {
+                    break;
+                }
+            }
+        }
+        let mut whole = self.together(rig);
+        whole.events.extend(events);
+        Ok(whole)
+    }
+
+    fn hold(&mut self) -> Result<(), BackendError> {
+        self.rig.hold()
+    }
+
+    fn make_safe(&mut self) -> Result<(), BackendError> {
+        self.rig.make_safe()
+    }
+
+    fn disarm(&mut self) -> Result<(), BackendError> {
+        self.rig.disarm()?;
+        self.disconnect();
+        Ok(())
+    }
+}
+
+/// Whether the samples continue after `last_s`, with columns of equal length.
+fn is_whole(batch: &SampleBatch, last_s: Option<f64>) -> bool {
+    let samples = batch.t_s.len();
+    let lengths = batch.columns.iter().map(|column| column.values.len());
+    let lengths = lengths.chain(batch.elements.iter().map(|column| column.values.len()));
+    let from = batch.provenance.iter().flat_map(|from| [from.source_t_s.len(), from.quality.len()]);
+    batch.t_s.iter().all(|t_s| t_s.is_finite())
+        && batch.t_s.is_sorted_by(|a, b| a < b)
+        && batch.t_s.first().zip(last_s).is_none_or(|(first_s, last_s)| *first_s > last_s)
+        && lengths.chain(from).all(|length| length == samples)
+}
+
+/// Cuts a batch after its first `at` samples; returns the later ones.
+fn split(batch: &mut SampleBatch, at: usize) -> SampleBatch {
+    fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
+        values.split_off(at.min(values.len()))
+    }
+    let columns = batch.columns.iter_mut();
+    let elements = batch.elements.iter_mut();
+    let provenance = batch.provenance.iter_mut();
+    SampleBatch {
+        t_s: cut(&mut batch.t_s, at),
+        columns: columns
+            .map(|one| ChannelColumn { channel: one.channel, values: cut(&mut one.values, at) })
+            .collect(),
+        elements: elements
+            .map(|one| ElementColumn { element: one.element, values: cut(&mut one.values, at) })
+            .collect(),
+        provenance: provenance
+            .map(|one| Provenance {
+                channel: one.channel,
+                source_t_s: cut(&mut one.source_t_s, at),
+                quality: cut(&mut one.quality, at),
+            })
+            .collect(),
+        ..SampleBatch::default()
+    }
+}
+
+/// Moves late readings behind `last_s`; they keep their source time.
+fn move_behind(part: &mut SampleBatch, last_s: Option<f64>) {
+    let Some(last_s) = last_s else { return };
+    let late = part.t_s.partition_point(|t_s| *t_s <= last_s);
+    if late == 0 {
+        return;
+    }
+    for column in &part.columns {
+        if part.provenance.iter().all(|from| from.channel != column.channel) {
+            let (source_t_s, quality) = (part.t_s.clone(), vec![Quality::Good; part.t_s.len()]);
+            part.provenance.push(Provenance { channel: column.channel, source_t_s, quality });
+        }
+    }
+    let mut behind_s = last_s;
+    for t_s in &mut part.t_s {
+        if *t_s > behind_s {
+            break;
+        }
+        // A step of one microsecond, or of the last bit if that is larger.
+        behind_s = (behind_s + BEHIND_S).max(behind_s.next_up());
+        *t_s = behind_s;
+    }
+}
+
+/// Distributes values over a superset of their times; `absent` elsewhere.
+fn spread<T: Copy>(values: &[T], own_s: &[f64], t_s: &[f64], absent: T) -> Vec<T> {
+    if own_s.len() == t_s.len() {
+        return values.to_vec();
+    }
+    let mut own = own_s.iter().zip(values).peekable();
+    t_s.iter()
+        .map(|t_s| own.next_if(|(own_s, _)| **own_s == *t_s).map_or(absent, |(_, value)| *value))
+        .collect()
+}
+
+fn truth_at(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
+    let column = |column: &TruthColumn| TruthColumn {
+        values: spread(&column.values, &rig.t_s, t_s, f64::NAN),
+        name: column.name.clone(),
+        unit: column.unit.clone(),
+    };
+    rig.truth.iter().map(column).collect()
+}
+
+/// Adds the wanted channels of one source to the merged batch.
+fn put(whole: &mut SampleBatch, part: SampleBatch, t_s: &[f64], wanted: &dyn Fn(Channel) -> bool) {
+    for column in part.columns.into_iter().filter(|column| wanted(column.channel)) {
+        let values = spread(&column.values, &part.t_s, t_s, f64::NAN);
+        whole.columns.push(ChannelColumn { values, ..column });
+    }
+    for column in part.elements.into_iter().filter(|column| wanted(column.element.channel)) {
+        let values = spread(&column.values, &part.t_s, t_s, f64::NAN);
+        whole.elements.push(ElementColumn { values, ..column });
+    }
+    for from in part.provenance.into_iter().filter(|from| wanted(from.channel)) {
+        let mut source_t_s = spread(&from.source_t_s, &part.t_s, t_s, f64::NAN);
+        // A time without a reading of this source is not old.
+        for (source_s, t_s) in source_t_s.iter_mut().zip(t_s).filter(|(source_s, _)| source_s.is_nan()) {
+            *source_s = *t_s;
+        }
+        let quality = spread(&from.quality, &part.t_s, t_s, Quality::Good);
+        whole.provenance.push(Provenance { source_t_s, quality, ..from });
+    }
+    whole.events.extend(part.events);
+}

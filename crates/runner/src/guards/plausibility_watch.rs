@@ -1,0 +1,374 @@
+//! Judges every sample against physics: the range of each sensor, jumps faster than its lag, and readings that contradict each other.
+//!
+//! Impossible readings are marked [`Quality::Bad`], so that the recording never has them as good. If they last, the run ends: guards
+//! cannot rely on such a channel. Guards still see every raw value, so a mark never hides a value above a limit.
+//!
+//! | rule | why |
+//! |---|---|
+//! | range | [`plausible`]: no machine of any size reads beyond it |
+//! | jump | behind a first-order lag, a reading covers at most `1 - exp(-dt/lag)` of the way to the end of its range |
+//! | T2 | compression heats at least isentropically; the housing cools the gas at most half of the way to its own temperature |
+//! | N | a wheel transfers at most the square of its tip speed (Euler, without pre-swirl) |
+//! | m_c | a compressor that holds a pressure ratio delivers; backflow of surge is shorter than its cycle |
+//! | P3, T3 | expansion lowers pressure and temperature; only the housing heats the gas |
+//!
+//! Pressures and shaft speed have no lag that bounds a jump between two samples; only the rules that combine channels judge them.
+
+use crate::guards::first_look::NEEDED;
+use crate::guards::guard::{Commanded, Trip};
+use crate::guards::recent_extreme::RecentExtreme;
+use mapper_core::{
+    CHANNELS, Channel, Dimension, GuardName, Provenance, Quality, Reaction, SampleBatch, measurable,
+    plausible, readable,
+};
+
+/// Time after which a contradiction ends the run, s. Cycles of surge and electrical interference are shorter, and the usual age limit of a
+/// guarded signal (3 s) is longer.
+const LASTS_S: f64 = 2.0;
+/// A reading is compared with others for this time, s: slow instruments deliver every second.
+const FRESH_S: f64 = 1.5;
+/// Time within which pressure and temperature at the outlet follow the shaft, s: a volume of 100 l empties through the valve of a large
+/// machine in some 0.7 s.
+const FOLLOWS_S: f64 = 2.0;
+/// Lags of a probe after which it has reached the gas (0.7 % are left).
+const LAGS: f64 = 5.0;
+/// Time within which the turbine's outlet probe follows its inlet, s: the sheathed probes of gas stands have lags of seconds.
+const TURBINE_FOLLOWS_S: f64 = 30.0;
+/// Shortest lag of a housing, s: the smallest one (0.2 kg of aluminium, 180 J/K) at its largest conductance (some 20 W/K) needs 9 s.
+const HOUSING_LAG_S: f64 = 5.0;
+/// Pressure ratio above which a compressor certainly works: beyond offsets and dynamic pressures of its taps.
+const WORKS_PR: f64 = 1.05;
+/// Share of the pressure ratio not used by the rules: static taps, at Mach 0.35 in the pipes, show up to 9 % more than total pressures.
+const TAP_RATIO: f64 = 1.1;
+/// `(k - 1)/k` of hot moist air (k = 1.37): lower than that of cold dry air, so the isentropic rise is a lower bound.
+const EXPONENT: f64 = 0.27;
+/// Heat capacity of air, J/(kg K).
+const CP_J_KGK: f64 = 1005.0;
+/// Largest cooling by the housing: `1 - exp(-NTU)` with the NTU of 0.7 of a small compressor at idle.
+const COOLED_RATIO: f64 = 0.5;
+/// Offsets of two temperature sensors together, K.
+const OFFSETS_K: f64 = 3.0;
+/// Isentropic work over the square of the tip speed. Physics allows 1; the square of a wheel diameter that is 20 % off allows 1.5.
+const HEAD_MAX_RATIO: f64 = 1.5;
+/// Time within which backflow of surge ends, s: cycles of turbochargers last less.
+const BACKFLOW_S: f64 = 1.0;
+/// Smallest ratio of P3 to P4 with offsets and taps.
+const EXPANDS_RATIO: f64 = 0.9;
+/// Noise of a reading that a jump must exceed: two readings at six standard deviations, and the resolution of a logger, K.
+const NOISE_SIGMAS: f64 = 12.0;
+const RESOLUTION_K: f64 = 1.0;
+
+/// What the campaign declares about machine and sensors, as far as the rules need it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ReadingBounds {
+    /// Diameter of the compressor wheel, m; `None`: not declared.
+    pub wheel_diameter_m: Option<f64>,
+    /// Lag of the T2 probe at the highest and the lowest possible flow, s; 0: a probe without inertia.
+    pub t2_lag_s: (f64, f64),
+    /// Noise of T2, Tc and Tt, K, one standard deviation.
+    pub noise_k: [f64; 3],
+}
+
+/// The rules, in the order of their states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Rule {
+    Range(Channel),
+    Jump(Channel),
+    OutletTemperature,
+    Head,
+    Flow,
+    TurbinePressure,
+    TurbineTemperature,
+}
+
+impl Rule {
+    /// The channels of which at least one is wrong.
+    fn channels(self) -> Vec<Channel> {
+        use Channel as C;
+        match self {
+            Rule::Range(channel) | Rule::Jump(channel) => vec![channel],
+            Rule::OutletTemperature => vec![C::P1, C::T1, C::P2, C::T2],
+            Rule::Head => vec![C::ShaftSpeed, C::P1, C::T1, C::P2],
+            Rule::Flow => vec![C::CompressorFlow],
+            Rule::TurbinePressure => vec![C::P3, C::P4],
+            Rule::TurbineTemperature => vec![C::T3, C::T4],
+        }
+    }
+
+    /// Whether the run depends on one of the channels: identification needs it, or a limit of the rig relates to it.
+    fn ends_the_run(self) -> bool {
+        self.channels()
+            .iter()
+            .any(|channel| NEEDED.contains(channel) || matches!(channel, Channel::P3 | Channel::T3))
+    }
+}
+
+/// A violated rule.
+#[derive(Debug, Clone, PartialEq)]
+struct Violation {
+    rule: Rule,
+    since_s: f64,
+    reason: String,
+    reported: bool,
+}
+
+/// See the module.
+#[derive(Debug, Clone)]
+pub struct PlausibilityWatch {
+    bounds: ReadingBounds,
+    /// Time and value of the last reading of each channel that is in its range.
+    last: [Option<(f64, f64)>; CHANNELS.len()],
+    /// Where each channel was before it jumped too fast, with the time.
+    jumped: [Option<(f64, f64)>; CHANNELS.len()],
+    violations: Vec<Violation>,
+    /// Lowest isentropic outlet temperature while the probe follows, K.
+    isentropic_k: RecentExtreme,
+    /// Lowest isentropic work while the shaft follows, J/kg.
+    work_j_kg: RecentExtreme,
+    /// Highest P3, Pa, and negative T3, K, while the outlet follows.
+    p3_pa: RecentExtreme,
+    t3_k: RecentExtreme,
+    /// Since when a working compressor shows no flow, s.
+    no_flow_since_s: Option<f64>,
+}
+
+impl PlausibilityWatch {
+    /// Creates the rules for a machine.
+    pub fn new(bounds: ReadingBounds) -> Self {
+        PlausibilityWatch {
+            bounds,
+            last: [None; CHANNELS.len()],
+            jumped: [None; CHANNELS.len()],
+            violations: Vec::new(),
+            isentropic_k: RecentExtreme::default(),
+            work_j_kg: RecentExtreme::default(),
+            p3_pa: RecentExtreme::default(),
+            t3_k: RecentExtreme::default(),
+            no_flow_since_s: None,
+        }
+    }
+
+    /// Marks the impossible readings of a batch, and reports what has been impossible for too long.
+    pub fn judge(&mut self, batch: &mut SampleBatch, state: &Commanded) -> Option<Trip> {
+        let mut marks: Vec<(Channel, usize)> = Vec::new();
+        let mut trip: Option<Trip> = None;
+        for index in 0..batch.t_s.len() {
+            let Some(t_s) = batch.t_s.get(index).copied().filter(|t_s| t_s.is_finite()) else { continue };
+            let found = self.sample(batch, index, t_s, state);
+            let channels = found.iter().flat_map(|(rule, _)| rule.channels());
+            marks.extend(channels.map(|channel| (channel, index)));
+            trip = trip.or(self.lasting(t_s, found));
+        }
+        marks.into_iter().for_each(|(channel, index)| mark(batch, channel, index));
+        trip
+    }
+
+    /// The violated rules of one sample.
+    fn sample(
+        &mut self,
+        batch: &SampleBatch,
+        index: usize,
+        t_s: f64,
+        state: &Commanded,
+    ) -> Vec<(Rule, String)> {
+        let mut found: Vec<(Rule, String)> = Vec::new();
+        for column in &batch.columns {
+            let channel = column.channel;
+            let bad = batch
+                .provenance_of(channel)
+                .is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad));
+            let Some(value) = column.values.get(index).copied().filter(|value| value.is_finite() && !bad)
+            else {
+                continue;
+            };
+            if !can_be(channel, value, state.running) {
+                found.push((Rule::Range(channel), format!("{channel} reads {}", shown(channel, value))));
+                continue;
+            }
+            if let Some(from) = self.jump(channel, t_s, value) {
+                let reason = format!(
+                    "{channel} jumped from {} to {}, faster than its sensor can follow",
+                    shown(channel, from),
+                    shown(channel, value)
+                );
+                found.push((Rule::Jump(channel), reason));
+            }
+            if let Some(last) = self.last.get_mut(channel as usize) {
+                *last = Some((t_s, value));
+            }
+        }
+        if state.running {
+            found.extend(self.compressor(t_s));
+            found.extend(self.turbine(t_s));
+        } else {
+            self.no_flow_since_s = None;
+        }
+        found
+    }
+
+    /// The value before a jump that the sensor's lag excludes, until the reading is back.
+    fn jump(&mut self, channel: Channel, t_s: f64, value: f64) -> Option<f64> {
+        let (lag_s, noise_k) = match channel {
+            Channel::T2 => (self.bounds.t2_lag_s.0, self.bounds.noise_k[0]),
+            Channel::Tc => (HOUSING_LAG_S, self.bounds.noise_k[1]),
+            Channel::Tt => (HOUSING_LAG_S, self.bounds.noise_k[2]),
+            _ => return None,
+        };
+        let (then_s, then) = self.last.get(channel as usize).copied().flatten()?;
+        let range = plausible(channel).running;
+        let reaches = |from: f64, duration_s: f64| {
+            let end = if value > from { *range.end() } else { *range.start() };
+            let share = if lag_s > 0.0 { 1.0 - (-duration_s.max(0.0) / lag_s).exp() } else { 1.0 };
+            let noise_k = NOISE_SIGMAS * noise_k + RESOLUTION_K;
+            (value - from).abs() <= noise_k + share * (end - from).abs()
+        };
+        let jumped = self.jumped.get_mut(channel as usize)?;
+        let step_s = t_s - then_s;
+        let jumps = !reaches(then, step_s);
+        *jumped = match *jumped {
+            None if jumps => Some((then_s, then)),
+            None => None,
+            // It is back after a jump to a place that the gas may have reached meanwhile, or where it was.
+            Some((since_s, from)) if jumps && reaches(from, t_s - since_s) => None,
+            Some((_, from)) if reaches(from, step_s) => None,
+            still => still,
+        };
+        jumped.map(|(_, from)| from)
+    }
+
+    /// A recent possible reading.
+    fn now(&self, channel: Channel, t_s: f64) -> Option<f64> {
+        let (then_s, value) = self.last.get(channel as usize).copied().flatten()?;
+        (t_s - then_s <= FRESH_S).then_some(value)
+    }
+
+    fn compressor(&mut self, t_s: f64) -> Vec<(Rule, String)> {
+        use Channel as C;
+        let mut found = Vec::new();
+        let read = (self.now(C::P1, t_s), self.now(C::T1, t_s), self.now(C::P2, t_s));
+        let (Some(p1_pa), Some(t1_k), Some(p2_pa)) = read else { return found };
+        let pr = p2_pa / p1_pa;
+        let surely = (pr / TAP_RATIO).max(1.0);
+        let isentropic_k = t1_k * surely.powf(EXPONENT);
+        let at = || format!("P2/P1 = {pr:.2} and T1 = {}", shown(C::T1, t1_k));
+        let follows_s = FOLLOWS_S + LAGS * self.bounds.t2_lag_s.1;
+        let lowest_k = self.isentropic_k.lowest(t_s, isentropic_k, follows_s);
+        if let Some(t2_k) = self.now(C::T2, t_s) {
+            // Without Tc the housing is taken for as cold as the inlet.
+            let housing_k = self.now(C::Tc, t_s).unwrap_or(t1_k).min(lowest_k);
+            let bound_k = lowest_k - COOLED_RATIO * (lowest_k - housing_k) - OFFSETS_K;
+            if t2_k < bound_k {
+                let (t2, bound) = (shown(C::T2, t2_k), shown(C::T2, bound_k));
+                let reason = format!("T2 reads {t2}, although {} heat the air to {bound} at least", at());
+                found.push((Rule::OutletTemperature, reason));
+            }
+        }
+        let work_j_kg = self.work_j_kg.lowest(t_s, CP_J_KGK * (isentropic_k - t1_k), FOLLOWS_S);
+        if let (Some(speed_rpm), Some(diameter_m)) =
+            (self.now(C::ShaftSpeed, t_s), self.bounds.wheel_diameter_m)
+        {
+            let tip_m_s = std::f64::consts::PI * diameter_m * speed_rpm / 60.0;
+            if work_j_kg > HEAD_MAX_RATIO * tip_m_s * tip_m_s && surely > 1.0 {
+                let speed = shown(C::ShaftSpeed, speed_rpm);
+                let reason = format!(
+                    "N reads {speed}, at which a wheel of {:.0} mm cannot compress to {}",
+                    1e3 * diameter_m,
+                    at()
+                );
+                found.push((Rule::Head, reason));
+            }
+        }
+        let flow = self.now(C::CompressorFlow, t_s);
+        let delivers = flow.is_none_or(|flow| flow >= *plausible(C::CompressorFlow).running.start());
+        match self.no_flow_since_s {
+            _ if delivers || pr < WORKS_PR => self.no_flow_since_s = None,
+            None => self.no_flow_since_s = Some(t_s),
+            Some(since_s) if t_s - since_s > BACKFLOW_S => {
+                let flow = shown(C::CompressorFlow, flow.unwrap_or(f64::NAN));
+                found.push((Rule::Flow, format!("m_c reads {flow}, although the compressor holds {}", at())));
+            }
+            Some(_) => {}
+        }
+        found
+    }
+
+    fn turbine(&mut self, t_s: f64) -> Vec<(Rule, String)> {
+        use Channel as C;
+        let mut found = Vec::new();
+        if let (Some(p3_pa), Some(p4_pa)) = (self.now(C::P3, t_s), self.now(C::P4, t_s)) {
+            let highest_pa = -self.p3_pa.lowest(t_s, -p3_pa, FOLLOWS_S);
+            if highest_pa < EXPANDS_RATIO * p4_pa {
+                let (p3, p4) = (shown(C::P3, p3_pa), shown(C::P4, p4_pa));
+                let reason = format!("P3 reads {p3} and P4 {p4}, although a turbine expands");
+                found.push((Rule::TurbinePressure, reason));
+            }
+        }
+        let read = (self.now(C::T3, t_s), self.now(C::T4, t_s), self.now(C::Tt, t_s));
+        if let (Some(t3_k), Some(t4_k), Some(tt_k)) = read {
+            let highest_k = -self.t3_k.lowest(t_s, -t3_k, TURBINE_FOLLOWS_S);
+            if t4_k > highest_k.max(tt_k) + 2.0 * OFFSETS_K {
+                let (t3, t4) = (shown(C::T3, t3_k), shown(C::T4, t4_k));
+                let reason = format!("T4 reads {t4} and T3 {t3}, although a turbine cools its gas");
+                found.push((Rule::TurbineTemperature, reason));
+            }
+        }
+        found
+    }
+
+    /// Follows how long each rule has been violated. Each violation is reported once.
+    fn lasting(&mut self, t_s: f64, found: Vec<(Rule, String)>) -> Option<Trip> {
+        self.violations.retain(|known| found.iter().any(|(rule, _)| *rule == known.rule));
+        for (rule, reason) in found {
+            match self.violations.iter_mut().find(|known| known.rule == rule) {
+                Some(known) => known.reason = reason,
+                None => self.violations.push(Violation { rule, since_s: t_s, reason, reported: false }),
+            }
+        }
+        let mut worst: Option<Trip> = None;
+        for violation in self.violations.iter_mut().filter(|one| !one.reported) {
+            // One microsecond covers the rounding of accumulated sample times.
+            if t_s - violation.since_s < LASTS_S - 1e-6 {
+                continue;
+            }
+            violation.reported = true;
+            let reaction = if violation.rule.ends_the_run() { Reaction::Safe } else { Reaction::Note };
+            let reason = format!(
+                "{} since {:.1} s: such readings cannot be true, and were recorded as bad; check the sensors",
+                violation.reason, violation.since_s
+            );
+            if worst.as_ref().is_none_or(|before| before.reaction < reaction) {
+                worst = Some(Trip { t_s, guard: GuardName::Signals, reaction, reason });
+            }
+        }
+        worst
+    }
+}
+
+/// Whether a sensor of this channel can read this value now. Shaft speed and flow start from zero while the rig already runs.
+pub(crate) fn can_be(channel: Channel, value: f64, running: bool) -> bool {
+    let from_rest = matches!(channel.info().dimension, Dimension::RotationalSpeed | Dimension::MassFlow);
+    value.is_finite()
+        && measurable(channel.info().dimension).contains(&value)
+        && (!running || from_rest || plausible(channel).running.contains(&value))
+}
+
+fn shown(channel: Channel, value: f64) -> String {
+    readable(value, channel.unit())
+}
+
+/// Marks one reading as bad.
+fn mark(batch: &mut SampleBatch, channel: Channel, index: usize) {
+    if batch.column(channel).is_none() {
+        return;
+    }
+    let place = batch.provenance.iter().position(|from| from.channel == channel).unwrap_or_else(|| {
+        let source_t_s = batch.t_s.clone();
+        let quality = vec![Quality::Good; source_t_s.len()];
+        batch.provenance.push(Provenance { channel, source_t_s, quality });
+        batch.provenance.len() - 1
+    });
+    let quality = batch.provenance.get_mut(place).and_then(|from| from.quality.get_mut(index));
+    if let Some(quality) = quality {
+        *quality = Quality::Bad;
+    }
+}

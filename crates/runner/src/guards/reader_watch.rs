@@ -1,0 +1,91 @@
+//! The guard for channels of auxiliary instruments that no other guard checks: it reports a channel without readings.
+
+use crate::guards::guard::{Commanded, Guard, Trip};
+use mapper_core::{Channel, GuardName, Reaction, SampleBatch};
+
+/// A channel of an auxiliary instrument.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadChannel {
+    /// Display name of the instrument.
+    pub reader: String,
+    /// The channel.
+    pub channel: Channel,
+    /// Time without a reading after which the channel is reported, s.
+    pub age_s: f64,
+}
+
+/// See the module. Loss of a channel that identification requires ends the run; loss of any other channel is noted.
+#[derive(Debug, Clone)]
+pub struct ReaderWatch {
+    channels: Vec<(ReadChannel, Option<f64>, bool)>,
+    first_look_s: Option<f64>,
+}
+
+impl ReaderWatch {
+    /// Creates a guard for these channels.
+    pub fn new(channels: Vec<ReadChannel>) -> Self {
+        let channels = channels.into_iter().map(|channel| (channel, None, false)).collect();
+        ReaderWatch { channels, first_look_s: None }
+    }
+}
+
+impl Guard for ReaderWatch {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
+        let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
+        let mut trip: Option<Trip> = None;
+        for (of, last_s, reported) in &mut self.channels {
+            let readings = batch.column(of.channel).unwrap_or_default().iter().zip(&batch.t_s);
+            if let Some((_, t_s)) = readings.rev().find(|(value, _)| value.is_finite()) {
+                (*last_s, *reported) = (Some(*t_s), false);
+            }
+            let since_s = last_s.unwrap_or(first_s);
+            if now_s - since_s <= of.age_s || *reported {
+                continue;
+            }
+            *reported = true;
+            let needed = crate::guards::first_look::NEEDED.contains(&of.channel);
+            let reaction = if needed { Reaction::Safe } else { Reaction::Note };
+            let (reader, channel) = (&of.reader, of.channel);
+            let reason = format!("the reader `{reader}` has given no {channel} since {since_s:.1} s");
+            let found = Trip { t_s: now_s, guard: GuardName::Signals, reaction, reason };
+            trip = match trip {
+                Some(before) if before.reaction >= found.reaction => Some(before),
+                _ => Some(found),
+            };
+        }
+        trip
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::ChannelColumn;
+
+    #[test]
+    fn a_channel_that_is_needed_ends_the_run_and_another_is_noted_once() {
+        let of = |channel| ReadChannel { reader: "bench".to_owned(), channel, age_s: 3.0 };
+        let batch = |t_s: f64, flow: f64, air: f64| SampleBatch {
+            t_s: vec![t_s],
+            columns: vec![
+                ChannelColumn { channel: Channel::CompressorFlow, values: vec![flow] },
+                ChannelColumn { channel: Channel::TAmb, values: vec![air] },
+            ],
+            ..SampleBatch::default()
+        };
+        let mut guard = ReaderWatch::new(vec![of(Channel::CompressorFlow), of(Channel::TAmb)]);
+        let nan = f64::NAN;
+        let mut look = |t_s, flow, air| guard.look(&batch(t_s, flow, air), t_s, &Commanded::default());
+        assert_eq!(look(0.0, 0.1, 298.0), None);
+        assert_eq!(look(3.0, 0.1, nan), None);
+        let trip = look(3.1, 0.1, nan).unwrap();
+        assert_eq!(trip.reaction, Reaction::Note);
+        assert!(trip.reason.contains("`bench` has given no T_amb since 0.0 s"), "{}", trip.reason);
+        assert_eq!(look(5.0, 0.1, nan), None);
+        // The channel returns and fails again, together with the flow, which is more severe.
+        assert_eq!(look(6.0, nan, 298.0), None);
+        let trip = look(9.5, nan, nan).unwrap();
+        assert_eq!(trip.reaction, Reaction::Safe);
+        assert!(trip.reason.contains("no m_c since 5.0 s"), "{}", trip.reason);
+    }
+}

@@ -1,0 +1,350 @@
+//! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
+
+use crate::guards::guard::{Commanded, Guard, Trip};
+use crate::guards::plausibility_watch::can_be;
+use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
+use std::collections::VecDeque;
+
+/// A continuing violation trips again after this time, s.
+const AGAIN_S: f64 = 10.0;
+/// Relative distance to a bound below which the rig is polled sample by sample.
+const NEAR_RATIO: f64 = 0.03;
+/// Time over which the slope is computed, s.
+const SLOPE_S: f64 = 0.5;
+/// A reading is frozen if it moves by no more than this ratio (4 mK of 400 K, 2 Pa of 200 kPa). The noise of thermocouple and
+/// pressure amplifiers is larger, and a jump of the setpoints moves a reading a hundred times as far.
+const STILL_RATIO: f64 = 1e-5;
+/// Minimum spacing of the readings kept for a change, as a share of its time. It bounds the memory for fast rigs.
+const CHANGE_RESOLUTION_RATIO: f64 = 1e-3;
+
+/// See [`SignalGuard`].
+#[derive(Debug, Clone)]
+pub struct SignalWatch {
+    spec: SignalGuard,
+    /// Source time of the last good reading, s.
+    last_good_s: Option<f64>,
+    /// Time of the first sample or poll, s: age counts from there.
+    first_look_s: Option<f64>,
+    last_value: Option<f64>,
+    /// Time and value of a reading about half a second ago, and the slope since then, unit of the channel per second.
+    anchor: Option<(f64, f64)>,
+    slope_per_s: f64,
+    /// Start of the violation of a bound, s.
+    beyond_since_s: Option<f64>,
+    /// A continuing violation does not trip again before this time, s.
+    quiet_until_s: Option<f64>,
+    /// Times and readings within the window of the change limit.
+    recent: VecDeque<(f64, f64)>,
+    /// Start of the period without movement, s, and its reading.
+    still: Option<(f64, f64)>,
+}
+
+impl SignalWatch {
+    /// Creates a guard from its specification.
+    pub fn new(spec: SignalGuard) -> Self {
+        SignalWatch {
+            spec,
+            last_good_s: None,
+            first_look_s: None,
+            last_value: None,
+            anchor: None,
+            slope_per_s: 0.0,
+            beyond_since_s: None,
+            quiet_until_s: None,
+            recent: VecDeque::new(),
+            still: None,
+        }
+    }
+
+    fn trip(&mut self, t_s: f64, reaction: Reaction, what: &str) -> Option<Trip> {
+        if self.quiet_until_s.is_some_and(|quiet_s| t_s < quiet_s) {
+            return None;
+        }
+        self.quiet_until_s = Some(t_s + AGAIN_S);
+        let channel = self.spec.channel;
+        let reason = format!("{} ({channel}) {what}", channel.info().description);
+        Some(Trip { t_s, guard: self.spec.name, reaction, reason })
+    }
+
+    /// Describes the bound that a value violates.
+    fn beyond(&self, value: f64, running: bool, slack: f64) -> Option<String> {
+        let unit = self.spec.channel.unit();
+        match (self.spec.above, self.spec.below) {
+            (Some(high), _) if value > high - slack => {
+                Some(format!("is {}, above its limit of {}", readable(value, unit), readable(high, unit)))
+            }
+            (_, Some(low)) if running && value < low + slack => {
+                Some(format!("is {}, below its limit of {}", readable(value, unit), readable(low, unit)))
+            }
+            _ => None,
+        }
+    }
+
+    fn one(&mut self, t_s: f64, value: f64, state: &Commanded) -> Option<Trip> {
+        // The slope over a single sample would be noise.
+        match self.anchor {
+            Some((then_s, then)) if t_s - then_s >= SLOPE_S => {
+                self.slope_per_s = (value - then) / (t_s - then_s);
+                self.anchor = Some((t_s, value));
+            }
+            Some(_) => {}
+            None => self.anchor = Some((t_s, value)),
+        }
+        self.last_good_s = Some(t_s);
+        let unchanged = |(_, there): &(f64, f64)| (value - there).abs() <= STILL_RATIO * there.abs();
+        self.still = self.still.filter(unchanged).or(Some((t_s, value)));
+        self.last_value = Some(value);
+        // Hysteresis: after a violation, the value has to return past the bound by this amount.
+        let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
+        if let Some(what) = self.beyond(value, state.running, slack) {
+            let since_s = *self.beyond_since_s.get_or_insert(t_s);
+            // One microsecond covers the rounding of accumulated sample times.
+            if t_s - since_s >= self.spec.dwell_s - 1e-6 {
+                return self.trip(t_s, self.spec.reaction, &what);
+            }
+        } else {
+            self.beyond_since_s = None;
+        }
+        self.changed(t_s, value).or_else(|| self.frozen(t_s, state))
+    }
+
+    /// Trips if the reading changes by more than the allowed change.
+    fn changed(&mut self, t_s: f64, value: f64) -> Option<Trip> {
+        let largest = self.spec.change?;
+        while self.recent.front().is_some_and(|(then_s, _)| t_s - then_s > largest.within_s) {
+            self.recent.pop_front();
+        }
+        let (low, high) = self
+            .recent
+            .iter()
+            .fold((value, value), |(low, high), (_, then)| (low.min(*then), high.max(*then)));
+        let apart_s = CHANGE_RESOLUTION_RATIO * largest.within_s;
+        if self.recent.back().is_none_or(|(then_s, _)| t_s - then_s >= apart_s) {
+            self.recent.push_back((t_s, value));
+        }
+        let change = (value - low).max(high - value);
+        if change <= largest.change {
+            return None;
+        }
+        let unit = self.spec.channel.unit();
+        let what = format!(
+            "has changed by {change:.1} {unit} within {:.0} s, more than the {:.1} {unit} allowed",
+            largest.within_s, largest.change
+        );
+        self.trip(t_s, self.spec.reaction, &what)
+    }
+
+    /// Trips if the reading has not moved although the setpoints have.
+    fn frozen(&mut self, t_s: f64, state: &Commanded) -> Option<Trip> {
+        let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.still?, state.jumped_s?);
+        let since_jump_s = t_s - jumped_s;
+        // The reading must be unchanged since before the jump.
+        if !state.running || since_jump_s < frozen_s || same_s > jumped_s {
+            return None;
+        }
+        let value = readable(self.last_value?, self.spec.channel.unit());
+        let what =
+            format!("is frozen: {value} since {same_s:.1} s, though the setpoints jumped at {jumped_s:.1} s");
+        self.trip(t_s, self.spec.reaction.max(Reaction::Safe), &what)
+    }
+}
+
+impl Guard for SignalWatch {
+    fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip> {
+        let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
+        if let Some(values) = batch.column(self.spec.channel) {
+            let provenance = batch.provenance_of(self.spec.channel);
+            let mut found: Option<Trip> = None;
+            for (index, (t_s, value)) in batch.t_s.iter().zip(values).enumerate() {
+                let bad = provenance.is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad));
+                // A stale or repeated value is as old as its source time.
+                let source_s = provenance.and_then(|from| from.source_t_s.get(index)).copied();
+                let taken_s = source_s.map_or(*t_s, |source_s| source_s.min(*t_s));
+                let new = self.last_good_s.is_none_or(|last_s| taken_s > last_s);
+                // A value above its limit counts even if it is implausible.
+                let above = value.is_finite() && self.spec.above.is_some_and(|high| *value > high);
+                let read = above || can_be(self.spec.channel, *value, state.running);
+                if read && taken_s.is_finite() && !bad && new {
+                    let trip = self.one(taken_s, *value, state);
+                    found = found.or(trip);
+                }
+            }
+            if found.is_some() {
+                return found;
+            }
+        }
+        // Age counts from the first poll, even if no samples arrive.
+        let since_s = self.last_good_s.unwrap_or(first_s);
+        if now_s - since_s > self.spec.age_s {
+            let what = format!("has given no good reading since {since_s:.1} s");
+            return self.trip(now_s, self.spec.reaction.max(Reaction::Safe), &what);
+        }
+        None
+    }
+
+    fn is_violated(&self) -> bool {
+        self.beyond_since_s.is_some()
+    }
+
+    fn is_alert(&self) -> bool {
+        let Some(value) = self.last_value else { return false };
+        // A bound that the value may reach within a second needs closer polling.
+        let soon = value + self.slope_per_s.max(0.0);
+        self.beyond_since_s.is_some()
+            || self.spec.above.is_some_and(|high| value.max(soon) > high - NEAR_RATIO * high.abs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{Channel, ChannelColumn, GuardName, LargestChange, Provenance};
+
+    fn spec() -> SignalGuard {
+        SignalGuard {
+            name: GuardName::CompressorOutletTemperature,
+            channel: Channel::T2,
+            above: Some(400.0),
+            below: None,
+            change: None,
+            hysteresis: 2.0,
+            dwell_s: 0.2,
+            age_s: 0.5,
+            frozen_s: None,
+            reaction: Reaction::Hold,
+        }
+    }
+
+    fn batch(first: u64, values: &[f64]) -> SampleBatch {
+        SampleBatch {
+            first_sequence: first,
+            t_s: (0..values.len()).map(|i| (first + i as u64) as f64 * 0.1).collect(),
+            columns: vec![ChannelColumn { channel: Channel::T2, values: values.to_vec() }],
+            ..SampleBatch::default()
+        }
+    }
+
+    fn look(guard: &mut SignalWatch, batch: &SampleBatch, now_s: f64) -> Option<Trip> {
+        guard.look(batch, now_s, &Commanded { running: true, ..Commanded::default() })
+    }
+
+    #[test]
+    fn one_noisy_sample_does_not_trip_but_a_dwell_across_batches_does_and_nan_does_not_reset_it() {
+        let mut guard = SignalWatch::new(SignalGuard { hysteresis: 0.0, ..spec() });
+        assert_eq!(look(&mut guard, &batch(0, &[401.0, 399.0, 401.0, f64::NAN]), 0.3), None);
+        assert!(guard.is_violated() && guard.is_alert());
+        let trip = look(&mut guard, &batch(4, &[401.5]), 0.4).unwrap();
+        assert_eq!((trip.t_s, trip.reaction), (0.4, Reaction::Hold));
+        assert!(trip.reason.contains("401.5 K") && trip.reason.contains("400.0 K"), "{}", trip.reason);
+        // The violation was already reported.
+        assert_eq!(look(&mut guard, &batch(5, &[401.5; 5]), 0.9), None);
+    }
+
+    #[test]
+    fn hysteresis_keeps_a_flapping_value_one_violation() {
+        let mut guard = SignalWatch::new(SignalGuard { dwell_s: 0.0, ..spec() });
+        let trips: Vec<Trip> = (0..50)
+            .filter_map(|i| {
+                let value = if i % 2 == 0 { 400.5 } else { 399.5 };
+                look(&mut guard, &batch(i, &[value]), i as f64 * 0.1)
+            })
+            .collect();
+        assert_eq!(trips.len(), 1, "{trips:?}");
+        assert!(guard.is_violated());
+        look(&mut guard, &batch(50, &[397.0]), 5.0);
+        assert!(!guard.is_violated());
+    }
+
+    #[test]
+    fn silence_nan_bad_quality_and_old_sources_are_trips_that_end_the_run() {
+        let nothing = SampleBatch::default();
+        let good = batch(0, &[300.0; 2]);
+        let bad = |source_s: f64, quality| SampleBatch {
+            provenance: vec![Provenance {
+                channel: Channel::T2,
+                source_t_s: vec![source_s; 10],
+                quality: vec![quality; 10],
+            }],
+            ..batch(2, &[300.0; 10])
+        };
+        for (what, later) in [
+            ("an empty batch", nothing.clone()),
+            ("NaN", batch(2, &[f64::NAN; 10])),
+            ("no column", SampleBatch { columns: Vec::new(), ..batch(2, &[300.0; 10]) }),
+            ("bad quality", bad(1.0, Quality::Bad)),
+            ("an old source", bad(0.1, Quality::Good)),
+        ] {
+            let mut guard = SignalWatch::new(spec());
+            assert_eq!(look(&mut guard, &good, 0.1), None, "{what}");
+            let trip = look(&mut guard, &later, 1.1).unwrap_or_else(|| panic!("{what}"));
+            assert_eq!(trip.reaction, Reaction::Safe, "{what}");
+            assert!(trip.reason.contains("no good reading since 0.1 s"), "{what}: {}", trip.reason);
+        }
+        // A source that never delivered a reading.
+        let mut guard = SignalWatch::new(spec());
+        assert_eq!(look(&mut guard, &nothing, 0.0), None);
+        assert!(look(&mut guard, &nothing, 0.6).is_some());
+    }
+
+    /// A clock set back by an hour looks like a source without new readings; a clock set forward does not.
+    #[test]
+    fn a_clock_that_is_set_back_is_silence_and_one_that_is_set_on_is_not() {
+        for (step_s, trips) in [(-3600.0, true), (3600.0, false)] {
+            let mut guard = SignalWatch::new(spec());
+            assert_eq!(look(&mut guard, &batch(0, &[300.0; 2]), 0.1), None);
+            let later = batch(2, &[300.0; 10]);
+            let source_t_s = later.t_s.iter().map(|t_s| t_s + step_s).collect();
+            let quality = vec![Quality::Good; 10];
+            let provenance = vec![Provenance { channel: Channel::T2, source_t_s, quality }];
+            let trip = look(&mut guard, &SampleBatch { provenance, ..later }, 1.1);
+            assert_eq!(trip.is_some(), trips, "set by {step_s} s: {trip:?}");
+        }
+    }
+
+    /// Wrong units (degC for K, Pa for kPa) appear in mid-run: no limit trips on them, but they age out as missing readings.
+    #[test]
+    fn a_reading_that_cannot_be_is_silence_and_one_above_its_limit_is_not() {
+        for (channel, good, wrong) in [
+            (Channel::T2, 390.0, 117.0),
+            (Channel::T2, 390.0, -50.0),
+            (Channel::P2, 180e3, 180.0),
+            (Channel::P2, 180e3, 1e12),
+            (Channel::CompressorFlow, 0.08, -5.0),
+        ] {
+            let spec = SignalGuard { channel, above: None, ..spec() };
+            let at = |first, value: f64, count| SampleBatch {
+                columns: vec![ChannelColumn { channel, values: vec![value; count] }],
+                ..batch(first, &vec![value; count])
+            };
+            let mut guard = SignalWatch::new(spec);
+            assert_eq!(look(&mut guard, &at(0, good, 20), 1.9), None, "{channel} {good}");
+            let trip = look(&mut guard, &at(20, wrong, 10), 2.9).unwrap();
+            assert_eq!(trip.reaction, Reaction::Safe, "{channel} {wrong}");
+        }
+        // A broken wire that reads 5000 K trips like a temperature above its limit.
+        let mut guard = SignalWatch::new(spec());
+        let trip = look(&mut guard, &batch(0, &[5000.0; 3]), 0.2).unwrap();
+        assert_eq!(trip.reaction, Reaction::Hold);
+    }
+
+    #[test]
+    fn a_change_and_a_frozen_reading_are_seen() {
+        let change = Some(LargestChange { change: 5.0, within_s: 1.0 });
+        let mut guard = SignalWatch::new(SignalGuard { above: None, change, ..spec() });
+        assert_eq!(look(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
+        assert!(look(&mut guard, &batch(4, &[306.0]), 0.4).unwrap().reason.contains("6.0 K within 1 s"));
+        let mut guard = SignalWatch::new(SignalGuard { frozen_s: Some(2.0), ..spec() });
+        let after_jump =
+            |jumped_s| Commanded { running: true, jumped_s: Some(jumped_s), ..Commanded::default() };
+        // Unchanged without a jump; moved after one; not moved.
+        assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &after_jump(9.5)), None);
+        let mut moved = guard.clone();
+        assert_eq!(moved.look(&batch(100, &[300.1; 30]), 12.9, &after_jump(9.5)), None);
+        let trip = guard.clone().look(&batch(100, &[300.0; 30]), 12.9, &after_jump(9.5)).unwrap();
+        assert_eq!(trip.reaction, Reaction::Safe);
+        // A flickering last digit is not movement.
+        let flicker: Vec<f64> = (0..30).map(|i| 300.0 + 1e-3 * f64::from(i % 2)).collect();
+        assert!(guard.look(&batch(100, &flicker), 12.9, &after_jump(9.5)).is_some());
+        assert!((trip.t_s - 11.5).abs() < 0.11 && trip.reason.contains("frozen"), "{trip:?}");
+    }
+}

@@ -1,0 +1,477 @@
+//! The run itself: soak, warm-up, steps, cool-down.
+
+use crate::guards::guard::{Bench, Commanded, Guard, Trip};
+use crate::guards::plausibility_watch::PlausibilityWatch;
+use crate::guards::speed_reached::Reached;
+use crate::run_control::merged_batches::append;
+use crate::run_control::observer::{ObserverError, RunObserver};
+use crate::run_control::operator::Operator;
+use crate::run_control::protection::Protection;
+use crate::run_control::run_error::RunError;
+use crate::run_control::speed_control::SpeedControl;
+use crate::step_sources::step_source::StepSource;
+use mapper_core::{
+    Backend, BackendError, Clock, Event, EventKind, GuardName, PlanStep, Reaction, RigMode, SampleBatch,
+    Setpoints, Soak, StepMarker,
+};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Interval at which observers and steps receive samples, s of run time.
+const POLL_INTERVAL_S: f64 = 1.0;
+/// Relative change of P3 that counts as a jump (twice this for the valve): sensors have to follow it.
+const JUMP_RATIO: f64 = 0.01;
+/// Longest time that a guard may hold the setpoints, s.
+const HOLD_MAX_S: f64 = 300.0;
+/// Longest time that the operator may hold a step, s. It limits a hold that an operator forgets.
+const OPERATOR_HOLD_MAX_S: f64 = 4.0 * 3600.0;
+/// Number of stages when a step is approached again, and the duration of each, s.
+const SMALLER_STEPS: u32 = 4;
+const SMALLER_STEP_S: f64 = 10.0;
+/// Maximum number of consecutive steps that guards may skip; one more ends the run.
+const SKIPPED_MAX: u32 = 3;
+
+/// How a run ended, if the program did not fail.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RunEnd {
+    /// Every step was run.
+    Completed,
+    /// The operator stopped it; the rig is safe.
+    Interrupted {
+        /// Run time, s.
+        t_s: f64,
+    },
+    /// A guard tripped; the rig is safe.
+    Tripped(Trip),
+}
+
+/// Step source, rig and everything else that a run needs.
+pub struct Runner<'a> {
+    /// The steps to execute: [`PlanSteps`](crate::PlanSteps) for a plan.
+    pub steps: &'a mut dyn StepSource,
+    /// The rig.
+    pub backend: &'a mut dyn Backend,
+    /// Paces the polls; see [`mapper_core::UnpacedClock`].
+    pub clock: &'a mut dyn Clock,
+    /// Guards that may end a step or the run.
+    pub guards: Vec<Box<dyn Guard>>,
+    /// Receives samples and events.
+    pub observer: &'a mut dyn RunObserver,
+    /// Controls the speed of each step; `None`: P3 stays as planned.
+    pub speed: Option<SpeedControl<'a>>,
+    /// Set from outside to stop at the next poll.
+    pub stop: &'a AtomicBool,
+}
+
+/// Why the run stopped before its last step.
+pub(crate) enum Halt {
+    Interrupted,
+    /// The trip, with the samples that no observer has received yet: the rig is made safe first.
+    Tripped(Trip, Option<Box<SampleBatch>>),
+    /// A guard ends this step only.
+    Cut(Trip),
+    Failed(RunError),
+}
+
+impl<E: Into<RunError>> From<E> for Halt {
+    fn from(error: E) -> Self {
+        Halt::Failed(error.into())
+    }
+}
+
+/// A run that is under way.
+pub(crate) struct Run<'a, 'p> {
+    pub(crate) with: Runner<'a>,
+    pub(crate) protection: &'p Protection<'p>,
+    pub(crate) now_s: f64,
+    /// The most recent setpoints.
+    pub(crate) sent: Option<Setpoints>,
+    pub(crate) commanded: Commanded,
+    sample_s: f64,
+    reached: Reached,
+    plausibility: Option<PlausibilityWatch>,
+    skipped: u32,
+    /// The step that a guard has cut short, until its end is reported.
+    pub(crate) open: Option<StepMarker>,
+    /// Whether the operator was informed that the run ends with this step.
+    pub(crate) stop_sent: bool,
+}
+
+impl Runner<'_> {
+    /// Runs all steps from arming to disarming, with guards but without further protection.
+    ///
+    /// # Errors
+    /// As [`Runner::run_under`].
+    pub fn run(self) -> Result<RunEnd, RunError> {
+        self.run_under(&Protection::default())
+    }
+
+    /// Runs all steps from arming to disarming.
+    ///
+    /// When this returns, the rig has been commanded to its safe state and disarmed, even after a panic.
+    ///
+    /// # Errors
+    /// [`RunError`] if the rig or an observer failed.
+    pub fn run_under(self, protection: &Protection<'_>) -> Result<RunEnd, RunError> {
+        self.backend.arm().map_err(RunError::NotArmed)?;
+        let sample_s = 1.0 / self.backend.describe().sample_rate_hz;
+        let mut run = Run {
+            with: self,
+            protection,
+            now_s: 0.0,
+            sent: None,
+            commanded: Commanded::default(),
+            sample_s: if sample_s > 0.0 { sample_s.min(POLL_INTERVAL_S) } else { POLL_INTERVAL_S },
+            reached: Reached::default(),
+            plausibility: protection.readings.map(PlausibilityWatch::new),
+            skipped: 0,
+            open: None,
+            stop_sent: false,
+        };
+        // After a panic, the possibly inconsistent state is used only to make the rig safe.
+        let end = match catch_unwind(AssertUnwindSafe(|| run.forward())) {
+            Ok(Ok(())) => Ok(RunEnd::Completed),
+            Ok(Err(halt)) => run.way_out(halt),
+            Err(panic) => run.way_out(Halt::Failed(RunError::Panicked { message: words_of(&*panic) })),
+        };
+        let disarmed = catch_unwind(AssertUnwindSafe(|| run.with.backend.disarm()));
+        let end = end?;
+        match disarmed {
+            Ok(disarmed) => disarmed?,
+            Err(panic) => return Err(RunError::Panicked { message: words_of(&*panic) }),
+        }
+        Ok(end)
+    }
+}
+
+/// The message of a panic.
+pub(crate) fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a panic".to_owned())
+}
+
+impl Run<'_, '_> {
+    fn forward(&mut self) -> Result<(), Halt> {
+        self.with.observer.on_start(&self.with.backend.describe())?;
+        let mut next = self.next_step()?;
+        self.pass_notes()?;
+        if let Some(first) = &next {
+            if let Some(soak) = self.with.steps.soak() {
+                self.soak(first, soak)?;
+            }
+            let warm_s = self.now_s + self.with.steps.warm_up_s();
+            if warm_s > self.now_s {
+                let first_setpoints = self.begin(first);
+                self.send(first_setpoints)?;
+                self.watch(warm_s, false, true)?;
+                // Whether the speed was reached is reported for the first step, not for its warm-up.
+                let now_s = self.now_s;
+                let _ = self.with.speed.as_mut().map(|speed| speed.end(now_s));
+            }
+        }
+        while let Some(step) = next {
+            self.step(&step)?;
+            if self.protection.stop_after_step.load(Ordering::Relaxed) {
+                return Err(Halt::Interrupted);
+            }
+            next = self.next_step()?;
+            self.pass_notes()?;
+        }
+        self.with.backend.make_safe()?;
+        (self.sent, self.commanded) = (None, Commanded::default());
+        let end_s = self.now_s + self.with.steps.cool_down_s();
+        self.watch(end_s, false, false)
+    }
+
+    /// The next step. While waiting for it, the runner obeys a stop and watches a rig that runs in real time.
+    fn next_step(&mut self) -> Result<Option<PlanStep>, Halt> {
+        while !self.with.steps.is_ready() {
+            self.look_for_a_stop(false, self.now_s)?;
+            if self.sent.is_some() && self.with.clock.goes_on_by_itself() {
+                self.watch(self.now_s + self.sample_s, false, true)?;
+            }
+        }
+        Ok(self.with.steps.next_step()?)
+    }
+
+    /// Executes one step, and repeats it once if a guard requests smaller steps.
+    fn step(&mut self, step: &PlanStep) -> Result<(), Halt> {
+        let before = self.sent;
+        let mut again = false;
+        loop {
+            let setpoints = self.begin(step);
+            if again && let Some(before) = before {
+                self.approach(before, setpoints)?;
+            }
+            let mut marker = StepMarker {
+                index: step.index,
+                kind: step.kind,
+                start_s: self.now_s,
+                end_s: self.now_s + step.dwell_s,
+                from: step.from,
+                to: Some(step.to),
+                p3_pa: setpoints.p3_pa,
+                valve_opening_ratio: setpoints.valve_opening_ratio,
+            };
+            self.send(setpoints)?;
+            (self.commanded.step_since_s, self.commanded.aim) = (Some(self.now_s), Some(step.to));
+            self.reached.clear();
+            self.with.observer.on_step_start(&marker)?;
+            self.with.steps.begins(&marker);
+            let watched = self.watch(marker.end_s, true, true);
+            let watched = watched.and_then(|()| {
+                self.end()?;
+                self.speed_is_reached(step)
+            });
+            (self.commanded.step_since_s, self.commanded.aim) = (None, None);
+            marker.end_s = self.now_s;
+            let trip = match watched {
+                Err(Halt::Cut(trip)) => trip,
+                Err(halt @ Halt::Tripped(..)) => {
+                    // The rig comes first: the safe shutdown reports the end of the step after its samples.
+                    self.open = Some(marker);
+                    return Err(halt);
+                }
+                ended => {
+                    // The reason for an early end takes precedence over a failure to write the marker.
+                    let recorded = self.with.observer.on_step_end(&marker);
+                    ended?;
+                    recorded?;
+                    self.with.observer.on_step_held(&marker)?;
+                    self.with.steps.after_step(&marker)?;
+                    self.skipped = 0;
+                    return Ok(());
+                }
+            };
+            self.with.observer.on_step_abandoned(&marker)?;
+            let (goes_again, what) = match trip.reaction {
+                Reaction::SmallerSteps if !again && before.is_some() => {
+                    (true, "the step is approached again")
+                }
+                _ => (false, "the step is left out"),
+            };
+            self.act(&trip, what)?;
+            if !goes_again {
+                self.skipped += 1;
+                if self.skipped > SKIPPED_MAX {
+                    let reason =
+                        format!("{} steps in a row were left out; the last: {}", self.skipped, trip.reason);
+                    return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, reason, ..trip }, None));
+                }
+                self.with.steps.skipped(&marker)?;
+                return Ok(());
+            }
+            again = true;
+        }
+    }
+
+    /// Returns to `before`, then approaches `to` in stages.
+    fn approach(&mut self, before: Setpoints, to: Setpoints) -> Result<(), Halt> {
+        for piece in 0..SMALLER_STEPS {
+            let share = f64::from(piece) / f64::from(SMALLER_STEPS);
+            let between = |from: f64, to: f64| from + share * (to - from);
+            self.send(Setpoints {
+                p3_pa: between(before.p3_pa, to.p3_pa),
+                valve_opening_ratio: between(before.valve_opening_ratio, to.valve_opening_ratio),
+                ..to
+            })?;
+            match self.watch(self.now_s + SMALLER_STEP_S, true, false) {
+                // The same guard tripped again: the step itself reports it.
+                Ok(()) | Err(Halt::Cut(_)) => {}
+                halt => return halt,
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the speed at the end of a step against the campaign's band.
+    fn speed_is_reached(&mut self, step: &PlanStep) -> Result<(), Halt> {
+        let missed = self.protection.speed.and_then(|band| self.reached.missed(band, step, self.now_s));
+        let Some(trip) = missed else { return Ok(()) };
+        match trip.reaction {
+            Reaction::Note | Reaction::Hold => self.act(&trip, "the run goes on"),
+            Reaction::SmallerSteps | Reaction::SkipStep => Err(Halt::Cut(trip)),
+            Reaction::Safe | Reaction::Latch => Err(Halt::Tripped(trip, None)),
+        }
+    }
+
+    /// The setpoints at the start of a step.
+    fn begin(&mut self, step: &PlanStep) -> Setpoints {
+        let now_s = self.now_s;
+        let p3_pa = self.with.speed.as_mut().map_or(step.p3_pa, |speed| speed.begin(step, now_s));
+        Setpoints { p3_pa, ..setpoints(step) }
+    }
+
+    /// Sends setpoints to the rig, and updates the state that the guards use.
+    pub(crate) fn send(&mut self, setpoints: Setpoints) -> Result<(), BackendError> {
+        self.with.backend.set(&setpoints)?;
+        let running = setpoints.mode == RigMode::Running;
+        let jumps = self.sent.is_some_and(|before| {
+            let change = |from: f64, to: f64| (to - from).abs() / from.abs();
+            change(before.p3_pa, setpoints.p3_pa) > JUMP_RATIO
+                || change(before.valve_opening_ratio, setpoints.valve_opening_ratio) > 2.0 * JUMP_RATIO
+        });
+        if jumps && running && self.commanded.running {
+            self.commanded.jumped_s = Some(self.now_s);
+        } else if !running {
+            self.commanded.jumped_s = None;
+        }
+        (self.commanded.running, self.sent) = (running, Some(setpoints));
+        Ok(())
+    }
+
+    /// Reports a step whose speed was not reached.
+    fn end(&mut self) -> Result<(), ObserverError> {
+        let now_s = self.now_s;
+        let event = self.with.speed.as_mut().and_then(|speed| speed.end(now_s));
+        event.map_or(Ok(()), |event| self.with.observer.on_event(&event))
+    }
+
+    /// Reports a guard that does not end the run.
+    fn act(&mut self, trip: &Trip, what: &str) -> Result<(), Halt> {
+        let message = format!("guard `{}`: {}; {what}", trip.guard, trip.reason);
+        let t_s = trip.t_s.max(self.now_s);
+        Ok(self.with.observer.on_event(&Event { t_s, kind: EventKind::GuardActed, message })?)
+    }
+
+    /// Keeps the machine at rest for the duration of the soak; events mark start and end.
+    fn soak(&mut self, first: &PlanStep, soak: Soak) -> Result<(), Halt> {
+        self.send(Setpoints {
+            mode: RigMode::Standstill,
+            oil_temperature_k: soak.oil_temperature_k,
+            ..setpoints(first)
+        })?;
+        let message =
+            format!("soak for {:.0} s: air off, oil at {:.2} K", soak.duration_s, soak.oil_temperature_k);
+        let (t_s, kind) = (self.now_s, EventKind::SoakStarted);
+        self.with.observer.on_event(&Event { t_s, kind, message })?;
+        self.watch(self.now_s + soak.duration_s, false, false)?;
+        let message = "the soak is over, air on".to_owned();
+        let (t_s, kind) = (self.now_s, EventKind::SoakEnded);
+        self.with.observer.on_event(&Event { t_s, kind, message })?;
+        Ok(())
+    }
+
+    /// Passes the source's notes to the observer.
+    pub(crate) fn pass_notes(&mut self) -> Result<(), ObserverError> {
+        let (t_s, kind) = (self.now_s, EventKind::Note);
+        let mut notes = self.with.steps.take_notes().into_iter();
+        notes.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))?;
+        self.pass_requests()
+    }
+
+    /// Records the operator's requests.
+    fn pass_requests(&mut self) -> Result<(), ObserverError> {
+        let Some(operator) = self.protection.operator else { return Ok(()) };
+        let (t_s, kind) = (self.now_s, EventKind::Note);
+        let mut requests = operator.take_messages().into_iter();
+        requests.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
+    }
+
+    /// Runs the rig to `until_s` while guards, observer and source receive its samples. Within a step the source may end it early,
+    /// and a guard may hold or cut it short. Outside a step, a guard that would cut a step short ends the run.
+    fn watch(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
+        let (mut held_s, mut operator_held_s, mut hold_sent) = (0.0, 0.0, false);
+        while self.now_s < until_s {
+            self.look_for_a_stop(in_step, until_s)?;
+            let before_s = self.now_s;
+            let (batch, trips) = self.acquire(until_s)?;
+            if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
+                return Err(Halt::Tripped(trip.clone(), Some(Box::new(batch))));
+            }
+            self.with.observer.on_batch(&batch)?;
+            for trip in &trips {
+                match trip.reaction {
+                    Reaction::Note => self.act(trip, "the run goes on")?,
+                    Reaction::Hold if held_s < HOLD_MAX_S => self.act(trip, "the setpoints are held")?,
+                    Reaction::SmallerSteps | Reaction::SkipStep if in_step => {
+                        return Err(Halt::Cut(trip.clone()));
+                    }
+                    _ => return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, ..trip.clone() }, None)),
+                }
+            }
+            self.pass_requests()?;
+            let operator_holds = self.protection.operator.is_some_and(Operator::holds)
+                && operator_held_s < OPERATOR_HOLD_MAX_S;
+            if operator_holds {
+                let more_s = self.now_s - before_s;
+                (operator_held_s, until_s) = (operator_held_s + more_s, until_s + more_s);
+            }
+            self.reached.keep(&batch, self.now_s);
+            let ends = self.with.steps.on_batch(&batch);
+            let holding = trips.iter().any(|trip| trip.reaction == Reaction::Hold)
+                || (held_s > 0.0 && Bench::new(&mut self.with.guards).is_violated());
+            // Sent once per hold: the backend reports whether it still accepts commands.
+            if (holding || operator_holds) && !hold_sent {
+                self.with.backend.hold()?;
+            }
+            hold_sent = holding || operator_holds;
+            if holding {
+                let last_s =
+                    batch.t_s.first().zip(batch.t_s.last()).map_or(0.0, |(first, last)| last - first);
+                let more_s = last_s.max(self.sample_s);
+                (held_s, until_s) = (held_s + more_s, until_s + more_s);
+                if held_s >= HOLD_MAX_S {
+                    let reason = format!(
+                        "a guard has held the setpoints for {HOLD_MAX_S:.0} s, and is still violated"
+                    );
+                    let (guard, reaction) = (GuardName::Signals, Reaction::Safe);
+                    return Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }, None));
+                }
+                continue;
+            }
+            held_s = 0.0;
+            if ends && in_step {
+                break;
+            }
+            if hold_speed && let (Some(speed), Some(sent)) = (&mut self.with.speed, self.sent) {
+                let (p3_pa, event) = speed.on_batch(&batch);
+                event.map_or(Ok(()), |event| self.with.observer.on_event(&event))?;
+                // At the end of a step the next step sets P3.
+                if let Some(p3_pa) = p3_pa.filter(|_| self.now_s < until_s) {
+                    self.send(Setpoints { p3_pa, ..sent })?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Samples of one second, up to `until_s`, or up to the sample at which a guard trips.
+    fn acquire(&mut self, until_s: f64) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
+        let end_s = (self.now_s + POLL_INTERVAL_S).min(until_s);
+        let mut whole: Option<SampleBatch> = None;
+        loop {
+            let alert = self.protection.each_sample || Bench::new(&mut self.with.guards).is_alert();
+            let next_s = if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s };
+            if !self.waited_until(next_s) {
+                return Ok((whole.unwrap_or_default(), Vec::new()));
+            }
+            let mut batch = self.with.backend.poll(next_s)?;
+            self.now_s = next_s;
+            // Guards see the readings before impossible ones are marked: a mark must not hide a value above its limit.
+            let mut trips = Bench::new(&mut self.with.guards).look(&batch, next_s, &self.commanded);
+            let judged =
+                self.plausibility.as_mut().and_then(|watch| watch.judge(&mut batch, &self.commanded));
+            trips.extend(judged);
+            match &mut whole {
+                None => whole = Some(batch),
+                Some(whole) => append(whole, batch),
+            }
+            // Rounding: accumulated sample times fall slightly short of the full second.
+            if !trips.is_empty() || end_s - self.now_s < 1e-9 * end_s.abs() {
+                self.now_s = if trips.is_empty() { end_s } else { self.now_s };
+                return Ok((whole.unwrap_or_default(), trips));
+            }
+        }
+    }
+}
+
+fn setpoints(step: &PlanStep) -> Setpoints {
+    Setpoints {
+        mode: RigMode::Running,
+        p3_pa: step.p3_pa,
+        t3_k: step.t3_k,
+        valve_opening_ratio: step.to.valve_opening_ratio,
+        oil_temperature_k: step.oil_temperature_k,
+    }
+}

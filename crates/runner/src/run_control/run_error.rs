@@ -1,0 +1,55 @@
+//! Why a run could not go on.
+
+use crate::run_control::observer::ObserverError;
+use crate::step_sources::step_source::StepSourceError;
+use mapper_core::BackendError;
+
+/// Why a run could not go on. The rig was asked to become safe before this is returned.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The rig could not be armed.
+    #[error("the rig could not be armed, no step was begun on it: {0}")]
+    NotArmed(#[source] BackendError),
+    /// The rig failed.
+    #[error("the rig failed: {0}")]
+    Backend(#[from] BackendError),
+    /// A recorder or another observer failed.
+    #[error("{0}")]
+    Observer(#[from] ObserverError),
+    /// The step source failed.
+    #[error("{0}")]
+    Source(#[from] StepSourceError),
+    /// The program itself failed.
+    #[error(
+        "the program failed on the way ({message}); the rig is safe. Please report this as a fault of the program"
+    )]
+    Panicked {
+        /// Message of the panic.
+        message: String,
+    },
+    /// The rig did not confirm its safe state.
+    #[error(
+        "THE RIG DID NOT CONFIRM ITS SAFE STATE: {source}. Cut its air by hand. The run had ended because: {why}"
+    )]
+    NotSafe {
+        /// Why the run had ended.
+        why: String,
+        /// The rig's error.
+        source: BackendError,
+    },
+}
+
+impl RunError {
+    /// Whether the state of the rig is unknown.
+    pub fn leaves_doubt(&self) -> bool {
+        match self {
+            RunError::NotSafe { .. } | RunError::Panicked { .. } => true,
+            RunError::Backend(error) => {
+                matches!(error, BackendError::Lost { .. } | BackendError::Deadline { .. })
+            }
+            // A rig that does not answer may still arm later.
+            RunError::NotArmed(error) => matches!(error, BackendError::Deadline { .. }),
+            RunError::Observer(_) | RunError::Source(_) => false,
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Converts a diagnosed machine into the virtual lab of a campaign.
+
+use crate::SessionError;
+use mapper_diagnose::gap::twin::{Found, TwinError};
+use mapper_physics::rig::effect::{Effect, EffectParameter};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Deviations that the virtual lab supports.
+const DEVIATIONS: [&str; 8] = [
+    "flow_meter_gain",
+    "flow_map",
+    "compressor_efficiency",
+    "turbine_efficiency",
+    "valve_area",
+    "convection",
+    "external_convection",
+    "oil_conductance",
+];
+
+/// Settings of the virtual lab.
+pub struct Twin<'a> {
+    /// The identified machine.
+    pub found: &'a Found,
+    /// File of its diagnosis.
+    pub source: &'a Path,
+    /// Lag of P3 behind its command assumed by the diagnosis, s.
+    pub p3_lag_s: f64,
+}
+
+/// A campaign's text with its backend replaced by a virtual lab of the identified machine.
+///
+/// # Errors
+/// [`TwinError::Effect`] if an effect is not in the library.
+pub fn twin_campaign(
+    campaign_text: &str,
+    twin: &Twin<'_>,
+    catalogue: &[Arc<dyn Effect>],
+) -> Result<String, SessionError> {
+    Ok(with_backend(campaign_text, &backend(twin, catalogue)?))
+}
+
+/// The backend block.
+fn backend(twin: &Twin<'_>, catalogue: &[Arc<dyn Effect>]) -> Result<String, SessionError> {
+    let mut effects = Map::new();
+    for effect in &twin.found.effects {
+        let known = catalogue.iter().find(|known| known.info().id == effect.id.as_str());
+        let known = known.ok_or_else(|| TwinError::Effect(effect.id.clone()))?;
+        let value = |(parameter, value): (&EffectParameter, &f64)| match parameter.unit.as_ref() {
+            "1" | "kg/kg" => (parameter.name.to_string(), json!(value)),
+            unit => (parameter.name.to_string(), json!(format!("{value} {unit}"))),
+        };
+        let parameters = &known.info().parameters;
+        let mut values: Map<String, Value> = parameters.iter().zip(&effect.values).map(value).collect();
+        let single = parameters.first().filter(|_| parameters.len() == 1);
+        let single = single.and_then(|parameter| values.remove(parameter.name.as_ref()));
+        effects.insert(effect.id.clone(), single.unwrap_or(Value::Object(values)));
+    }
+    let tolerances = &twin.found.tolerances;
+    let deviations = tolerances.iter().filter(|t| DEVIATIONS.contains(&t.name.as_str()));
+    let deviations = deviations.map(|t| (t.name.clone(), json!(format!("{:.4} %", 100.0 * t.value))));
+    let offsets = tolerances.iter().filter_map(|t| {
+        let channel = t.offset_of()?;
+        Some((channel.to_string(), json!(format!("{:.4} {}", t.value, channel.unit()))))
+    });
+    let lab = json!({
+        "start": "settled",
+        // As in the diagnosis: P3 follows with its declared lag, the valve without lag.
+        "actuators": {
+            "turbine_inlet_pressure": {"lag": format!("{} s", twin.p3_lag_s), "slew": "1000 bar/s"},
+            "valve": {"lag": "0 s", "slew": "1000 1/s"},
+        },
+        "effects": effects,
+        "deviations": deviations.collect::<Map<_, _>>(),
+        "offset_of": offsets.collect::<Map<_, _>>(),
+    });
+    let block = serde_yaml::to_string(&json!({"backend": {"virtual_lab": lab}}))?;
+    Ok(format!("# The machine as found in {}; its covariance is there.\n{block}", twin.source.display()))
+}
+
+/// A campaign's text with its backend's block replaced.
+fn with_backend(text: &str, block: &str) -> String {
+    let mut written = String::new();
+    let mut inside = false;
+    // Comments and empty lines before a key belong to it.
+    let mut held = String::new();
+    for line in text.lines() {
+        let top_level = line.chars().next().is_some_and(|c| !c.is_whitespace() && c != '#');
+        if top_level {
+            written += &std::mem::take(&mut held);
+            inside = line.starts_with("backend:");
+            if inside {
+                written += block;
+            }
+        }
+        if inside {
+            let loose = line.trim().is_empty() || line.starts_with('#');
+            if loose {
+                held += line;
+                held.push('\n');
+            } else {
+                held.clear();
+            }
+        } else {
+            written += line;
+            written.push('\n');
+        }
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_diagnose::gap::twin::{FoundEffect, FoundTolerance};
+
+    /// Every effect of the library, and tolerances of both kinds, arrive in the campaign as numbers or values with units.
+    #[test]
+    fn a_machine_becomes_the_settings_of_the_virtual_lab() {
+        let catalogue = mapper_effects::catalogue();
+        let effect = |effect: &Arc<dyn Effect>| {
+            let values = effect.info().parameters.iter().map(|parameter| parameter.high);
+            FoundEffect { id: effect.info().id.to_string(), values: values.collect() }
+        };
+        let tolerance =
+            |(name, value): (&str, f64)| FoundTolerance { name: name.to_owned(), value, sigma: 1.0 };
+        let found = Found {
+            effects: catalogue.iter().map(effect).collect(),
+            tolerances: [("valve_area", -0.02), ("offset of T1", 0.25), ("offset of P2", -40.0)]
+                .map(tolerance)
+                .into(),
+            covariance: Vec::new(),
+        };
+        let twin = Twin { found: &found, source: Path::new("first.json"), p3_lag_s: 0.4 };
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/grid18.yaml"));
+        let text = twin_campaign(&std::fs::read_to_string(path).unwrap(), &twin, &catalogue).unwrap();
+        let campaign = mapper_campaign::check(&text, path, &mapper_campaign::read_text).unwrap();
+        let lab = campaign.backend.settings;
+        assert_eq!(lab["deviations"], json!({"valve_area": "-2.0000 %"}));
+        assert_eq!(lab["offset_of"], json!({"T1": "0.2500 K", "P2": "-40.0000 Pa"}));
+        assert_eq!(lab["actuators"]["turbine_inlet_pressure"]["lag"], "0.4 s");
+        for effect in catalogue {
+            let written = &lab["effects"][effect.info().id.as_ref()];
+            for parameter in &effect.info().parameters {
+                let value = if effect.info().parameters.len() == 1 {
+                    written
+                } else {
+                    &written[parameter.name.as_ref()]
+                };
+                let number = value.as_f64().or_else(|| value.as_str()?.split(' ').next()?.parse().ok());
+                assert_eq!(number, Some(parameter.high), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn only_the_block_of_the_backend_is_replaced() {
+        let text = "a: 1\nbackend:\n  rig: {x: 1}\n  # inner\n\n  more: 2\n\n# of c\nc: 3\n";
+        assert_eq!(with_backend(text, "backend: {}\n"), "a: 1\nbackend: {}\n\n# of c\nc: 3\n");
+    }
+}

@@ -1,0 +1,78 @@
+//! Files of the calibrated model: a diagnosis, and a pre-registered prediction.
+
+use crate::SessionError;
+use crate::recording::files::{json_text, read_at_most, write_new};
+use mapper_diagnose::gap::twin::{Expected, Found};
+use mapper_planner::sha256_hex;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Maximum size of a diagnosis or prediction file, bytes.
+const FILE_MAX_BYTES: u64 = 64 << 20;
+
+/// The fields read from a diagnosis.
+#[derive(Debug, Deserialize)]
+struct Diagnosis {
+    found: Option<Found>,
+}
+
+/// The identified machine, from the file that `mapper gap diagnose --json` prints.
+///
+/// # Errors
+/// [`SessionError::File`] if it cannot be read, [`SessionError::TwinFile`] if it is not a diagnosis.
+pub fn found_in(path: &Path) -> Result<Found, SessionError> {
+    let diagnosis: Diagnosis = serde_json::from_str(&text_of(path)?)
+        .map_err(|error| wrong(path, format!("not a diagnosis: {error}")))?;
+    diagnosis.found.ok_or_else(|| {
+        wrong(path, "it does not hold what was found; make it with `mapper gap diagnose --json`, of one recording and without --healthy".to_owned())
+    })
+}
+
+/// A prediction of the next recording, made before that recording is known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SealedForecast {
+    /// Name of the campaign.
+    pub campaign: String,
+    /// The identified machine, with its covariance.
+    pub found: Found,
+    /// Expected values at the ends of the planned steps, with the half-width of the 95 % interval.
+    pub steps: Vec<Expected>,
+}
+
+impl SealedForecast {
+    /// Writes a new file and returns its SHA-256.
+    ///
+    /// # Errors
+    /// [`SessionError::File`] if the file exists or cannot be written.
+    pub fn write(&self, path: &Path) -> Result<String, SessionError> {
+        let text = json_text(self)?;
+        write_new(path, text.as_bytes())?;
+        Ok(sha256_hex(&text))
+    }
+
+    /// Reads a prediction and its SHA-256. `wanted`: the required hash, in digits of either case.
+    ///
+    /// # Errors
+    /// [`SessionError::File`] if it cannot be read, [`SessionError::TwinFile`] if it has another hash or is not a prediction.
+    pub fn read(path: &Path, wanted: Option<&str>) -> Result<(SealedForecast, String), SessionError> {
+        let text = text_of(path)?;
+        let seal = sha256_hex(&text);
+        if let Some(wanted) = wanted.filter(|wanted| !wanted.eq_ignore_ascii_case(&seal)) {
+            let why = format!("its SHA-256 is {seal}, not {wanted}: it is not the forecast that was sealed");
+            return Err(wrong(path, why));
+        }
+        let forecast =
+            serde_json::from_str(&text).map_err(|error| wrong(path, format!("not a forecast: {error}")))?;
+        Ok((forecast, seal))
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, SessionError> {
+    let bytes = read_at_most(path, FILE_MAX_BYTES)?;
+    String::from_utf8(bytes).map_err(|_| wrong(path, "it is not UTF-8".to_owned()))
+}
+
+fn wrong(path: &Path, why: String) -> SessionError {
+    SessionError::TwinFile { path: path.to_owned(), why }
+}

@@ -1,0 +1,98 @@
+//! Checks whether the rig stayed the same over one or more recordings.
+
+use crate::recording::fusing::{Fused, fused, recordings};
+use crate::recording::identification_config::identification_with;
+use crate::recording::recording_file::{Recorded, all_differ, attached_campaign, same_machine};
+use crate::{Session, SessionError, plan::planning};
+use mapper_campaign::Campaign;
+use mapper_core::Recording;
+use mapper_diagnose::drift::{DriftReport, DriftRequest, RecordedRun, diagnose};
+use mapper_identify::{IdentifyConfig, ZeroOutcome};
+use mapper_observe::FusedChannel;
+use mapper_recording::ChannelMap;
+
+/// Drift report of the recordings, with the zero that was subtracted from them.
+#[derive(Debug)]
+pub struct Drift {
+    /// The drift report.
+    pub report: DriftReport,
+    /// Result of sensor fusion. A sensor excluded from one recording is excluded from all.
+    pub sensors: Vec<FusedChannel>,
+    /// Result of the isothermal zero.
+    pub zero: ZeroOutcome,
+}
+
+impl Session<'_> {
+    /// Compares recordings in the order in which they were made. They must be of the machine in `campaign`.
+    ///
+    /// # Errors
+    /// [`SessionError::Drift`] if there is nothing to compare, [`SessionError::Model`] if the campaign's map is unusable.
+    pub fn drift(
+        &self,
+        recorded: &[Recorded],
+        campaign: &Campaign,
+        map: &ChannelMap,
+    ) -> Result<Drift, SessionError> {
+        for (index, recorded) in recorded.iter().enumerate() {
+            if let Err(other) = same_machine(recorded, campaign) {
+                let reason = format!("No verdict: recording {}: {other}.", index + 1);
+                return Ok(Drift {
+                    report: DriftReport::without_verdict(reason),
+                    sensors: Vec::new(),
+                    zero: ZeroOutcome::NotAsked,
+                });
+            }
+        }
+        all_differ(recorded)?;
+        let mut model = planning::nominal_model(campaign)?;
+        let config = identification_with(campaign, map);
+        let Fused { recordings, config, channels } = fused(recordings(recorded), config, Some(campaign), map);
+        let sensors = channels.into_iter().next().unwrap_or_default();
+        model.params.t2_probe_diameter_m = config.probe_diameter_m;
+        let (recordings, config, zero) = zeroed_alike(recordings, config, campaign);
+        let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
+        let runs: Vec<RecordedRun<'_>> = recordings
+            .iter()
+            .zip(&fingerprints)
+            .map(|(recording, fingerprint)| RecordedRun { recording, fingerprint: fingerprint.as_deref() })
+            .collect();
+        let report = diagnose(&DriftRequest {
+            runs: &runs,
+            model: &model,
+            boundary: campaign.boundary,
+            tolerances: campaign.tolerances,
+            identification: &config,
+        })?;
+        Ok(Drift { report, sensors, zero })
+    }
+}
+
+/// Subtracts the zero of the first run from all runs. A separate zero for each run would hide drift between them.
+fn zeroed_alike(
+    recordings: Vec<Recording>,
+    config: IdentifyConfig,
+    campaign: &Campaign,
+) -> (Vec<Recording>, IdentifyConfig, ZeroOutcome) {
+    let zero = recordings
+        .first()
+        .map_or(ZeroOutcome::NotAsked, |first| ZeroOutcome::of(first, &config, campaign.zero));
+    let off = |recording: Recording| zero.take_off(recording, config.clone()).0;
+    let recordings = recordings.into_iter().map(off).collect();
+    // Declared offsets are kept: they are not drift. The zero determines them far better than the model, whose own errors would appear as
+    // changes.
+    (recordings, config, zero)
+}
+
+/// Fingerprint of what must be the same in all runs: machine, boundary conditions, points and timing. Seed, name, rig and output may differ.
+fn fingerprint(recorded: &Recorded) -> Option<String> {
+    let (read, file) = (&recorded.read, &recorded.path);
+    let of_campaign = || {
+        let campaign = attached_campaign(read, file).ok()??;
+        let dwell = campaign.timing.dwell;
+        let same = (&campaign.machine, campaign.boundary, campaign.follow_outlet, &campaign.points, dwell);
+        serde_json::to_string(&same).ok()
+    };
+    let of_hashes =
+        || Some(format!("{} {}", read.metadata.get("campaign_sha256")?, read.metadata.get("model_sha256")?));
+    of_campaign().or_else(of_hashes)
+}

@@ -1,0 +1,367 @@
+//! Explains the gap between nominal model and rig: drift search first, then zero subtraction, then diagnosis.
+
+use crate::analysis::experiments::experiments;
+use crate::plan::planning::nominal_model;
+use crate::plan::planning::plan;
+use crate::recording::fusing::{Fused, fused, recordings};
+use crate::recording::identification_config::identification_with;
+use crate::recording::recording_file::{Recorded, same_machine};
+use crate::{Session, SessionError, SessionEvent};
+use mapper_campaign::Campaign;
+use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker};
+use mapper_diagnose::drift::{CauseKind, DriftReport, without_drift};
+use mapper_diagnose::gap::best_fit::adequacy::adequacy;
+use mapper_diagnose::gap::best_fit::fit::{Effort, fit};
+use mapper_diagnose::gap::best_fit::selection::Selection;
+use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
+use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict, law_found};
+use mapper_diagnose::gap::next_experiment::best_experiment::look_beside;
+use mapper_diagnose::gap::next_experiment::outlook::Alike;
+use mapper_diagnose::gap::preconditions::problem::Problem;
+use mapper_diagnose::gap::preconditions::usable::usable;
+use mapper_diagnose::gap::reference::healthy::Healthy;
+use mapper_diagnose::gap::residuals::actuators::Actuators;
+use mapper_diagnose::gap::residuals::study::Study;
+use mapper_diagnose::gap::residuals::whiten::Linearised;
+use mapper_diagnose::gap::twin::{Expected, Found, Held, forecast_steps, hold};
+use mapper_diagnose::missing_terms::discover::discover;
+use mapper_identify::ZeroOutcome;
+use mapper_observe::averages::time_table::Table;
+use mapper_observe::model_inputs::lagged_command::Response;
+use mapper_observe::{Declared, FusedChannel};
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::simulation::model::Model;
+use mapper_recording::ChannelMap;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::slice;
+use std::sync::Arc;
+
+/// Result of a gap diagnosis.
+pub struct Gap {
+    /// The diagnosis with its inputs.
+    pub diagnosed: Diagnosed,
+    /// Drift during the recording; `None` if none was found or none can be detected, for example without repeats.
+    pub drift: Option<DriftReport>,
+    /// Result of sensor fusion.
+    pub sensors: Vec<FusedChannel>,
+    /// Result of the isothermal zero.
+    pub zero: ZeroOutcome,
+}
+
+impl Gap {
+    /// Machine-readable output: diagnosis, identified effects, drift and zero.
+    ///
+    /// # Errors
+    /// [`SessionError::Json`]: none in practice.
+    pub fn json(&self) -> Result<Value, SessionError> {
+        let mut value = serde_json::to_value(&self.diagnosed.diagnosis)?;
+        // An effect that is present in both recordings belongs to the rig; it does not describe a complete machine.
+        let whole = self.diagnosed.diagnosis.since.is_none();
+        value["found"] = json!(whole.then(|| Found::of(&self.diagnosed)).flatten());
+        value["drift"] = self.drift.as_ref().map_or(Value::Null, drift_json);
+        value["zero"] = json!(self.zero);
+        if !self.sensors.is_empty() {
+            value["sensors"] = json!(self.sensors);
+        }
+        Ok(value)
+    }
+}
+
+/// Drift without the individual points.
+fn drift_json(drift: &DriftReport) -> Value {
+    json!({"verdict": drift.verdict, "drifts": drift.drifts, "reason": drift.reason})
+}
+
+impl Session<'_> {
+    /// Diagnoses one recording with candidate effects.
+    ///
+    /// # Errors
+    /// [`SessionError::OtherMachine`] if the recording is not of the campaign's machine, [`SessionError::Gap`] if required data are missing or
+    /// the nominal model cannot follow it.
+    pub fn diagnose_gap(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+        healthy: Option<&Recorded>,
+    ) -> Result<Gap, SessionError> {
+        // The drift search runs first and takes about this share of the total time.
+        let progress = |done_ratio: f64, what: &str| {
+            self.send(SessionEvent::Progress { done_ratio, what: what.to_owned() });
+        };
+        progress(0.0, "drift");
+        let Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest } =
+            self.prepared_for_gap(recorded, campaign, map)?;
+        let before = healthy.map(|healthy| self.prepared_for_gap(healthy, campaign, map)).transpose()?;
+        let between = |from: f64, to: f64| {
+            move |done_ratio: f64, what: &str| progress(from + (to - from) * done_ratio, what)
+        };
+        let (in_catalogue, beyond) = (between(DRIFT_SHARE, CATALOGUE_END), between(CATALOGUE_END, 1.0));
+        progress(DRIFT_SHARE, "steps that are allowed");
+        let calibration = Calibration::shipped().map_err(SessionError::Calibration)?;
+        let mut diagnosed = diagnose(Question {
+            recording: &recording,
+            declared,
+            healthy: before.as_ref().zip(healthy).map(|(before, healthy)| Healthy {
+                name: healthy.path.display().to_string(),
+                recording: &before.recording,
+                declared: before.declared.clone(),
+            }),
+            tolerances_declared: campaign.tolerances_declared,
+            experiments: experiments(self.registry, campaign, map, &model)?,
+            model,
+            effects,
+            calibration: calibration.clone(),
+            progress: &in_catalogue,
+        })?;
+        let found = discover(&diagnosed, &calibration, &beyond);
+        if let Some(law) = found.settled {
+            diagnosed.accounted_by(law);
+        }
+        let diagnosis = &mut diagnosed.diagnosis;
+        (diagnosis.laws, diagnosis.forces) = (found.laws, found.forces);
+        if let Some(places) = found.places {
+            diagnosis.r#where = places;
+            // The best extra sensor is one next to the location that was just found.
+            if matches!(diagnosis.next, Some(Next::Sensor { .. })) {
+                diagnosis.next = Some(look_beside(&diagnosis.r#where));
+            }
+        }
+        let with_a_law = law_found(diagnosis).is_some();
+        if let Some(Next::Sensor { reason, .. }) = &mut diagnosis.next
+            && with_a_law
+        {
+            "the law is to be confirmed: give it to the next diagnosis with --effect, and measure there"
+                .clone_into(reason);
+        }
+        // Reader warnings belong to the remarks of the diagnosis.
+        let warnings = recorded.read.warnings.iter().map(ToString::to_string);
+        diagnosed.diagnosis.warnings.extend(warnings);
+        diagnosed.diagnosis.off_at_rest = off_at_rest;
+        note_drift(&mut diagnosed.diagnosis, drift.as_ref());
+        diagnosed.diagnosis.warnings.extend(doubted.map(|reason| {
+            format!("Without a drift nothing but noise is left of this recording; so none was subtracted, though: {reason}")
+        }));
+        Ok(Gap { diagnosed, drift, sensors, zero })
+    }
+
+    /// A recording prepared for the diagnosis: sensor drift and zero offsets are subtracted.
+    fn prepared_for_gap(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+    ) -> Result<Prepared, SessionError> {
+        same_machine(recorded, campaign)?;
+        let mut model = nominal_model(campaign)?;
+        // A recording that does not permit a drift search may still have a gap.
+        let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();
+        let drift = drift.map(|drift| drift.report).filter(|report| !report.drifts.is_empty());
+        let config = identification_with(campaign, map);
+        let Fused { recordings, config, channels } =
+            fused(recordings(slice::from_ref(recorded)), config, Some(campaign), map);
+        let sensors = channels.into_iter().next().unwrap_or_default();
+        let raw = recordings.into_iter().next().unwrap_or_default();
+        model.params.t2_probe_diameter_m = config.probe_diameter_m;
+        let ready = |drift: Option<&DriftReport>| {
+            let recording = taken_off(raw.clone(), drift);
+            // The zero reduces the offset uncertainty.
+            let zero = ZeroOutcome::with_a_fault(&recording, &config, campaign.zero);
+            let off_at_rest = off_at_rest(&zero, &config.declared);
+            let (recording, zeroed) = zero.take_off(recording, config.clone());
+            let declared = Declared {
+                sensors: zeroed.declared,
+                noise_colour: map.noise_colour.unwrap_or_default(),
+                tolerances: campaign.tolerances,
+                nominal: campaign.boundary,
+                common_offsets: zero.found().map_or_else(Vec::new, |zero| zero.common.clone()),
+            };
+            Zeroed { recording, declared, zero, off_at_rest }
+        };
+        let as_it_is = ready(None);
+        let (zeroed, drift, doubted) = match drift {
+            Some(drift) if leaves_noise(&as_it_is, campaign, &model) => (as_it_is, None, Some(drift.reason)),
+            Some(drift) => (ready(Some(&drift)), Some(drift), None),
+            None => (as_it_is, None, None),
+        };
+        let Zeroed { recording, declared, zero, off_at_rest } = zeroed;
+        Ok(Prepared { recording, declared, model, drift, doubted, sensors, zero, off_at_rest })
+    }
+
+    /// Validates the machine found by a diagnosis against an independent recording. Nothing is fitted.
+    ///
+    /// # Errors
+    /// As [`Session::diagnose_gap`], and [`SessionError::Twin`] if diagnosis and recording do not belong together.
+    pub fn hold_twin(
+        &self,
+        recorded: &Recorded,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+        found: &Found,
+    ) -> Result<Held, SessionError> {
+        let Prepared { recording, declared, model, .. } = self.prepared_for_gap(recorded, campaign, map)?;
+        Ok(hold(&study_of(&recording, campaign, declared, model, effects)?, found)?)
+    }
+
+    /// Expected readings of the diagnosed machine at the end of each planned step of a campaign.
+    ///
+    /// # Errors
+    /// [`SessionError`] if no plan can be made, or the calibrated model cannot follow it.
+    pub fn forecast_twin(
+        &self,
+        campaign: &Campaign,
+        map: &ChannelMap,
+        effects: Vec<Arc<dyn Effect>>,
+        found: &Found,
+    ) -> Result<Vec<Expected>, SessionError> {
+        let model = nominal_model(campaign)?;
+        let plan = plan(campaign, &model)?;
+        let sensors = identification_with(campaign, map).declared;
+        let lag = Response::lag(campaign.tolerances.actuator_lag_s);
+        let like = Alike {
+            channels: sensors.keys().copied().collect(),
+            declared: Declared {
+                sensors,
+                noise_colour: map.noise_colour.unwrap_or_default(),
+                tolerances: campaign.tolerances,
+                nominal: campaign.boundary,
+                common_offsets: Vec::new(),
+            },
+            model,
+            effects,
+            actuators: Actuators { p3: lag, valve: Response::lag(0.0), judged: campaign.tolerances_declared },
+        };
+        let steps = plan.steps.iter().map(|step| StepMarker {
+            index: step.index,
+            kind: step.kind,
+            start_s: step.start_s,
+            end_s: step.start_s + step.dwell_s,
+            from: step.from,
+            to: Some(step.to),
+            p3_pa: step.p3_pa,
+            valve_opening_ratio: step.to.valve_opening_ratio,
+        });
+        Ok(forecast_steps(like, steps.collect(), found)?)
+    }
+}
+
+/// A recording in the form that the diagnosis needs.
+fn study_of(
+    recording: &Recording,
+    campaign: &Campaign,
+    declared: Declared,
+    model: Model,
+    effects: Vec<Arc<dyn Effect>>,
+) -> Result<Study, GapError> {
+    let table = Table::new(recording).ok_or(GapError::from(Problem::Empty))?;
+    usable(recording, &table, &declared)?;
+    let actuators = Actuators::of(&table, recording, &declared, campaign.tolerances_declared);
+    Ok(Study::with_actuators(recording, table, declared, model, effects, actuators))
+}
+
+/// Whether tolerances alone explain the recording down to noise. In that case apparent drift in repeats is not subtracted, because the diagnosis
+/// is much more sensitive.
+fn leaves_noise(zeroed: &Zeroed, campaign: &Campaign, model: &Model) -> bool {
+    let look = || -> Result<bool, GapError> {
+        let study =
+            study_of(&zeroed.recording, campaign, zeroed.declared.clone(), model.clone(), Vec::new())?;
+        let linearised = Linearised::new(&study)?;
+        let null = fit(&study, &linearised, &study.nothing(), &Selection::all(&study), Effort::default())?;
+        let left = adequacy(&study, &linearised, &null, 0.0);
+        Ok(Calibration::shipped().is_ok_and(|calibration| calibration.outside(left.features()) < 0.5))
+    };
+    look().unwrap_or(false)
+}
+
+/// A recording with its zero subtracted.
+struct Zeroed {
+    recording: Recording,
+    declared: Declared,
+    zero: ZeroOutcome,
+    off_at_rest: Vec<String>,
+}
+
+/// A recording prepared for the diagnosis.
+struct Prepared {
+    recording: Recording,
+    declared: Declared,
+    model: Model,
+    drift: Option<DriftReport>,
+    /// A detected drift that was rejected.
+    doubted: Option<String>,
+    sensors: Vec<FusedChannel>,
+    zero: ZeroOutcome,
+    /// Remarks of the zero on sensors with offsets beyond their declaration.
+    off_at_rest: Vec<String>,
+}
+
+/// Zero offset, in declared standard deviations, above which a sensor is reported.
+const BEYOND_SIGMAS: f64 = 3.0;
+
+/// One sentence for each sensor whose zero offset exceeds its declaration.
+fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<String> {
+    let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
+    let beyond = zero.offsets.iter().filter_map(|(channel, off)| {
+        let sigma = declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
+        let left = zero.left_sigma.get(channel).copied().unwrap_or(0.0);
+        let much = off.abs() > BEYOND_SIGMAS * sigma.hypot(left);
+        much.then(|| {
+            format!(
+                "{channel} reads {:.2} {unit} too {} at rest, where {sigma:.2} {unit} are declared",
+                off.abs(),
+                if *off > 0.0 { "high" } else { "low" },
+                unit = channel.unit(),
+            )
+        })
+    });
+    beyond.collect()
+}
+
+/// Share of the time taken by the drift search.
+const DRIFT_SHARE: f64 = 0.15;
+/// Share of the time after which the effect library is finished and the search for unmodelled effects begins.
+const CATALOGUE_END: f64 = 0.7;
+
+/// The recording for the diagnosis, with sensor drift subtracted.
+fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
+    drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
+}
+
+/// After drift subtraction, unmodelled causes below this probability are ignored. The uncertainty of the drift's time history is not in any
+/// tolerance, and its residual resembles a small unmodelled cause.
+const SURELY_OUTSIDE: f64 = 0.9;
+
+/// Adds the drift to the diagnosis, which does not name a cause for it.
+fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
+    let Some(drift) = drift else { return };
+    let taken_off = drift.drifts.iter().all(|drift| drift.cause.kind() == CauseKind::Sensor);
+    let consequence = if taken_off {
+        "this was subtracted from its reading before the diagnosis"
+    } else {
+        "the diagnosis assumes a rig that does not change, so no cause is named"
+    };
+    diagnosis
+        .warnings
+        .insert(0, format!("Drift while the recording was made: {} Here {consequence}.", drift.reason));
+    if taken_off
+        && diagnosis.verdict == Verdict::Unexplained
+        && diagnosis.probability_outside < SURELY_OUTSIDE
+    {
+        diagnosis.verdict = Verdict::WithinTolerance;
+        diagnosis.r#where.clear();
+        diagnosis.forces.clear();
+        diagnosis.next = None;
+        diagnosis.experiments.clear();
+    }
+    // A change with time cannot be expressed as a closure term.
+    diagnosis.laws.clear();
+    if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
+        diagnosis.verdict = Verdict::Unexplained;
+        diagnosis.experiments.clear();
+        diagnosis.next.get_or_insert_with(|| look_beside(&diagnosis.r#where));
+    }
+}

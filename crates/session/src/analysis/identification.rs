@@ -1,0 +1,326 @@
+//! Converts a recording into identified points, with their truth if known. All commands use this module.
+
+use crate::plan::surge::marks_of;
+use crate::recording::fusing::fused;
+use crate::recording::identification_config::{declared_conditions, identification_of, identification_with};
+use crate::recording::recording_file::{Recorded, all_differ, same_machine};
+use crate::{Session, SessionError, SessionEvent};
+use mapper_campaign::{Campaign, nominal_model};
+use mapper_core::{
+    Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, ThermalModel, joined,
+};
+use mapper_identify::{
+    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_beside,
+    isothermal_zero, method_for,
+};
+use mapper_maps::{RepeatedJump, repeated_jumps};
+use mapper_observe::FusedChannel;
+use mapper_recording::score::{
+    AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, beside_truths, score, score_marks,
+};
+use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use mapper_runner::surge::SurgeMarks;
+use std::path::{Path, PathBuf};
+
+/// Minimum soak before the first step, s, that triggers a remark. Thermocouples in a housing need this time to equalise.
+const UNUSED_REST_S: f64 = 600.0;
+
+/// Identification result of a recording.
+#[derive(Debug)]
+pub struct Identified {
+    /// The identified recording: joined from several files, with fused sensors and the isothermal zero subtracted.
+    pub recording: Recording,
+    /// Origin of each of its steps.
+    pub origins: Vec<StepOrigin>,
+    /// The identification settings.
+    pub config: IdentifyConfig,
+    /// The points, with the truth if the recording contains it.
+    pub points: Vec<ScoredPoint>,
+    /// Parameters common to all points (joint method).
+    pub thermal: Option<ThermalModel>,
+    /// Two-parameter results for the same steps (joint method).
+    pub two_parameter: Vec<TwoParameter>,
+    /// Faults of sensors or machine that are needed to explain the recording.
+    pub faults: Vec<FoundFault>,
+    /// Uncertainty budgets of the points, in order.
+    pub budgets: Vec<PointBudgets>,
+    /// Result of sensor fusion.
+    pub sensors: Vec<FusedChannel>,
+    /// Result of the zero.
+    pub zero: ZeroOutcome,
+    /// Errors of the points against the truth; `None` on a real rig.
+    pub score: Option<ScoreSummary>,
+    /// Surge-side limits of the map; `None` if there was no search.
+    pub surge: Option<SoughtSurge>,
+    /// Other remarks.
+    pub remarks: Vec<String>,
+}
+
+/// Result of the surge search.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SoughtSurge {
+    /// The marks in order of speed, with the truth if the recording contains it.
+    pub marks: Vec<ScoredMark>,
+    /// Remarks on lines without a surge point.
+    pub remarks: Vec<String>,
+    /// Number of surge events of the compressor.
+    pub surges: usize,
+}
+
+impl Identified {
+    /// Machine-readable output. `recording`: the first file; `warnings`: the reader's warnings.
+    pub fn json(&self, recording: Option<&Path>, warnings: &[String]) -> Value {
+        let mut value = json!({
+            "recording": recording,
+            "reference": self.config.reference,
+            "efficiency": self.config.air.efficiency,
+            "points": self.points,
+            "thermal": self.thermal,
+            "two_parameter": self.two_parameter,
+            "faults": self.faults,
+            "budgets": self.budgets,
+            "zero": self.zero,
+            "score": self.score,
+            "recording_warnings": warnings,
+            "remarks": self.remarks,
+        });
+        if !self.sensors.is_empty() {
+            value["sensors"] = json!(self.sensors);
+        }
+        if let Some(surge) = &self.surge {
+            value["surge"] = json!(surge);
+        }
+        value
+    }
+
+    /// The points without their truth.
+    pub fn points_alone(&self) -> impl Iterator<Item = &IdentifiedPoint> {
+        self.points.iter().map(|scored| &scored.point)
+    }
+
+    /// Checks that there is at least one point.
+    ///
+    /// # Errors
+    /// [`SessionError::NoPoints`] with the known facts, including the `warnings` of the reader.
+    pub fn has_points(&self, warnings: &[String]) -> Result<(), SessionError> {
+        let why: Vec<&str> = warnings.iter().chain(&self.remarks).map(String::as_str).collect();
+        if self.points.is_empty() { Err(SessionError::NoPoints { why: why.join("; ") }) } else { Ok(()) }
+    }
+
+    /// Jumps that were repeated.
+    pub fn repeats(&self) -> Vec<RepeatedJump> {
+        let points: Vec<IdentifiedPoint> = self.points_alone().cloned().collect();
+        repeated_jumps(&self.recording.steps, &points)
+    }
+}
+
+impl Session<'_> {
+    /// Identifies all steps of one recording, or of several of the same machine together. Machine, sensors and window come from the campaign of
+    /// the first, or from the channel map. The zero of the first is subtracted from all.
+    ///
+    /// # Errors
+    /// [`SessionError::NoRecording`] for an empty list, [`SessionError::MachineUnknown`] if neither campaign nor channel map defines the
+    /// machine, [`SessionError::OtherMachine`] if a recording is of another machine, [`SessionError::NotTogether`] if the recordings' own
+    /// campaigns differ, [`SessionError::Identify`] if data that the method needs are missing.
+    pub fn identify(
+        &self,
+        recorded: Vec<Recorded>,
+        map: &ChannelMap,
+        method: Option<Method>,
+    ) -> Result<Identified, SessionError> {
+        let paths: Vec<PathBuf> = recorded.iter().map(|one| one.path.clone()).collect();
+        beside_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
+    }
+
+    /// Same as [`identify`](Session::identify), and compares with the truths in the recordings.
+    pub(crate) fn identify_and_score(
+        &self,
+        recorded: Vec<Recorded>,
+        map: &ChannelMap,
+        method: Option<Method>,
+        truths: AwaitedTruths<'_>,
+    ) -> Result<Identified, SessionError> {
+        let campaign = same_campaign(&recorded)?.cloned();
+        all_differ(&recorded)?;
+        let campaign = campaign.as_ref();
+        let mut config = match (campaign, &map.machine) {
+            (Some(campaign), _) => identification_with(campaign, map),
+            (None, Some(machine)) => identification_of(machine, map),
+            (None, None) => {
+                return Err(SessionError::MachineUnknown {
+                    remedy: "Give `--campaign FILE`, or `machine:` with `compressor_internal_area` in the channel map",
+                });
+            }
+        };
+        let mut remarks = Vec::new();
+        config.method = method.unwrap_or_else(|| {
+            let usual = config.method;
+            let found = recorded.iter().map(|one| method_for(&one.read.recording, usual));
+            let (method, why) =
+                found.reduce(|a, b| if a.1.is_some() { a } else { b }).unwrap_or((usual, None));
+            remarks.extend(why);
+            method
+        });
+        remarks.extend(unknown_barometer(map));
+        let soak = campaign.and_then(|campaign| campaign.zero);
+        let (mut recordings, mut sources) = (Vec::new(), Vec::new());
+        for Recorded { read, approaches, .. } in recorded {
+            sources.push(Source { steps: read.recording.steps.clone(), approaches });
+            recordings.push(read.recording);
+        }
+        let fused = fused(recordings, config, campaign, map);
+        let sensors = fused.channels.into_iter().next().unwrap_or_default();
+        let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
+        let zero = ZeroOutcome::of(first, &fused.config, soak);
+        remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| rest_unused(first, &fused.config)));
+        let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
+        let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
+        let (recording, origins) = joined(fused.recordings.into_iter().map(off).collect());
+        let declared = campaign.filter(|campaign| campaign.tolerances_declared);
+        let model = declared.map(nominal_model).transpose()?;
+        let nominal = declared.zip(model.as_ref());
+        let conditions = campaign.map(declared_conditions).unwrap_or_default();
+        let nominal = nominal.map(|(campaign, model)| NominalRig {
+            model,
+            tolerances: &campaign.tolerances,
+            conditions: &conditions,
+        });
+        let found = identify_beside(&recording, &config, nominal)?;
+        let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
+        for point in &points {
+            self.send(SessionEvent::PointIdentified(Box::new(point.clone())));
+        }
+        let truths = truths.wait()?;
+        let surge = sought(&sources, &truths, off, campaign, &config);
+        let points = scored(&sources, &truths, &recording, &origins, points);
+        let score = mapper_recording::score::summarise(&points);
+        Ok(Identified {
+            recording,
+            origins,
+            config,
+            points,
+            thermal: found.thermal,
+            two_parameter: found.two_parameter,
+            faults: found.faults,
+            budgets: found.budgets,
+            sensors,
+            zero,
+            score,
+            surge,
+            remarks,
+        })
+    }
+}
+
+/// Remark that gauge pressures are added to an unknown ambient pressure.
+fn unknown_barometer(map: &ChannelMap) -> Option<String> {
+    let unknown = Barometer::unknown();
+    let used = [Channel::P1, Channel::P2].into_iter().any(|channel| map.is_gauge(channel));
+    (used && map.ambient_pressure == Some(AmbientPressure::Constant(unknown))).then(|| {
+        format!(
+            "the ambient pressure is unknown: it counts as {:.1} kPa with a standard uncertainty of {:.0} kPa, which the intervals include; write \
+             what the barometer read or the altitude of the stand as `ambient_pressure` in the channel map",
+            1e-3 * unknown.pressure_pa,
+            1e-3 * unknown.sigma_pa
+        )
+    })
+}
+
+/// Remark that a recording has a soak long enough for a zero, but no zero was requested.
+fn rest_unused(recording: &Recording, config: &IdentifyConfig) -> Option<String> {
+    let settings = ZeroSettings { shortest_s: UNUSED_REST_S, ..ZeroSettings::default() };
+    let rest = isothermal_zero(recording, config, &settings).ok().filter(|rest| !rest.offsets.is_empty())?;
+    Some(format!(
+        "from {:.0} to {:.0} s, before the first step, the machine rests and its sensors read alike: `zero: {{soak: {:.0} min}}` in the \
+         campaign takes off what they read differently there, which leaves less of the declared offsets in the intervals",
+        rest.start_s,
+        rest.end_s,
+        (rest.end_s - rest.start_s) / 60.0
+    ))
+}
+
+/// Metadata kept for each recording.
+struct Source {
+    steps: Vec<StepMarker>,
+    approaches: Option<Recording>,
+}
+
+/// The campaign that all recordings belong to; `None` if none names one.
+fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionError> {
+    let first = recorded.first().ok_or(SessionError::NoRecording)?;
+    let Some(campaign) = &first.campaign else { return Ok(None) };
+    for other in recorded {
+        same_machine(other, campaign)?;
+        let Some(theirs) = &other.campaign else { continue };
+        let differs = if theirs.machine != campaign.machine {
+            "machine"
+        } else if theirs.sensors != campaign.sensors {
+            "sensors"
+        } else if theirs.reference != campaign.reference {
+            "reference state"
+        } else {
+            continue;
+        };
+        let (first, other) = (first.path.clone(), other.path.clone());
+        return Err(SessionError::NotTogether { first, other, differs });
+    }
+    Ok(Some(campaign))
+}
+
+/// The points with their truth, each from its own recording.
+fn scored(
+    sources: &[Source],
+    truths: &[Truth],
+    recording: &Recording,
+    origins: &[StepOrigin],
+    points: Vec<IdentifiedPoint>,
+) -> Vec<ScoredPoint> {
+    let origin_of = |index: usize| {
+        let position = recording.steps.iter().position(|step| step.index == index)?;
+        origins.get(position)
+    };
+    let mut scored: Vec<(usize, ScoredPoint)> = Vec::new();
+    for (number, (source, truth)) in sources.iter().zip(truths).enumerate() {
+        let theirs = points.iter().enumerate().filter_map(|(place, point)| {
+            let origin = origin_of(point.step).filter(|origin| origin.recording == number)?;
+            Some((place, point.step, IdentifiedPoint { step: origin.step, ..point.clone() }))
+        });
+        let (places, alone): (Vec<(usize, usize)>, Vec<IdentifiedPoint>) =
+            theirs.map(|(place, step, point)| ((place, step), point)).unzip();
+        let found = score(truth, &source.steps, alone);
+        scored.extend(places.into_iter().zip(found).map(|((place, step), mut found)| {
+            found.point.step = step;
+            (place, found)
+        }));
+    }
+    scored.sort_by_key(|(place, _)| *place);
+    scored.into_iter().map(|(_, found)| found).collect()
+}
+
+/// The marks of all approaches with their truth; `None` if there was no surge search.
+fn sought(
+    sources: &[Source],
+    truths: &[Truth],
+    off: impl Fn(Recording) -> Recording,
+    campaign: Option<&Campaign>,
+    config: &IdentifyConfig,
+) -> Option<SoughtSurge> {
+    let mut all: Option<SoughtSurge> = None;
+    for (Source { approaches, .. }, truth) in sources.iter().zip(truths) {
+        let Some(approaches) = approaches.clone().map(&off) else { continue };
+        let SurgeMarks { marks, remarks, surges } = marks_of(&approaches, campaign, config);
+        let marks = score_marks(truth, &approaches, config.reference, marks);
+        let together =
+            all.get_or_insert_with(|| SoughtSurge { marks: Vec::new(), remarks: Vec::new(), surges: 0 });
+        together.marks.extend(marks);
+        together.remarks.extend(remarks);
+        together.surges += surges;
+    }
+    if let Some(all) = &mut all {
+        all.marks.sort_by(|a, b| a.mark.speed_corrected_rpm.total_cmp(&b.mark.speed_corrected_rpm));
+    }
+    all
+}

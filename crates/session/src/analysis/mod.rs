@@ -1,0 +1,12 @@
+//! Analysis of a finished recording: identified points, result files, gap diagnosis, drift check, and calibrated models.
+
+pub(crate) mod budget_file;
+pub(crate) mod calibrated_model_campaign;
+pub(crate) mod calibrated_model_files;
+pub(crate) mod drift;
+pub(crate) mod experiments;
+pub(crate) mod further_results;
+pub(crate) mod gap;
+pub(crate) mod identification;
+pub(crate) mod results;
+pub(crate) mod transient;

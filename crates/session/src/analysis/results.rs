@@ -1,0 +1,492 @@
+//! Results of a run or recording: points, map and report, as data and as files in its directory.
+
+use crate::analysis::budget_file::budget_csv;
+use crate::analysis::identification::{Identified, SoughtSurge};
+use crate::recording::files::{json_text, write_new};
+use crate::recording::program::program_and_commit;
+use crate::recording::recording_file::Recorded;
+use crate::{Gap, Registry, Session, SessionError, recording::run_directory};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::Outputs;
+use mapper_campaign::units::Kind;
+use mapper_core::{
+    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, RunEnding, ThermalModel,
+};
+use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
+use mapper_maps::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
+use mapper_observe::FusedChannel;
+use mapper_recording::score::{ScoreSummary, ScoredPoint, beside_truths};
+use mapper_recording::{ChannelMap, ReadOptions, read_recording};
+use mapper_report::page::{OtherRun, RunPage, run_page};
+use mapper_report::{
+    Display, PointsOrigin, ReportSource, RunReport, SurgeReport, gap_part, instant, run_report,
+};
+use serde::Serialize;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// All results of a run and their files. As JSON, this is the one object that a run prints.
+#[derive(Debug, Serialize)]
+pub struct Results {
+    /// The run's directory.
+    pub run: PathBuf,
+    /// Its recording, or the first of several that were identified together.
+    pub recording: PathBuf,
+    /// The other recordings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub further_recordings: Vec<PathBuf>,
+    /// Identified points, repeats included.
+    pub points: Vec<ScoredPoint>,
+    /// Files of the map by format.
+    pub map: BTreeMap<String, PathBuf>,
+    /// The test report.
+    pub report: PathBuf,
+    /// The extended report as a page for a browser.
+    pub page: PathBuf,
+    /// Errors of the points against the truth; `None` on a real rig.
+    pub score: Option<ScoreSummary>,
+    /// Jumps that were repeated.
+    pub repeats: Vec<RepeatedJump>,
+    /// Parameters common to all points (joint method).
+    pub thermal: Option<ThermalModel>,
+    /// Two-parameter results for the same steps (joint method).
+    pub two_parameter: Vec<TwoParameter>,
+    /// Result of sensor fusion.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sensors: Vec<FusedChannel>,
+    /// Result of the isothermal zero.
+    pub zero: ZeroOutcome,
+    /// Surge-side limits of the map; `None` if there was no search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surge: Option<SoughtSurge>,
+    /// Other remarks.
+    pub remarks: Vec<String>,
+    /// Why a file of the results could not be written, and how to write it later; `None`: all were written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unwritten: Option<String>,
+    /// The map itself; `None` if there is none.
+    #[serde(skip)]
+    pub compressor_map: Option<CompressorMap>,
+}
+
+/// Provenance of recordings.
+pub(crate) struct Provenance {
+    campaign: Option<Campaign>,
+    plan: Option<Plan>,
+    /// How the run ended; `None` for points from recordings.
+    ending: Option<RunEnding>,
+    machine: String,
+    /// Test date for people.
+    tested_at: Option<String>,
+    sources: Vec<ReportSource>,
+}
+
+impl Provenance {
+    /// Provenance from the recordings themselves.
+    pub(crate) fn of(recorded: &[Recorded]) -> Provenance {
+        let campaign = recorded.first().and_then(|first| first.campaign.clone());
+        // Recordings of one run have the same plan.
+        let plans: Vec<Option<&[u8]>> = recorded.iter().map(|one| one.read.plan_json.as_deref()).collect();
+        let plan = match plans.as_slice() {
+            [Some(first), others @ ..] if others.iter().all(|other| *other == Some(*first)) => {
+                serde_json::from_slice(first).ok()
+            }
+            _ => None,
+        };
+        let file = recorded.first().and_then(|first| first.path.file_stem());
+        let named = || file.unwrap_or_default().to_string_lossy().into_owned();
+        let sources: Vec<ReportSource> = recorded.iter().map(source).collect();
+        Provenance {
+            ending: None,
+            machine: campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone()),
+            // Simulated time has no date; the name of the run directory has one.
+            tested_at: sources
+                .first()
+                .and_then(|source| instant(source.start_time_ns))
+                .or_else(|| run_directory::started(recorded.first()?.path.parent()?)),
+            campaign,
+            plan,
+            sources,
+        }
+    }
+
+    /// Units of the map's pictures, as requested by the campaign.
+    fn map_units(&self) -> MapUnits {
+        let Some(campaign) = &self.campaign else { return MapUnits::default() };
+        let display = Display::new(&campaign.display);
+        MapUnits {
+            flow: campaign.display.flow.clone(),
+            flow_of_one_kg_s: display.number(Kind::MassFlow, 1.0),
+            speed: campaign.display.speed.clone(),
+            speed_of_one_rpm: display.number(Kind::Speed, 1.0),
+        }
+    }
+
+    fn formats(&self) -> Vec<String> {
+        let usual = Outputs::default();
+        let outputs = self.campaign.as_ref().map_or(&usual, |campaign| &campaign.outputs);
+        outputs.formats.iter().map(|format| format.name().to_owned()).collect()
+    }
+}
+
+/// One recording of a run.
+pub(crate) struct RunPart {
+    pub(crate) recording: PathBuf,
+    /// Valid steps of it; `None`: all.
+    pub(crate) saved: Option<BTreeSet<usize>>,
+}
+
+impl Session<'_> {
+    /// Reads the recording of a run, identifies, assembles, exports and reports. All files go into `directory`.
+    ///
+    /// # Errors
+    /// [`SessionError`] if the recording cannot be identified or a file cannot be written. If a map cannot be assembled or fitted, a remark says
+    /// so.
+    pub(crate) fn results(
+        &self,
+        campaign: &Campaign,
+        plan: &Plan,
+        ending: RunEnding,
+        started_ns: u64,
+        directory: &Path,
+        parts: &[RunPart],
+    ) -> Result<Results, SessionError> {
+        let paths: Vec<PathBuf> = parts.iter().map(|part| part.recording.clone()).collect();
+        let mut remarks = Vec::new();
+        let identified = beside_truths(&paths, |truths| {
+            let mut together = Vec::new();
+            for part in parts {
+                let mut read =
+                    read_recording(&part.recording, &ChannelMap::native(), &ReadOptions::default())?;
+                remarks.extend(read.warnings.iter().map(ToString::to_string));
+                if let Some(saved) = &part.saved {
+                    read.recording.steps.retain(|step| saved.contains(&step.index));
+                }
+                together.push(Recorded::of(part.recording.clone(), read, Some(campaign.clone())));
+            }
+            self.identify_and_score(together, &ChannelMap::native(), None, truths)
+        })?;
+        let mut files = paths.into_iter();
+        let recording = files.next().ok_or(SessionError::NoRecording)?;
+        let further: Vec<PathBuf> = files.collect();
+        let origin = Provenance {
+            campaign: Some(campaign.clone()),
+            plan: Some(plan.clone()),
+            ending: Some(ending),
+            machine: campaign.machine.name.clone(),
+            tested_at: instant(started_ns),
+            sources: Vec::new(),
+        };
+        let (results, written) =
+            self.written(&origin, identified, (recording, further), remarks, directory)?;
+        let unwritten = written.err().map(|error| {
+            let run = directory.display();
+            format!("{error}; make room, then write the results with `mapper run --resume {run}`, which does not use the rig")
+        });
+        Ok(Results { unwritten, ..results })
+    }
+
+    /// Identifies recordings and writes the same results as a run, points, map and report, to `directory`. Creates it if missing. Existing
+    /// results are never replaced and stop the identification.
+    ///
+    /// # Errors
+    /// As [`Session::identify`]; [`SessionError::File`] if a file exists or cannot be written.
+    pub fn identify_into(
+        &self,
+        recorded: Vec<Recorded>,
+        map: &ChannelMap,
+        method: Option<Method>,
+        directory: &Path,
+    ) -> Result<Results, SessionError> {
+        for name in [run_directory::POINTS, run_directory::REPORT] {
+            let path = directory.join(name);
+            if path.exists() {
+                return Err(SessionError::file("write", &path)(std::io::ErrorKind::AlreadyExists.into()));
+            }
+        }
+        let remarks = recorded.iter().flat_map(|one| remarks_of(one, recorded.len() > 1)).collect();
+        let mut files = recorded.iter().map(|one| one.path.clone());
+        let first = files.next().ok_or(SessionError::NoRecording)?;
+        let further: Vec<PathBuf> = files.collect();
+        let origin = Provenance::of(&recorded);
+        let identified = self.identify(recorded, map, method)?;
+        std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
+        let (results, written) = self.written(&origin, identified, (first, further), remarks, directory)?;
+        written.map(|()| results)
+    }
+
+    /// The page of the run with recordings `shown`, with other runs' maps for comparison and its gap diagnosis, if any. Writes no file.
+    ///
+    /// # Errors
+    /// As [`Session::identify`].
+    pub fn page(
+        &self,
+        shown: Vec<Recorded>,
+        others: Vec<Vec<Recorded>>,
+        channels: &ChannelMap,
+        gap: Option<&Gap>,
+    ) -> Result<String, SessionError> {
+        let origin = Provenance::of(&shown);
+        let mut remarks: Vec<String> =
+            shown.iter().flat_map(|one| remarks_of(one, shown.len() > 1)).collect();
+        let identified = self.identify(shown, channels, None)?;
+        remarks.extend(identified.remarks.iter().cloned());
+        let map = compressor_map(&origin.machine, &identified, &mut remarks);
+        let reference = identified.config.reference;
+        let mut other_maps: Vec<(String, CompressorMap)> = Vec::new();
+        for other in others {
+            let name = other.first().map_or_else(String::new, |first| name_of(&first.path));
+            let machine = Provenance::of(&other).machine;
+            let identified = self.identify(other, channels, None)?;
+            match compressor_map(&machine, &identified, &mut Vec::new()) {
+                Some(map) => other_maps.push((name, map.at_reference(reference))),
+                None => remarks.push(format!("{name} has no map to compare this one with")),
+            }
+        }
+        let others: Vec<OtherRun<'_>> =
+            other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
+        let repeats = identified.repeats();
+        let program = program_and_commit(self.registry.commit);
+        let report = run_report_of(&origin, &identified, map.as_ref(), &program, &remarks, &repeats, false);
+        page_of(&identified, &report, &others, gap)
+    }
+
+    /// Writes the files of an identification. A file that cannot be written costs the later ones, and not the results themselves.
+    fn written(
+        &self,
+        origin: &Provenance,
+        identified: Identified,
+        (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
+        mut remarks: Vec<String>,
+        directory: &Path,
+    ) -> Result<(Results, Result<(), SessionError>), SessionError> {
+        remarks.extend(identified.remarks.iter().cloned());
+        let compressor_map = compressor_map(&origin.machine, &identified, &mut remarks);
+        let mut files = ResultFiles { directory, failed: Ok(()) };
+        let map = match &compressor_map {
+            Some(map) => {
+                export(self.registry, &origin.formats(), map, &origin.map_units(), &mut files, &mut remarks)?
+            }
+            None => BTreeMap::new(),
+        };
+        let mut points_file = json!({
+            "reference": identified.config.reference,
+            "efficiency": identified.config.air.efficiency,
+            "points": identified.points,
+            "thermal": identified.thermal,
+            "two_parameter": identified.two_parameter,
+            "faults": identified.faults,
+            "budgets": identified.budgets,
+            "zero": identified.zero,
+        });
+        if !identified.sensors.is_empty() {
+            points_file["sensors"] = json!(identified.sensors);
+        }
+        if let Some(surge) = &identified.surge {
+            points_file["surge"] = json!(surge);
+        }
+        files.write(run_directory::POINTS, json_text(&points_file)?.as_bytes());
+        if !identified.budgets.is_empty() {
+            files.write(run_directory::BUDGET, &budget_csv(&identified.budgets)?);
+        }
+        let repeats = identified.repeats();
+        let program = program_and_commit(self.registry.commit);
+        let has_picture = map.contains_key("svg");
+        let shown = run_report_of(
+            origin,
+            &identified,
+            compressor_map.as_ref(),
+            &program,
+            &remarks,
+            &repeats,
+            has_picture,
+        );
+        let report = files.write(run_directory::REPORT, run_report(&shown).as_bytes());
+        let page = files.write(run_directory::PAGE, page_of(&identified, &shown, &[], None)?.as_bytes());
+        let Identified { points, thermal, two_parameter, sensors, zero, score, surge, .. } = identified;
+        let results = Results {
+            run: directory.to_owned(),
+            recording: recording_file,
+            further_recordings,
+            points,
+            map,
+            report,
+            page,
+            score,
+            repeats,
+            thermal,
+            two_parameter,
+            sensors,
+            zero,
+            surge,
+            remarks,
+            unwritten: None,
+            compressor_map,
+        };
+        Ok((results, files.failed))
+    }
+}
+
+/// The files of an identification in their directory.
+struct ResultFiles<'a> {
+    directory: &'a Path,
+    /// Why the first file that could not be written could not; none is written after it.
+    failed: Result<(), SessionError>,
+}
+
+impl ResultFiles<'_> {
+    /// Writes a file, and returns its path.
+    fn write(&mut self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.directory.join(name);
+        if self.failed.is_ok() {
+            self.failed = write_new(&path, bytes);
+        }
+        path
+    }
+}
+
+/// Name of a recording in comparisons: its run directory, or its file.
+fn name_of(path: &Path) -> String {
+    let named = match path.file_name() {
+        Some(file) if file == run_directory::RECORDING => path.parent().and_then(Path::file_name),
+        file => file,
+    };
+    named.unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Contents of the report and the page.
+fn run_report_of<'a>(
+    origin: &'a Provenance,
+    identified: &'a Identified,
+    map: Option<&'a CompressorMap>,
+    program: &'a str,
+    remarks: &'a [String],
+    repeats: &'a [RepeatedJump],
+    has_picture: bool,
+) -> RunReport<'a> {
+    RunReport {
+        machine: &origin.machine,
+        campaign: origin.campaign.as_ref(),
+        plan: origin.plan.as_ref(),
+        tested_at: origin.tested_at.as_deref(),
+        program,
+        map,
+        recording: &identified.recording,
+        used: &identified.config.declared,
+        budgets: &identified.budgets,
+        zero: &identified.zero,
+        sources: &origin.sources,
+        origin: origin
+            .ending
+            .clone()
+            .map_or(PointsOrigin::Recordings(identified.config.method), PointsOrigin::Run),
+        remarks,
+        reference: identified.config.reference,
+        efficiency: identified.config.air.efficiency,
+        method: identified.config.method,
+        alpha_area_ratio: identified.config.alpha_area_ratio,
+        events: &identified.recording.events,
+        points: &identified.points,
+        repeats,
+        two_parameter: &identified.two_parameter,
+        sensors: &identified.sensors,
+        score: identified.score.as_ref(),
+        surge: identified.surge.as_ref().map(|surge| SurgeReport {
+            marks: &surge.marks,
+            remarks: &surge.remarks,
+            surges: surge.surges,
+        }),
+        has_picture,
+    }
+}
+
+/// The page of an identification, with other runs' maps.
+fn page_of(
+    identified: &Identified,
+    report: &RunReport<'_>,
+    others: &[OtherRun<'_>],
+    gap: Option<&Gap>,
+) -> Result<String, SessionError> {
+    let course = |point: &IdentifiedPoint| t2_course(&identified.recording, point, &identified.config);
+    let courses: Vec<T2Course> = identified.points_alone().filter_map(course).collect();
+    let gap = gap.map(|gap| gap_part(&gap.diagnosed));
+    Ok(run_page(&RunPage { report, courses: &courses, gap, others })?)
+}
+
+/// Source entry of a recording in a report.
+fn source(recorded: &Recorded) -> ReportSource {
+    let recording = &recorded.read.recording;
+    let spans = recording.series.values().filter_map(|series| series.t_s.first().zip(series.t_s.last()));
+    let (first_s, last_s) =
+        spans.fold((f64::INFINITY, 0.0f64), |(first, last), (a, b)| (first.min(*a), last.max(*b)));
+    ReportSource {
+        file: recorded.path.display().to_string(),
+        start_time_ns: recorded.read.start_time_ns,
+        duration_s: (last_s - first_s).max(0.0),
+        steps: recording.steps.len(),
+    }
+}
+
+/// Reader warnings of a file, prefixed with its name if there are several.
+fn remarks_of(recorded: &Recorded, several: bool) -> Vec<String> {
+    let named = |warning: &mapper_recording::ReadWarning| match several {
+        true => format!("{}: {warning}", recorded.path.display()),
+        false => warning.to_string(),
+    };
+    recorded.read.warnings.iter().map(named).collect()
+}
+
+/// The map of all points with map coordinates, with a fitted surface if there are enough of them. `None` without a map; a remark says why.
+pub fn compressor_map(
+    machine: &str,
+    identified: &Identified,
+    remarks: &mut Vec<String>,
+) -> Option<CompressorMap> {
+    let has_place = |point: &&IdentifiedPoint| {
+        [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm]
+            .iter()
+            .all(|value| value.is_finite())
+    };
+    let placed: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
+    let config = &identified.config;
+    let map = assemble(&placed, machine, config.reference, config.method, Grouping::default())
+        .map_err(|error| remarks.push(format!("there is no map: {error}")))
+        .ok()?;
+    let marks = identified.surge.iter().flat_map(|surge| surge.marks.iter().map(|scored| scored.mark));
+    let map = CompressorMap { efficiency: Some(config.air.efficiency), surge: marks.collect(), ..map };
+    match MapFit::new(&map).and_then(|fit| fit.table(&MapFitOptions::default())) {
+        Ok(table) => Some(CompressorMap { fitted: Some(table), ..map }),
+        Err(error) => {
+            remarks.push(format!("the map is not fitted: {error}"));
+            Some(map)
+        }
+    }
+}
+
+/// Writes the map in these formats.
+fn export(
+    registry: &Registry,
+    formats: &[String],
+    map: &CompressorMap,
+    units: &MapUnits,
+    files: &mut ResultFiles<'_>,
+    remarks: &mut Vec<String>,
+) -> Result<BTreeMap<String, PathBuf>, SessionError> {
+    let mut paths = BTreeMap::new();
+    for name in formats {
+        let format = registry.written_format(name)?;
+        let bytes = match format.write_in(map, units) {
+            Ok(bytes) => bytes,
+            // A campaign of a few points has a map but no fitted surface.
+            Err(error @ ExportError::NeedsFit { .. }) => {
+                remarks.push(error.to_string());
+                continue;
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let path = files.write(&format!("map.{}", format.extension), &bytes);
+        paths.insert(name.to_owned(), path);
+    }
+    Ok(paths)
+}

@@ -1,0 +1,120 @@
+//! Analyses one side of a machine from a log without steps: its parameters, and the cause that explains the residual.
+
+use crate::plan::planning::nominal_model;
+use crate::recording::files::{Existing, json_text, write_file};
+use crate::recording::identification_config::declared;
+use crate::recording::recording_file::{Recorded, same_machine};
+use crate::{Session, SessionError};
+use mapper_core::ExportError;
+use mapper_diagnose::driven::cause_search::{Ask, Diagnosis, Which, diagnose};
+use mapper_diagnose::driven::{DrivenOutcome, Readings, identify};
+use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_observe::Declared;
+use mapper_physics::rig::effect::{Effect, Rig};
+use mapper_recording::ChannelMap;
+use mapper_report::{transient_figure, transient_text, why_figure, why_text};
+use serde::Serialize;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Name of the report's files.
+const STEM: &str = "transient";
+
+/// Result of a log without steps for one side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Transient {
+    /// Findings independent of the cause; compressor side only.
+    #[serde(flatten)]
+    pub identified: Option<DrivenOutcome>,
+    /// The diagnosis of the cause, relative to the campaign's machine.
+    pub why: Diagnosis,
+}
+
+impl Transient {
+    /// Text for people.
+    pub fn text(&self) -> String {
+        let identified =
+            self.identified.as_ref().map_or_else(String::new, |found| transient_text(found) + "\n");
+        identified + why_text(&self.why).as_str()
+    }
+}
+
+impl Session<'_> {
+    /// Analyses a log without steps of one side of its campaign's machine, and determines which of `effects` explains it. Fits the data before
+    /// `fit_until_s` (log time, s; default: all) and predicts the later data.
+    ///
+    /// # Errors
+    /// [`SessionError::MachineUnknown`] if no campaign defines the machine, [`SessionError::OtherMachine`] if it is another,
+    /// [`SessionError::Driven`] if the log has too little data.
+    pub fn transient(
+        &self,
+        recorded: &Recorded,
+        map: &ChannelMap,
+        side: Which,
+        fit_until_s: Option<f64>,
+        effects: &[Arc<dyn Effect>],
+    ) -> Result<Transient, SessionError> {
+        let campaign = recorded.known("Give `--campaign FILE` with the machine and its geometry")?;
+        same_machine(recorded, campaign)?;
+        let recording = &recorded.read.recording;
+        let fit_until_s = fit_until_s.unwrap_or(f64::INFINITY);
+        let identified = match side {
+            Which::Compressor => {
+                let rows = Readings::of(recording)?;
+                Some(identify(&rows, campaign.machine.params, fit_until_s, campaign.seed)?)
+            }
+            Which::Turbine => None,
+        };
+        let why = diagnose(
+            &Ask {
+                recording,
+                nominal: &Rig::new(nominal_model(campaign)?),
+                effects,
+                declared: &Declared {
+                    sensors: declared(campaign, map),
+                    noise_colour: map.noise_colour.unwrap_or_default(),
+                    tolerances: campaign.tolerances,
+                    nominal: campaign.boundary,
+                    common_offsets: Vec::new(),
+                },
+                calibration: &Calibration::shipped().map_err(SessionError::Calibration)?,
+                fit_until_s,
+                seed: campaign.seed,
+            },
+            side,
+        )?;
+        Ok(Transient { identified, why })
+    }
+}
+
+/// Writes text, JSON and pictures of the result to a directory. Creates it if missing and returns the files.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn write_transient(
+    found: &Transient,
+    machine: &str,
+    directory: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, SessionError> {
+    let figure = match &found.identified {
+        Some(outcome) => transient_figure(machine, outcome),
+        None => why_figure(machine, &found.why),
+    };
+    let png = figure.to_png(2.0).map_err(ExportError::failed("png"))?;
+    let contents: [(String, Vec<u8>); 4] = [
+        (format!("{STEM}.json"), json_text(&json!(found))?.into_bytes()),
+        (format!("{STEM}.txt"), found.text().into_bytes()),
+        (format!("{STEM}.svg"), figure.to_svg().into_bytes()),
+        (format!("{STEM}.png"), png),
+    ];
+    std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
+    let mut files = Vec::new();
+    for (name, bytes) in &contents {
+        let path = directory.join(name);
+        write_file(&path, bytes, existing)?;
+        files.push(path);
+    }
+    Ok(files)
+}

@@ -1,0 +1,500 @@
+//! Errors of a session.
+
+use crate::errors::error_kind::ErrorKind;
+use crate::errors::error_words::{in_doubt_text, word};
+use crate::errors::map_work_error::MapWorkError;
+use crate::variant::VariantError;
+use mapper_campaign::{CampaignError, NightlyError};
+use mapper_core::{BackendError, ExportError, ImportError};
+use mapper_diagnose::drift::DriftError;
+use mapper_diagnose::gap::diagnose::GapError;
+use mapper_diagnose::gap::twin::TwinError;
+use mapper_history::HistoryError;
+use mapper_identify::IdentifyError;
+use mapper_maps::table::DescriptionError;
+use mapper_observe::OtherMachine;
+use mapper_planner::PlanError;
+use mapper_recording::logs::{LogError, OptionError};
+use mapper_recording::{ChannelMapError, RecordError};
+use mapper_runner::{RunError, StepSourceError};
+use mapper_sequence::SequenceError;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a session could not complete a request.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The campaign cannot be read or has mistakes.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
+    /// The nightly campaign cannot be read or has mistakes.
+    #[error(transparent)]
+    Nightly(#[from] NightlyError),
+    /// A nightly campaign lists a campaign whose steps come from a script.
+    #[error(
+        "{}: a nightly run compares the same points night after night; the steps of this campaign come from a script, \
+         which may visit others. Give it a grid instead of `sequence`", .path.display()
+    )]
+    NightlySequence {
+        /// The campaign.
+        path: PathBuf,
+    },
+    /// The machine list of a nightly campaign is wrong.
+    #[error(transparent)]
+    Variant(#[from] VariantError),
+    /// Two runs of a night have the same campaign, machine, method and seed.
+    #[error("{key} appears twice in the nightly campaign; give each campaign its own name")]
+    NightlyTwice {
+        /// The run.
+        key: String,
+    },
+    /// Rows made elsewhere do not match the runs of this night.
+    #[error(
+        "the runs that were made elsewhere are not those of this nightly campaign: {lacks}; make the study again from it"
+    )]
+    OtherNight {
+        /// What differs.
+        lacks: String,
+    },
+    /// A log without steps has too little data.
+    #[error(transparent)]
+    Driven(#[from] mapper_diagnose::driven::DrivenError),
+    /// A first campaign cannot get its nominal map.
+    #[error(transparent)]
+    FirstMap(#[from] Box<crate::errors::first_map_error::FirstMapError>),
+    /// No recording was given.
+    #[error("no recording was given; name a run directory or a recording")]
+    NoRecording,
+    /// The recordings cannot be identified together.
+    #[error(
+        "{} and {} cannot be identified together: their campaigns have another {differs}; identify each by itself, or give the campaign \
+         that holds for all with `--campaign`", .first.display(), .other.display()
+    )]
+    NotTogether {
+        /// The first recording.
+        first: PathBuf,
+        /// The recording that differs from it.
+        other: PathBuf,
+        /// What differs.
+        differs: &'static str,
+    },
+    /// An unknown method.
+    #[error("`{name}` is not a method: {source}")]
+    Method {
+        /// The name given.
+        name: String,
+        /// The known methods.
+        source: serde_json::Error,
+    },
+    /// The campaign's map is unusable.
+    #[error("the nominal model has no map: {0}")]
+    Model(#[from] mapper_campaign::NominalTableError),
+    /// No plan is possible.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A file does not contain a plan.
+    #[error("{} is not a plan: {source}", .path.display())]
+    NotAPlan {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: serde_json::Error,
+    },
+    /// A stored plan no longer matches its inputs.
+    #[error(
+        "{} is stale: {} changed since it was made; make it again with `mapper plan CAMPAIGN --out FILE`",
+        .path.display(), .changed.join(" and ")
+    )]
+    StalePlan {
+        /// The file.
+        path: PathBuf,
+        /// What has changed.
+        changed: Vec<&'static str>,
+    },
+    /// A backend could not be made because its name or its settings are wrong.
+    #[error(transparent)]
+    Backend(BackendError),
+    /// An auxiliary instrument cannot be created, or delivers the wrong channels.
+    #[error("the reader at `{at}`: {source}")]
+    Reader {
+        /// Key path of the instrument in the campaign.
+        at: String,
+        /// Path below that, if the fault is in one of the backend's own settings.
+        setting: String,
+        /// What is wrong.
+        source: mapper_core::BackendCause,
+    },
+    /// A stored plan violates a limit that applies to every plan.
+    #[error("{}: {why}; make it again with `mapper plan CAMPAIGN --out FILE`", .path.display())]
+    WrongPlan {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// No point was identified from a recording.
+    #[error("no point was identified: the recording has no step that is long enough to be one. {why}")]
+    NoPoints {
+        /// What is known about the recording.
+        why: String,
+    },
+    /// A recording was given twice.
+    #[error(
+        "{} and {} hold the same readings; give each recording once, or its noise would count as new evidence",
+        .first.display(),
+        .second.display()
+    )]
+    SameRecording {
+        /// One of them.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
+    /// A run cannot be resumed.
+    #[error("{} cannot be resumed: {why}", .run.display())]
+    NotResumable {
+        /// Its directory.
+        run: PathBuf,
+        /// The reason.
+        why: String,
+    },
+    /// Another runner has the rig.
+    #[error("the rig `{rig}` is in use by {owner}; wait for its end, or stop it there")]
+    RigInUse {
+        /// The rig.
+        rig: String,
+        /// The current owner.
+        owner: String,
+    },
+    /// A runner ended without releasing the rig.
+    #[error(
+        "the rig `{rig}` was left by {owner}, which ended with the rig in its hands; a driver makes it safe by itself then. Look at the rig; then go on with \
+         `mapper run --resume {}`, or clear it with `mapper rig acknowledge {}`", .run.display(), word(.rig)
+    )]
+    RigAbandoned {
+        /// The rig.
+        rig: String,
+        /// The run that left it.
+        run: PathBuf,
+        /// The owner that left it.
+        owner: String,
+    },
+    /// The rig is locked out, and the lockout has not been acknowledged.
+    #[error(
+        "the rig `{rig}` is latched since the run {}: {reason}. Look at the rig; then clear it with `mapper rig acknowledge {}`",
+        .run.display(), word(.rig)
+    )]
+    RigLatched {
+        /// The rig.
+        rig: String,
+        /// The reason.
+        reason: String,
+        /// The run.
+        run: PathBuf,
+    },
+    /// The rig has no lockout and no abandoned run, or no rig has this name.
+    #[error("nothing was acknowledged: the rig `{rig}` is in no doubt, or its name is another; {}", in_doubt_text(.in_doubt))]
+    NothingToAcknowledge {
+        /// The rig.
+        rig: String,
+        /// Rigs that wait for acknowledgement.
+        in_doubt: Vec<String>,
+    },
+    /// The rig could not be armed, so the run did not start.
+    #[error(transparent)]
+    NotArmed(RunError),
+    /// The preflight check refused the run.
+    #[error("the run was not begun: {0}")]
+    Preflight(String),
+    /// The rig needs a guard that the campaign does not have.
+    #[error(
+        "backend `{backend}` must not be run without these guards: {guards}; give their limits in `limits:` or `guards:` of the \
+         campaign, with a reaction that ends the run"
+    )]
+    Unguarded {
+        /// The backend.
+        backend: String,
+        /// What is missing.
+        guards: String,
+    },
+    /// A guard watches a channel that the rig does not deliver.
+    #[error("backend `{backend}` does not deliver what is to be guarded: {channels}")]
+    GuardBlind {
+        /// The backend.
+        backend: String,
+        /// Channels and their guards.
+        channels: String,
+    },
+    /// A run failed; the rig is safe.
+    #[error("{source}\nThe recording up to then is {}.", .recording.display())]
+    Run {
+        /// The reason.
+        source: RunError,
+        /// The recording up to the failure.
+        recording: PathBuf,
+    },
+    /// A sequence script has a mistake.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    /// A sequence script failed at one of its steps.
+    #[error(transparent)]
+    Script(StepSourceError),
+    /// The rehearsal of a sequence script failed.
+    #[error("the rehearsal failed: {0}")]
+    Rehearsal(#[source] RunError),
+    /// A guard tripped in the rehearsal of a script.
+    #[error("in the rehearsal on the nominal machine at {t_s:.1} s {reason}")]
+    RehearsalTripped {
+        /// Run time, s.
+        t_s: f64,
+        /// What tripped it.
+        reason: String,
+    },
+    /// A script makes no step.
+    #[error("the sequence script {} makes no step", .path.display())]
+    NoSteps {
+        /// The script.
+        path: PathBuf,
+    },
+    /// A suspected effect is not a valid effect.
+    #[error(transparent)]
+    Effect(Box<dyn std::error::Error + Send + Sync>),
+    /// This program cannot read effects from files.
+    #[error("{}: this program does not read effects from files", .path.display())]
+    EffectUnread {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A suspected effect has the same name as another.
+    #[error("{}: there is already an effect `{id}`; choose another name", .path.display())]
+    EffectTaken {
+        /// The script.
+        path: PathBuf,
+        /// The name.
+        id: String,
+    },
+    /// A recording cannot be read or written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The log of another program cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A log option is wrong.
+    #[error(transparent)]
+    LogOption(#[from] OptionError),
+    /// The channel map cannot be read or has mistakes.
+    #[error(transparent)]
+    ChannelMap(#[from] ChannelMapError),
+    /// The recorded machine is unknown.
+    #[error("the machine is not known: the recording carries no campaign. {remedy}")]
+    MachineUnknown {
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The recording is of another machine.
+    #[error("{0}: use the campaign of the machine that was recorded")]
+    OtherMachine(#[from] OtherMachine),
+    /// A recording cannot be identified.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// Recordings cannot be searched for drift.
+    #[error(transparent)]
+    Drift(#[from] DriftError),
+    /// A recording cannot be diagnosed.
+    #[error(transparent)]
+    Gap(#[from] GapError),
+    /// A diagnosis cannot be validated against a recording.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    /// The built-in calibration cannot be read.
+    #[error("failed to read the calibration of the diagnosis: {0}")]
+    Calibration(#[source] serde_json::Error),
+    /// A history cannot be opened or written.
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    /// A map cannot be written in a format.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// The file is not a diagnosis or forecast, or has another hash than the pre-registered one.
+    #[error("{}: {why}", .path.display())]
+    TwinFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A command on map files ended early.
+    #[error(transparent)]
+    MapWork(#[from] MapWorkError),
+    /// A map file has mistakes.
+    #[error("{}: {source}", .path.display())]
+    Import {
+        /// The file.
+        path: PathBuf,
+        /// Its mistakes.
+        source: ImportError,
+    },
+    /// An unknown map format.
+    #[error("there is no map format `{name}`; the formats are {}", .known.join(", "))]
+    UnknownFormat {
+        /// The name given.
+        name: String,
+        /// The formats.
+        known: Vec<&'static str>,
+    },
+    /// The extension of a file matches no known map format.
+    #[error("{}: maps are read from files with the extension {}; this one has `{extension}`", .path.display(), .known.join(", "))]
+    UnknownExtension {
+        /// The file.
+        path: PathBuf,
+        /// Its extension.
+        extension: String,
+        /// The readable extensions.
+        known: Vec<&'static str>,
+    },
+    /// The extension of a new file matches no known map format.
+    #[error("{}: give the format by the extension or by `--to`: {}", .path.display(), .known.join(", "))]
+    FormatUnstated {
+        /// The file.
+        path: PathBuf,
+        /// Formats and their extensions.
+        known: Vec<String>,
+    },
+    /// A map cannot be fitted.
+    #[error("`{format}` needs a fitted map: {source}")]
+    Fit {
+        /// The format.
+        format: &'static str,
+        /// The reason.
+        source: mapper_maps::MapFitError,
+    },
+    /// A machine cannot be written as an FMU.
+    #[error(transparent)]
+    Fmu(#[from] crate::errors::fmu_error::FmuExportError),
+    /// The file already exists.
+    #[error("{} is there already and is kept; choose another name", .path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file or directory could not be read, written or made.
+    #[error("failed to {action} {}: {source}", .path.display())]
+    File {
+        /// The attempted action: "read", "write" or "create".
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: io::Error,
+    },
+    /// A parent directory has too many runs.
+    #[error("{} already holds 999 runs from this second", .parent.display())]
+    TooManyRuns {
+        /// The directory.
+        parent: PathBuf,
+    },
+    /// Data could not be written as YAML: a defect of the program.
+    #[error("failed to write YAML: {0}")]
+    Yaml(#[from] serde_yaml::Error),
+    /// Data could not be written as JSON: a defect of the program.
+    #[error("failed to write JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// The operator stopped the work.
+    #[error("stopped by the operator")]
+    Interrupted,
+}
+
+impl SessionError {
+    /// A file that could not be read, written or created.
+    pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| match source.kind() {
+            io::ErrorKind::AlreadyExists => SessionError::Exists { path },
+            _ => SessionError::File { action, path, source },
+        }
+    }
+
+    /// Category of the error.
+    pub fn kind(&self) -> ErrorKind {
+        use SessionError as E;
+        match self {
+            E::Campaign(CampaignError::Read { .. })
+            | E::Nightly(NightlyError::Read { .. })
+            | E::MapWork(MapWorkError::Description(DescriptionError::Read { .. }))
+            | E::ChannelMap(ChannelMapError::Read { .. }) => ErrorKind::Failure,
+            E::Campaign(CampaignError::Mistakes(_))
+            | E::Nightly(NightlyError::Mistakes(_))
+            | E::NightlySequence { .. }
+            | E::NightlyTwice { .. }
+            | E::Variant(_)
+            | E::OtherNight { .. }
+            | E::NoRecording
+            | E::NotTogether { .. }
+            | E::Method { .. }
+            | E::Model(_)
+            | E::Backend(_)
+            | E::Reader { .. }
+            | E::Effect(_)
+            | E::EffectTaken { .. }
+            | E::EffectUnread { .. }
+            | E::ChannelMap(ChannelMapError::Mistakes(_))
+            | E::MachineUnknown { .. }
+            | E::NothingToAcknowledge { .. }
+            | E::Import { .. }
+            | E::MapWork(_)
+            | E::UnknownFormat { .. }
+            | E::UnknownExtension { .. }
+            | E::FormatUnstated { .. }
+            | E::Fit { .. }
+            | E::Fmu(_)
+            | E::FirstMap(_)
+            | E::Drift(DriftError::NoRun)
+            | E::Export(ExportError::NeedsFit { .. })
+            | E::Script(_)
+            | E::SameRecording { .. } => ErrorKind::BadInput,
+            E::Unguarded { .. }
+            | E::GuardBlind { .. }
+            | E::RigInUse { .. }
+            | E::RigAbandoned { .. }
+            | E::RigLatched { .. }
+            | E::NotArmed(_)
+            | E::Preflight(_) => ErrorKind::Rig,
+            E::Plan(_)
+            | E::NotAPlan { .. }
+            | E::StalePlan { .. }
+            | E::WrongPlan { .. }
+            | E::NotResumable { .. }
+            | E::RehearsalTripped { .. }
+            | E::NoSteps { .. } => ErrorKind::NoPlan,
+            E::Run { source, .. } => match source {
+                RunError::Backend(_) | RunError::NotArmed(_) => ErrorKind::Rig,
+                RunError::Source(_) => ErrorKind::BadInput,
+                RunError::Observer(_) | RunError::Panicked { .. } => ErrorKind::Failure,
+                RunError::NotSafe { .. } => ErrorKind::Rig,
+            },
+            // Only these errors come from the file system; all others come from the recording itself.
+            E::Record(RecordError::Read { .. } | RecordError::Exists { .. } | RecordError::Create { .. })
+            | E::Record(RecordError::Write { .. } | RecordError::BadInput { .. }) => ErrorKind::Failure,
+            E::Record(RecordError::ChannelMap(_) | RecordError::LogWithoutMap { .. }) => ErrorKind::BadInput,
+            E::Record(RecordError::Log(LogError::Read { .. })) | E::Log(LogError::Read { .. }) => {
+                ErrorKind::Failure
+            }
+            E::Log(_) | E::NoPoints { .. } => ErrorKind::BadRecording,
+            E::LogOption(_) | E::Twin(_) | E::TwinFile { .. } => ErrorKind::BadInput,
+            E::Record(_) | E::Driven(_) | E::OtherMachine(_) | E::Identify(_) | E::Drift(_) | E::Gap(_) => {
+                ErrorKind::BadRecording
+            }
+            E::Sequence(_)
+            | E::Rehearsal(_)
+            | E::Calibration(_)
+            | E::History(_)
+            | E::Export(_)
+            | E::File { .. }
+            | E::Exists { .. }
+            | E::TooManyRuns { .. }
+            | E::Yaml(_)
+            | E::Json(_) => ErrorKind::Failure,
+            E::Interrupted => ErrorKind::Interrupted,
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The first campaign of a machine: a commented file, its nominal map and a channel map, from the wheel's diameter.
+
+use crate::machine::first_map::{FirstMap, MapLines};
+use crate::machine::first_request::{FirstCampaignRequest, FirstRig, digits};
+use crate::recording::files::write_new;
+use crate::{Registry, SessionError};
+use mapper_campaign::{AssumedSize, Campaign, CampaignError, similar_sizes};
+use mapper_physics::compressor_map::closed_form_map::TURBO_A_WHEEL_M;
+use serde::Serialize;
+use std::io::{Error, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// Its steps dwell 60 s: all 30 machines of `benches/first_campaign.py` have at least 80 % good points with it.
+const CAMPAIGN: &str = include_str!("../../templates/campaign.yaml");
+const CHANNELS: &str = include_str!("../../templates/channels.yaml");
+const ZERO: &str = include_str!("../../templates/zero.yaml");
+/// Noise of the flow meter of campaigns/turbo_a.yaml, whose wheel has 52 mm, kg/s; meters are chosen by their full scale.
+const FLOW_NOISE_KG_S: f64 = 1.5e-4;
+/// Speed limit over the highest speed of the grid. Judgement: room for the overshoot of a jump; your machine's own limit replaces it.
+const SPEED_LIMIT_RATIO: f64 = 1.1;
+/// Points of a speed line.
+const POINTS: usize = 6;
+
+impl FirstRig {
+    fn backend(self) -> &'static str {
+        match self {
+            FirstRig::VirtualLab => include_str!("../../templates/virtual_lab.yaml"),
+            FirstRig::GasStand => include_str!("../../templates/gas_stand.yaml"),
+            FirstRig::Log => include_str!("../../templates/log.yaml"),
+        }
+    }
+
+    fn title(self) -> &'static str {
+        match self {
+            FirstRig::VirtualLab => "The map of a compressor on the virtual lab.",
+            FirstRig::GasStand => "The map of a compressor on a gas stand.",
+            FirstRig::Log => "The map of a compressor from a log of another program.",
+        }
+    }
+}
+
+/// The files that were written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FirstCampaign {
+    /// The campaign.
+    pub campaign: PathBuf,
+    /// The nominal map.
+    pub map: PathBuf,
+    /// The channel map; `None` for the virtual lab.
+    pub channels: Option<PathBuf>,
+    /// Points of the grid.
+    pub points: usize,
+    /// Sizes that the campaign assumes.
+    pub assumed: Vec<AssumedSize>,
+}
+
+/// Writes the first campaign of a machine after checking it. No existing file is replaced.
+///
+/// # Errors
+/// [`SessionError::Campaign`] with the mistakes that the campaign would have, e.g. a map that does not fit the wheel;
+/// [`SessionError::FirstMap`] for a map without enough points; as [`Registry::read_map`] for one that cannot be read; [`SessionError::Exists`] and [`SessionError::File`] for its files.
+pub fn first_campaign(
+    registry: &Registry,
+    request: &FirstCampaignRequest,
+) -> Result<FirstCampaign, SessionError> {
+    let map = FirstMap::of(registry, request)?;
+    let file = |ending: &str| request.directory.join(format!("{}{ending}", request.name));
+    let (campaign_path, map_path) = (file(".yaml"), request.directory.join(&map.file_name));
+    let text = campaign_text(request, &map);
+    let campaign = checked(&text, &campaign_path, &map)?;
+    let channels = (request.rig != FirstRig::VirtualLab).then(|| file("_channels.yaml"));
+    std::fs::create_dir_all(&request.directory).map_err(SessionError::file("create", &request.directory))?;
+    // The campaign last: without it the other files mean nothing.
+    for path in [Some(&campaign_path), channels.as_ref()].into_iter().flatten() {
+        if path.exists() {
+            return Err(SessionError::Exists { path: path.clone() });
+        }
+    }
+    write_new(&map_path, map.text.as_bytes())?;
+    if let Some(path) = &channels {
+        write_new(path, filled(CHANNELS, &[("reference", request.reference.name.to_owned())]).as_bytes())?;
+    }
+    write_new(&campaign_path, text.as_bytes())?;
+    Ok(FirstCampaign {
+        campaign: campaign_path,
+        map: map_path,
+        channels,
+        points: campaign.points.len(),
+        assumed: campaign.machine.assumed,
+    })
+}
+
+/// The campaign of the text, or its mistakes.
+fn checked(text: &str, path: &Path, map: &FirstMap) -> Result<Campaign, SessionError> {
+    let files = |asked: &Path| match asked.file_name() {
+        Some(name) if name == map.file_name.as_str() => Ok(map.text.clone()),
+        _ => Err(Error::from(ErrorKind::NotFound)),
+    };
+    mapper_campaign::check(text, path, &files)
+        .map_err(|findings| CampaignError::Mistakes(Box::new(findings)).into())
+}
+
+fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
+    let wheel_ratio = request.wheel_diameter_m / TURBO_A_WHEEL_M;
+    let name = &request.name;
+    let commands = match request.rig {
+        FirstRig::VirtualLab | FirstRig::GasStand => format!(
+            "#   mapper plan  {name}.yaml     the steps and their expected errors\n\
+             #   mapper run   {name}.yaml     map and report\n#"
+        ),
+        FirstRig::Log => format!(
+            "#   mapper identify LOG --channels {name}_channels.yaml --campaign {name}.yaml --out {name}\n#"
+        ),
+    };
+    let tap = |diameter_m: Option<f64>, size: &str| match request.has_static_taps {
+        true => {
+            let own = diameter_m.map(|m| 1e3 * m).or_else(|| similar_mm(request, size));
+            format!("static, pipe_diameter: {} mm", digits(own.unwrap_or(0.0), 3))
+        }
+        false => "total".to_owned(),
+    };
+    let values = [
+        ("title", request.rig.title().to_owned()),
+        ("commands", commands),
+        ("name", name.clone()),
+        ("geometry", geometry(request, map)),
+        ("map_file", map.file_name.clone()),
+        ("reference", request.reference.name.to_owned()),
+        ("flow_noise", digits(FLOW_NOISE_KG_S * wheel_ratio * wheel_ratio, 2)),
+        ("inlet_tap", tap(request.inlet_diameter_m, "compressor.inlet_diameter")),
+        ("outlet_tap", tap(request.outlet_diameter_m, "compressor.outlet_diameter")),
+        ("probe", format!("{} mm", digits(1e3 * request.probe_diameter_m.unwrap_or(0.0), 3))),
+        ("lines", lines(&map.lines)),
+        // A log has its rest, if there was one, in its readings.
+        ("zero", if request.rig == FirstRig::Log { String::new() } else { ZERO.to_owned() }),
+        ("speed_limit", format!("{} krpm", (SPEED_LIMIT_RATIO * map.lines.highest_rpm() / 1e3).ceil())),
+    ];
+    // The backend has placeholders of its own.
+    filled(&CAMPAIGN.replace("{{backend}}\n", request.rig.backend()), &values)
+}
+
+fn lines(lines: &MapLines) -> String {
+    let line =
+        |rpm: &f64| format!("    - {{speed_corrected: {} krpm, points: {POINTS}}}", digits(rpm / 1e3, 6));
+    lines.speeds_rpm.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// A size of the similar machine in mm.
+fn similar_mm(request: &FirstCampaignRequest, key: &str) -> Option<f64> {
+    similar_sizes(request.wheel_diameter_m).into_iter().find(|size| size.key == key).map(|size| size.value)
+}
+
+/// The geometry: known sizes as keys, the others as comments with their assumed values.
+fn geometry(request: &FirstCampaignRequest, map: &FirstMap) -> String {
+    let sizes = similar_sizes(request.wheel_diameter_m);
+    let mm = |diameter_m: Option<f64>| diameter_m.map(|m| format!("{} mm", digits(1e3 * m, 4)));
+    let known = |size: &AssumedSize| match size.key.as_str() {
+        "compressor.inlet_diameter" => mm(request.inlet_diameter_m),
+        "compressor.outlet_diameter" => mm(request.outlet_diameter_m),
+        // A turbine and a valve that fit the flow of the machine's own map.
+        "turbine.choked_flow" | "outlet.valve_area" => map.flow_ratio.map(|ratio| {
+            format!("{} {}    # fits the map's choke flow", digits(ratio * size.value, 3), size.unit)
+        }),
+        _ => None,
+    };
+    let wheel = format!("{} mm", digits(1e3 * request.wheel_diameter_m, 6));
+    let mut text = String::new();
+    for side in ["compressor", "turbine", "bearing", "outlet"] {
+        let mut rows = Vec::new();
+        if side == "compressor" {
+            rows.push((true, format!("wheel_diameter: {wheel}")));
+        }
+        for size in &sizes {
+            let Some(key) = size.key.strip_prefix(side).and_then(|rest| rest.strip_prefix('.')) else {
+                continue;
+            };
+            // The Nusselt laws have no dimension: they stay.
+            if key.contains('.') {
+                continue;
+            }
+            rows.push(match known(size) {
+                Some(value) => (true, format!("{key}: {value}")),
+                None => (false, format!("{key}: {} {}", digits(size.value, 3), size.unit)),
+            });
+        }
+        let mark = |is_known: bool| if is_known { "" } else { "# " };
+        let has_known = rows.iter().any(|(is_known, _)| *is_known);
+        text += &format!("    {}{side}:\n", mark(has_known));
+        for (is_known, row) in rows {
+            text += &format!("      {}{row}\n", mark(is_known));
+        }
+    }
+    if let Some(inertia) = sizes.iter().find(|size| size.key == "shaft_inertia") {
+        text += &format!("    # shaft_inertia: {} {}", digits(inertia.value, 3), inertia.unit);
+    }
+    text
+}
+
+/// A template with its placeholders replaced.
+fn filled(template: &str, values: &[(&str, String)]) -> String {
+    values
+        .iter()
+        .fold(template.to_owned(), |text, (key, value)| text.replace(&format!("{{{{{key}}}}}"), value))
+}

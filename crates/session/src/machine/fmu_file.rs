@@ -1,0 +1,199 @@
+//! Writes a machine as an FMU: the nominal machine of a campaign, or the machine identified from a recording.
+
+use crate::errors::fmu_error::FmuExportError;
+use crate::machine::fmu_binary::with_binary;
+use crate::recording::files::{Existing, write_file};
+use crate::recording::recording_file::Recorded;
+use crate::{Session, SessionError};
+use mapper_campaign::Campaign;
+use mapper_core::{CompressorMap, IdentifiedPoint, ThermalModel};
+use mapper_fmu::{FmuMachine, FmuMap, archive, files, table_of_fit};
+use mapper_maps::{Grouping, MapFitOptions, assemble, fit_map};
+use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
+use mapper_physics::machine::params::Params;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::simulation::steady::{SteadyError, SteadyState, hold_speed};
+use mapper_recording::ChannelMap;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// An FMU that was written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WrittenFmu {
+    /// The file.
+    pub file: PathBuf,
+    /// Source of its numbers, in one sentence.
+    pub origin: String,
+    /// Shaft speed at the start, rpm.
+    pub start_speed_rpm: f64,
+    /// Folder of the library for this computer; `None` if the FMU contains sources only.
+    pub binary: Option<String>,
+}
+
+/// A machine to be exported as an FMU.
+struct Made {
+    name: String,
+    origin: String,
+    params: Params,
+    map: FmuMap,
+}
+
+impl Session<'_> {
+    /// Writes the nominal machine of a campaign.
+    ///
+    /// # Errors
+    /// [`SessionError::Fmu`] if export fails; otherwise as [`write_file`].
+    pub fn nominal_fmu(
+        &self,
+        campaign: &Campaign,
+        compile: bool,
+        out: &Path,
+        existing: Existing,
+    ) -> Result<WrittenFmu, SessionError> {
+        let machine = &campaign.machine;
+        let params = machine.params;
+        let (map, form) = match machine.map.table() {
+            None => {
+                let wheel_diameter_m = params.compressor.wheel_diameter_m;
+                (FmuMap::ClosedForm(ClosedFormMap { wheel_diameter_m }), "closed-form map")
+            }
+            Some(table) => (FmuMap::Table(table?), "map from its table"),
+        };
+        let origin = format!("nominal machine of a campaign: {form}, thermal model as declared");
+        write(Made { name: machine.name.clone(), origin, params, map }, campaign, compile, out, existing)
+    }
+
+    /// Identifies a recording by its campaign's method and writes the identified map and, for the joint method, the thermal model. Parameters
+    /// without information in the recording keep their declared values.
+    ///
+    /// # Errors
+    /// [`SessionError`] if the machine is unknown or identification fails, [`SessionError::Fmu`] if the result is not a complete machine.
+    pub fn identified_fmu(
+        &self,
+        recorded: Recorded,
+        channels: &ChannelMap,
+        compile: bool,
+        out: &Path,
+        existing: Existing,
+    ) -> Result<WrittenFmu, SessionError> {
+        let campaign = recorded.known("Give `--campaign FILE`")?.clone();
+        let identified = self.identify(vec![recorded], channels, None)?;
+        // Points without map coordinates are skipped; they do not prevent a map.
+        let has_place = |point: &&IdentifiedPoint| {
+            let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];
+            place.iter().all(|value| value.is_finite())
+        };
+        let points: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
+        let config = &identified.config;
+        let name = &campaign.machine.name;
+        let no_map = |why: String| FmuExportError::NoMap(why);
+        let map = assemble(&points, name, config.reference, config.method, Grouping::default())
+            .map_err(|error| no_map(error.to_string()))?;
+        let surge = identified.surge.iter().flat_map(|found| found.marks.iter().map(|scored| scored.mark));
+        let map = CompressorMap { efficiency: Some(config.air.efficiency), surge: surge.collect(), ..map };
+        let options = MapFitOptions { leave_one_out: false, ..MapFitOptions::default() };
+        let map = fit_map(map, &options).map_err(|error| no_map(error.to_string()))?;
+        let fitted = map.fitted.as_ref().ok_or_else(|| no_map("it is not fitted".to_owned()))?;
+        let table = table_of_fit(fitted, map.reference).map_err(FmuExportError::Map)?;
+        let thermal = identified.thermal.as_ref();
+        let law = if thermal.is_some_and(|found| found.convection.is_some()) {
+            "as identified"
+        } else {
+            "as declared"
+        };
+        let made = Made {
+            name: name.clone(),
+            origin: format!(
+                "identified by the {} method: fitted map of {} points on {} speed lines, compressor's heat transfer {law}; \
+                 turbine, bearing and masses as declared",
+                config.method,
+                map.lines.iter().map(|line| line.points.len()).sum::<usize>(),
+                map.lines.len()
+            ),
+            params: thermal
+                .map_or(campaign.machine.params, |found| with_found(&campaign.machine.params, found)),
+            map: FmuMap::Table(table),
+        };
+        write(made, &campaign, compile, out, existing)
+    }
+}
+
+/// Declared parameters, replaced by the identified values if they exist.
+fn with_found(declared: &Params, found: &ThermalModel) -> Params {
+    let mut params = *declared;
+    let compressor = &mut params.compressor;
+    compressor.internal_area_m2 = found.internal_area_m2;
+    if let Some(law) = &found.convection
+        && let Some((a, b)) = law.coefficient.value.zip(law.exponent.value)
+    {
+        compressor.nusselt_coefficient = a;
+        compressor.nusselt_exponent = b;
+        compressor.outlet_diameter_m = law.diameter_m;
+    }
+    if let Some(alpha) = found.alpha_area_ratio.value {
+        compressor.alpha_area_ratio = alpha;
+    }
+    if let Some(factor) = found.direction_factor.value {
+        compressor.hot_metal_h_ratio = factor;
+    }
+    if let Some(inlet) = &found.inlet {
+        compressor.inlet_convection = inlet.convection;
+        compressor.inlet_diameter_m = inlet.diameter_m;
+    }
+    if let Some(diameter_m) = found.probe_diameter_m.value {
+        params.t2_probe_diameter_m = diameter_m;
+    }
+    params
+}
+
+fn write(
+    made: Made,
+    campaign: &Campaign,
+    compile: bool,
+    out: &Path,
+    existing: Existing,
+) -> Result<WrittenFmu, SessionError> {
+    let start = start(&made, campaign).map_err(FmuExportError::Start)?;
+    let machine = FmuMachine {
+        name: &made.name,
+        origin: &made.origin,
+        params: &made.params,
+        map: &made.map,
+        boundary: &start.boundary,
+        start: &start.state,
+    };
+    let mut files = files(&machine).map_err(FmuExportError::Fmu)?;
+    let binary = if compile { Some(with_binary(&mut files, &machine.identifier())?) } else { None };
+    write_file(out, &archive(&files).map_err(FmuExportError::Fmu)?, existing)?;
+    Ok(WrittenFmu {
+        file: out.to_owned(),
+        origin: made.origin.clone(),
+        start_speed_rpm: start.state.shaft_speed_rpm(),
+        binary,
+    })
+}
+
+/// Start state: steady at the middle point of the grid, or at the first other point with a steady state.
+fn start(made: &Made, campaign: &Campaign) -> Result<SteadyState, SteadyError> {
+    let model = match &made.map {
+        FmuMap::ClosedForm(map) => Model::new(made.params, Arc::new(*map)),
+        FmuMap::Table(map) => Model::new(made.params, Arc::new(map.clone())),
+    };
+    let mut points = campaign.points.clone();
+    points.sort_by(|a, b| a.speed_rpm.total_cmp(&b.speed_rpm));
+    let half = points.len() / 2;
+    points.rotate_left(half);
+    let mut refused = SteadyError::NoHeatBalance { speed_rpm: f64::NAN, valve_opening_ratio: f64::NAN };
+    for point in points {
+        let boundary = mapper_physics::machine::params::BoundaryConditions {
+            valve_opening_ratio: point.valve_opening_ratio,
+            ..campaign.boundary
+        };
+        match hold_speed(&model, point.speed_rpm, &boundary) {
+            Ok(held) => return Ok(held),
+            Err(error) => refused = error,
+        }
+    }
+    Err(refused)
+}

@@ -1,0 +1,307 @@
+//! Commands on map files, of compressors and turbines: the result as text for people and as JSON for programs.
+
+use crate::errors::map_work_error::MapWorkError;
+use crate::machine::map_file::write_map_fitted_if_needed;
+use crate::recording::files::Existing;
+use crate::{Registry, SessionError, write_file, write_map};
+use mapper_core::{
+    EfficiencyDefinition, ExportError, ImportError, ImportRemark, ImportedMap, ImportedTurbine,
+    MapDescription, MapFormat, ReferenceState, TurbineMap,
+};
+use mapper_maps::table::{describe, describe_turbine};
+use mapper_maps::{MapFitOptions, compare, compare_turbines, convert_efficiency, fit_map, fit_turbine};
+use mapper_report::{
+    distinct_names, import_remark_text, imported_map_text, imported_turbine_text, map_comparison_figure,
+    map_comparison_text, map_fit_text, turbine_comparison_text, turbine_fit_text,
+};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// The result of a command.
+#[derive(Debug)]
+pub struct MapWork {
+    /// For people.
+    pub text: String,
+    /// For programs.
+    pub json: Value,
+    /// What was assumed about the files.
+    pub warnings: Vec<String>,
+}
+
+/// The map of a file.
+#[derive(Debug)]
+pub enum MapFile {
+    /// Of a compressor.
+    Compressor(ImportedMap),
+    /// Of a turbine.
+    Turbine(ImportedTurbine),
+}
+
+/// A new file with a map.
+#[derive(Debug, Clone, Copy)]
+pub struct MapOut<'a> {
+    /// The file.
+    pub path: &'a Path,
+    /// Name of its format; by the extension if none is given.
+    pub format: Option<&'a str>,
+    /// What becomes of a file that is there.
+    pub existing: Existing,
+}
+
+impl MapOut<'_> {
+    fn format(&self, registry: &Registry) -> Result<&'static MapFormat, SessionError> {
+        registry.format_of(self.path, self.format)
+    }
+}
+
+fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
+    remarks.iter().map(|remark| format!("{}: {}", path.display(), import_remark_text(*remark))).collect()
+}
+
+impl Registry {
+    /// Reads the map of a compressor or of a turbine.
+    ///
+    /// # Errors
+    /// As [`Registry::inspect_map`].
+    pub fn read_map_file(&self, path: &Path, given: &MapDescription) -> Result<MapFile, SessionError> {
+        match self.inspect_map(path, given) {
+            Ok(found) => Ok(MapFile::Compressor(found)),
+            Err(SessionError::Import { source: ImportError::Turbine { .. }, .. }) => {
+                self.inspect_turbine(path, given).map(MapFile::Turbine)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// How a map file is understood; `description` is a new file for the map description.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map_file`], and those of writing.
+    pub fn inspect_map_file(
+        &self,
+        path: &Path,
+        given: &MapDescription,
+        description: Option<(&Path, Existing)>,
+    ) -> Result<MapWork, SessionError> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let (described, text, json) = match self.read_map_file(path, given)? {
+            MapFile::Compressor(found) => {
+                let lines = found.map.lines.iter().map(|line| {
+                    json!({"speed_corrected_rpm": line.speed_corrected_rpm, "points": line.points.len()})
+                });
+                let json = json!({
+                    "machine": "compressor",
+                    "reference": found.map.reference,
+                    "efficiency": found.map.efficiency,
+                    "columns": found.columns,
+                    "remarks": found.remarks,
+                    "lines": lines.collect::<Vec<_>>(),
+                });
+                (describe(&name, &found, given), imported_map_text(&found), json)
+            }
+            MapFile::Turbine(found) => {
+                let lines = found.map.lines().map(|line| {
+                    json!({
+                        "vane_position": line.first().and_then(|point| point.vane_position),
+                        "speed_parameter_rpm_sqrt_k": line.first().map(|point| point.speed_parameter_rpm_sqrt_k),
+                        "points": line.len(),
+                    })
+                });
+                let json = json!({
+                    "machine": "turbine",
+                    "columns": found.columns,
+                    "remarks": found.remarks,
+                    "lines": lines.collect::<Vec<_>>(),
+                });
+                (describe_turbine(&name, &found, given), imported_turbine_text(&found), json)
+            }
+        };
+        if let Some((file, existing)) = description {
+            write_file(file, described.as_bytes(), existing)?;
+        }
+        Ok(MapWork { text, json, warnings: Vec::new() })
+    }
+
+    /// Fits a map and writes it if asked.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
+    pub fn fit_map_file(
+        &self,
+        path: &Path,
+        given: &MapDescription,
+        options: &MapFitOptions,
+        out: Option<MapOut<'_>>,
+    ) -> Result<MapWork, SessionError> {
+        let format = out.map(|out| Ok::<_, SessionError>((out, out.format(self)?))).transpose()?;
+        let file = out.map(|out| out.path);
+        let (mut text, json, remarks) = match self.read_map_file(path, given)? {
+            MapFile::Compressor(found) => {
+                let map = fit_map(found.map, options)
+                    .map_err(|source| MapWorkError::NotFitted { path: path.to_owned(), source })?;
+                if let Some((out, format)) = format {
+                    write_map(out.path, format, &map, out.existing)?;
+                }
+                let json =
+                    json!({"map": path, "reference": map.reference, "fitted": map.fitted, "file": file});
+                let text = map.fitted.as_ref().map(|fitted| map_fit_text(&map, fitted)).unwrap_or_default();
+                (text, json, found.remarks)
+            }
+            MapFile::Turbine(found) => {
+                let map = fit_turbine(found.map)
+                    .map_err(|source| MapWorkError::TurbineNotFitted { path: path.to_owned(), source })?;
+                if let Some((out, format)) = format {
+                    write_file(out.path, &format.write_turbine(&map)?, out.existing)?;
+                }
+                let json = json!({"map": path, "fitted": map.fitted, "file": file});
+                let text = map.fitted.as_ref().map(|fitted| turbine_fit_text(&map, fitted));
+                (text.unwrap_or_default(), json, found.remarks)
+            }
+        };
+        if let Some(file) = file {
+            text.push_str(&format!("map        {}\n", file.display()));
+        }
+        Ok(MapWork { text, json, warnings: warnings(path, &remarks) })
+    }
+
+    /// Writes a map in another format, at another reference state, with efficiencies of another definition.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
+    pub fn convert_map_file(
+        &self,
+        path: &Path,
+        given: &MapDescription,
+        out: MapOut<'_>,
+        to_reference: Option<ReferenceState>,
+        efficiencies: (Option<EfficiencyDefinition>, Option<EfficiencyDefinition>),
+    ) -> Result<MapWork, SessionError> {
+        let format = out.format(self)?;
+        let file = out.path.display();
+        let note = |fitted| if fitted { "; the format is a table, so the map was fitted" } else { "" };
+        match self.read_map_file(path, given)? {
+            MapFile::Compressor(found) => {
+                let mut map = found.map;
+                if let Some(reference) = to_reference {
+                    map = map.at_reference(reference);
+                }
+                let efficiency = map.efficiency.or(efficiencies.0);
+                match (efficiency, efficiencies.1) {
+                    (Some(from), Some(to)) => map = convert_efficiency(map, from, to),
+                    (None, Some(_)) => return Err(MapWorkError::NoDefinition.into()),
+                    (_, None) => map.efficiency = efficiency,
+                }
+                let (map, fitted_here) = write_map_fitted_if_needed(out.path, format, map, out.existing)?;
+                let points: usize = map.lines.iter().map(|line| line.points.len()).sum();
+                let (lines, reference) = (map.lines.len(), map.reference);
+                let text = format!(
+                    "{file}: {}, {points} points on {lines} speed lines, corrected to {reference}{}\n",
+                    format.name,
+                    note(fitted_here)
+                );
+                let json = json!({
+                    "file": out.path,
+                    "format": format.name,
+                    "reference": reference,
+                    "efficiency": map.efficiency,
+                    "lines": lines,
+                    "points": points,
+                    "fitted": map.fitted.is_some(),
+                });
+                Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
+            }
+            MapFile::Turbine(found) => {
+                let asked = [
+                    (to_reference.is_some(), "--to-reference"),
+                    (efficiencies.0.is_some() || efficiencies.1.is_some(), "--to-efficiency"),
+                ];
+                if let Some((_, option)) = asked.into_iter().find(|(asked, _)| *asked) {
+                    return Err(MapWorkError::NotOfTurbine { path: path.to_owned(), option }.into());
+                }
+                let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, found.map)?;
+                let (points, lines) = (map.points.len(), map.lines().count());
+                let text = format!(
+                    "{file}: {}, turbine, {points} points on {lines} speed lines{}\n",
+                    format.name,
+                    note(fitted_here)
+                );
+                let json = json!({
+                    "file": out.path,
+                    "format": format.name,
+                    "machine": "turbine",
+                    "lines": lines,
+                    "points": points,
+                    "fitted": map.fitted.is_some(),
+                });
+                Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
+            }
+        }
+    }
+
+    /// Compares two maps of the same machine; `picture` is a new file with both.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
+    pub fn compare_map_files(
+        &self,
+        [first, second]: [(&Path, &MapDescription); 2],
+        picture: Option<(&Path, Existing)>,
+    ) -> Result<MapWork, SessionError> {
+        let paths = [first.0, second.0];
+        match (self.read_map_file(first.0, first.1)?, self.read_map_file(second.0, second.1)?) {
+            (MapFile::Compressor(a), MapFile::Compressor(b)) => {
+                let comparison = compare(&a.map, &b.map).map_err(MapWorkError::from)?;
+                if let Some((path, existing)) = picture {
+                    let names = distinct_names(paths);
+                    let figure = map_comparison_figure(&a.map, &b.map, &comparison, &names);
+                    let png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+                    let failed =
+                        |error: &dyn std::fmt::Display| MapWorkError::Picture { problem: error.to_string() };
+                    let bytes = match png {
+                        true => figure.to_png(2.0).map_err(|error| failed(&error))?,
+                        false => figure.to_svg().into_bytes(),
+                    };
+                    write_file(path, &bytes, existing)?;
+                }
+                let warned = [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
+                let json = serde_json::to_value(&comparison)?;
+                Ok(MapWork { text: map_comparison_text(&comparison), json, warnings: warned })
+            }
+            (MapFile::Turbine(a), MapFile::Turbine(b)) => {
+                if picture.is_some() {
+                    let option = "--picture";
+                    return Err(MapWorkError::NotOfTurbine { path: paths[0].to_owned(), option }.into());
+                }
+                let comparison = compare_turbines(&a.map, &b.map)
+                    .map_err(|source| MapWorkError::TurbineNotFitted { path: paths[0].to_owned(), source })?;
+                let warned = [warnings(paths[0], &a.remarks), warnings(paths[1], &b.remarks)].concat();
+                let json = serde_json::to_value(&comparison)?;
+                Ok(MapWork { text: turbine_comparison_text(&comparison), json, warnings: warned })
+            }
+            (MapFile::Turbine(_), _) => {
+                Err(MapWorkError::TwoMachines { turbine: paths[0].to_owned() }.into())
+            }
+            (_, MapFile::Turbine(_)) => {
+                Err(MapWorkError::TwoMachines { turbine: paths[1].to_owned() }.into())
+            }
+        }
+    }
+}
+
+/// Writes a turbine map; a format that is a table gets a fitted one. Returns the written map and whether it was fitted here.
+fn write_turbine_fitted_if_needed(
+    path: &Path,
+    out: MapOut<'_>,
+    format: &MapFormat,
+    map: TurbineMap,
+) -> Result<(TurbineMap, bool), SessionError> {
+    let needs_fit =
+        map.fitted.is_none() && matches!(format.write_turbine(&map), Err(ExportError::NeedsFit { .. }));
+    let map = if needs_fit {
+        fit_turbine(map).map_err(|source| MapWorkError::TurbineNotFitted { path: path.to_owned(), source })?
+    } else {
+        map
+    };
+    write_file(out.path, &format.write_turbine(&map)?, out.existing)?;
+    Ok((map, needs_fit))
+}

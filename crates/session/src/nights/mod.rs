@@ -1,0 +1,6 @@
+//! Nightly campaigns on the simulated rig: their runs, history entries, and the report that compares nights.
+
+pub(crate) mod night_report;
+pub(crate) mod nightly;
+pub(crate) mod nightly_row;
+pub(crate) mod nightly_run;

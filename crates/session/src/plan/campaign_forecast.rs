@@ -1,0 +1,248 @@
+//! Forecast of a campaign before its run: duration, and parts that will give no result.
+
+use crate::plan::needed_dwell::{needed_s, settled_time_s};
+use crate::plan::planning::{PlanInputs, plan_of};
+use crate::plan::rehearsal::rehearse;
+use crate::plan::verdict_forecast::{advise, forecast_verdicts};
+use crate::rig::drive::soak_s;
+use crate::{Session, SessionError};
+use mapper_campaign::{Campaign, Concern};
+use mapper_core::{
+    Advice, Dwell, JointSettings, Method, Plan, PlanStep, StepKind, VerdictForecast, WindowRule,
+};
+use mapper_identify::ZeroSettings;
+use mapper_physics::laws::standstill::{StandstillState, relax};
+use mapper_physics::laws::thermocouple::time_constant_s;
+use mapper_physics::simulation::model::Model;
+use mapper_planner::{PlanRequest, max_steps};
+
+/// Assumed temperature difference between cold housings and test cell, K. The zero uses the same value to find the limit that Tc relaxes to.
+const WARM_K: f64 = 3.0;
+/// Longest soak tried, s.
+const LONGEST_SOAK_S: f64 = 86_400.0;
+/// Spacing of the soaks tried, s.
+const SOAK_STEP_S: f64 = 300.0;
+
+/// Minimum window length in time constants of the T2 probe. The effect of the preceding step is then below 1 %.
+const PROBE_TIME_CONSTANTS: f64 = 5.0;
+
+/// Maximum number of points for which all steps are simulated to find concerns. Larger grids are sampled at every n-th point, so that the
+/// forecast takes seconds.
+const MAX_SIMULATED_POINTS: usize = 200;
+
+/// Effort of the search for the simulated order; concerns hardly depend on the order.
+const QUICK_EFFORT: f64 = 0.05;
+
+/// Forecast of a campaign.
+#[derive(Debug)]
+pub struct Prospects {
+    /// Number of steps; the upper bound if the grid is too large to plan here.
+    pub steps: usize,
+    /// Whether the number is exact.
+    pub is_planned: bool,
+    /// Rig time from the start of the soak to the end of the cool-down, s; the maximum if the number of steps is an upper bound.
+    pub duration_s: f64,
+    /// Expected problems.
+    pub concerns: Vec<Concern>,
+    /// Expected verdicts of the points; `None` for a script and for methods other than `joint`.
+    pub verdicts: Option<VerdictForecast>,
+    /// Changes after which more points are expected to be good, the cheapest first.
+    pub advice: Vec<Advice>,
+}
+
+impl Session<'_> {
+    /// Simulates the steps of the campaign, or rehearses its script, and looks for parts that will give no result.
+    ///
+    /// # Errors
+    /// [`SessionError`] if the plan is missing, or the script fails.
+    pub fn prospects(&self, campaign: &Campaign, model: &Model) -> Result<Prospects, SessionError> {
+        let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
+        let plan = match &campaign.sequence {
+            None => plan_of_sample(campaign, model, every)?,
+            Some(source) => rehearse(self, campaign, model, source)?.plan,
+        };
+        let concerns = [
+            soak(campaign, model),
+            settling(campaign, &plan),
+            probe(campaign, &plan),
+            required_error(campaign, &plan),
+            uninformative_steps(campaign, &plan),
+        ];
+        let verdicts = forecast_verdicts(campaign, &plan);
+        let advice = match verdicts {
+            Some(now) if now.surely_good() < now.points => {
+                advise(campaign, now, |changed| plan_of_sample(changed, model, every))?
+            }
+            _ => Vec::new(),
+        };
+        let is_planned = every == 1 || campaign.sequence.is_some();
+        let (steps, duration_s) = if is_planned {
+            (plan.steps.len(), plan.duration_s())
+        } else {
+            let inputs = PlanInputs::of(campaign)?;
+            let steps = max_steps(&inputs.request(campaign, model));
+            let dwell_s = plan.steps.first().map_or(0.0, |step| step.dwell_s);
+            (steps, plan.warm_up_s + plan.cool_down_s + plan.surge_search_s + steps as f64 * dwell_s)
+        };
+        Ok(Prospects {
+            steps,
+            is_planned,
+            duration_s: soak_s(campaign) + duration_s,
+            concerns: concerns.into_iter().flatten().collect(),
+            verdicts,
+            advice,
+        })
+    }
+}
+
+/// The plan of every n-th point, without its error bound.
+fn plan_of_sample(campaign: &Campaign, model: &Model, every: usize) -> Result<Plan, SessionError> {
+    let inputs = PlanInputs::of(campaign)?;
+    let mut request = PlanRequest { bound: false, effort: QUICK_EFFORT, ..inputs.request(campaign, model) };
+    if let Dwell::TimeBudget(budget_s) = request.timing.dwell {
+        let share = max_steps(&request) as f64;
+        let fixed_s = request.timing.warm_up_s + request.timing.cool_down_s;
+        if every > 1 {
+            request.timing.dwell = Dwell::Fixed(((budget_s - fixed_s) / share).max(1.0));
+        }
+    }
+    let points: Vec<_> = campaign.points.iter().copied().step_by(every).collect();
+    plan_of(campaign, &PlanRequest { points: &points, ..request })
+}
+
+/// A soak too short for the housings to reach the cell temperature, from the largest difference that the zero assumes.
+fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
+    let soak = campaign.zero?;
+    let settings = ZeroSettings::from(soak);
+    let ambient_k = campaign.boundary.ambient_temperature_k;
+    let warm_k = ambient_k + WARM_K;
+    let start = StandstillState { tc_k: warm_k, tt_k: warm_k };
+    let tc_k = |after_s: f64| relax(&model.params, start, soak.oil_temperature_k, ambient_k, after_s).tc_k;
+    // As in the zero: from the first to the last third of its segment.
+    let drift_k_min = |duration_s: f64| {
+        let third_s = duration_s.min(settings.longest_s) / 3.0;
+        let middle_k = |from_s: f64| tc_k(from_s + 0.5 * third_s);
+        (middle_k(duration_s - third_s) - middle_k(duration_s - 3.0 * third_s)) / (2.0 * third_s / 60.0)
+    };
+    let enough = |duration_s: f64| {
+        drift_k_min(duration_s).abs() <= settings.drift_k_min && tc_k(duration_s) - ambient_k <= 0.5 * WARM_K
+    };
+    if enough(soak.duration_s) {
+        return None;
+    }
+    let longer =
+        (1..).map(|i| SOAK_STEP_S * f64::from(i)).take_while(|s| *s <= LONGEST_SOAK_S).find(|s| enough(*s));
+    let remedy = longer.map_or_else(
+        || "no soak of a day is long enough: oil and cell need one temperature, and the machine its true masses".to_owned(),
+        |s| format!("soak {:.0} min or longer", s / 60.0),
+    );
+    Some(Concern::warning(
+        &["zero", "soak"],
+        format!(
+            "after {:.0} min at rest, housings that were {WARM_K} K warmer than the cell would still be {:.1} K warmer, and Tc drift by \
+             {:+.2} K/min; the zero refuses a drift of more than {:.2} K/min, and takes the remaining difference for an offset",
+            soak.duration_s / 60.0,
+            tc_k(soak.duration_s) - ambient_k,
+            drift_k_min(soak.duration_s),
+            settings.drift_k_min
+        ),
+        remedy,
+    ))
+}
+
+/// Steps that settle too late for `window: auto`.
+fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let transient = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
+    let auto = campaign.identification.window == WindowRule::Auto;
+    // A script evaluates its own steps.
+    if !(transient && auto && campaign.sequence.is_none()) {
+        return None;
+    }
+    let joint = campaign.identification.method == Method::Joint;
+    let needed_s = |step: &PlanStep| needed_s(step, joint);
+    let measured = || plan.steps.iter().filter(|step| step.kind != StepKind::Repeat && step.from.is_some());
+    let late: Vec<_> = measured().filter(|step| needed_s(step) > step.dwell_s).collect();
+    let worst = late.iter().max_by(|a, b| needed_s(a).total_cmp(&needed_s(b)))?;
+    let settles = worst.predicted.settle_s.map_or_else(
+        || format!("does not settle within {:.0} s", worst.dwell_s),
+        |settle_s| format!("settles {settle_s:.0} s after its jump"),
+    );
+    Some(Concern::warning(
+        &["timing", "dwell"],
+        format!(
+            "{} of {} points would not have settled {:.0} s before the end of their dwell and be doubtful \
+             (`not_stabilised`); {} {settles}",
+            late.len(),
+            measured().count(),
+            settled_time_s(worst.dwell_s, joint),
+            worst.to
+        ),
+        "lengthen `timing.dwell`, or widen `identification.stabilisation`".to_owned(),
+    ))
+}
+
+/// Steps with too little information on alpha_A, probe and heating/cooling ratio for any point with verdict good.
+fn uninformative_steps(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
+    let settings = campaign.identification.joint;
+    let unpredicted = joint && settings != JointSettings::all_off() && plan.figures.rms_error_eta.is_none();
+    unpredicted.then(|| {
+        Concern::warning(
+            &["timing"],
+            "these steps contain too little information on alpha_A, probe and heating/cooling ratio: the points will be doubtful (`rests_on_declaration`)"
+                .to_owned(),
+            "lengthen the dwell, add points, or hold what is known (`identification.joint`)".to_owned(),
+        )
+    })
+}
+
+/// A required error that is not reached even with the longest dwell.
+fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let Dwell::RequiredSigmaEta(required) = campaign.timing.dwell else { return None };
+    let found = plan.figures.rms_error_eta?;
+    (found > required).then(|| {
+        Concern::warning(
+            &["timing", "required_sigma_eta"],
+            format!(
+                "steps of {:.0} s, the longest that are chosen, reach an expected error of {:.2} points of efficiency (rms), not the {:.2} that \
+                 are required",
+                plan.steps.first().map_or(0.0, |step| step.dwell_s),
+                100.0 * found,
+                100.0 * required
+            ),
+            "begin with a `zero`, or require less".to_owned(),
+        )
+    })
+}
+
+/// A window dominated by the response of the declared T2 probe to the preceding step.
+fn probe(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+    let params = &campaign.machine.params;
+    let (diameter_m, pipe_m) = (params.t2_probe_diameter_m, params.compressor.outlet_diameter_m);
+    let judged = |step: &PlanStep| {
+        let predicted = &step.predicted;
+        let window_s = match campaign.identification.method {
+            Method::Dynamic | Method::Joint => {
+                let (start_s, end_s) =
+                    campaign.identification.window.of_step_s(predicted.settle_s, step.dwell_s);
+                end_s - start_s
+            }
+            Method::Steady | Method::Imported => step.dwell_s,
+        };
+        (time_constant_s(diameter_m, pipe_m, predicted.flow_kg_s, predicted.t2_k), window_s, step.to)
+    };
+    let share = |(tau_s, window_s, _): &(f64, f64, _)| tau_s / window_s;
+    let worst = plan.steps.iter().map(judged).max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let (tau_s, window_s, at) = worst;
+    (PROBE_TIME_CONSTANTS * tau_s > window_s).then(|| {
+        Concern::warning(
+            &["sensors", "T2", "probe_diameter"],
+            format!(
+                "a probe of {:.2} mm has a time constant of {tau_s:.1} s at {at}, and {window_s:.0} s are looked at there: less than \
+                 {PROBE_TIME_CONSTANTS} time constants, so that much of it is spent on what came before",
+                1e3 * diameter_m
+            ),
+            "lengthen `timing.dwell`, or use a thinner probe".to_owned(),
+        )
+    })
+}

@@ -1,0 +1,117 @@
+//! Rehearses a sequence script on the nominal machine, so that its errors never reach the rig.
+
+use crate::plan::planning::{fingerprint, plan};
+use crate::plan::scripted_steps::ScriptedSteps;
+use crate::plan::surge::count_surge_search;
+use crate::rig::drive::drive;
+use crate::{Session, SessionError};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::{BackendChoice, SequenceSource};
+use mapper_core::{Plan, PlanStep, StepMarker, VisitOrder};
+use mapper_physics::simulation::model::Model;
+use mapper_runner::{RunEnd, RunError, RunObserver, StepSource, StepSourceError};
+
+/// Objective recorded in the plan of a script.
+const OBJECTIVE: &str = "sequence";
+/// The backend of the rehearsal.
+const REHEARSED_ON: &str = "virtual_lab";
+
+/// Result of a rehearsal.
+pub struct Rehearsal {
+    /// The steps in executed order, with their standard errors.
+    pub plan: Plan,
+    /// The script's notes.
+    pub notes: Vec<String>,
+}
+
+/// Runs the script on the virtual lab of the nominal machine, without a recording.
+///
+/// # Errors
+/// [`SessionError`] if the script has a mistake, makes no step, or a guard trips.
+pub fn rehearse(
+    session: &Session<'_>,
+    campaign: &Campaign,
+    model: &Model,
+    source: &SequenceSource,
+) -> Result<Rehearsal, SessionError> {
+    let base = base_plan(campaign, model)?;
+    let choice = BackendChoice { name: REHEARSED_ON.to_owned(), settings: serde_json::json!({}) };
+    // Only the script's own steps: the sensors of a rehearsal need no zero.
+    let nominal = Campaign { backend: choice, zero: None, ..campaign.clone() };
+    let mut backend = session.registry.make_backend(&nominal, model)?;
+    let mut steps = Rehearsing { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
+    let end = drive(&nominal, model, &mut steps, backend.as_mut(), &mut Nobody, session.stop);
+    let failed = |error| match error {
+        RunError::Source(error) => SessionError::Script(error),
+        error => SessionError::Rehearsal(error),
+    };
+    match end.map_err(failed)? {
+        RunEnd::Completed => {}
+        RunEnd::Tripped(trip) => {
+            return Err(SessionError::RehearsalTripped { t_s: trip.t_s, reason: trip.reason });
+        }
+        RunEnd::Interrupted { .. } => return Err(SessionError::Interrupted),
+    }
+    let mut plan = steps.steps.executed(&base);
+    if plan.steps.is_empty() {
+        return Err(SessionError::NoSteps { path: source.path.clone() });
+    }
+    count_surge_search(campaign, model, &mut plan);
+    Ok(Rehearsal { plan, notes: steps.notes })
+}
+
+struct Nobody;
+
+impl RunObserver for Nobody {}
+
+/// Steps on the nominal machine; their identified points are the forecast.
+struct Rehearsing {
+    steps: ScriptedSteps,
+    notes: Vec<String>,
+}
+
+impl StepSource for Rehearsing {
+    fn inner(&self) -> Option<&dyn StepSource> {
+        Some(&self.steps)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn StepSource> {
+        Some(&mut self.steps)
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        self.steps.next_step()
+    }
+
+    fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.steps.after_step(marker)?;
+        if let (Some(step), Some(result)) = (self.steps.done.last_mut(), &self.steps.finished) {
+            step.predicted.sigma_eta = Some(result.sigma_eta()).filter(|sigma| sigma.is_finite());
+            step.predicted.sigma_h_rel =
+                result.h_w_m2k().map(|h| result.sigma_h_w_m2k() / h).filter(|ratio| ratio.is_finite());
+        }
+        Ok(())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        let notes = self.steps.take_notes();
+        self.notes.extend(notes.iter().cloned());
+        notes
+    }
+}
+
+/// A plan with hashes and times but without the script's steps.
+fn base_plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
+    // The planner plans one point only; the script selects the others.
+    let points = campaign.points.iter().copied().take(1).collect();
+    let one = Campaign {
+        sequence: None,
+        repeats: None,
+        points,
+        order: VisitOrder::Listed,
+        surge_search: None,
+        ..campaign.clone()
+    };
+    let (objective, made_from) = (OBJECTIVE.to_owned(), fingerprint(campaign, model)?);
+    Ok(Plan { objective, made_from, ..plan(&one, model)? })
+}

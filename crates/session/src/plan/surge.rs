@@ -1,0 +1,98 @@
+//! The surge search: control near surge, forecast of its duration, and its marks.
+
+use crate::recording::identification_config::declared;
+use mapper_campaign::Campaign;
+use mapper_core::{OperatingPoint, Plan, Predicted, Recording, SurgeSeek};
+use mapper_identify::IdentifyConfig;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::hold_speed;
+use mapper_physics::simulation::model::Model;
+use mapper_recording::ChannelMap;
+use mapper_runner::surge::{SurgeErrors, SurgeMarks, surge_marks};
+use mapper_runner::{Held, SurgeSearch};
+
+/// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
+/// campaign's limits.
+pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint) -> Option<Held> {
+    let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
+    let held = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
+    let (limits, outputs) = (&campaign.limits, &held.outputs);
+    let p3_pa = held.boundary.p3_pa;
+    let within = (limits.p3_min_pa..=limits.p3_max_pa).contains(&p3_pa)
+        && limits.t2_max_k.is_none_or(|limit_k| outputs.t2_k <= limit_k);
+    within.then(|| Held {
+        p3_pa,
+        t3_k: held.boundary.t3_k,
+        oil_temperature_k: held.boundary.oil_temperature_k,
+        predicted: Predicted::settled(outputs.flow_kg_s, outputs.pressure_ratio, outputs.t2_k, 0.0),
+        surge_margin_ratio: held.surge_margin_ratio(model),
+    })
+}
+
+/// Forecast of the search on the nominal machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurgeForecast {
+    /// Speed lines.
+    pub lines: usize,
+    /// Steps.
+    pub steps: usize,
+    /// Rig time, s.
+    pub duration_s: f64,
+}
+
+/// Forecast of the search after a plan; `None` if the campaign has none.
+pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option<SurgeForecast> {
+    let seek = campaign.surge_search?;
+    let mut ends: Vec<OperatingPoint> = Vec::new();
+    for step in &plan.steps {
+        match ends.iter_mut().find(|end| (end.speed_rpm - step.to.speed_rpm).abs() < 1e-3) {
+            Some(end) if end.valve_opening_ratio <= step.to.valve_opening_ratio => {}
+            Some(end) => *end = step.to,
+            None => ends.push(step.to),
+        }
+    }
+    let margin = |end: &OperatingPoint| {
+        hold_near_surge(campaign, model, *end).map_or(1.0, |held| held.surge_margin_ratio)
+    };
+    let looks: usize = ends.iter().map(|end| mapper_runner::surge::expected_looks(margin(end), &seek)).sum();
+    Some(SurgeForecast {
+        lines: ends.len(),
+        steps: looks + 2 * ends.len(),
+        duration_s: looks as f64 * seek.dwell_s + ends.len() as f64 * SurgeSearch::AROUND_S,
+    })
+}
+
+impl SurgeForecast {
+    /// One sentence for a plan's remarks.
+    pub fn sentence(&self, seek: &SurgeSeek) -> String {
+        format!(
+            "behind these steps surge is sought at the ends of {} speed lines, no nearer than a margin of {:.1} %: about {} steps, \
+             {:.0} min, counted in",
+            self.lines,
+            100.0 * seek.closest_margin_ratio,
+            self.steps,
+            self.duration_s / 60.0
+        )
+    }
+}
+
+/// Adds the search to a plan's duration and remarks.
+pub(crate) fn count_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
+    if let Some((seek, forecast)) = campaign.surge_search.zip(surge_forecast(campaign, model, plan)) {
+        plan.surge_search_s = forecast.duration_s;
+        plan.figures.minutes = plan.duration_s() / 60.0;
+        plan.remarks.push(forecast.sentence(&seek));
+    }
+}
+
+/// The marks of the approaches of a recording.
+pub(crate) fn marks_of(
+    approaches: &Recording,
+    campaign: Option<&Campaign>,
+    config: &IdentifyConfig,
+) -> SurgeMarks {
+    let errors = campaign.map_or_else(SurgeErrors::default, |campaign| {
+        SurgeErrors::of(&declared(campaign, &ChannelMap::native()))
+    });
+    surge_marks(approaches, config.reference, errors)
+}

@@ -1,0 +1,87 @@
+//! Fuses several sensors of a channel into one reading. All commands use the same procedure.
+
+use crate::recording::recording_file::Recorded;
+use mapper_campaign::Campaign;
+use mapper_core::{Channel, DeclaredUncertainty, Recording, RedundantSensors};
+use mapper_identify::IdentifyConfig;
+use mapper_observe::redundant_sensors::fuse::{alike, element_count};
+use mapper_observe::{FusedChannel, fuse, judge_elements};
+use mapper_recording::ChannelMap;
+use std::collections::BTreeMap;
+
+/// Recordings with one reading per channel, and the declared uncertainty of that reading.
+pub(crate) struct Fused {
+    pub(crate) recordings: Vec<Recording>,
+    pub(crate) config: IdentifyConfig,
+    /// Fusion result by recording; empty if every channel has one sensor.
+    pub(crate) channels: Vec<Vec<FusedChannel>>,
+}
+
+/// Fuses the sensors of recordings that are compared with each other. A sensor excluded from one is excluded from all.
+pub(crate) fn fused(
+    recordings: Vec<Recording>,
+    config: IdentifyConfig,
+    campaign: Option<&Campaign>,
+    map: &ChannelMap,
+) -> Fused {
+    let Some(first) = recordings.first().filter(|first| !first.elements.is_empty()) else {
+        let channels = vec![Vec::new(); recordings.len()];
+        return Fused { recordings, config, channels };
+    };
+    let declared = declared(first, campaign, map);
+    let colour = config.noise_colour;
+    let judged = recordings.iter().map(|recording| judge_elements(recording, &declared, colour)).collect();
+    let channels = alike(judged, &declared);
+    let recordings = recordings
+        .into_iter()
+        .zip(&channels)
+        .map(|(recording, fused)| fuse(recording, &declared, fused))
+        .collect();
+    let mut config = config;
+    for fused in channels.iter().flatten() {
+        take_over(&mut config, fused, campaign);
+    }
+    Fused { recordings, config, channels }
+}
+
+/// The recordings of several runs as stored.
+pub(crate) fn recordings(recorded: &[Recorded]) -> Vec<Recording> {
+    recorded.iter().map(|recorded| recorded.read.recording.clone()).collect()
+}
+
+/// Copies the uncertainty of a fused channel into the configuration. For several recordings the largest applies.
+fn take_over(config: &mut IdentifyConfig, fused: &FusedChannel, campaign: Option<&Campaign>) {
+    let DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio } = fused.declared;
+    if noise_sigma > 0.0 || offset_sigma > 0.0 || gain_sigma_ratio > 0.0 {
+        let entry = config.declared.entry(fused.channel).or_default();
+        // If no gain is declared for a sensor, the gain tolerance already in the configuration applies.
+        let gain_sigma_ratio = if gain_sigma_ratio > 0.0 { gain_sigma_ratio } else { entry.gain_sigma_ratio };
+        *entry = DeclaredUncertainty { noise_sigma, offset_sigma, gain_sigma_ratio };
+    }
+    let probes = campaign.and_then(|campaign| campaign.sensors.get(&fused.channel)?.redundant.as_ref());
+    if fused.channel == Channel::T2 && probes.is_some() {
+        config.probe_diameter_m = fused.probe_diameter_m;
+    }
+}
+
+/// Declared uncertainty of each sensor in channels with several sensors. The channel map takes precedence; the campaign applies if its number of
+/// sensors matches. A declaration for a channel as a whole applies to each of its sensors.
+fn declared(
+    recording: &Recording,
+    campaign: Option<&Campaign>,
+    map: &ChannelMap,
+) -> BTreeMap<Channel, RedundantSensors> {
+    let channels = recording.elements.keys().map(|element| element.channel);
+    let of = |channel: Channel| {
+        let count = element_count(recording, channel);
+        let as_many = |declared: &&RedundantSensors| declared.elements.len() == count;
+        let sensor = campaign.and_then(|campaign| campaign.sensors.get(&channel));
+        let each = map.sensors.get(&channel).copied().or(sensor.map(|sensor| sensor.declared));
+        let given = map.redundant.get(&channel).filter(as_many);
+        let given = given.or_else(|| {
+            sensor?.redundant.as_ref().filter(as_many).filter(|_| !map.sensors.contains_key(&channel))
+        });
+        given.cloned().unwrap_or_else(|| RedundantSensors::alike(channel, count, each.unwrap_or_default()))
+    };
+    channels.map(|channel| (channel, of(channel))).collect()
+}

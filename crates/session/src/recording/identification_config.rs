@@ -1,0 +1,145 @@
+//! Converts a campaign's declarations into the configuration of identification and diagnosis.
+
+use mapper_campaign::Campaign;
+use mapper_core::{
+    ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, Method, ReferenceState, WindowRule,
+};
+use mapper_identify::{IdentifyConfig, PressureTap};
+use mapper_observe::declared_uncertainties;
+use mapper_physics::gas::air::Air;
+use mapper_recording::{AmbientPressure, ChannelMap, MachineConstants};
+use std::collections::BTreeMap;
+
+/// Identification settings for the recordings of this campaign.
+pub fn identification(campaign: &Campaign) -> IdentifyConfig {
+    let chosen = &campaign.identification;
+    let tap = |channel: Channel| {
+        let sensor = campaign.sensors.get(&channel);
+        match sensor.and_then(|sensor| sensor.static_tap_pipe_diameter_m) {
+            Some(pipe_diameter_m) => PressureTap::Static { pipe_diameter_m },
+            None => PressureTap::Total,
+        }
+    };
+    IdentifyConfig {
+        method: chosen.method,
+        window: chosen.window,
+        settle_bands: chosen.settle_bands,
+        alpha_area_ratio: chosen.alpha_area_ratio,
+        alpha_area_sigma_ratio: chosen.alpha_area_sigma_ratio,
+        inlet_convection: campaign.machine.params.compressor.inlet_convection,
+        inlet_diameter_m: campaign.machine.params.compressor.inlet_diameter_m,
+        outlet_diameter_m: campaign.machine.params.compressor.outlet_diameter_m,
+        probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
+        joint: chosen.joint,
+        internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
+        air: campaign.machine.params.compressor.air(),
+        humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
+        reference: campaign.reference,
+        inlet_tap: tap(Channel::P1),
+        outlet_tap: tap(Channel::P2),
+        declared: declared(campaign, &ChannelMap::native()),
+        ..IdentifyConfig::default()
+    }
+}
+
+/// The conditions that the campaign declares as constant, SI.
+pub(crate) fn declared_conditions(campaign: &Campaign) -> BTreeMap<Channel, f64> {
+    let (boundary, follows) = (&campaign.boundary, &campaign.follow_outlet);
+    let mut conditions = BTreeMap::from([
+        (Channel::P1, boundary.p1_pa),
+        (Channel::T1, boundary.t1_k),
+        (Channel::TAmb, boundary.ambient_temperature_k),
+    ]);
+    if !follows.turbine_inlet {
+        conditions.insert(Channel::T3, boundary.t3_k);
+    }
+    if !follows.oil {
+        conditions.insert(Channel::TOil, boundary.oil_temperature_k);
+    }
+    conditions
+}
+
+/// Declared uncertainty of the sensors in a recording that is read with this channel map.
+pub fn declared(campaign: &Campaign, map: &ChannelMap) -> BTreeMap<Channel, DeclaredUncertainty> {
+    let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared)).collect();
+    let mut declared = declared_uncertainties(&sensors, &campaign.tolerances, &map.sensors);
+    for (channel, sensor) in &campaign.sensors {
+        if let Some(declared) = declared.get_mut(channel).filter(|_| !sensor.gain_is_declared) {
+            add_pressure_gain(*channel, declared);
+        }
+    }
+    declared
+}
+
+/// Gain error of a pressure transducer without a declared one, ratio, one standard deviation: accuracy class 0.1, the best of EN 837-1, as the
+/// limits of a rectangular distribution (GUM 4.3.7).
+const PRESSURE_GAIN_RATIO: f64 = 5.8e-4;
+
+fn add_pressure_gain(channel: Channel, declared: &mut DeclaredUncertainty) {
+    if channel.info().dimension == Dimension::Pressure && declared.gain_sigma_ratio == 0.0 {
+        declared.gain_sigma_ratio = PRESSURE_GAIN_RATIO;
+    }
+}
+
+/// Adds the uncertainty of the ambient pressure to which gauge pressures are added.
+fn with_barometer(mut config: IdentifyConfig, map: &ChannelMap) -> IdentifyConfig {
+    let Some(AmbientPressure::Constant(barometer)) = &map.ambient_pressure else { return config };
+    let gauge: Vec<Channel> =
+        [Channel::P1, Channel::P2].into_iter().filter(|channel| map.is_gauge(*channel)).collect();
+    match gauge.as_slice() {
+        [_, _] => config.barometer_sigma_pa = barometer.sigma_pa,
+        [one] => {
+            let declared = config.declared.entry(*one).or_default();
+            declared.offset_sigma = declared.offset_sigma.hypot(barometer.sigma_pa);
+        }
+        _ => {}
+    }
+    config
+}
+
+/// Same as [`identification`], for a recording that is read with this channel map. The map overrides the campaign for sensors, noise and window.
+pub fn identification_with(campaign: &Campaign, map: &ChannelMap) -> IdentifyConfig {
+    let identification = identification(campaign);
+    let config = IdentifyConfig {
+        declared: declared(campaign, map),
+        noise_colour: map.noise_colour.unwrap_or(identification.noise_colour),
+        window: map.window.map_or(identification.window, |window| WindowRule::Fixed {
+            start_s: window.start_s,
+            end_s: window.end_s,
+        }),
+        ..identification
+    };
+    with_barometer(config, map)
+}
+
+/// Identification settings for a recording that has a channel map but no campaign. A pipe diameter in the map always means a static tap.
+pub(crate) fn identification_of(machine: &MachineConstants, map: &ChannelMap) -> IdentifyConfig {
+    let usual = IdentifyConfig::default();
+    let tap = |diameter_m: Option<f64>| {
+        diameter_m.map_or(PressureTap::Total, |pipe_diameter_m| PressureTap::Static { pipe_diameter_m })
+    };
+    let (inlet_m, outlet_m) = (machine.compressor_inlet_diameter_m, machine.compressor_outlet_diameter_m);
+    let mut declared = map.sensors.clone();
+    declared.iter_mut().for_each(|(channel, declared)| add_pressure_gain(*channel, declared));
+    let config = IdentifyConfig {
+        method: Method::Joint,
+        alpha_area_ratio: machine.alpha_area_ratio,
+        alpha_area_sigma_ratio: ALPHA_AREA_SIGMA_RATIO,
+        internal_area_m2: machine.compressor_internal_area_m2,
+        probe_diameter_m: machine.t2_probe_diameter_m,
+        inlet_tap: tap(inlet_m),
+        outlet_tap: tap(outlet_m),
+        inlet_diameter_m: inlet_m.unwrap_or(usual.inlet_diameter_m),
+        outlet_diameter_m: outlet_m.unwrap_or(usual.outlet_diameter_m),
+        reference: map.reference.unwrap_or(ReferenceState::SAE),
+        air: Air::DRY,
+        window: map.window.map_or_else(WindowRule::default, |window| WindowRule::Fixed {
+            start_s: window.start_s,
+            end_s: window.end_s,
+        }),
+        declared,
+        noise_colour: map.noise_colour.unwrap_or_default(),
+        ..usual
+    };
+    with_barometer(config, map)
+}

@@ -1,0 +1,296 @@
+//! The journal of a run: its identity and the steps safely recorded. Each entry is one line of JSON, so that a torn last line leaves all earlier
+//! lines valid.
+
+use crate::SessionError;
+use mapper_campaign::Campaign;
+use mapper_core::{Plan, RigDescription, RunEnding};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Read, Write};
+use std::path::Path;
+
+/// Maximum size of a journal, bytes: some hundred thousand steps.
+const READ_MAX: u64 = 16 << 20;
+
+/// Properties that must be unchanged to resume a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Name of the machine.
+    pub machine: String,
+    /// Its serial number.
+    pub serial_number: Option<String>,
+    /// Hash of the campaign.
+    pub campaign_sha256: String,
+    /// Hash of the nominal model.
+    pub model_sha256: String,
+    /// Hash of the plan.
+    pub plan_sha256: String,
+    /// The backend and its rig.
+    pub backend: String,
+    /// Hash of the backend's settings.
+    pub settings_sha256: String,
+    /// Hash of the rig description; missing in journals of older runs.
+    #[serde(default)]
+    pub rig_sha256: Option<String>,
+}
+
+/// Hash of the rig description: channels, rate, accepted ranges, safe trajectory.
+///
+/// # Errors
+/// [`SessionError::Json`] if it cannot be written as JSON.
+pub fn rig_sha256(rig: &RigDescription) -> Result<String, SessionError> {
+    Ok(mapper_planner::sha256_hex(&serde_json::to_string(rig)?))
+}
+
+impl Identity {
+    /// Identity of a run.
+    ///
+    /// # Errors
+    /// [`SessionError::Json`] if the plan cannot be written as JSON.
+    pub fn of(campaign: &Campaign, plan: &Plan, rig: &RigDescription) -> Result<Self, SessionError> {
+        let hash = |text: &str| mapper_planner::sha256_hex(text);
+        let behind = rig.exclusive.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
+        // The rig has a separate hash, so that a difference in the rig is reported as such.
+        let mut without_rig = plan.clone();
+        without_rig.made_from.rig_sha256 = None;
+        Ok(Identity {
+            machine: campaign.machine.name.clone(),
+            serial_number: campaign.machine.serial_number.clone(),
+            campaign_sha256: plan.made_from.campaign_sha256.clone(),
+            model_sha256: plan.made_from.model_sha256.clone(),
+            plan_sha256: hash(&serde_json::to_string(&without_rig)?),
+            backend: format!("{} {}{behind}", rig.backend, rig.version),
+            settings_sha256: match campaign.readers.as_slice() {
+                [] => hash(&campaign.backend.settings.to_string()),
+                readers => hash(&serde_json::to_string(&(&campaign.backend.settings, readers))?),
+            },
+            rig_sha256: Some(rig_sha256(rig)?),
+        })
+    }
+
+    /// Names of the properties that differ.
+    pub fn differences(&self, now: &Identity) -> Vec<&'static str> {
+        let other = |then: &Option<String>, now: &Option<String>| {
+            then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
+        };
+        [
+            ("the machine", self.machine != now.machine || self.serial_number != now.serial_number),
+            ("the campaign", self.campaign_sha256 != now.campaign_sha256),
+            ("the nominal model", self.model_sha256 != now.model_sha256),
+            ("the plan", self.plan_sha256 != now.plan_sha256),
+            ("the backend", self.backend != now.backend || self.settings_sha256 != now.settings_sha256),
+            ("what the rig says of itself", other(&self.rig_sha256, &now.rig_sha256)),
+        ]
+        .into_iter()
+        .filter_map(|(what, differs)| differs.then_some(what))
+        .collect()
+    }
+}
+
+/// One journal entry.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Entry {
+    /// A part of the run begins, with a new recording.
+    Part {
+        /// Identity of the run.
+        identity: Identity,
+        /// File name of its recording in the run directory.
+        recording: String,
+    },
+    /// The soak is complete and recorded.
+    Soaked,
+    /// A step is complete and recorded. Holds its index in the plan, stored as the step number.
+    StepSaved(#[serde(with = "mapper_core::test_plan::step_number")] usize),
+    /// The run has ended.
+    Ended(RunEnding),
+}
+
+/// A journal that is being written.
+#[derive(Debug)]
+pub struct Journal {
+    file: File,
+    /// Whether each line is flushed to disk. Needed for rigs that keep running if the computer fails.
+    synced: bool,
+}
+
+impl Journal {
+    /// Opens the journal of a run to append, and locks it until it is dropped: a run has one runner.
+    ///
+    /// # Errors
+    /// The system's error; of kind `WouldBlock` if another runner has the journal.
+    pub fn open(path: &Path, synced: bool) -> std::io::Result<Self> {
+        let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(std::io::Error::new(ErrorKind::WouldBlock, "another process runs it"));
+            }
+            // A file system without locks.
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(error)) => return Err(error),
+        }
+        let mut text = Vec::new();
+        (&mut file).take(READ_MAX).read_to_end(&mut text)?;
+        // Terminates a line that was torn by a crash.
+        if text.last().is_some_and(|last| *last != b'\n') {
+            file.write_all(b"\n")?;
+        }
+        Ok(Journal { file, synced })
+    }
+
+    /// Writes one line.
+    ///
+    /// # Errors
+    /// The system's error.
+    pub fn write(&mut self, entry: &Entry) -> std::io::Result<()> {
+        let mut line = serde_json::to_vec(entry)?;
+        line.push(b'\n');
+        self.file.write_all(&line)?;
+        if self.synced { self.file.sync_data() } else { Ok(()) }
+    }
+}
+
+/// One part of a run, as read from its journal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JournalPart {
+    /// Identity of the run.
+    pub identity: Identity,
+    /// File name of its recording.
+    pub recording: String,
+    /// Whether its soak is recorded.
+    pub soaked: bool,
+    /// Recorded steps.
+    pub saved: BTreeSet<usize>,
+    /// Whether it reached the end of the run's steps.
+    pub completed: bool,
+}
+
+/// Reads the parts of a run. Unreadable lines are skipped: a step not known to be saved is run again.
+///
+/// # Errors
+/// The system's error.
+pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
+    let mut bytes = Vec::new();
+    mapper_yaml::open_file(path)?.take(READ_MAX).read_to_end(&mut bytes)?;
+    let mut parts: Vec<JournalPart> = Vec::new();
+    for line in bytes.split(|byte| *byte == b'\n') {
+        match (serde_json::from_slice::<Entry>(line), parts.last_mut()) {
+            (Ok(Entry::Part { identity, recording }), _) => {
+                parts.push(JournalPart {
+                    identity,
+                    recording,
+                    soaked: false,
+                    saved: BTreeSet::new(),
+                    completed: false,
+                });
+            }
+            (Ok(Entry::Soaked), Some(part)) => part.soaked = true,
+            (Ok(Entry::StepSaved(index)), Some(part)) => {
+                part.saved.insert(index);
+            }
+            (Ok(Entry::Ended(how)), Some(part)) => part.completed = how == RunEnding::Completed,
+            _ => {}
+        }
+    }
+    Ok(parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(recording: &str) -> Entry {
+        let text = || "x".to_owned();
+        Entry::Part {
+            identity: Identity {
+                machine: text(),
+                serial_number: None,
+                campaign_sha256: text(),
+                model_sha256: text(),
+                plan_sha256: text(),
+                backend: text(),
+                settings_sha256: text(),
+                rig_sha256: None,
+            },
+            recording: recording.to_owned(),
+        }
+    }
+
+    /// Cuts the journal at every byte: all complete lines are read, and the journal can be continued.
+    #[test]
+    fn a_journal_cut_anywhere_holds_what_was_written_before() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal");
+        let mut journal = Journal::open(&path, false).unwrap();
+        let entries = [
+            part("a"),
+            Entry::Soaked,
+            Entry::StepSaved(0),
+            Entry::StepSaved(1),
+            part("b"),
+            Entry::StepSaved(2),
+        ];
+        let mut ends = vec![0];
+        for entry in &entries {
+            journal.write(entry).unwrap();
+            ends.push(std::fs::metadata(&path).unwrap().len() as usize);
+        }
+        assert_eq!(Journal::open(&path, false).unwrap_err().kind(), ErrorKind::WouldBlock);
+        drop(journal);
+        let whole = std::fs::read(&path).unwrap();
+        for cut in 0..=whole.len() {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let parts = read_journal(&path).unwrap();
+            // A complete line counts even without its line break.
+            let written = ends.iter().filter(|end| **end > 0 && **end <= cut + 1).count();
+            let saved: usize = parts.iter().map(|part| part.saved.len() + usize::from(part.soaked) + 1).sum();
+            assert_eq!(saved, written, "cut at {cut}");
+            Journal::open(&path, false).unwrap().write(&part("c")).unwrap();
+            let more = read_journal(&path).unwrap();
+            assert_eq!(more.last().unwrap().recording, "c");
+            assert_eq!(more.len(), parts.len() + 1);
+        }
+    }
+
+    /// A journal that names a soak: the recording decides whether there was one.
+    #[test]
+    fn a_soak_counts_only_if_the_recording_holds_it() {
+        use mapper_core::{Event, EventKind};
+        for (recorded, soaked) in [(EventKind::SoakStarted, false), (EventKind::SoakEnded, true)] {
+            let directory = tempfile::tempdir().unwrap();
+            let mut journal = Journal::open(&directory.path().join("journal.jsonl"), false).unwrap();
+            journal.write(&part("recording.mcap")).unwrap();
+            journal.write(&Entry::Soaked).unwrap();
+            let header = mapper_recording::RecordingHeader {
+                library: "mapper".to_owned(),
+                profile: String::new(),
+                start_time_ns: 0,
+                metadata: std::collections::BTreeMap::new(),
+                plan_json: None,
+                campaign_yaml: None,
+            };
+            let path = directory.path().join("recording.mcap");
+            let mut writer = mapper_recording::RecordingWriter::create(&path, &header).unwrap();
+            writer.write_event(&Event { t_s: 1.0, kind: recorded, message: String::new() }).unwrap();
+            writer.finish().unwrap();
+            let broken_off = crate::BrokenOff::read(directory.path()).unwrap();
+            assert_eq!(broken_off.soaked(), soaked, "{recorded:?}");
+        }
+    }
+
+    #[test]
+    fn anything_else_is_no_journal_and_no_panic() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal");
+        for bytes in [
+            &b"\xff\xfe\x00"[..],
+            b"{}\n[]\n\"step_saved\"",
+            b"{\"step_saved\": -1}\n{\"step_saved\": 0}\n{\"step_saved\": 1e400}",
+        ] {
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(read_journal(&path).unwrap(), []);
+        }
+    }
+}

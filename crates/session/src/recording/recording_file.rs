@@ -1,0 +1,152 @@
+//! A recording read from a file, with the campaign that describes the recorded machine.
+
+use crate::recording::resume::BrokenOff;
+use crate::recording::run_directory;
+use crate::{Registry, SessionError};
+use mapper_campaign::{Campaign, CampaignError};
+use mapper_core::Recording;
+use mapper_observe::OtherMachine;
+use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use std::path::{Path, PathBuf};
+
+/// A recording, its file and its campaign.
+#[derive(Debug)]
+pub struct Recorded {
+    /// The file.
+    pub path: PathBuf,
+    /// The contents.
+    pub read: ReadReport,
+    /// The campaign given by the caller, or the one attached to the recording.
+    pub campaign: Option<Campaign>,
+    /// The surge approaches, which are not identified; `None` if there are none.
+    pub approaches: Option<Recording>,
+}
+
+impl Recorded {
+    /// Reads a run directory, an MCAP file or a log of any format of the registry. The machine comes from the first of these: the given
+    /// campaign, the `machine` of the channel map, the campaign attached to the recording.
+    ///
+    /// # Errors
+    /// [`SessionError::Record`] if the recording cannot be read, [`SessionError::Campaign`] if the attached campaign has mistakes.
+    pub fn read(
+        registry: &Registry,
+        path: &Path,
+        map: &ChannelMap,
+        given: Option<&Campaign>,
+    ) -> Result<Recorded, SessionError> {
+        let file = run_directory::recording_of(path);
+        let options = ReadOptions { logs: registry.logs, ..ReadOptions::default() };
+        let read = read_recording(&file, map, &options)?;
+        let campaign = match given {
+            Some(campaign) => Some(campaign.clone()),
+            None if map.machine.is_some() => None,
+            None => attached_campaign(&read, &file)?,
+        };
+        Ok(Recorded::of(file, read, campaign))
+    }
+
+    /// Same as [`read`](Recorded::read), for all recordings of a run directory. A resumed run has several; only the valid steps of each are
+    /// returned.
+    ///
+    /// # Errors
+    /// As [`read`](Recorded::read).
+    pub fn read_run(
+        registry: &Registry,
+        path: &Path,
+        map: &ChannelMap,
+        given: Option<&Campaign>,
+    ) -> Result<Vec<Recorded>, SessionError> {
+        let Some(parts) = broken_off(path) else {
+            return Ok(vec![Recorded::read(registry, path, map, given)?]);
+        };
+        let first = Recorded::read(registry, &path.join(run_directory::RECORDING), map, given)?;
+        let mut broken_off = parts;
+        if let Some(campaign) = &first.campaign {
+            broken_off.keep_what_goes_on(campaign)?;
+        }
+        let last = broken_off.parts.len() - 1;
+        let mut all = Vec::new();
+        for (place, part) in broken_off.parts.iter().enumerate() {
+            let mut recorded = Recorded::read(registry, &path.join(&part.recording), map, given)?;
+            // The last part may have ended normally or been interrupted: all its complete steps are valid.
+            if place < last {
+                recorded.read.recording.steps.retain(|step| part.saved.contains(&step.index));
+            }
+            all.push(recorded);
+        }
+        Ok(all)
+    }
+
+    /// The contents of a file, with the surge approaches separated.
+    pub(crate) fn of(path: PathBuf, mut read: ReadReport, campaign: Option<Campaign>) -> Recorded {
+        let approaches = read.recording.split_off_approaches();
+        Recorded { path, read, campaign, approaches }
+    }
+
+    /// Returns the campaign, or an error if the machine is unknown.
+    ///
+    /// # Errors
+    /// [`SessionError::MachineUnknown`] with `remedy`.
+    pub fn known(&self, remedy: &'static str) -> Result<&Campaign, SessionError> {
+        self.campaign.as_ref().ok_or(SessionError::MachineUnknown { remedy })
+    }
+}
+
+/// The journal of a run that was resumed; `None` for anything else.
+fn broken_off(path: &Path) -> Option<BrokenOff> {
+    let broken_off = path.is_dir().then(|| BrokenOff::read(path).ok())??;
+    (broken_off.parts.len() > 1).then_some(broken_off)
+}
+
+/// Rejects a recording that was given twice: its noise would count as new evidence.
+///
+/// # Errors
+/// [`SessionError::SameRecording`] with both paths, regardless of the file names.
+pub(crate) fn all_differ(recorded: &[Recorded]) -> Result<(), SessionError> {
+    for (place, second) in recorded.iter().enumerate() {
+        let series = &second.read.recording.series;
+        let same = |first: &&Recorded| !series.is_empty() && first.read.recording.series == *series;
+        if let Some(first) = recorded[..place].iter().find(same) {
+            return Err(SessionError::SameRecording {
+                first: first.path.clone(),
+                second: second.path.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The campaign attached to a recording; `None` if there is none.
+pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option<Campaign>, SessionError> {
+    let Some(text) = &read.campaign_text else { return Ok(None) };
+    let origin = file.with_file_name(run_directory::CAMPAIGN);
+    let checked = mapper_campaign::check(text, &origin, &read_beside);
+    Ok(Some(checked.map_err(|findings| CampaignError::Mistakes(Box::new(findings)))?))
+}
+
+/// Reads a file named by the campaign of a recording. A missing sequence script is not an error, because it is not needed here.
+fn read_beside(path: &Path) -> std::io::Result<String> {
+    let text = mapper_campaign::read_text(path);
+    if path.extension().is_some_and(|extension| extension == "rhai") {
+        Ok(text.unwrap_or_default())
+    } else {
+        text
+    }
+}
+
+/// Reads a channel map from a file.
+///
+/// # Errors
+/// [`SessionError::ChannelMap`] with the read error or the file's mistakes.
+pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
+    Ok(ChannelMap::load(file)?)
+}
+
+/// Rejects a recording of another machine than the campaign's.
+///
+/// # Errors
+/// [`OtherMachine`], by the rule of [`mapper_observe::same_machine`].
+pub(crate) fn same_machine(recorded: &Recorded, campaign: &Campaign) -> Result<(), OtherMachine> {
+    let machine = &campaign.machine;
+    mapper_observe::same_machine(&recorded.read.metadata, &machine.name, machine.serial_number.as_deref())
+}

@@ -1,0 +1,185 @@
+//! Resumes an interrupted run: determines the valid parts and the steps to repeat.
+
+use crate::recording::journal::{Identity, JournalPart, read_journal};
+use crate::{SessionError, recording::run_directory};
+use mapper_campaign::Campaign;
+use mapper_core::{EventKind, Plan, PlanStep, StepKind, StepMarker};
+use mapper_recording::{ReadOptions, read_marks, read_steps};
+use mapper_runner::{StepSource, StepSourceError};
+use std::collections::{BTreeSet, VecDeque};
+use std::path::{Path, PathBuf};
+
+/// First index for steps that are repeated only to approach a missing step from its planned predecessor.
+pub(crate) const AGAIN_FROM: usize = StepMarker::AGAIN_FROM;
+
+/// Whether the steps of a campaign depend on measured data.
+pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
+    campaign.sequence.is_some() || campaign.surge_search.is_some() || campaign.on_drift.is_some()
+}
+
+/// State of an interrupted run.
+#[derive(Debug, Clone)]
+pub struct BrokenOff {
+    /// Its directory.
+    pub directory: PathBuf,
+    pub(crate) parts: Vec<JournalPart>,
+}
+
+impl BrokenOff {
+    /// Reads the journal of a run directory.
+    ///
+    /// # Errors
+    /// [`SessionError::NotResumable`] if there is none.
+    pub fn read(directory: &Path) -> Result<Self, SessionError> {
+        let why = |why: String| SessionError::NotResumable { run: directory.to_owned(), why };
+        let path = directory.join(run_directory::JOURNAL);
+        let mut parts =
+            read_journal(&path).map_err(|error| why(format!("its journal cannot be read: {error}")))?;
+        if parts.is_empty() {
+            return Err(why("its journal holds no run".to_owned()));
+        }
+        for part in parts.iter_mut().filter(|part| part.soaked || !part.saved.is_empty()) {
+            // The recording decides: a step, or a soak, that the journal names and the recording does not hold to its end is run again.
+            let (steps, events) =
+                read_marks(&directory.join(&part.recording), &ReadOptions::default()).unwrap_or_default();
+            part.soaked = events.iter().any(|event| event.kind == EventKind::SoakEnded);
+            let whole = steps.iter().filter(|step| step.end_s > step.start_s).map(|step| step.index);
+            let whole: BTreeSet<usize> = whole.collect();
+            part.saved.retain(|index| whole.contains(index));
+        }
+        Ok(BrokenOff { directory: directory.to_owned(), parts })
+    }
+
+    /// Removes steps that a later part repeated, and the last line of the surge search. The search depends on its preceding data and restarts
+    /// that line.
+    ///
+    /// # Errors
+    /// Read errors of a recording.
+    pub(crate) fn keep_what_goes_on(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
+        if !depends_on_readings(campaign) {
+            return Ok(());
+        }
+        let mut first_later = AGAIN_FROM;
+        for part in self.parts.iter_mut().rev() {
+            part.saved.retain(|index| *index < first_later || *index >= AGAIN_FROM);
+            first_later = part.saved.iter().copied().next().unwrap_or(first_later).min(first_later);
+        }
+        let last =
+            self.parts.iter_mut().rev().find(|part| part.saved.iter().any(|index| *index < AGAIN_FROM));
+        let Some(part) = last.filter(|part| campaign.surge_search.is_some() && !part.completed) else {
+            return Ok(());
+        };
+        let path = self.directory.join(&part.recording);
+        let steps = read_steps(&path, &ReadOptions::default())?;
+        let holds = |step: &&StepMarker| step.index < AGAIN_FROM && part.saved.contains(&step.index);
+        let held: Vec<StepMarker> = steps.iter().filter(holds).copied().collect();
+        let speed = |step: &StepMarker| step.to.map(|to| to.speed_rpm.to_bits());
+        let line = held.last().and_then(speed);
+        let sought = |step: &&StepMarker| step.kind == StepKind::Approach && speed(step) == line;
+        let open: Vec<usize> = held.iter().rev().take_while(sought).map(|step| step.index).collect();
+        part.saved.retain(|index| !open.contains(index));
+        Ok(())
+    }
+
+    /// Steps that are in one of the recordings, by index in the plan.
+    pub(crate) fn saved(&self) -> BTreeSet<usize> {
+        self.parts.iter().flat_map(|part| part.saved.iter().copied()).collect()
+    }
+
+    /// Whether one of the recordings contains the soak.
+    pub fn soaked(&self) -> bool {
+        self.parts.iter().any(|part| part.soaked)
+    }
+
+    /// Rejects a run with another identity, or one with no remaining work.
+    ///
+    /// # Errors
+    /// [`SessionError::NotResumable`] with the differences or the reason.
+    pub(crate) fn check(&self, campaign: &Campaign, plan: &Plan, now: &Identity) -> Result<(), SessionError> {
+        let why = |why: String| Err(SessionError::NotResumable { run: self.directory.clone(), why });
+        for part in &self.parts {
+            let differences = part.identity.differences(now);
+            if !differences.is_empty() {
+                return why(format!("{} changed since", differences.join(" and ")));
+            }
+        }
+        // The page is written last: without it the disk was full, or the program was killed.
+        let results = [run_directory::POINTS, run_directory::REPORT, run_directory::PAGE];
+        let written = results.iter().all(|name| self.directory.join(name).exists());
+        if written && self.is_whole(campaign, plan) {
+            return why("all of its steps are there, and so are its results".to_owned());
+        }
+        Ok(())
+    }
+
+    /// Whether every step is recorded, so that at most the map is missing.
+    pub(crate) fn is_whole(&self, campaign: &Campaign, plan: &Plan) -> bool {
+        if depends_on_readings(campaign) {
+            // Only a completed run shows that no further step was due.
+            return self.parts.last().is_some_and(|part| part.completed);
+        }
+        let saved = self.saved();
+        plan.steps.iter().all(|step| saved.contains(&step.index))
+    }
+
+    /// One sentence on the repeated work and its reason.
+    pub(crate) fn summary(&self, campaign: &Campaign, plan: &Plan, saved: &BTreeSet<usize>) -> String {
+        let soak = match (campaign.zero.is_some(), self.soaked()) {
+            (false, _) => "without a soak, as before",
+            (true, true) => "the soak is not repeated: what sensors read at rest holds for the run",
+            (true, false) => "the soak is repeated: the recording does not have it whole",
+        };
+        format!(
+            "resumed: {} of {} steps hold; {soak}; it is unknown how far the housings have cooled, so they are warmed up again and the step before the first \
+             missing one is made once more",
+            plan.steps.iter().filter(|step| saved.contains(&step.index)).count(),
+            plan.steps.len()
+        )
+    }
+}
+
+/// The missing steps of a plan, each after its planned predecessor.
+pub(crate) struct MissingSteps<'a> {
+    plan: &'a Plan,
+    next: VecDeque<PlanStep>,
+    notes: Vec<String>,
+}
+
+impl<'a> MissingSteps<'a> {
+    pub(crate) fn new(plan: &'a Plan, saved: &BTreeSet<usize>, note: String) -> Self {
+        let mut next: VecDeque<PlanStep> = VecDeque::new();
+        for (place, step) in plan.steps.iter().enumerate() {
+            if saved.contains(&step.index) {
+                continue;
+            }
+            // If the rig is not at the planned predecessor, that step is repeated first.
+            let comes_from = place.checked_sub(1).and_then(|before| plan.steps.get(before));
+            if let Some(before) = comes_from
+                && next.back().is_none_or(|last| last.index != before.index)
+            {
+                let index = plan.steps.len() + next.len();
+                next.push_back(PlanStep { index, kind: StepKind::Repeat, from: None, ..before.clone() });
+            }
+            next.push_back(step.clone());
+        }
+        MissingSteps { plan, next, notes: vec![note] }
+    }
+}
+
+impl StepSource for MissingSteps<'_> {
+    fn warm_up_s(&self) -> f64 {
+        self.plan.warm_up_s
+    }
+
+    fn cool_down_s(&self) -> f64 {
+        self.plan.cool_down_s
+    }
+
+    fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
+        Ok(self.next.pop_front())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+}

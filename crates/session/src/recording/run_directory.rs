@@ -1,0 +1,110 @@
+//! Run directories: each run gets a new one.
+
+use crate::SessionError;
+use crate::recording::files::write_new;
+use std::io::ErrorKind;
+use std::path::{Component, Path, PathBuf};
+
+/// File names in a run directory: the recording.
+pub const RECORDING: &str = "recording.mcap";
+/// The executed plan.
+pub const PLAN: &str = "plan.json";
+/// The executed steps of a sequence script.
+pub const EXECUTED: &str = "executed_plan.json";
+/// The campaign as it was read.
+pub const CAMPAIGN: &str = "campaign.yaml";
+/// The sequence script, if any.
+pub const SEQUENCE: &str = "sequence.rhai";
+/// Identified points.
+pub const POINTS: &str = "points.json";
+/// Uncertainty budgets of the points.
+pub const BUDGET: &str = "budget.csv";
+/// The journal of safely recorded steps.
+pub const JOURNAL: &str = "journal.jsonl";
+/// The test report.
+pub const REPORT: &str = "report.md";
+
+/// The extended report as a page for a browser.
+pub const PAGE: &str = "report.html";
+
+/// Whether a file of this name is a result: points, map, report, page, or executed steps of a script.
+pub(crate) fn is_result(name: &str) -> bool {
+    [POINTS, BUDGET, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")
+}
+
+/// Creates `<parent>/<campaign>-<time>`, with suffix `-2`, `-3`, ... if it already exists.
+///
+/// # Errors
+/// [`SessionError::File`] if a directory cannot be created, [`SessionError::TooManyRuns`] after 999 of the same name.
+pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, SessionError> {
+    std::fs::create_dir_all(parent).map_err(|error| match error.kind() {
+        // A file, or a link to a place that does not exist.
+        ErrorKind::AlreadyExists => {
+            let why = "something else has the name of the directory for runs; remove it, or choose another directory";
+            SessionError::file("create", parent)(std::io::Error::new(ErrorKind::NotADirectory, why))
+        }
+        _ => SessionError::file("create", parent)(error),
+    })?;
+    for attempt in 1..=999 {
+        let suffix = if attempt == 1 { String::new() } else { format!("-{attempt}") };
+        let path = parent.join(format!("{campaign}-{time}{suffix}"));
+        match std::fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(SessionError::file("create", &path)(error)),
+        }
+    }
+    Err(SessionError::TooManyRuns { parent: parent.to_owned() })
+}
+
+/// Stores a file named by the campaign under the same relative path in the run directory. A file outside the campaign's directory stays in
+/// place, or is given later with `--campaign`.
+pub(crate) fn keep_beside(directory: &Path, named: &str, text: &str) -> Result<(), SessionError> {
+    let named = Path::new(named);
+    if !named.components().all(|part| matches!(part, Component::Normal(_))) {
+        return Ok(());
+    }
+    let path = directory.join(named);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(SessionError::file("create", folder))?;
+    }
+    write_new(&path, text.as_bytes())
+}
+
+/// Start time for people, from the name of the run directory; `None` for any other name.
+pub(crate) fn started(directory: &Path) -> Option<String> {
+    directory.file_name()?.to_str()?.rsplit('-').find_map(instant)
+}
+
+/// `20261124T110618Z` as `2026-11-24 11:06:18 UTC`.
+fn instant(stamp: &str) -> Option<String> {
+    let (day, time) = stamp.strip_suffix('Z')?.split_once('T')?;
+    let is_number =
+        |text: &str, digits: usize| text.len() == digits && text.bytes().all(|b| b.is_ascii_digit());
+    (is_number(day, 8) && is_number(time, 6)).then(|| {
+        let (date, clock) = ([&day[..4], &day[4..6], &day[6..]], [&time[..2], &time[2..4], &time[4..]]);
+        format!("{} {} UTC", date.join("-"), clock.join(":"))
+    })
+}
+
+/// The recording of a run directory, or the file itself.
+pub fn recording_of(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join(RECORDING) } else { path.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_was_made_knows_when_from_its_directory() {
+        let parent = tempfile::tempdir().unwrap();
+        for _ in 0..2 {
+            let made = create(parent.path(), "a-b", "20261124T110618Z").unwrap();
+            assert_eq!(started(&made).as_deref(), Some("2026-11-24 11:06:18 UTC"), "{}", made.display());
+        }
+        for other in ["runs/a", "a-2026T1Z", "a-20261124T11061éZ", "/"] {
+            assert_eq!(started(Path::new(other)), None, "{other}");
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Starts the runner with steps, a rig and observers. No other module starts it.
+
+use crate::rig::guards::guards;
+use mapper_campaign::Campaign;
+use mapper_core::{Backend, Channel, Clock, PlanStep, UnpacedClock};
+use mapper_physics::laws::thermocouple;
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::speed_response::speed_response;
+use mapper_physics::simulation::model::Model;
+use mapper_runner::{
+    Operator, Protection, ReadChannel, ReadingBounds, RunEnd, RunError, RunObserver, Runner, Soaked,
+    SpeedControl, SpeedControlLimits, StepSource,
+};
+use std::sync::atomic::AtomicBool;
+
+/// Runs the steps on the rig, after the soak if the campaign has one. Guards and the speed loop follow the campaign; `model` is the nominal
+/// machine that tunes the loop.
+///
+/// # Errors
+/// [`RunError`] if rig, steps or observer fail; the rig is safe then.
+pub fn drive(
+    campaign: &Campaign,
+    model: &Model,
+    steps: &mut dyn StepSource,
+    backend: &mut dyn Backend,
+    observer: &mut dyn RunObserver,
+    stop: &AtomicBool,
+) -> Result<RunEnd, RunError> {
+    let pace = Pace {
+        clock: &mut UnpacedClock,
+        each_sample: false,
+        stop,
+        stop_after_step: &NEVER,
+        operator: None,
+        read: &[],
+    };
+    drive_paced(campaign, model, steps, backend, observer, pace)
+}
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+/// Pace and stop flags of a run.
+pub struct Pace<'a> {
+    /// Waits for the rig.
+    pub clock: &'a mut dyn Clock,
+    /// Polls each sample separately. Needed if the rig runs in real time or is paced.
+    pub each_sample: bool,
+    /// Set by the caller to stop at once.
+    pub stop: &'a AtomicBool,
+    /// Set by the caller to stop at the end of the step.
+    pub stop_after_step: &'a AtomicBool,
+    /// Other operator requests.
+    pub operator: Option<&'a Operator>,
+    /// Channels of auxiliary instruments, which must stay alive.
+    pub read: &'a [ReadChannel],
+}
+
+/// Same as [`drive`], at a given pace.
+///
+/// # Errors
+/// As [`drive`].
+pub fn drive_paced(
+    campaign: &Campaign,
+    model: &Model,
+    steps: &mut dyn StepSource,
+    backend: &mut dyn Backend,
+    observer: &mut dyn RunObserver,
+    pace: Pace<'_>,
+) -> Result<RunEnd, RunError> {
+    let rig = backend.describe();
+    let guards = guards(campaign, &rig, pace.read);
+    let mut soaked;
+    let steps: &mut dyn StepSource = match campaign.zero {
+        None => steps,
+        Some(soak) => {
+            soaked = Soaked::new(steps, soak);
+            &mut soaked
+        }
+    };
+    let protection = Protection {
+        safe: campaign.safe_state.unwrap_or(rig.safe),
+        p3_min_pa: campaign.limits.p3_min_pa,
+        accepts: rig.accepts,
+        speed: campaign.guard_set().speed.filter(|_| rig.controls),
+        readings: rig.controls.then(|| reading_bounds(campaign)),
+        stop_after_step: pace.stop_after_step,
+        each_sample: pace.each_sample || !rig.simulated_time,
+        operator: pace.operator,
+    };
+    Runner {
+        steps,
+        speed: speed_control(campaign, model),
+        backend,
+        clock: pace.clock,
+        guards,
+        observer,
+        stop: pace.stop,
+    }
+    .run_under(&protection)
+}
+
+/// Allowed positive error of the P3 reading, in declared standard deviations.
+const READS_TOO_HIGH_SIGMAS: f64 = 4.0;
+
+/// Flow in the outlet pipe with the shortest and the longest lag of the T2 probe: the speed of sound (347 m/s) at 400 kPa, and a
+/// fiftieth of it at 100 kPa, both at 300 K.
+const SONIC_KG_M2S: f64 = 4.65 * 347.0;
+const SLOW_KG_M2S: f64 = 1.16 * 347.0 / 50.0;
+const PROBE_K: f64 = 300.0;
+
+/// Bounds of the readings from the declared machine and sensors. A wheel that the campaign does not give excludes no reading.
+fn reading_bounds(campaign: &Campaign) -> ReadingBounds {
+    let (machine, compressor) = (&campaign.machine, &campaign.machine.params.compressor);
+    let area_m2 = 0.25 * std::f64::consts::PI * compressor.outlet_diameter_m.powi(2);
+    let tip_m = machine.params.t2_probe_diameter_m;
+    let lag_s = |flux_kg_m2s: f64| {
+        let flow_kg_s = flux_kg_m2s * area_m2;
+        thermocouple::time_constant_s(tip_m, compressor.outlet_diameter_m, flow_kg_s, PROBE_K)
+    };
+    let noise_k = |channel| campaign.sensors.get(&channel).map_or(0.0, |sensor| sensor.declared.noise_sigma);
+    ReadingBounds {
+        wheel_diameter_m: machine.wheel_is_declared.then_some(compressor.wheel_diameter_m),
+        t2_lag_s: (lag_s(SONIC_KG_M2S), lag_s(SLOW_KG_M2S)),
+        noise_k: [Channel::T2, Channel::Tc, Channel::Tt].map(noise_k),
+    }
+}
+
+/// The speed loop that the campaign asks for.
+fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedControl<'a>> {
+    let sensor = campaign.sensors.get(&Channel::P3).map(|sensor| sensor.declared).unwrap_or_default();
+    let high_pa = campaign.limits.p3_max_pa;
+    let sigma_pa = sensor.noise_sigma.hypot(sensor.offset_sigma).hypot(sensor.gain_sigma_ratio * high_pa);
+    let limits = SpeedControlLimits {
+        p3_min_pa: campaign.limits.p3_min_pa,
+        p3_max_pa: high_pa - READS_TOO_HIGH_SIGMAS * sigma_pa,
+        p3_slew_max_pa_s: campaign.limits.p3_slew_max_pa_s(),
+        speed_max_rpm: campaign.limits.speed_max_rpm,
+    };
+    let response_at = move |step: &PlanStep| {
+        let boundary = BoundaryConditions {
+            t3_k: step.t3_k,
+            oil_temperature_k: step.oil_temperature_k,
+            valve_opening_ratio: step.to.valve_opening_ratio,
+            ..campaign.boundary
+        };
+        speed_response(model, step.to.speed_rpm, &boundary)
+    };
+    Some(SpeedControl::new(campaign.speed_control?, limits, Box::new(response_at)))
+}
+
+/// Soak time before the plan begins, s.
+pub fn soak_s(campaign: &Campaign) -> f64 {
+    campaign.zero.map_or(0.0, |zero| zero.duration_s)
+}

@@ -1,0 +1,125 @@
+//! The data sources of a campaign: the rig and auxiliary instruments.
+
+use crate::{Registry, SessionError};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::ReaderChoice;
+use mapper_core::{Backend, BackendError, Channel, RigDescription};
+use mapper_physics::simulation::model::Model;
+use mapper_runner::{ReadChannel, Reader, RigWithInstruments};
+use std::time::Duration;
+
+/// Connection timeout of an auxiliary instrument, equal to that of a rig.
+const CONNECTS_WITHIN: Duration = Duration::from_secs(11);
+/// Number of missed samples after which an instrument counts as silent, if its data are also older than the allowed signal age.
+const MISSED: f64 = 3.0;
+/// Maximum signal age if no guard sets one, s.
+const USUAL_AGE_S: f64 = 3.0;
+
+/// Why a source cannot serve as an auxiliary instrument.
+#[derive(Debug, thiserror::Error)]
+enum ReaderProblem {
+    #[error(
+        "{0} can be driven, and a reader is only read: make it the `backend`, or name a driver that reads alone"
+    )]
+    Controls(String),
+    #[error("it gives no {channel}; it gives {gives}")]
+    Lacks { channel: Channel, gives: String },
+    #[error("{channel} is given by {other} too: list the channels that are to be taken from here")]
+    Twice { channel: Channel, other: String },
+}
+
+/// The rig with its auxiliary instruments, and their channels for the guards.
+pub struct Sources {
+    /// All sources combined into one backend.
+    pub backend: Box<dyn Backend>,
+    /// Every channel of an auxiliary instrument.
+    pub read: Vec<ReadChannel>,
+    /// Names of instruments that only one run may use at a time.
+    pub exclusive: Vec<String>,
+}
+
+impl Registry {
+    /// The rig of a campaign with all auxiliary instruments, not yet connected.
+    ///
+    /// # Errors
+    /// As [`Registry::make_backend`]; [`SessionError::Reader`] for an invalid source, missing channels, or channels that another source also
+    /// provides.
+    pub fn make_sources(&self, campaign: &Campaign, model: &Model) -> Result<Sources, SessionError> {
+        let rig = self.make_backend(campaign, model)?;
+        if campaign.readers.is_empty() {
+            return Ok(Sources { backend: rig, read: Vec::new(), exclusive: Vec::new() });
+        }
+        let own = rig.describe();
+        let age_s = campaign.guard_set().signals.first().map_or(USUAL_AGE_S, |guard| guard.age_s);
+        let mut taken: Vec<(Channel, String)> =
+            own.channels.iter().map(|channel| (*channel, "the rig".to_owned())).collect();
+        let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
+        for choice in &campaign.readers {
+            let at = format!("readers.{}.backend.{}", choice.name, choice.backend.name);
+            let wrong = |error| match error {
+                BackendError::Settings { path, source, .. } => {
+                    SessionError::Reader { at: at.clone(), setting: path, source }
+                }
+                other => {
+                    SessionError::Reader { at: at.clone(), setting: String::new(), source: Box::new(other) }
+                }
+            };
+            let backend = self.made(&choice.backend, campaign, model).map_err(wrong)?;
+            let rig = backend.describe();
+            let channels = wanted(choice, &rig, &mut taken)?;
+            let age_s = age_s.max(MISSED / rig.sample_rate_hz.max(1e-3));
+            let watched =
+                |channel: &Channel| ReadChannel { reader: choice.name.clone(), channel: *channel, age_s };
+            read.extend(channels.iter().map(watched));
+            exclusive.extend(rig.exclusive);
+            readers.push(Reader { name: choice.name.clone(), backend, channels });
+        }
+        let backend =
+            RigWithInstruments::new(rig, readers, CONNECTS_WITHIN).map_err(SessionError::Backend)?;
+        Ok(Sources { backend: Box::new(backend), read, exclusive })
+    }
+}
+
+/// The channels to take from an auxiliary instrument.
+fn wanted(
+    choice: &ReaderChoice,
+    rig: &RigDescription,
+    taken: &mut Vec<(Channel, String)>,
+) -> Result<Vec<Channel>, SessionError> {
+    let below = |key: &str| format!("readers.{}.{key}", choice.name);
+    let wrong = |at: String, problem: ReaderProblem| {
+        Err(SessionError::Reader { at, setting: String::new(), source: Box::new(problem) })
+    };
+    if rig.controls {
+        return wrong(below("backend"), ReaderProblem::Controls(format!("`{}`", choice.backend.name)));
+    }
+    let from = |channel: &Channel, taken: &[(Channel, String)]| {
+        taken.iter().find(|(known, _)| known == channel).map(|(_, other)| other.clone())
+    };
+    match &choice.channels {
+        Some(listed) => {
+            if let Some(channel) = listed.iter().find(|channel| !rig.channels.contains(channel)) {
+                let gives =
+                    rig.channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ");
+                return wrong(below("channels"), ReaderProblem::Lacks { channel: *channel, gives });
+            }
+            // A listed channel replaces the rig's own.
+            for channel in listed {
+                if let Some(other) = from(channel, taken).filter(|other| other != "the rig") {
+                    return wrong(below("channels"), ReaderProblem::Twice { channel: *channel, other });
+                }
+            }
+        }
+        None => {
+            for channel in &rig.channels {
+                if let Some(other) = from(channel, taken) {
+                    return wrong(below("backend"), ReaderProblem::Twice { channel: *channel, other });
+                }
+            }
+        }
+    }
+    let channels = choice.channels.clone().unwrap_or_else(|| rig.channels.clone());
+    taken.retain(|(channel, _)| !channels.contains(channel));
+    taken.extend(channels.iter().map(|channel| (*channel, format!("`{}`", choice.name))));
+    Ok(channels)
+}

@@ -1,0 +1,8 @@
+//! One complete run from preflight checks to report, with its stop signals, metadata, and resumption by replay.
+
+pub(crate) mod preflight;
+pub(crate) mod prepared_run;
+pub(crate) mod recording_metadata;
+pub(crate) mod replayed_steps;
+pub(crate) mod run_end;
+pub(crate) mod run_stop;

@@ -1,0 +1,448 @@
+//! A complete run: plan, drive the rig, record, identify, assemble, report.
+
+use crate::analysis::results::{Results, RunPart};
+use crate::plan::planning::{fingerprint, nominal_model, plan};
+use crate::plan::rehearsal::rehearse;
+use crate::plan::scripted_steps::ScriptedSteps;
+use crate::plan::stored_plan::stored_plan;
+use crate::plan::surge::hold_near_surge;
+use crate::recording::files::{json_text, write_new};
+use crate::recording::identification_config::identification;
+use crate::recording::journal::{Entry, Identity, Journal, rig_sha256};
+use crate::recording::program::PROGRAM;
+use crate::recording::resume::{BrokenOff, MissingSteps, depends_on_readings};
+use crate::rig::drive::{Pace, drive_paced, soak_s};
+use crate::rig::estimates::Estimates;
+use crate::rig::guards::{check_guards, drift_watch};
+use crate::rig::observers::{Recorder, Teller};
+use crate::rig::rig_lease::RigLease;
+use crate::rig::rig_state::RigStates;
+use crate::rig::sources::Sources;
+use crate::rig::threaded_observer::{Placed, ThreadedObserver};
+use crate::run::preflight::{check_room, check_setpoints};
+use crate::run::recording_metadata::metadata;
+use crate::run::replayed_steps::going_on;
+use crate::run::run_end::{Ended, doubt};
+use crate::{Session, SessionError, SessionEvent, recording::run_directory};
+use mapper_campaign::Campaign;
+use mapper_campaign::campaign::MapSource;
+use mapper_core::{Clock, MadeFrom, Plan, RigDescription, UnpacedClock};
+use mapper_physics::simulation::model::Model;
+use mapper_recording::{RecordingHeader, RecordingWriter};
+use mapper_report::ending_sentence;
+use mapper_runner::{Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Deadlines for rig calls. Arming and release get slightly more time than a driver has (docs/reference/protocol.md).
+const DEADLINES: Deadlines = Deadlines { arming: Duration::from_secs(11), call: Duration::from_secs(2) };
+
+/// Request for a run.
+pub struct RunRequest<'a> {
+    /// The campaign.
+    pub campaign: &'a Campaign,
+    /// Its text, stored with the run and in the recording.
+    pub campaign_text: &'a str,
+    /// A stored plan to run instead of a new one.
+    pub plan: Option<&'a Path>,
+    /// Parent directory, in which the run directory is created.
+    pub parent: &'a Path,
+    /// Start time, ns since 1970-01-01 UTC, for recordings of rigs in real time.
+    pub started_ns: u64,
+    /// Start time in the name of the run directory, e.g. `20261122T101500Z`.
+    pub started_name: &'a str,
+    /// Directory of the locks and lockouts of rigs; `.rigs` in `parent` by default.
+    pub rig_states: Option<&'a Path>,
+    /// The interrupted run to resume.
+    pub resume: Option<BrokenOff>,
+}
+
+impl<'a> RunRequest<'a> {
+    /// A run on a simulated rig, with time starting at 0. Its directory is `<parent>/<campaign>-run`.
+    pub fn new(campaign: &'a Campaign, campaign_text: &'a str, parent: &'a Path) -> Self {
+        RunRequest {
+            campaign,
+            campaign_text,
+            plan: None,
+            parent,
+            started_ns: 0,
+            started_name: "run",
+            rig_states: None,
+            resume: None,
+        }
+    }
+}
+
+/// A run that is ready to start; nothing has been written or armed yet.
+pub struct PreparedRun<'a> {
+    request: RunRequest<'a>,
+    model: Model,
+    /// The plan to run; for a script, its forecast.
+    plan: Plan,
+    scripted: Option<ScriptedSteps>,
+    sources: Sources,
+}
+
+/// Outcome of a run. In all cases the rig is safe and the recording is kept.
+#[derive(Debug)]
+pub struct RunOutcome {
+    /// The run's directory.
+    pub directory: PathBuf,
+    /// Its recording.
+    pub recording: PathBuf,
+    /// How it ended.
+    pub end: Ended,
+    /// The results, or the reason why there are none.
+    pub results: Result<Results, SessionError>,
+}
+
+impl RunOutcome {
+    /// One sentence on how it ended.
+    pub fn sentence(&self) -> String {
+        ending_sentence(&self.end.ending())
+    }
+}
+
+impl<'s> Session<'s> {
+    /// Makes the plan or checks the stored one, rehearses a script and creates the backend. Errors here never reach the rig.
+    ///
+    /// # Errors
+    /// [`SessionError`] if the plan is missing, the stored one is stale, the script fails or the backend's settings are wrong.
+    pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
+        let (campaign, mut request) = (request.campaign, request);
+        if let Some(broken_off) = &mut request.resume {
+            broken_off.keep_what_goes_on(campaign)?;
+        }
+        self.registry.check_formats(campaign)?;
+        let model = nominal_model(campaign)?;
+        let sources = self.registry.make_sources(campaign, &model)?;
+        let rig = sources.backend.describe();
+        let rig_sha256 = Some(rig_sha256(&rig)?);
+        let kept = request.resume.as_ref().map(|broken_off| broken_off.directory.join(run_directory::PLAN));
+        let mut plan = match (request.plan.or(kept.as_deref()), &campaign.sequence) {
+            (Some(path), _) => {
+                let now = MadeFrom { rig_sha256: rig_sha256.clone(), ..fingerprint(campaign, &model)? };
+                stored_plan(path, &now, campaign)?
+            }
+            (None, None) => plan(campaign, &model)?,
+            (None, Some(source)) => rehearse(self, campaign, &model, source)?.plan,
+        };
+        plan.made_from.rig_sha256 = rig_sha256;
+        let scripted = match &campaign.sequence {
+            Some(source) if request.plan.is_none() => Some(ScriptedSteps::new(campaign, &model, source)?),
+            _ => None,
+        };
+        check_guards(campaign, &rig)?;
+        check_setpoints(&plan, &rig)?;
+        if let Some(broken_off) = &request.resume {
+            broken_off.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
+        }
+        Ok(PreparedRun { request, model, plan, scripted, sources })
+    }
+
+    /// Prepares and runs.
+    ///
+    /// # Errors
+    /// As [`Session::prepare`] and [`PreparedRun::run`].
+    pub fn run(&self, request: RunRequest<'_>) -> Result<RunOutcome, SessionError> {
+        self.prepare(request)?.run(self)
+    }
+}
+
+impl PreparedRun<'_> {
+    /// The plan to run.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The nominal model used for the plan.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> RigDescription {
+        self.sources.backend.describe()
+    }
+
+    /// Drives the rig at full speed, records, identifies, reports.
+    ///
+    /// # Errors
+    /// As [`PreparedRun::run_paced`].
+    pub fn run(self, session: &Session<'_>) -> Result<RunOutcome, SessionError> {
+        self.run_paced(session, &mut UnpacedClock, false)
+    }
+
+    /// Drives the rig by a clock, records, identifies, reports. `each_sample`: polls each sample separately.
+    ///
+    /// # Errors
+    /// If the rig is not available or the run's files cannot be created. Failures during the run are part of its outcome.
+    pub fn run_paced(
+        mut self,
+        session: &Session<'_>,
+        clock: &mut dyn Clock,
+        each_sample: bool,
+    ) -> Result<RunOutcome, SessionError> {
+        let campaign = self.request.campaign;
+        let rig = self.rig();
+        if !rig.simulated_time {
+            let deadlined = Deadlined::new(self.sources.backend, DEADLINES).map_err(SessionError::Backend)?;
+            self.sources.backend = Box::new(deadlined);
+        }
+        if let Some(whole) = self.identify_whole(session)? {
+            return Ok(whole);
+        }
+        let mut held = self.hold(&rig)?;
+        let (directory, plan_json) = (self.directory()?, json_text(&self.plan)?);
+        held.sign(&directory, self.request.started_name)?;
+        check_room(&directory, soak_s(campaign) + self.plan.duration_s(), &rig)?;
+        let mut parts = self.parts_before(&directory);
+        let name = match parts.len() {
+            0 => run_directory::RECORDING.to_owned(),
+            before => format!("recording-{}.mcap", before + 1),
+        };
+        let recording = directory.join(&name);
+        let path = directory.join(run_directory::JOURNAL);
+        let mut journal = Journal::open(&path, !rig.simulated_time).map_err(|error| match error.kind() {
+            ErrorKind::WouldBlock => {
+                SessionError::NotResumable { run: directory.clone(), why: error.to_string() }
+            }
+            _ => SessionError::file("write", &path)(error),
+        })?;
+        // With several sources, each has its own sample times.
+        let writer = RecordingWriter::create(&recording, &self.header(plan_json))?
+            .leaving_out_absent(!self.sources.read.is_empty());
+        let identity = Identity::of(campaign, &self.plan, &rig)?;
+        journal
+            .write(&Entry::Part { identity, recording: name })
+            .map_err(SessionError::file("write", &path))?;
+        // A rig in real time keeps running if this computer fails, so the recording is flushed to disk.
+        let through = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
+        let recorder = Recorder::new(writer).with_journal(journal, through);
+        let read = self.sources.read.clone();
+        let pace = Pace {
+            clock,
+            each_sample,
+            stop: session.stop,
+            stop_after_step: session.stop_after_step,
+            operator: session.operator,
+            read: &read,
+        };
+        let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
+        held.give_back(doubt, &directory)?;
+        session.send(SessionEvent::RigReleased);
+        if let Ended::Failed(error @ RunError::NotArmed(_)) = end {
+            return Err(self.never_begun(error, &directory));
+        }
+        // A failed run has its own reason; any other run must have a complete file.
+        if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
+            finished?;
+        }
+        parts.push(RunPart { recording: recording.clone(), saved: None });
+        set_aside(&directory)?;
+        let executed = self.executed(&directory);
+        let results = self.results(session, executed, &end, &directory, &parts);
+        Ok(RunOutcome { directory, recording, end, results })
+    }
+
+    /// Removes the files of a run whose rig was not armed.
+    fn never_begun(&self, error: RunError, directory: &Path) -> SessionError {
+        if self.request.resume.is_none() && !error.leaves_doubt() {
+            // A remaining directory does no harm.
+            let _ = std::fs::remove_dir_all(directory);
+        }
+        SessionError::NotArmed(error)
+    }
+
+    fn results(
+        &self,
+        session: &Session<'_>,
+        executed: Result<Plan, SessionError>,
+        end: &Ended,
+        directory: &Path,
+        parts: &[RunPart],
+    ) -> Result<Results, SessionError> {
+        let what = format!("identifying {} steps", self.plan.steps.len());
+        session.send(SessionEvent::Progress { done_ratio: 0.0, what });
+        let (campaign, started_ns) = (self.request.campaign, self.request.started_ns);
+        session.results(campaign, &executed?, end.ending(), started_ns, directory, parts)
+    }
+
+    /// Identifies a run that was interrupted after its last step. Only the map is missing, so the rig is not used.
+    fn identify_whole(&self, session: &Session<'_>) -> Result<Option<RunOutcome>, SessionError> {
+        let Some(broken_off) = &self.request.resume else { return Ok(None) };
+        if !broken_off.is_whole(self.request.campaign, &self.plan) {
+            return Ok(None);
+        }
+        let directory = broken_off.directory.clone();
+        let parts = self.parts_before(&directory);
+        let recording = parts.last().map_or_else(PathBuf::new, |part| part.recording.clone());
+        let end = Ended::Completed;
+        set_aside(&directory)?;
+        let results = self.results(session, Ok(self.plan.clone()), &end, &directory, &parts);
+        Ok(Some(RunOutcome { directory, recording, end, results }))
+    }
+
+    /// Locks the rig and its auxiliary instruments if they can have only one user.
+    fn hold(&self, rig: &RigDescription) -> Result<RigLease, SessionError> {
+        let usual = self.request.parent.join(".rigs");
+        let states = RigStates::new(self.request.rig_states.unwrap_or(&usual));
+        let resumes = self.request.resume.as_ref().map(|broken_off| broken_off.directory.as_path());
+        let place = rig.reached_at.iter().map(|place| format!("at {place}"));
+        let shared: Vec<String> = self.sources.exclusive.iter().cloned().chain(place).collect();
+        RigLease::take(&states, rig.exclusive.as_deref(), &shared, resumes)
+    }
+
+    /// The run directory: a new one with the inputs of the run, or that of the resumed run.
+    fn directory(&self) -> Result<PathBuf, SessionError> {
+        if let Some(broken_off) = &self.request.resume {
+            return Ok(broken_off.directory.clone());
+        }
+        let campaign = self.request.campaign;
+        let directory =
+            run_directory::create(self.request.parent, &campaign.name, self.request.started_name)?;
+        write_new(&directory.join(run_directory::CAMPAIGN), self.request.campaign_text.as_bytes())?;
+        write_new(&directory.join(run_directory::PLAN), json_text(&self.plan)?.as_bytes())?;
+        if let MapSource::Table { named, text, description, .. } = &campaign.machine.map {
+            run_directory::keep_beside(&directory, named, text)?;
+            if let Some(description) = description {
+                run_directory::keep_beside(&directory, &description.named, &description.text)?;
+            }
+        }
+        if let Some(source) = &campaign.sequence {
+            write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
+            // A resumed run finds the script under the name in its campaign.
+            if Path::new(&source.named) != Path::new(run_directory::SEQUENCE) {
+                run_directory::keep_beside(&directory, &source.named, &source.text)?;
+            }
+        }
+        Ok(directory)
+    }
+
+    /// The earlier recordings of a resumed run.
+    fn parts_before(&self, directory: &Path) -> Vec<RunPart> {
+        let parts = self.request.resume.iter().flat_map(|broken_off| &broken_off.parts);
+        parts
+            .map(|part| RunPart {
+                recording: directory.join(&part.recording),
+                saved: Some(part.saved.clone()),
+            })
+            .collect()
+    }
+
+    fn drive_and_record(
+        &mut self,
+        session: &Session<'_>,
+        recorder: Recorder,
+        pace: Pace<'_>,
+    ) -> (Ended, Result<(), SessionError>, Option<String>) {
+        let mut planned = PlanSteps::new(&self.plan);
+        let mut missing;
+        // A resumed run uses its unchanged plan, or replays its data.
+        let resumes = self.request.resume.as_ref();
+        let replayed = resumes.filter(|_| depends_on_readings(self.request.campaign));
+        let by_plan = resumes.filter(|_| replayed.is_none());
+        // The soak data apply to the whole run.
+        let without_soak;
+        let mut campaign = self.request.campaign;
+        if resumes.is_some_and(BrokenOff::soaked) {
+            without_soak = Campaign { zero: None, ..campaign.clone() };
+            campaign = &without_soak;
+        }
+        let steps: &mut dyn StepSource = match (&mut self.scripted, by_plan) {
+            (Some(scripted), _) => scripted,
+            (None, Some(broken_off)) => {
+                let saved = broken_off.saved();
+                let note = broken_off.summary(campaign, &self.plan, &saved);
+                missing = MissingSteps::new(&self.plan, &saved, note);
+                &mut missing
+            }
+            (None, None) => &mut planned,
+        };
+        let hold = |point| hold_near_surge(campaign, &self.model, point);
+        let mut search;
+        let steps: &mut dyn StepSource = match campaign.surge_search {
+            None => steps,
+            Some(seek) => {
+                search = SurgeSearch::new(steps, seek, campaign.reference, &hold);
+                &mut search
+            }
+        };
+        let mut teller = Teller {
+            on_event: session.on_event,
+            steps: self.plan.steps.len(),
+            duration_s: soak_s(campaign) + self.plan.duration_s(),
+        };
+        let (model, backend) = (&self.model, self.sources.backend.as_mut());
+        let (end, drifted, recorder) = std::thread::scope(|scope| {
+            let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
+            let mut estimates = session.estimates.then(begin);
+            let mut recorder = match pace.each_sample {
+                true => Placed::ThreadedObserver(ThreadedObserver::begin(scope, recorder)),
+                false => Placed::Here(recorder),
+            };
+            let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut teller];
+            observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
+            let go = |steps: &mut dyn StepSource| {
+                going_on(replayed, steps, |steps| {
+                    drive_paced(campaign, model, steps, backend, &mut observers, pace)
+                })
+            };
+            let (end, drifted) = match drift_watch(campaign, steps) {
+                Ok(mut watch) => (go(&mut watch), watch.ended_by_drift().map(str::to_owned)),
+                Err(steps) => (go(steps), None),
+            };
+            let (recorder, recorded) = recorder.end();
+            // A write error at the very end is reported after the run.
+            let end = end.and_then(|end| recorded.map(|()| end).map_err(RunError::from));
+            (end, drifted, recorder)
+        });
+        let doubt = doubt(&end);
+        let end = Ended::of(end, drifted);
+        let finished = recorder.finish(end.ending()).map_err(SessionError::from);
+        (end, finished, doubt)
+    }
+
+    /// The plan as executed; a script's is stored next to its forecast.
+    fn executed(&self, directory: &Path) -> Result<Plan, SessionError> {
+        let Some(steps) = &self.scripted else { return Ok(self.plan.clone()) };
+        let executed = steps.executed(&self.plan);
+        write_new(&directory.join(run_directory::EXECUTED), json_text(&executed)?.as_bytes())?;
+        Ok(executed)
+    }
+
+    fn header(&self, plan_json: String) -> RecordingHeader {
+        RecordingHeader {
+            library: PROGRAM.to_owned(),
+            profile: String::new(),
+            // Simulated time starts at 0, so that equal seeds give equal bytes.
+            start_time_ns: crate::start_time_ns(&self.rig(), self.request.started_ns),
+            metadata: metadata(self.request.campaign, &self.plan),
+            plan_json: Some(plan_json.into_bytes()),
+            campaign_yaml: Some(self.request.campaign_text.as_bytes().to_vec()),
+        }
+    }
+}
+
+/// Moves earlier results of this run, complete or partial, into a separate directory. The newest results stay at the top and nothing is
+/// overwritten.
+fn set_aside(run: &Path) -> Result<(), SessionError> {
+    let entries = std::fs::read_dir(run).map_err(SessionError::file("read", run))?;
+    let results: Vec<_> = entries
+        .filter_map(Result::ok)
+        .map(|entry| entry.file_name())
+        .filter(|name| name.to_str().is_some_and(run_directory::is_result))
+        .collect();
+    if results.is_empty() {
+        return Ok(());
+    }
+    let free = (1..).map(|number| run.join(format!("results-{number}"))).find(|path| !path.exists());
+    let Some(aside) = free else { return Ok(()) };
+    std::fs::create_dir(&aside).map_err(SessionError::file("create", &aside))?;
+    for name in results {
+        let (from, to) = (run.join(&name), aside.join(&name));
+        std::fs::rename(&from, &to).map_err(SessionError::file("move", &from))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,332 @@
+//! Calibrates the diagnosis: draws cases of its own, with outside causes that the check does not use, diagnoses them, and
+//! finds the numbers that turn scores into probabilities.
+
+use crate::blind::calibration::logistic::{Row, logistic};
+use crate::blind::calibration::no_cause_study::{StudyRuler, declared};
+use crate::blind::cases::case::{Case, Draw};
+use crate::blind::cases::kind::CaseKind;
+use crate::blind::error::BlindError;
+use crate::blind::outside::{OutsideUse, outside_kinds};
+use crate::blind::virtual_runs::case_run::Schedule;
+use mapper_campaign::{Campaign, nominal_model};
+use mapper_diagnose::gap::best_fit::coordinate::coordinates;
+use mapper_diagnose::gap::best_fit::fit::Fit;
+use mapper_diagnose::gap::causes::calibration::Calibration;
+use mapper_diagnose::gap::causes::weigh::weight;
+use mapper_diagnose::gap::diagnose::{Diagnosed, Question, diagnose};
+use mapper_diagnose::gap::findings::report::Verdict;
+use mapper_diagnose::gap::residuals::study::{Study, members};
+use mapper_fleet::Engine;
+use mapper_numerics::statistics::{NORMAL_975, quantile};
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::simulation::model::Model;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Which cases calibrate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan {
+    /// Seed of everything.
+    pub seed: u64,
+    /// Cases without a cause, which set the threshold.
+    pub nulls: usize,
+    /// Cases of all other kinds.
+    pub others: usize,
+}
+
+impl Plan {
+    /// The command that calibrates with it on one machine.
+    pub fn command(&self, campaign: &Path) -> String {
+        format!(
+            "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
+            campaign.display(),
+            self.seed,
+            self.nulls,
+            self.others
+        )
+    }
+}
+
+/// What one diagnosis gave, as far as the calibration needs it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Observed {
+    /// What the case is a case of.
+    pub kind: CaseKind,
+    /// Ids of its causes.
+    pub causes: BTreeSet<String>,
+    /// Verdict of the diagnosis with the previous calibration.
+    pub verdict: Verdict,
+    /// Length of the shortest of their signatures, sigmas.
+    pub sigma: Option<f64>,
+    /// Score of nothing, prior included.
+    pub nothing: f64,
+    /// Each candidate with its score, prior included.
+    pub candidates: Vec<(BTreeSet<String>, f64)>,
+    /// Features of the logistic of an outside cause.
+    pub features: [f64; 3],
+    /// Error of each parameter in its own standard errors, where the causes were found.
+    pub errors_sigma: Vec<f64>,
+}
+
+impl Observed {
+    /// By how much the best cause beats nothing.
+    fn margin(&self) -> f64 {
+        self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
+    }
+}
+
+/// Draws the cases, diagnoses them, several at a time, and fits; `None` where the operator stopped it.
+///
+/// # Errors
+/// [`BlindError`] where a case cannot be run; a recording that cannot be diagnosed is left out.
+pub fn calibrate(
+    campaign: &Campaign,
+    catalogue: &[Arc<dyn Effect>],
+    plan: &Plan,
+    made_by: String,
+    engine: &Engine<'_>,
+) -> Result<Option<(Calibration, Vec<Observed>)>, BlindError> {
+    // Drawing takes some seconds: show progress from the start.
+    (engine.on_progress)(0, plan.nulls + plan.others);
+    let cases = cases(campaign, catalogue, plan)?;
+    let diagnosis = Calibrated::new(campaign, catalogue)?;
+    let observed = engine.each(&cases, |_, case| diagnosis.observe(case))?;
+    // What was not begun was stopped; what could not be diagnosed is left out.
+    let Some(observed) = observed.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+    let observed: Vec<Observed> = observed.into_iter().flatten().collect();
+    Ok(Some((fit(&shipped()?, &observed, made_by), observed)))
+}
+
+pub(crate) fn shipped() -> Result<Calibration, BlindError> {
+    Calibration::shipped().map_err(BlindError::signatures)
+}
+
+/// The cases that calibrate.
+///
+/// # Errors
+/// [`BlindError`] where the campaign has no nominal model or cannot be run.
+pub fn cases(
+    campaign: &Campaign,
+    catalogue: &[Arc<dyn Effect>],
+    plan: &Plan,
+) -> Result<Vec<Case>, BlindError> {
+    let nominal = nominal_model(campaign)?;
+    let schedule = Schedule::new(campaign, &nominal)?;
+    let mut known = catalogue.to_vec();
+    known.extend(outside_kinds(OutsideUse::Calibration));
+    let ruler = StudyRuler::new(campaign, &schedule, &nominal, known, plan.seed)?;
+    let draw = |cases, kinds, seed| Draw { kinds, ..Draw::new(seed, cases, OutsideUse::Calibration) };
+    let others = vec![CaseKind::Single, CaseKind::Pair, CaseKind::Outside];
+    let mut cases = draw(plan.others, others, plan.seed).cases(catalogue, &ruler);
+    cases.extend(draw(plan.nulls, vec![CaseKind::None], plan.seed.wrapping_add(1)).cases(catalogue, &ruler));
+    Ok(cases)
+}
+
+/// What every case that calibrates is diagnosed with.
+pub struct Calibrated<'a> {
+    campaign: &'a Campaign,
+    catalogue: &'a [Arc<dyn Effect>],
+    nominal: Model,
+    before: Calibration,
+}
+
+impl<'a> Calibrated<'a> {
+    /// With the calibration that ships.
+    ///
+    /// # Errors
+    /// [`BlindError`] where the campaign has no nominal model.
+    pub fn new(campaign: &'a Campaign, catalogue: &'a [Arc<dyn Effect>]) -> Result<Self, BlindError> {
+        Ok(Calibrated { campaign, catalogue, nominal: nominal_model(campaign)?, before: shipped()? })
+    }
+
+    /// Runs and diagnoses a case; `None` where its recording cannot be diagnosed.
+    ///
+    /// # Errors
+    /// [`BlindError`] where it cannot be run.
+    pub fn observe(&self, case: &Case) -> Result<Option<Observed>, BlindError> {
+        let recording = Schedule::new(self.campaign, &self.nominal)?.record(case)?;
+        let diagnosed = diagnose(Question {
+            tolerances_declared: true,
+            experiments: Vec::new(),
+            recording: &recording,
+            declared: declared(self.campaign),
+            healthy: None,
+            model: self.nominal.clone(),
+            effects: self.catalogue.to_vec(),
+            calibration: self.before.clone(),
+            progress: &|_, _| {},
+        });
+        Ok(diagnosed.ok().map(|diagnosed| observe(case, &self.before, &diagnosed)))
+    }
+}
+
+fn observe(case: &Case, calibration: &Calibration, diagnosed: &Diagnosed) -> Observed {
+    let Diagnosed { study, null, fits, adequacy, diagnosis, .. } = diagnosed;
+    let causes: BTreeSet<String> = case.causes.iter().map(|c| c.effect.info().id.to_string()).collect();
+    let names = |fit: &Fit| -> BTreeSet<String> {
+        members(&fit.hypothesis).into_iter().map(|i| study.effects[i].info().id.to_string()).collect()
+    };
+    let named = fits.first().filter(|fit| names(fit) == causes);
+    Observed {
+        kind: case.kind,
+        causes,
+        verdict: diagnosis.verdict,
+        sigma: case.sigmas.iter().copied().reduce(f64::min),
+        nothing: weight(calibration, study, null),
+        candidates: fits.iter().map(|fit| (names(fit), weight(calibration, study, fit))).collect(),
+        features: adequacy.features(),
+        errors_sigma: named.map_or_else(Vec::new, |fit| errors_sigma(case, study, fit)),
+    }
+}
+
+/// Error of each parameter in its own standard errors, in the coordinate in which it was searched.
+fn errors_sigma(case: &Case, study: &Study, fit: &Fit) -> Vec<f64> {
+    let coordinates = coordinates(&study.effects, &fit.hypothesis);
+    let mut place = 0;
+    let mut errors = Vec::new();
+    for (index, values) in &fit.hypothesis.effects {
+        let id = &study.effects[*index].info().id;
+        let truth = case.causes.iter().find(|cause| cause.effect.info().id == *id).map(|cause| &cause.values);
+        for (number, value) in values.iter().enumerate() {
+            let (coordinate, variance) = (&coordinates[place], fit.covariance[(place, place)]);
+            if let Some(truth) = truth.and_then(|truth| truth.get(number)) {
+                errors.push((coordinate.of(*truth) - coordinate.of(*value)) / variance.sqrt());
+            }
+            place += 1;
+        }
+    }
+    errors.retain(|error| error.is_finite());
+    errors
+}
+
+/// How much each case counts, 1 on average. The threshold needs many cases without a cause; together they count only as much as the
+/// prior probability of no cause, so that the fitted and judged probabilities are those that the user reads.
+pub(crate) fn weights(calibration: &Calibration, observed: &[Observed]) -> Vec<f64> {
+    let all = observed.len() as f64;
+    let nothing = observed.iter().filter(|o| o.kind == CaseKind::None).count() as f64;
+    if nothing == 0.0 || nothing == all {
+        return vec![1.0; observed.len()];
+    }
+    let (of_nothing, of_causes) =
+        (calibration.prior_none * all / nothing, (1.0 - calibration.prior_none) * all / (all - nothing));
+    observed.iter().map(|o| if o.kind == CaseKind::None { of_nothing } else { of_causes }).collect()
+}
+
+/// Share of the effect-free cases that stay below the threshold.
+const QUIET: f64 = 0.985;
+/// Minimum threshold: odds of e^3 for the cause, whatever the effect-free cases suggest.
+const MIN_THRESHOLD: f64 = 3.0;
+/// The calibration that fits the observed cases, based on the shipped one.
+///
+/// # Errors
+/// [`BlindError::Signatures`] where the one that ships was spoilt.
+pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, BlindError> {
+    Ok(fit(&shipped()?, observed, made_by))
+}
+
+/// The calibration that fits what was observed: all of it, weak signatures too. An outside cause that can hardly be seen is named as
+/// something of the catalogue, and a probability must state how often that happens.
+pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
+    let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
+    let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
+    let weights = weights(before, observed);
+    let weighted = || observed.iter().zip(weights.iter().copied());
+    let inside: Vec<(&Observed, f64)> = weighted().filter(|(o, _)| o.kind != CaseKind::Outside).collect();
+    let rows: Vec<Row> = weighted()
+        .map(|(o, weight)| Row { features: o.features, outside: o.kind == CaseKind::Outside, weight })
+        .collect();
+    let errors = observed.iter().flat_map(|o| &o.errors_sigma).map(|z| z.abs());
+    Calibration {
+        made_by,
+        threshold: quiet,
+        temperature: temperature(&inside, before.temperature),
+        // Never narrower than the fit states: a few cases do not justify more confidence.
+        interval_factor: quantile(errors, 0.95).map_or(before.interval_factor, |z| (z / NORMAL_975).max(1.0)),
+        outside: logistic(&rows).unwrap_or(before.outside),
+        ..before.clone()
+    }
+}
+
+/// Spread of the logarithm of the temperature that is expected around the one of before: where every case is right, the
+/// cases alone would ask for certainty.
+const TEMPERATURE_SPREAD: f64 = 0.3;
+
+/// The temperature under which the truth of the cases has the largest probability, as far as they say otherwise than
+/// `before`.
+fn temperature(cases: &[(&Observed, f64)], before: f64) -> f64 {
+    let cost = |temperature: f64| -> f64 {
+        let away = (temperature / before).ln() / TEMPERATURE_SPREAD;
+        let misses: f64 = cases
+            .iter()
+            .filter_map(|(case, weight)| {
+                let truth = match case.kind {
+                    CaseKind::None => Some(case.nothing),
+                    _ => case.candidates.iter().find(|(names, _)| *names == case.causes).map(|(_, s)| *s),
+                };
+                let all = case.candidates.iter().map(|(_, score)| *score).chain([case.nothing]);
+                let top = all.clone().fold(f64::NEG_INFINITY, f64::max);
+                let sum: f64 = all.map(|score| ((score - top) / temperature).exp()).sum();
+                truth.map(|score| weight * (sum.ln() - (score - top) / temperature))
+            })
+            .sum();
+        misses + 0.5 * away * away
+    };
+    let grid = (0..=60).map(|i| 1.0 * 30f64.powf(f64::from(i) / 60.0));
+    grid.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn observed(kind: CaseKind, truth: f64, rival: f64) -> Observed {
+        let set = |id: &str| BTreeSet::from([id.to_owned()]);
+        Observed {
+            kind,
+            causes: if kind == CaseKind::None { BTreeSet::new() } else { set("a") },
+            verdict: Verdict::Explained,
+            sigma: (kind != CaseKind::None).then_some(30.0),
+            nothing: 0.0,
+            candidates: vec![(set("a"), truth), (set("b"), rival)],
+            features: [0.0; 3],
+            errors_sigma: Vec::new(),
+        }
+    }
+
+    /// Two candidates whose scores differ by x are right in a share s of the cases: the likeliest temperature is that at
+    /// which the better has probability s, x/ln(s/(1-s)).
+    #[test]
+    fn the_temperature_is_that_of_the_share_that_is_right() {
+        let mut cases: Vec<Observed> = (0..80).map(|_| observed(CaseKind::Single, 40.0, 36.0)).collect();
+        cases.extend((0..20).map(|_| observed(CaseKind::Single, 36.0, 40.0)));
+        let expected = 4.0 / 4f64.ln();
+        let found = temperature(&cases.iter().map(|case| (case, 1.0)).collect::<Vec<_>>(), expected);
+        // The grid's own steps are 6 %.
+        assert!((found / expected - 1.0).abs() < 0.06, "{found} for {expected}");
+    }
+
+    /// 90 cases without and 10 with a cause count according to the priors, and on average 1.
+    #[test]
+    fn cases_of_nothing_count_as_the_prior_says() {
+        let before = Calibration { prior_none: 0.3, ..Calibration::shipped().unwrap() };
+        let of = |kind, count| (0..count).map(move |_| observed(kind, 0.0, 0.0));
+        let cases: Vec<Observed> = of(CaseKind::None, 90).chain(of(CaseKind::Single, 10)).collect();
+        let found = weights(&before, &cases);
+        let [nothing, causes] = [&found[..90], &found[90..]].map(|part| part.iter().sum::<f64>());
+        assert!((nothing - 30.0).abs() < 1e-9 && (causes - 70.0).abs() < 1e-9, "{nothing} {causes}");
+        assert_eq!(weights(&before, &cases[90..]), vec![1.0; 10]);
+    }
+
+    #[test]
+    fn the_threshold_lets_most_effect_free_cases_pass() {
+        let before = Calibration::shipped().unwrap();
+        let cases: Vec<Observed> =
+            (0..200).map(|i| observed(CaseKind::None, f64::from(i) / 20.0, -50.0)).collect();
+        let found = fit(&before, &cases, String::new());
+        let alarms = cases.iter().filter(|case| case.margin() > found.threshold).count();
+        // 1.5 % of 200.
+        assert_eq!(alarms, 3);
+    }
+}

@@ -1,0 +1,96 @@
+//! A logistic regression with three features.
+
+use mapper_diagnose::gap::causes::calibration::counted;
+use mapper_numerics::minimise::minimise;
+
+/// Rounds of coordinate descent at most; it needs some fifty.
+const ROUNDS: usize = 300;
+/// Slopes that are expected, and the precision of that expectation: some ten cases outweigh it.
+const EXPECTED: f64 = 1.0;
+const PRIOR: f64 = 0.25;
+/// Minimum slopes: more misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from
+/// noise, whatever the cases state: after a failed search, a fit with the right cause leaves a residual of thousands of
+/// sigmas, and a few such cases would teach that a gross misfit means nothing.
+const MIN: [f64; 3] = [0.5, 0.0, 0.0];
+
+/// A case.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub features: [f64; 3],
+    pub outside: bool,
+    /// How much it counts.
+    pub weight: f64,
+}
+
+/// Offset and slopes of the logistic that separates outside causes from the others. `None` where one of the classes is empty.
+pub(crate) fn logistic(rows: &[Row]) -> Option<[f64; 4]> {
+    if rows.iter().all(|row| row.outside) || rows.iter().all(|row| !row.outside) {
+        return None;
+    }
+    let rows: Vec<Row> = rows.iter().map(|row| Row { features: counted(row.features), ..*row }).collect();
+    let loss = |weights: &[f64; 4]| -> f64 {
+        let away: f64 = weights[1..].iter().map(|slope| 0.5 * PRIOR * (slope - EXPECTED).powi(2)).sum();
+        let miss = |row: &Row| {
+            let x = argument(weights, &row.features);
+            row.weight * if row.outside { (-x).exp().ln_1p() } else { x.exp().ln_1p() }
+        };
+        away + rows.iter().map(miss).sum::<f64>()
+    };
+    let mut weights = [-5.0, EXPECTED, EXPECTED, EXPECTED];
+    // Coordinate by coordinate, each between its bounds: the loss is convex.
+    for _ in 0..ROUNDS {
+        let last = weights;
+        for place in 0..weights.len() {
+            let (low, high) = if place == 0 { (-30.0, 30.0) } else { (MIN[place - 1], 10.0) };
+            weights[place] = minimise(low, high, 1e-9, |value| {
+                let mut tried = weights;
+                tried[place] = value;
+                loss(&tried)
+            })
+            .at;
+        }
+        let moved = weights.iter().zip(&last).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        if moved < 1e-5 {
+            break;
+        }
+    }
+    Some(weights)
+}
+
+/// Of counted features.
+fn argument(weights: &[f64; 4], features: &[f64; 3]) -> f64 {
+    // Beyond 500 an exponential is infinite.
+    let x = weights[0] + weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>();
+    x.clamp(-500.0, 500.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(features: [f64; 3], outside: bool) -> Row {
+        Row { features, outside, weight: 1.0 }
+    }
+
+    /// Two classes that only the second feature separates, 2 and 20; the others carry no information.
+    #[test]
+    fn the_boundary_lies_between_the_classes() {
+        let rows: Vec<Row> = (0..80)
+            .map(|i| row([-1.0, if i % 2 == 0 { 2.0 } else { 20.0 }, f64::from(i / 2 % 3)], i % 2 == 1))
+            .collect();
+        let weights = logistic(&rows).unwrap();
+        // Eighty cases against a weak prior: each class on its side with odds of e^2 at least.
+        let at = |features| argument(&weights, &counted(features));
+        assert!(at([-1.0, 2.0, 1.0]) < -2.0 && at([-1.0, 20.0, 1.0]) > 2.0);
+        assert!(logistic(&[row([1.0; 3], true)]).is_none());
+    }
+
+    /// Cases that went astray do not teach that a gross misfit is nothing.
+    #[test]
+    fn a_gross_misfit_is_never_nothing() {
+        let rows: Vec<Row> =
+            (0..80).map(|i| row([if i % 8 == 0 { 1e4 } else { 0.0 }, 0.0, 3.0], i % 8 == 1)).collect();
+        let weights = logistic(&rows).unwrap();
+        assert!(argument(&weights, &counted([20.0, 0.0, 3.0])) > 10.0, "{weights:?}");
+    }
+}

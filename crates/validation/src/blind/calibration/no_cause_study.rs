@@ -1,0 +1,90 @@
+//! The ruler of the diagnosis itself, laid on a recording without causes.
+
+use crate::blind::cases::case::Case;
+use crate::blind::cases::cause::Cause;
+use crate::blind::cases::kind::CaseKind;
+use crate::blind::cases::strength::Ruler;
+use crate::blind::error::BlindError;
+use crate::blind::virtual_runs::case_run::Schedule;
+use mapper_campaign::{Campaign, nominal_model};
+use mapper_core::NoiseColour;
+use mapper_diagnose::gap::best_fit::signature::lengths;
+use mapper_diagnose::gap::residuals::study::{EffectValues, Study};
+use mapper_diagnose::gap::residuals::whiten::Linearised;
+use mapper_observe::averages::time_table::Table;
+use mapper_observe::{Declared, declared_uncertainties};
+use mapper_physics::rig::effect::Effect;
+use mapper_physics::simulation::model::Model;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A recording of the campaign that has noise, offsets, tolerances and weather, and no cause, made ready with `effects`; equal
+/// seeds give equal recordings.
+///
+/// # Errors
+/// [`BlindError`] where the campaign has no nominal model or cannot be run.
+pub fn study_without_causes(
+    campaign: &Campaign,
+    effects: Vec<Arc<dyn Effect>>,
+    seed: u64,
+) -> Result<(Study, Linearised), BlindError> {
+    let nominal = nominal_model(campaign)?;
+    let StudyRuler { study, linearised } =
+        StudyRuler::new(campaign, &Schedule::new(campaign, &nominal)?, &nominal, effects, seed)?;
+    Ok((study, linearised))
+}
+
+/// Measures signatures on one recording of the campaign that has noise, offsets, tolerances and weather, and no cause.
+/// Those of other recordings of the same campaign differ by the weather, some per cent.
+pub(crate) struct StudyRuler {
+    study: Study,
+    linearised: Linearised,
+}
+
+/// What the campaign declares.
+pub(crate) fn declared(campaign: &Campaign) -> Declared {
+    let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared));
+    Declared {
+        sensors: declared_uncertainties(&sensors.collect(), &campaign.tolerances, &BTreeMap::new()),
+        noise_colour: NoiseColour::default(),
+        tolerances: campaign.tolerances,
+        nominal: campaign.boundary,
+        common_offsets: Vec::new(),
+    }
+}
+
+impl StudyRuler {
+    /// Records a case without causes, and makes it ready.
+    pub(crate) fn new(
+        campaign: &Campaign,
+        schedule: &Schedule<'_>,
+        nominal: &Model,
+        effects: Vec<Arc<dyn Effect>>,
+        seed: u64,
+    ) -> Result<StudyRuler, BlindError> {
+        let case = Case {
+            name: "ruler".to_owned(),
+            kind: CaseKind::None,
+            causes: Vec::new(),
+            sigmas: Vec::new(),
+            seed,
+        };
+        let recording = schedule.record(&case)?;
+        let table = Table::new(&recording).ok_or(BlindError::NothingRecorded)?;
+        let study = Study::new(&recording, table, declared(campaign), nominal.clone(), effects);
+        let linearised = Linearised::new(&study).map_err(BlindError::signatures)?;
+        Ok(StudyRuler { study, linearised })
+    }
+}
+
+impl Ruler for StudyRuler {
+    fn lengths(&self, causes: &[Cause]) -> Vec<f64> {
+        let place = |cause: &Cause| {
+            self.study.effects.iter().position(|effect| effect.info().id == cause.effect.info().id)
+        };
+        let values: Option<EffectValues> =
+            causes.iter().map(|cause| Some((place(cause)?, cause.values.clone()))).collect();
+        let measured = values.and_then(|values| lengths(&self.study, &self.linearised, &values).ok());
+        measured.unwrap_or_else(|| vec![0.0; causes.len()])
+    }
+}

@@ -1,0 +1,13 @@
+//! What a case has that the nominal machine has not.
+
+use mapper_physics::rig::effect::Effect;
+use std::sync::Arc;
+
+/// One cause with its strength.
+#[derive(Debug, Clone)]
+pub struct Cause {
+    /// The effect.
+    pub effect: Arc<dyn Effect>,
+    /// Its values.
+    pub values: Vec<f64>,
+}

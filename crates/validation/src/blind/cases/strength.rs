@@ -1,0 +1,100 @@
+//! How strong a cause is drawn: so that its signature in the recording has a wanted length.
+
+use crate::blind::cases::cause::Cause;
+use mapper_physics::rig::effect::{Effect, EffectParameter};
+use rand::RngExt;
+use rand_pcg::Pcg64;
+use std::sync::Arc;
+
+/// Measures how plainly causes show in a recording.
+pub trait Ruler {
+    /// Length of each cause's signature in the presence of the others, in sigmas; 0 where the rig cannot run with them.
+    fn lengths(&self, causes: &[Cause]) -> Vec<f64>;
+}
+
+/// Relative distance from the wanted length that is near enough.
+const NEAR_RATIO: f64 = 0.1;
+/// Maximum number of looks for a strength.
+const LOOKS: usize = 6;
+/// Share of the housing that an inner wall takes.
+const INNER_SHARE: std::ops::Range<f64> = 0.15..0.6;
+
+/// Weakest and strongest draw in the effect's typical steps, whatever its signature: from the weakest that a user
+/// might look for to one that breaks a test.
+const STEPS: std::ops::RangeInclusive<f64> = 0.02..=4.0;
+
+/// Values of an effect in the direction `sign` of its typical step whose signature alone is `sigma` long, or as long as its
+/// range allows.
+pub(crate) fn strength(
+    effect: &Arc<dyn Effect>,
+    sign: f64,
+    sigma: f64,
+    ruler: &dyn Ruler,
+    random: &mut Pcg64,
+) -> Vec<f64> {
+    let length = |values: Vec<f64>| {
+        let cause = Cause { effect: effect.clone(), values };
+        ruler.lengths(std::slice::from_ref(&cause)).first().copied().unwrap_or(0.0)
+    };
+    let parameters = &effect.info().parameters;
+    if let [phi, conductance] = parameters.as_slice() {
+        let phi = random.random_range(INNER_SHARE).clamp(phi.low, phi.high);
+        // The wall's own resistance 1/G is what shows: searched in its size like any strength, and never none at all.
+        let values = |resistance_k_w: f64| {
+            vec![phi, (1.0 / resistance_k_w).clamp(conductance.low, 0.9 * conductance.high)]
+        };
+        let found = search(0.05, sigma, |resistance_k_w| length(values(resistance_k_w)));
+        return values(found);
+    }
+    let [parameter] = parameters.as_slice() else {
+        return parameters.iter().map(|p| value_at(p, sign * 0.5)).collect();
+    };
+    let steps = search(0.5, sigma, |steps| length(vec![value_at(parameter, sign * steps)]));
+    let steps = steps.clamp(*STEPS.start(), *STEPS.end());
+    vec![value_at(parameter, sign * steps)]
+}
+
+/// Whether an effect does anything to the machine that the ruler measures.
+pub(crate) fn shows(effect: &Arc<dyn Effect>, ruler: &dyn Ruler) -> bool {
+    // Where the rig cannot run with half a step it can with less.
+    [0.5, 0.1].into_iter().any(|steps| {
+        let values = effect.info().parameters.iter().map(|parameter| value_at(parameter, steps)).collect();
+        let cause = Cause { effect: effect.clone(), values };
+        ruler.lengths(std::slice::from_ref(&cause)).iter().any(|length| *length > 0.0)
+    })
+}
+
+/// The value so many typical steps from neutral, within the range.
+fn value_at(parameter: &EffectParameter, steps: f64) -> f64 {
+    (parameter.neutral + steps * parameter.typical_step).clamp(parameter.low, parameter.high)
+}
+
+/// The size at which `length`, which grows with size and nearly in proportion, is `wanted`.
+fn search(start: f64, wanted: f64, length: impl Fn(f64) -> f64) -> f64 {
+    let mut size = start;
+    for _ in 0..LOOKS {
+        let found = length(size);
+        if (found / wanted - 1.0).abs() < NEAR_RATIO {
+            break;
+        }
+        // A rig that cannot run so strongly has length 0.
+        size *= if found > 0.0 { (wanted / found).clamp(0.05, 5.0) } else { 0.4 };
+    }
+    size
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_length_that_bends_is_found() {
+        // A square root and a square: neither in proportion.
+        for (power, wanted) in [(0.5, 30.0), (1.5, 200.0)] {
+            let found = search(0.5, wanted, |size| 40.0 * f64::powf(size, power));
+            let reached = 40.0 * f64::powf(found, power);
+            // Six looks at most; within a third for powers this far from 1.
+            assert!((reached / wanted).ln().abs() < 0.3, "{power}: {reached} for {wanted}");
+        }
+    }
+}

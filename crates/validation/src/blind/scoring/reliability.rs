@@ -1,0 +1,261 @@
+//! Reliability of the probabilities: an answer given with probability p should be right in a share p of the cases.
+
+use crate::blind::calibration::calibrate::{Observed, fit, shipped, weights};
+use crate::blind::cases::kind::CaseKind;
+use crate::blind::error::BlindError;
+use crate::blind::scoring::interval::{Share, clopper_pearson_95};
+use mapper_diagnose::gap::causes::calibration::Calibration;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Classes of equal width from 0 to 1.
+const BINS: usize = 10;
+/// Parts of the cases: each is judged by a calibration that was fitted to the others.
+const FOLDS: usize = 5;
+
+/// Cases whose first answer was given about the same probability.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bin {
+    /// Lowest probability of the class.
+    pub from: f64,
+    /// Highest probability of the class.
+    pub to: f64,
+    /// Share of all cases, by how much they count.
+    pub share: f64,
+    /// Mean of the probabilities that were given.
+    pub said: f64,
+    /// How often the first answer was right, each case counting once.
+    pub right: Share,
+    /// The share that is right, by how much the cases count.
+    pub right_share: f64,
+    /// 95 % interval of that share (Clopper and Pearson), as of [so many](Bin::effective_cases) equal cases.
+    pub right_low: f64,
+    /// Its other end.
+    pub right_high: f64,
+    /// Number of equally weighted cases with the same information (Kish 1965): squared sum of the weights over the sum of their squares.
+    pub effective_cases: f64,
+}
+
+/// A first answer.
+#[derive(Debug, Clone, Copy)]
+struct Answer {
+    probability: f64,
+    right: bool,
+    /// How much the case counts.
+    weight: f64,
+}
+
+/// Reliability of the first answer, by one calibration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reliability {
+    /// Which calibration gave the probabilities.
+    pub calibration: String,
+    /// The classes that hold cases, from small probabilities to large ones.
+    pub bins: Vec<Bin>,
+    /// Expected calibration error: how far the share that is right is from the mean probability of a class, on average over all
+    /// cases, fraction (Naeini, Cooper and Hauskrecht 2015); `None` without cases.
+    pub expected_calibration_error: Option<f64>,
+    /// How large that error is expected to be by chance alone where every probability holds.
+    pub expected_by_chance: Option<f64>,
+    /// Cases whose truth was not among the answers that have a probability.
+    pub truth_not_listed: usize,
+}
+
+/// The first answer: its probability, and whether it is right. `None` without any score.
+fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool)> {
+    let outside = calibration.outside(case.features);
+    let scores = || case.candidates.iter().map(|(_, score)| *score).chain([case.nothing]);
+    let top = scores().reduce(f64::max)?;
+    let weight = |score: f64| ((score - top) / calibration.temperature).exp();
+    let total: f64 = scores().map(weight).sum();
+    let inside = |score: f64| (1.0 - outside) * weight(score) / total;
+    let is_outside = case.kind == CaseKind::Outside;
+    // What only adds to a better cause is that cause, as the diagnosis shows it.
+    let mut shown: Vec<(&BTreeSet<String>, f64)> = Vec::new();
+    for (causes, score) in &case.candidates {
+        match shown.iter_mut().find(|(better, _)| better.is_subset(causes)) {
+            Some((_, probability)) => *probability += inside(*score),
+            None => shown.push((causes, inside(*score))),
+        }
+    }
+    let is_right = |causes: &BTreeSet<String>| {
+        !matches!(case.kind, CaseKind::None | CaseKind::Outside) && *causes == case.causes
+    };
+    let named = shown.into_iter().map(|(causes, probability)| (probability, is_right(causes)));
+    named
+        .chain([(inside(case.nothing), case.kind == CaseKind::None), (outside, is_outside)])
+        .filter(|(probability, _)| probability.is_finite())
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Whether the truth has a probability at all.
+fn is_listed(case: &Observed) -> bool {
+    matches!(case.kind, CaseKind::None | CaseKind::Outside)
+        || case.candidates.iter().any(|(causes, _)| *causes == case.causes)
+}
+
+/// Classes, and their expected calibration error.
+fn reliability(calibration: &str, cases: &[Observed], answers: &[Answer]) -> Reliability {
+    let all: f64 = answers.iter().map(|answer| answer.weight).sum();
+    let bins: Vec<Bin> = (0..BINS)
+        .filter_map(|index| {
+            let inside =
+                |answer: &&Answer| ((answer.probability * BINS as f64) as usize).min(BINS - 1) == index;
+            let members: Vec<&Answer> = answers.iter().filter(inside).collect();
+            bin(index, &members, all)
+        })
+        .collect();
+    let over = |error: &dyn Fn(&Bin) -> f64| {
+        (!bins.is_empty()).then(|| bins.iter().map(|bin| bin.share * error(bin)).sum::<f64>())
+    };
+    let missed = |bin: &Bin| (bin.right_share - bin.said).abs();
+    // Mean absolute deviation of a share about its expectation, by the normal law: sqrt(2/pi) sigma.
+    let by_chance = |bin: &Bin| {
+        (2.0 / std::f64::consts::PI * bin.said * (1.0 - bin.said) / bin.effective_cases).max(0.0).sqrt()
+    };
+    Reliability {
+        calibration: calibration.to_owned(),
+        expected_calibration_error: over(&missed),
+        expected_by_chance: over(&by_chance),
+        truth_not_listed: cases.iter().filter(|case| !is_listed(case)).count(),
+        bins,
+    }
+}
+
+/// A class; `None` without members. `all`: the sum of all weights.
+fn bin(index: usize, members: &[&Answer], all: f64) -> Option<Bin> {
+    let sum = |value: &dyn Fn(&Answer) -> f64| members.iter().map(|answer| value(answer)).sum::<f64>();
+    let weight = sum(&|answer| answer.weight);
+    let right_share = sum(&|answer| if answer.right { answer.weight } else { 0.0 }) / weight;
+    let effective_cases = weight * weight / sum(&|answer| answer.weight * answer.weight);
+    let equal = Share {
+        hits: (right_share * effective_cases).round() as usize,
+        trials: effective_cases.round() as usize,
+    };
+    let (right_low, right_high) = clopper_pearson_95(equal);
+    let edge = |index: usize| index as f64 / BINS as f64;
+    (!members.is_empty()).then_some(Bin {
+        from: edge(index),
+        to: edge(index + 1),
+        share: weight / all,
+        said: sum(&|answer| answer.weight * answer.probability) / weight,
+        right: Share { hits: members.iter().filter(|answer| answer.right).count(), trials: members.len() },
+        right_share,
+        right_low,
+        right_high,
+        effective_cases,
+    })
+}
+
+/// Reliability by the calibration that ships, which may have seen the cases, and by the one that they fit, each case judged by
+/// a fit to the others (five parts).
+///
+/// # Errors
+/// [`BlindError::Signatures`] where the one that ships was spoilt.
+pub fn reliabilities(observed: &[Observed]) -> Result<[Reliability; 2], BlindError> {
+    Ok(both(&shipped()?, observed))
+}
+
+fn both(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
+    let weights = weights(before, observed);
+    let by = |calibration: &Calibration, (case, weight): (&Observed, f64)| {
+        first_answer(case, calibration).map(|(probability, right)| Answer { probability, right, weight })
+    };
+    let weighted: Vec<(&Observed, f64)> = observed.iter().zip(weights.iter().copied()).collect();
+    let shipped: Vec<Answer> = weighted.iter().filter_map(|case| by(before, *case)).collect();
+    let mut held_out = Vec::new();
+    for fold in 0..FOLDS {
+        let of_fold = |(index, _): &(usize, &(&Observed, f64))| index % FOLDS == fold;
+        let (judged, fitted): (Vec<_>, Vec<_>) = weighted.iter().enumerate().partition(of_fold);
+        let fitted: Vec<Observed> = fitted.into_iter().map(|(_, (case, _))| (*case).clone()).collect();
+        let calibration = fit(before, &fitted, String::new());
+        held_out.extend(judged.iter().filter_map(|(_, case)| by(&calibration, **case)));
+    }
+    [
+        reliability("that ships", observed, &shipped),
+        reliability("fitted to the other cases", observed, &held_out),
+    ]
+}
+
+/// What came of so many diagnoses, and where the calibration is.
+pub fn calibrated_text(diagnoses: usize, file: &Path, reliabilities: &[Reliability]) -> String {
+    let reliability = reliability_text(reliabilities);
+    format!("calibration from {diagnoses} diagnoses in {}\n{reliability}", file.display())
+}
+
+/// A sentence for each.
+pub fn reliability_text(reliabilities: &[Reliability]) -> String {
+    let mut text = String::new();
+    for one in reliabilities {
+        let cases: usize = one.bins.iter().map(|bin| bin.right.trials).sum();
+        let percent =
+            |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "calibration {}: expected calibration error {} over {cases} diagnoses ({} by chance alone where every probability \
+             holds); the truth was not among the answers in {}",
+            one.calibration,
+            percent(one.expected_calibration_error),
+            percent(one.expected_by_chance),
+            one.truth_not_listed,
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_diagnose::gap::findings::report::Verdict;
+
+    /// A case whose first candidate leads by the score that gives it `probability`, right or not.
+    fn case(probability: f64, right: bool) -> Observed {
+        let set = |id: &str| BTreeSet::from([id.to_owned()]);
+        let lead = (probability / (1.0 - probability)).ln();
+        Observed {
+            kind: CaseKind::Single,
+            causes: set(if right { "a" } else { "b" }),
+            verdict: Verdict::Explained,
+            sigma: Some(30.0),
+            nothing: f64::NEG_INFINITY,
+            candidates: vec![(set("a"), lead), (set("b"), 0.0)],
+            features: [-1e9; 3],
+            errors_sigma: Vec::new(),
+        }
+    }
+
+    /// Temperature 1 and nothing outside: the probabilities are those of the scores.
+    fn plain() -> Calibration {
+        Calibration { temperature: 1.0, outside: [-50.0, 0.0, 0.0, 0.0], ..Calibration::shipped().unwrap() }
+    }
+
+    fn judged(cases: &[Observed]) -> Reliability {
+        let [before, _] = both(&plain(), cases);
+        before
+    }
+
+    #[test]
+    fn what_is_right_as_often_as_it_says_has_no_error() {
+        // 0.8 is right in 80 of 100 cases, 0.6 in 60 of 100.
+        let of = |p: f64, hits: usize| (0..100).map(move |i| case(p, i < hits));
+        let honest: Vec<Observed> = of(0.8, 80).chain(of(0.6, 60)).collect();
+        let found = judged(&honest);
+        assert!(found.expected_calibration_error.unwrap() < 1e-9, "{found:?}");
+        assert_eq!(found.bins.len(), 2);
+        // sqrt(2/pi 0.8 0.2/100) = 3.2 % and sqrt(2/pi 0.6 0.4/100) = 3.9 %, half of the cases each.
+        assert!((found.expected_by_chance.unwrap() - 0.0355).abs() < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn too_sure_by_a_fifth_is_an_error_of_a_fifth() {
+        let boasting: Vec<Observed> = (0..100).map(|i| case(0.95, i < 75)).collect();
+        let found = judged(&boasting);
+        assert!((found.expected_calibration_error.unwrap() - 0.2).abs() < 1e-9, "{found:?}");
+        let [bin] = found.bins.as_slice() else { panic!("{found:?}") };
+        assert!(bin.right_low < 0.75 && 0.75 < bin.right_high && bin.right_high < bin.said);
+        assert_eq!(judged(&[]).expected_calibration_error, None);
+    }
+}

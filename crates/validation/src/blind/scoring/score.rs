@@ -1,0 +1,344 @@
+//! Holds diagnoses against opened answers.
+
+use crate::blind::cases::kind::CaseKind;
+use crate::blind::cases::truth::Truth;
+use crate::blind::error::BlindError;
+use crate::blind::scoring::interval::Share;
+use crate::blind::seal::{MANIFEST_NAME, Manifest, open, read_json};
+use mapper_effects::catalogue;
+use mapper_numerics::statistics::{mean, nearest_rank};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// What is read of a diagnosis; the rest of its JSON is for people.
+#[derive(Debug, Clone, Default, Deserialize)]
+struct Diagnosis {
+    verdict: String,
+    #[serde(default, rename = "where")]
+    places: Vec<Place>,
+    #[serde(default)]
+    candidates: Vec<Candidate>,
+    #[serde(default)]
+    probability_none: Option<f64>,
+    #[serde(default)]
+    probability_outside: Option<f64>,
+    #[serde(default)]
+    gap: Option<Gap>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Place {
+    submodel: String,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+struct Candidate {
+    effects: BTreeSet<String>,
+    #[serde(default)]
+    probability: f64,
+    #[serde(default)]
+    parameters: BTreeMap<String, Estimate>,
+    #[serde(default)]
+    equivalent: Vec<BTreeSet<String>>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Estimate {
+    value: f64,
+    low: Option<f64>,
+    high: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Gap {
+    shrink: Option<f64>,
+}
+
+/// One case as it came out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoredCase {
+    /// Its name.
+    pub name: String,
+    /// What it is a case of.
+    pub kind: CaseKind,
+    /// Its causes.
+    pub causes: BTreeSet<String>,
+    /// Verdict of the diagnosis; `None` without a diagnosis.
+    pub verdict: Option<String>,
+    /// The causes it named.
+    pub named: BTreeSet<String>,
+    /// Probability it gave to them.
+    pub probability: Option<f64>,
+    /// Whether that is right.
+    pub right: bool,
+    /// Length of the weakest cause's signature in the presence of the others, in sigmas; `None` without causes, and if the
+    /// answers do not contain it.
+    pub sigma: Option<f64>,
+}
+
+/// Ends of the classes of signature length, sigmas.
+pub(crate) const CLASSES_SIGMA: [f64; 3] = [12.0, 24.0, f64::INFINITY];
+
+/// Cases whose causes show about equally plainly.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SigmaClass {
+    /// Shortest signature of the class, sigmas.
+    pub from_sigma: f64,
+    /// Single effects that were named.
+    pub single: Share,
+    /// Pairs of which both were named.
+    pub pair: Share,
+    /// Pairs of which at least one was named.
+    pub one_of_pair: Share,
+    /// Outside causes that were recognised as outside.
+    pub outside: Share,
+    /// Outside causes that were explained by the catalogue.
+    pub falsely_explained: Share,
+}
+
+/// The table, as `score.py` prints it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Score {
+    /// Case by case.
+    pub cases: Vec<ScoredCase>,
+    /// The cases by the signature length of their weakest cause.
+    pub classes: [SigmaClass; CLASSES_SIGMA.len()],
+    /// Recordings without effect that were left alone.
+    pub none: Share,
+    /// Recordings without effect in which one was named.
+    pub none_named: Share,
+    /// Single effects that were named, in a set of at most three.
+    pub single: Share,
+    /// Pairs of which both were named.
+    pub pair: Share,
+    /// Pairs of which at least one was named.
+    pub one_of_pair: Share,
+    /// Triples of which all three were named.
+    pub triple: Share,
+    /// Triples of which at least two were named.
+    pub two_of_triple: Share,
+    /// Outside causes that were recognised as outside.
+    pub outside: Share,
+    /// Outside causes that were explained by the catalogue.
+    pub falsely_explained: Share,
+    /// Effects whose place was among the first two.
+    pub place: Share,
+    /// Parameters whose 95 % interval holds the truth.
+    pub covered: Share,
+    /// Median error of a parameter over its distance from neutral; `None` where none was named.
+    pub parameter_error_median: Option<f64>,
+    /// Median share of the gap that was removed; `None` where nothing was named.
+    pub shrink_median: Option<f64>,
+    /// Mean of the squared miss of the probability given to the truth; `None` without cases.
+    pub squared_miss_mean: Option<f64>,
+    /// Mean number of indistinguishable explanations; `None` without diagnoses.
+    pub set_size_mean: Option<f64>,
+}
+
+/// Opens the seal of `directory` and holds NAME.diagnosis.json of each case against its answer.
+///
+/// # Errors
+/// [`BlindError`] where the directory holds no cases or the answers have been changed. A missing or broken diagnosis is
+/// a wrong one, not an error.
+pub fn score(directory: &Path) -> Result<Score, BlindError> {
+    let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
+    let truths = open(directory, &manifest)?;
+    Ok(score_truths(&truths, |name| {
+        read_json::<Diagnosis>(&directory.join(format!("{name}.diagnosis.json")), "diagnosis").ok()
+    }))
+}
+
+/// Writes NAME.truth.json of each answer next to its recording, for `score.py`.
+///
+/// # Errors
+/// As [`score`], and where a file cannot be written.
+pub fn open_answers(directory: &Path) -> Result<usize, BlindError> {
+    let manifest = Manifest::read(&directory.join(MANIFEST_NAME))?;
+    let truths = open(directory, &manifest)?;
+    for truth in &truths {
+        // Names come from the answers, which are sealed, but a name must not lead out of the directory.
+        if !manifest.cases.contains(&truth.name) || truth.name.contains(['/', '\\']) {
+            continue;
+        }
+        let path = directory.join(format!("{}.truth.json", truth.name));
+        let bytes = serde_json::to_vec_pretty(truth).map_err(|source| BlindError::Content {
+            path: path.clone(),
+            what: "JSON",
+            source,
+        })?;
+        std::fs::write(&path, bytes).map_err(BlindError::file(&path))?;
+    }
+    Ok(truths.len())
+}
+
+fn kind_of(truth: &Truth) -> CaseKind {
+    if truth.effects.keys().any(|id| id.starts_with("X_") || id == "outside_catalogue") {
+        return CaseKind::Outside;
+    }
+    match truth.effects.len() {
+        0 => CaseKind::None,
+        1 => CaseKind::Single,
+        2 => CaseKind::Pair,
+        _ => CaseKind::Triple,
+    }
+}
+
+fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosis>) -> Score {
+    let catalogue = catalogue();
+    // More than one place is right where neighbours share a balance.
+    let shows_in = |id: &str, submodel: &str| {
+        catalogue.iter().any(|effect| effect.info().id == id && effect.info().shows_in(submodel))
+    };
+    let neutral: BTreeMap<String, f64> = catalogue
+        .iter()
+        .filter_map(|effect| match effect.info().parameters.as_slice() {
+            [only] => Some((effect.info().id.to_string(), only.neutral)),
+            _ => None,
+        })
+        .collect();
+    let mut score = Score::default();
+    for (class, from_sigma) in score.classes.iter_mut().zip(std::iter::once(&0.0).chain(&CLASSES_SIGMA)) {
+        class.from_sigma = *from_sigma;
+    }
+    let (mut errors, mut shrinks, mut squared_misses, mut set_sizes) = (vec![], vec![], vec![], vec![]);
+    for truth in truths {
+        let causes: BTreeSet<String> = truth.effects.keys().cloned().collect();
+        let kind = kind_of(truth);
+        let diagnosis = diagnosis_of(&truth.name);
+        let judged = diagnosis.as_ref().map(|diagnosis| Judged::new(kind, &causes, diagnosis));
+        let right = judged.as_ref().is_some_and(|judged| judged.right);
+        let verdict = diagnosis.as_ref().map(|diagnosis| diagnosis.verdict.as_str());
+        let sigma = truth.sigmas.values().copied().reduce(f64::min);
+        let mut unstated = SigmaClass::default();
+        let of_class = sigma.and_then(|sigma| CLASSES_SIGMA.iter().position(|end| sigma < *end));
+        let class = of_class.map_or(&mut unstated, |place| &mut score.classes[place]);
+        match kind {
+            CaseKind::None => {
+                score.none.count(right);
+                score.none_named.count(judged.as_ref().is_some_and(|judged| !judged.named.is_empty()));
+            }
+            CaseKind::Single => {
+                score.single.count(right);
+                class.single.count(right);
+            }
+            CaseKind::Pair => {
+                let one = judged.as_ref().is_some_and(|judged| !judged.named.is_disjoint(&causes));
+                for (both, at_least) in
+                    [(&mut score.pair, &mut score.one_of_pair), (&mut class.pair, &mut class.one_of_pair)]
+                {
+                    both.count(right);
+                    at_least.count(one);
+                }
+            }
+            CaseKind::Triple => {
+                score.triple.count(right);
+                let named = judged.as_ref().map_or(0, |judged| judged.named.intersection(&causes).count());
+                score.two_of_triple.count(named >= 2);
+            }
+            CaseKind::Outside => {
+                let falsely = verdict == Some("explained");
+                for (recognised, explained) in [
+                    (&mut score.outside, &mut score.falsely_explained),
+                    (&mut class.outside, &mut class.falsely_explained),
+                ] {
+                    recognised.count(right);
+                    explained.count(falsely);
+                }
+            }
+        }
+        let p_truth = judged.as_ref().map_or(0.0, |judged| judged.p_truth);
+        squared_misses.push((1.0 - p_truth.min(1.0)).powi(2));
+        if let (Some(diagnosis), Some(judged)) = (&diagnosis, &judged) {
+            set_sizes.push(judged.set_size as f64);
+            if matches!(kind, CaseKind::Single | CaseKind::Pair | CaseKind::Triple) {
+                let first_two = diagnosis.places.iter().take(2);
+                let right = first_two
+                    .flat_map(|place| causes.iter().map(|id| shows_in(id, &place.submodel)))
+                    .any(|right| right);
+                score.place.count(right);
+                if judged.named == causes {
+                    let estimates = diagnosis.candidates.first().map(|first| &first.parameters);
+                    for (id, value) in &truth.effects {
+                        let estimate = estimates.and_then(|estimates| estimates.get(id));
+                        let (Some(value), Some(neutral), Some(estimate)) =
+                            (value.as_f64(), neutral.get(id), estimate)
+                        else {
+                            continue;
+                        };
+                        errors.push((estimate.value - value).abs() / (value - neutral).abs());
+                        let (low, high) =
+                            (estimate.low.unwrap_or(f64::NAN), estimate.high.unwrap_or(f64::NAN));
+                        score.covered.count(low <= value && value <= high);
+                    }
+                    shrinks.extend(diagnosis.gap.and_then(|gap| gap.shrink));
+                }
+            }
+        }
+        score.cases.push(ScoredCase {
+            name: truth.name.clone(),
+            kind,
+            causes,
+            verdict: verdict.map(str::to_owned),
+            probability: diagnosis
+                .as_ref()
+                .and_then(|diagnosis| Some(diagnosis.candidates.first()?.probability)),
+            named: judged.map_or_else(BTreeSet::new, |judged| judged.named),
+            right,
+            sigma,
+        });
+    }
+    // Of an even number the upper of the two middle values, as `score.py` takes it.
+    score.parameter_error_median = nearest_rank(&errors, 0.5);
+    score.shrink_median = nearest_rank(&shrinks, 0.5);
+    score.squared_miss_mean = mean(&squared_misses);
+    score.set_size_mean = mean(&set_sizes);
+    score
+}
+
+/// A diagnosis compared with the truth.
+struct Judged {
+    named: BTreeSet<String>,
+    set_size: usize,
+    right: bool,
+    p_truth: f64,
+}
+
+impl Judged {
+    fn new(kind: CaseKind, causes: &BTreeSet<String>, diagnosis: &Diagnosis) -> Self {
+        let verdict = diagnosis.verdict.as_str();
+        let first = diagnosis.candidates.first();
+        let names = matches!(verdict, "explained" | "partly_explained");
+        let named = first.filter(|_| names).map_or_else(BTreeSet::new, |first| first.effects.clone());
+        let equivalent = first.map_or(&[][..], |first| &first.equivalent);
+        let set_size = 1 + equivalent.len();
+        let in_set = named == *causes || equivalent.contains(causes);
+        let right = match kind {
+            CaseKind::None => verdict == "within_tolerance",
+            CaseKind::Outside => matches!(verdict, "unexplained" | "partly_explained"),
+            CaseKind::Single | CaseKind::Pair | CaseKind::Triple => {
+                verdict != "within_tolerance" && in_set && set_size <= 3
+            }
+        };
+        let p_truth = match kind {
+            CaseKind::None => diagnosis.probability_none.unwrap_or(0.0),
+            CaseKind::Outside => diagnosis.probability_outside.unwrap_or(0.0),
+            CaseKind::Single | CaseKind::Pair | CaseKind::Triple => diagnosis
+                .candidates
+                .iter()
+                .filter(|candidate| candidate.effects == *causes || candidate.equivalent.contains(causes))
+                .map(|candidate| candidate.probability)
+                .sum(),
+        };
+        Judged { named, set_size, right, p_truth }
+    }
+}
+
+/// A diagnosis as JSON, read as scoring reads it; for tests of what diagnoses.
+///
+/// # Errors
+/// What is missing or of the wrong type.
+pub fn check_diagnosis(value: &Value) -> Result<(), String> {
+    serde_json::from_value::<Diagnosis>(value.clone()).map(drop).map_err(|error| error.to_string())
+}

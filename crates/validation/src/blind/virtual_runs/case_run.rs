@@ -1,0 +1,160 @@
+//! Runs one case on the virtual lab.
+
+use crate::blind::cases::case::Case;
+use crate::blind::cases::equations::Laboratory;
+use crate::blind::cases::truth::Truth;
+use crate::blind::error::BlindError;
+use crate::blind::virtual_runs::destination::{ToFile, ToMemory};
+use crate::blind::virtual_runs::steps::{StepsOfCase, steps_of_case};
+use mapper_backends::other_lab::{self, OtherStructure};
+use mapper_backends::virtual_lab::{
+    ActuatorDynamics, LabSettings, SensorErrors, Start, VirtualLab, Weather, draw_tolerances,
+};
+use mapper_campaign::Campaign;
+use mapper_core::{Channel, NoiseColour, PlanStep, Recording, UnpacedClock};
+use mapper_physics::rig::effect::{self, Rig};
+use mapper_physics::simulation::model::Model;
+use mapper_recording::{RecordingHeader, RecordingWriter};
+use mapper_runner::{RunObserver, Runner};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// What all cases of a campaign share: its points with the P3 that the nominal model needs for them.
+pub(crate) struct Schedule<'a> {
+    campaign: &'a Campaign,
+    nominal: &'a Model,
+    steps: Vec<PlanStep>,
+    laboratory: Laboratory,
+}
+
+/// Turns the seed of a case into that of the night on which its rig was healthy: no other draw uses it.
+const ANOTHER_NIGHT: u64 = 0x3C6E_F372_FE94_F82B;
+
+impl<'a> Schedule<'a> {
+    /// The points in the campaign's own order, P3 commanded open loop.
+    pub(crate) fn new(campaign: &'a Campaign, nominal: &'a Model) -> Result<Self, BlindError> {
+        Ok(Schedule {
+            campaign,
+            nominal,
+            steps: steps_of_case(campaign, nominal)?,
+            laboratory: Laboratory::default(),
+        })
+    }
+
+    /// The same on another simulator.
+    pub(crate) fn on(self, laboratory: Laboratory) -> Self {
+        Schedule { laboratory, ..self }
+    }
+
+    /// The lab of a case: nominal machine, drawn tolerances, then the causes; noise and weather of `night_seed`.
+    fn lab(&self, case: &Case, night_seed: u64) -> Result<VirtualLab, BlindError> {
+        let mut rig = Rig::new(self.nominal.clone());
+        draw_tolerances(&mut rig, &self.campaign.tolerances, case.seed);
+        for cause in &case.causes {
+            effect::add(&mut rig, cause.effect.as_ref(), &cause.values)?;
+        }
+        let at_once = ActuatorDynamics { lag_s: 0.0, slew_per_s: f64::INFINITY };
+        let p3_actuator =
+            ActuatorDynamics { lag_s: self.campaign.tolerances.actuator_lag_s, slew_per_s: f64::INFINITY };
+        let mut settings = LabSettings {
+            start: Start::Settled,
+            p3_actuator,
+            t3_actuator: at_once,
+            valve_actuator: at_once,
+            oil_actuator: at_once,
+            weather: Weather::drawn(night_seed),
+            seed: night_seed,
+            ..LabSettings::ideal(self.nominal.clone(), self.campaign.boundary)
+        };
+        settings.take(rig);
+        settings.sensors = self.sensors(case.seed);
+        if self.laboratory == Laboratory::OtherLab {
+            other_lab::turn_into(&mut settings, OtherStructure::default());
+        }
+        Ok(VirtualLab::new(settings))
+    }
+
+    /// Noise and drawn offsets as declared.
+    fn sensors(&self, seed: u64) -> std::collections::BTreeMap<Channel, SensorErrors> {
+        let colour = NoiseColour::default();
+        let white_share = (1.0 - colour.first_order_share_ratio.powi(2)).sqrt();
+        // A stream that nothing else of the lab uses.
+        let mut random = Pcg64::seed_from_u64(seed ^ 0x5851_F42D_4C95_7F2D);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let sensors = self.campaign.sensors.iter();
+        sensors
+            .map(|(channel, sensor)| {
+                let declared = sensor.declared;
+                let errors = SensorErrors {
+                    white_sigma: white_share * declared.noise_sigma,
+                    coloured_sigma: colour.first_order_share_ratio * declared.noise_sigma,
+                    coloured_time_constant_s: colour.time_constant_s,
+                    offset: declared.offset_sigma * normal(),
+                    gain_ratio: declared.gain_sigma_ratio * normal(),
+                };
+                (*channel, errors)
+            })
+            .collect()
+    }
+
+    /// Runs a case into a recording without truth, and gives the truth.
+    ///
+    /// # Errors
+    /// If the lab stops or the file cannot be written.
+    pub(crate) fn run(
+        &self,
+        case: &Case,
+        file: &Path,
+        header: &RecordingHeader,
+    ) -> Result<Truth, BlindError> {
+        let mut kept = ToFile::new(RecordingWriter::create(file, header)?);
+        self.drive(case, case.seed, &mut kept)?;
+        Ok(Truth::new(case, kept.finish()?))
+    }
+
+    /// Runs the rig of a case without its causes on another night: the same offsets and tolerances, other noise and weather.
+    ///
+    /// # Errors
+    /// If the lab stops or the file cannot be written.
+    pub(crate) fn run_healthy(
+        &self,
+        case: &Case,
+        file: &Path,
+        header: &RecordingHeader,
+    ) -> Result<(), BlindError> {
+        let mut kept = ToFile::new(RecordingWriter::create(file, header)?);
+        let healthy = Case { causes: Vec::new(), sigmas: Vec::new(), ..case.clone() };
+        self.drive(&healthy, case.seed ^ ANOTHER_NIGHT, &mut kept)?;
+        kept.finish()?;
+        Ok(())
+    }
+
+    /// Runs a case into memory.
+    ///
+    /// # Errors
+    /// If the lab stops.
+    pub(crate) fn record(&self, case: &Case) -> Result<Recording, BlindError> {
+        let mut kept = ToMemory::default();
+        self.drive(case, case.seed, &mut kept)?;
+        Ok(kept.recording)
+    }
+
+    /// The runner of every campaign, without guards: nothing that is drawn endangers a virtual machine.
+    fn drive(&self, case: &Case, night_seed: u64, observer: &mut dyn RunObserver) -> Result<(), BlindError> {
+        let runner = Runner {
+            steps: &mut StepsOfCase::new(&self.steps, self.campaign.timing.warm_up_s),
+            backend: &mut self.lab(case, night_seed)?,
+            clock: &mut UnpacedClock,
+            guards: Vec::new(),
+            observer,
+            // What withheld causes do to the speed is part of what is to be found.
+            speed: None,
+            stop: &AtomicBool::new(false),
+        };
+        let of_case = |source| BlindError::Run { name: case.name.clone(), source };
+        runner.run().map(|_| ()).map_err(of_case)
+    }
+}

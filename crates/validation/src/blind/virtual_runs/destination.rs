@@ -1,0 +1,74 @@
+//! Destination of a case: a file without its truth, or memory.
+
+use crate::blind::cases::truth::TruthPoint;
+use mapper_core::{Recording, SampleBatch, StepMarker};
+use mapper_recording::{RecordError, RecordingWriter, StepPhase};
+use mapper_runner::{ObserverError, RunObserver};
+
+/// Writes the recording and keeps the truth at the end of each step apart: it is what the answers hold.
+pub(crate) struct ToFile {
+    writer: RecordingWriter,
+    last: SampleBatch,
+    points: Vec<TruthPoint>,
+}
+
+impl ToFile {
+    pub(crate) fn new(writer: RecordingWriter) -> Self {
+        ToFile { writer, last: SampleBatch::default(), points: Vec::new() }
+    }
+
+    /// Ends the file; the truth point by point.
+    pub(crate) fn finish(self) -> Result<Vec<TruthPoint>, RecordError> {
+        self.writer.finish()?;
+        Ok(self.points)
+    }
+}
+
+impl RunObserver for ToFile {
+    fn on_step_start(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.writer.write_step(marker, StepPhase::Start).map_err(ObserverError::of)
+    }
+
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        let without_truth = SampleBatch { truth: Vec::new(), ..batch.clone() };
+        self.writer.write_batch(&without_truth).map_err(ObserverError::of)?;
+        self.last = batch.clone();
+        Ok(())
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        let last = |name: &str| {
+            let column = self.last.truth.iter().find(|column| column.name == name);
+            column.and_then(|column| column.values.last().copied()).unwrap_or(f64::NAN)
+        };
+        self.points.push(TruthPoint {
+            valve: marker.valve_opening_ratio,
+            speed_rpm: last("speed_rpm"),
+            eta: last("eta"),
+            h: last("h_w_m2k"),
+        });
+        self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)
+    }
+}
+
+/// Keeps the recording, and no truth.
+#[derive(Default)]
+pub(crate) struct ToMemory {
+    pub(crate) recording: Recording,
+}
+
+impl RunObserver for ToMemory {
+    fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
+        for column in &batch.columns {
+            let series = self.recording.series.entry(column.channel).or_default();
+            series.t_s.extend(&batch.t_s);
+            series.values.extend(&column.values);
+        }
+        Ok(())
+    }
+
+    fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.recording.steps.push(*marker);
+        Ok(())
+    }
+}

@@ -1,0 +1,314 @@
+//! The place of every key and value of a YAML text, and the limits of what is read.
+//!
+//! saphyr-parser reads the text once, event by event, so its depth is bounded here and not by the stack. serde_yaml, which
+//! gives no positions, reads the values afterwards from a text that passed. YAML that our files do not use and that would
+//! hide mistakes (anchors, aliases, merge keys, tags, several documents) is refused with its place.
+
+use crate::document::path::Step;
+use crate::mistakes::finding::FindingKind;
+use crate::mistakes::notes::Notes;
+use crate::mistakes::source::Source;
+use saphyr_parser::{Event, Marker, Parser, ScalarStyle, ScanError};
+use serde::de::IgnoredAny;
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// Deepest nesting that is read; a campaign needs six.
+const DEPTH_LIMIT: usize = 32;
+
+/// Maximum number of values that are read; the longest list of points a campaign's grid may have takes three each.
+const VALUE_LIMIT: usize = 100_000;
+
+/// Characters after a syntax error that libyaml may read to place it: its time grows with the square of the nesting.
+const TAIL_LIMIT: usize = 1000;
+
+pub(crate) const SYNTAX_REMEDY: &str =
+    "check the indentation (spaces, no tabs), the space after each colon, quotes and brackets up to here";
+
+/// Where a value and its key are.
+#[derive(Debug)]
+pub(crate) struct Place {
+    /// Byte range of the key; `None` for an item of a list.
+    pub key: Option<Range<usize>>,
+    /// Byte range that a complaint about the value marks: a scalar itself, the key of a mapping or list.
+    pub value: Range<usize>,
+}
+
+/// The places of all values, the root first.
+#[derive(Debug, Default)]
+pub(crate) struct Places {
+    list: Vec<Place>,
+    /// Index of a part by the index of the whole.
+    parts: HashMap<(usize, Step), usize>,
+}
+
+impl Places {
+    /// The place at the end of a path, or of its nearest parent; whether it is the end.
+    pub fn nearest(&self, steps: &[Step]) -> Option<(&Place, bool)> {
+        let mut index = 0;
+        let part = |whole: &mut usize, step: &Step| {
+            *whole = *self.parts.get(&(*whole, step.clone()))?;
+            Some(())
+        };
+        let is_end = steps.iter().all(|step| part(&mut index, step).is_some());
+        Some((self.list.get(index)?, is_end))
+    }
+}
+
+/// Returns the places, and the text for serde_yaml: without the refused aliases and tags, and with a blank in `{key:}`,
+/// which is valid YAML 1.2 and an error for libyaml. `None` if the text cannot be read; then at least one finding gives
+/// the reason.
+pub(crate) fn locate(source: &Source, notes: &mut Notes) -> Option<(Places, String)> {
+    let readable = source.text().to_owned();
+    let mut walk =
+        Walk { source, notes, places: Places::default(), open: Vec::new(), readable, empty: Vec::new() };
+    walk.document().ok()?;
+    let Walk { places, mut readable, empty, .. } = walk;
+    for colon in empty.into_iter().rev() {
+        if source.text().get(colon..).is_some_and(|rest| rest.starts_with(':')) {
+            readable.insert(colon + 1, ' ');
+        }
+    }
+    Some((places, readable))
+}
+
+/// A collection whose end was not read yet.
+struct Open {
+    /// Index of its place.
+    index: usize,
+    parts: Parts,
+}
+
+enum Parts {
+    /// Index of the next item.
+    List(usize),
+    /// A key whose value follows, and its place.
+    Mapping(Option<(String, Range<usize>)>),
+}
+
+struct Walk<'a> {
+    source: &'a Source,
+    notes: &'a mut Notes,
+    places: Places,
+    open: Vec<Open>,
+    readable: String,
+    /// Offsets of the colons whose value is not written.
+    empty: Vec<usize>,
+}
+
+/// Reading cannot continue; the finding is already noted.
+struct Stop;
+
+impl Walk<'_> {
+    fn document(&mut self) -> Result<(), Stop> {
+        let text = self.source.text();
+        // Line breaks of YAML 1.1 only: saphyr reads a comment where libyaml reads the next line.
+        if let Some((at, breaks)) = text.char_indices().find(|(_, c)| "\u{85}\u{2028}\u{2029}".contains(*c)) {
+            let message = format!("the character U+{:04X} is not read", u32::from(breaks));
+            self.note(FindingKind::Unsupported, at..at, message, "remove it");
+            return Err(Stop);
+        }
+        let mut documents = 0;
+        for event in Parser::new_from_iter(with_plain_blanks(text)) {
+            let (event, span) = event.map_err(|error| self.on_syntax_error(&error))?;
+            let byte = |marker: Marker| self.source.byte_of_char(marker.index());
+            let span = byte(span.start)..byte(span.end);
+            if matches!(event, Event::DocumentStart(_)) {
+                documents += 1;
+                if documents > 1 {
+                    let message = "a second YAML document starts here".to_owned();
+                    let remedy = "write one document per file, and remove the line `---`";
+                    self.note(FindingKind::Unsupported, span, message, remedy);
+                    return Ok(());
+                }
+            }
+            self.on_event(event, span)?;
+        }
+        if self.places.list.is_empty() {
+            let document = self.source.document;
+            let remedy = format!("see `{}` for a complete {}", document.example, document.name);
+            self.note(FindingKind::MissingKey, 0..0, "the file is empty".into(), &remedy);
+            return Err(Stop);
+        }
+        Ok(())
+    }
+
+    fn note(&mut self, kind: FindingKind, span: Range<usize>, message: String, remedy: &str) {
+        let source = self.source;
+        self.notes.push_with(|| source.finding(kind, String::new(), span, message, remedy.to_owned()));
+    }
+
+    /// libyaml gives the line of a tab, where saphyr gives the line before it.
+    fn on_syntax_error(&mut self, error: &ScanError) -> Stop {
+        let text = self.source.text();
+        let at = self.source.byte_of_char(error.marker().index());
+        let lines = text.get(at..).into_iter().flat_map(|tail| tail.split_inclusive('\n')).take(2);
+        let end = text.floor_char_boundary(at + lines.map(str::len).sum::<usize>().min(TAIL_LIMIT));
+        let known = serde_yaml::from_str::<IgnoredAny>(text.get(..end).unwrap_or_default());
+        let placed = known.err().and_then(|error| {
+            let place = self.source.byte_of_char(error.location()?.index());
+            // At the end it complains about the cut.
+            (place < end).then(|| (place, error.to_string()))
+        });
+        let (at, reason) = placed.unwrap_or_else(|| (at, error.info().to_owned()));
+        self.note(FindingKind::Syntax, at..at, format!("this is not YAML: {reason}"), SYNTAX_REMEDY);
+        Stop
+    }
+
+    fn on_event(&mut self, event: Event<'_>, span: Range<usize>) -> Result<(), Stop> {
+        match event {
+            Event::Scalar(text, style, anchor, tag) => {
+                self.refuse_decoration(anchor, tag.is_some(), &span);
+                if self.waits_for_key() {
+                    self.on_key(text.into_owned(), span);
+                    return Ok(());
+                }
+                if style == ScalarStyle::Plain && tag.is_none() && !is_finite(&text) {
+                    let message = format!("`{text}` is not a finite number");
+                    let remedy = "write a number, or put the text into quotes";
+                    self.note(FindingKind::WrongValue, span.clone(), message, remedy);
+                }
+                self.on_scalar(span)?;
+            }
+            Event::SequenceStart(anchor, tag) => {
+                self.refuse_decoration(anchor, tag.is_some(), &span);
+                self.on_start(span, Parts::List(0))?;
+            }
+            Event::MappingStart(anchor, tag) => {
+                self.refuse_decoration(anchor, tag.is_some(), &span);
+                self.on_start(span, Parts::Mapping(None))?;
+            }
+            Event::SequenceEnd | Event::MappingEnd => {
+                let place = self.open.pop().and_then(|open| self.places.list.get_mut(open.index));
+                // An item of a list is marked as a whole.
+                if let Some(place) = place.filter(|place| place.key.is_none() && !self.open.is_empty()) {
+                    place.value.end = span.end.max(place.value.start);
+                }
+            }
+            Event::Alias(_) => {
+                self.refuse("aliases (`*name`)", "write the value out", &span);
+                self.blank(span.start);
+                if self.waits_for_key() {
+                    self.on_key(String::new(), span);
+                } else {
+                    self.on_scalar(span)?;
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn waits_for_key(&self) -> bool {
+        matches!(self.open.last(), Some(Open { parts: Parts::Mapping(None), .. }))
+    }
+
+    fn refuse(&mut self, syntax: &str, remedy: &str, span: &Range<usize>) {
+        let message = format!("{syntax} are not read in a {}", self.source.document.name);
+        self.note(FindingKind::Unsupported, span.clone(), message, remedy);
+    }
+
+    /// `anchor`: 0 if there is none.
+    fn refuse_decoration(&mut self, anchor: usize, is_tagged: bool, span: &Range<usize>) {
+        if anchor != 0 {
+            let remedy = "remove the anchor, and write the value out where it was used";
+            self.refuse("anchors (`&name`)", remedy, span);
+        }
+        if is_tagged {
+            self.refuse("tags (`!name`)", "remove the tag", span);
+            self.blank(span.start);
+        }
+    }
+
+    /// Takes an alias or a tag out of the text, so that the rest is checked too.
+    fn blank(&mut self, start: usize) {
+        let token = self.readable.get(start..).filter(|rest| rest.starts_with(['*', '!']));
+        let length = token.map_or(0, |token| {
+            token.find(|c: char| c.is_whitespace() || ",[]{}".contains(c)).unwrap_or(token.len())
+        });
+        self.readable.replace_range(start..start + length, &" ".repeat(length));
+    }
+
+    fn on_key(&mut self, key: String, span: Range<usize>) {
+        let Some(Open { index, parts: Parts::Mapping(pending) }) = self.open.last_mut() else { return };
+        let is_known = self.places.parts.contains_key(&(*index, Step::Key(key.clone())));
+        *pending = Some((key.clone(), span.clone()));
+        if key == "<<" {
+            self.refuse("merge keys (`<<`)", "write the keys out", &span);
+        } else if is_known {
+            let message = format!("the key `{key}` appears here a second time");
+            self.note(FindingKind::DuplicateKey, span, message, "remove one of the two");
+        }
+    }
+
+    fn on_start(&mut self, span: Range<usize>, parts: Parts) -> Result<(), Stop> {
+        if self.waits_for_key() {
+            let message = "a key must be plain text, but this is a list or a mapping".to_owned();
+            self.note(FindingKind::Syntax, span, message, SYNTAX_REMEDY);
+            return Err(Stop);
+        }
+        if self.open.len() >= DEPTH_LIMIT {
+            let message = format!("the nesting is deeper than {DEPTH_LIMIT} levels");
+            let remedy = "six levels are enough; look for a bracket that is not closed";
+            self.note(FindingKind::TooLarge, span, message, remedy);
+            return Err(Stop);
+        }
+        let index = self.on_value(span, true)?;
+        self.open.push(Open { index, parts });
+        Ok(())
+    }
+
+    fn on_scalar(&mut self, span: Range<usize>) -> Result<(), Stop> {
+        if span.is_empty() {
+            self.empty.push(span.start);
+        }
+        self.on_value(span, false).map(drop)
+    }
+
+    /// The index of its place.
+    fn on_value(&mut self, span: Range<usize>, is_collection: bool) -> Result<usize, Stop> {
+        let index = self.places.list.len();
+        if index >= VALUE_LIMIT {
+            let message = format!("the file has more than {VALUE_LIMIT} values");
+            let remedy = "is this the right file? A long list may have a shorter form, as a grid has `speeds` and `openings`";
+            self.note(FindingKind::TooLarge, span, message, remedy);
+            return Err(Stop);
+        }
+        let start = span.start;
+        let (whole, step, place) = match self.open.last_mut() {
+            None => {
+                self.places.list.push(Place { key: None, value: start..start });
+                return Ok(index);
+            }
+            Some(Open { index, parts: Parts::List(next) }) => {
+                *next += 1;
+                (*index, Step::Index(*next - 1), Place { key: None, value: span })
+            }
+            Some(Open { index, parts: Parts::Mapping(pending) }) => {
+                let (key, place) = pending.take().unwrap_or((String::new(), start..start));
+                let value = if is_collection || span.is_empty() { place.clone() } else { span };
+                (*index, Step::Key(key), Place { key: Some(place), value })
+            }
+        };
+        self.places.list.push(place);
+        // Of two equal keys the last counts, as for serde_yaml.
+        self.places.parts.insert((whole, step), index);
+        Ok(index)
+    }
+}
+
+/// The text with spaces for tabs, except for tabs in the indentation: saphyr refuses a tab after a colon, which is valid.
+fn with_plain_blanks(text: &str) -> impl Iterator<Item = char> {
+    text.chars().scan(true, |is_indentation, c| {
+        *is_indentation = c == '\n' || (*is_indentation && matches!(c, ' ' | '\t'));
+        Some(if c == '\t' && !*is_indentation { ' ' } else { c })
+    })
+}
+
+/// Whether a plain scalar is anything but an infinite number or none.
+fn is_finite(text: &str) -> bool {
+    let digits = text.trim_start_matches(['+', '-']);
+    let is_named = [".inf", ".nan"].iter().any(|name| digits.eq_ignore_ascii_case(name));
+    let is_number = digits.starts_with(|c: char| c.is_ascii_digit() || c == '.');
+    !(is_named || is_number && digits.parse().is_ok_and(f64::is_infinite))
+}

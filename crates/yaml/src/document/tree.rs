@@ -1,0 +1,146 @@
+//! The values of a YAML text, and their places.
+
+use crate::document::path::{Step, path_text};
+use crate::document::positions::{Place, Places, SYNTAX_REMEDY, locate};
+use crate::mistakes::finding::{Finding, FindingKind};
+use crate::mistakes::findings::Findings;
+use crate::mistakes::notes::Notes;
+use crate::mistakes::source::Source;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::ops::Range;
+
+/// A text that was read.
+#[derive(Debug)]
+pub struct Tree {
+    source: Source,
+    /// The text for serde_yaml.
+    readable: String,
+    value: Value,
+    places: Places,
+}
+
+/// Reads a text; the notes are about YAML that is not used here.
+///
+/// # Errors
+/// The reasons why no values can be read.
+pub fn read(source: Source) -> Result<(Tree, Notes), Findings> {
+    let mut notes = Notes::default();
+    let Some((places, readable)) = locate(&source, &mut notes) else {
+        return Err(Findings::new(source, notes));
+    };
+    let document = serde_yaml::Deserializer::from_str(&readable).next();
+    match document.map_or(Ok(Value::Null), Value::deserialize) {
+        Ok(value) => Ok((Tree { source, readable, value, places }, notes)),
+        Err(error) => {
+            // Refused YAML may be the reason.
+            if notes.is_empty() {
+                let at = error.location().map_or(0, |location| source.byte_of_char(location.index()));
+                let message = format!("this is not YAML: {error}");
+                let remedy = SYNTAX_REMEDY.to_owned();
+                notes.push(source.finding(FindingKind::Syntax, String::new(), at..at, message, remedy));
+            }
+            Err(Findings::new(source, notes))
+        }
+    }
+}
+
+impl Tree {
+    /// The text.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// All values.
+    pub fn value(&self) -> &Value {
+        &self.value
+    }
+
+    /// The value at the end of a path.
+    pub fn get(&self, steps: &[Step]) -> Option<&Value> {
+        steps.iter().try_fold(&self.value, |value, step| match step {
+            Step::Key(key) => value.get(key),
+            Step::Index(index) => value.get(index),
+        })
+    }
+
+    /// The text at the end of a path.
+    pub fn text(&self, steps: &[Step]) -> Option<&str> {
+        self.get(steps)?.as_str()
+    }
+
+    /// The items of a list at the end of a path; empty for everything else.
+    pub fn items(&self, steps: &[Step]) -> &[Value] {
+        self.get(steps).and_then(Value::as_array).map_or(&[], Vec::as_slice)
+    }
+
+    /// The keys of a mapping at the end of a path.
+    pub fn keys(&self, steps: &[Step]) -> impl Iterator<Item = &str> {
+        self.get(steps).and_then(Value::as_object).into_iter().flatten().map(|(key, _)| key.as_str())
+    }
+
+    /// The place for a complaint about a value: a scalar itself, the key of a mapping or list; its nearest parent if
+    /// the path leads nowhere.
+    pub fn place(&self, steps: &[Step]) -> Range<usize> {
+        self.places.nearest(steps).map_or(0..0, |(place, _)| place.value.clone())
+    }
+
+    /// A finding about a value.
+    pub fn finding(
+        &self,
+        kind: FindingKind,
+        steps: &[Step],
+        message: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Finding {
+        let place = self.place(steps);
+        self.source.finding(kind, path_text(steps), place, message.into(), remedy.into())
+    }
+
+    /// A finding about a key, if the key itself is wrong and not its value.
+    pub fn key_finding(
+        &self,
+        kind: FindingKind,
+        steps: &[Step],
+        message: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Finding {
+        let place = match self.places.nearest(steps) {
+            Some((Place { key: Some(key), .. }, true)) => key.clone(),
+            _ => self.place(steps),
+        };
+        self.source.finding(kind, path_text(steps), place, message.into(), remedy.into())
+    }
+
+    /// The text as a value of a type, once no mistakes were found.
+    ///
+    /// # Errors
+    /// The first value that does not fit, which the schema of the type allows.
+    pub fn deserialise<T: DeserializeOwned>(&self) -> Result<T, Finding> {
+        let document = serde_yaml::Deserializer::from_str(&self.readable);
+        serde_path_to_error::deserialize(document).map_err(|error| {
+            let steps = error.path().iter().filter_map(|segment| match segment {
+                serde_path_to_error::Segment::Seq { index } => Some(Step::Index(*index)),
+                serde_path_to_error::Segment::Map { key } => Some(Step::Key(key.clone())),
+                _ => None,
+            });
+            let (kind, steps) = (FindingKind::WrongValue, steps.collect::<Vec<_>>());
+            let remedy = "put the value into quotes, or write it in a simpler form";
+            self.finding(kind, &steps, error.inner().to_string(), remedy)
+        })
+    }
+
+    /// Shows asterisks in place of a value, of the same length so that all places stay valid.
+    pub fn hide(&mut self, steps: &[Step]) {
+        let (place, text) = (self.place(steps), self.source.text());
+        let hidden = |(at, byte): (usize, u8)| if place.contains(&at) && byte != b'\n' { b'*' } else { byte };
+        let text: Vec<u8> = text.bytes().enumerate().map(hidden).collect();
+        self.source = Source::new(self.source.document, &self.source.origin, &String::from_utf8_lossy(&text));
+    }
+
+    /// All findings about the text.
+    pub fn findings(self, notes: Notes) -> Findings {
+        Findings::new(self.source, notes)
+    }
+}

@@ -1,0 +1,51 @@
+//! All mistakes of a file.
+
+use crate::mistakes::finding::{Finding, FindingKind, SHOWN_LIMIT};
+use crate::mistakes::notes::Notes;
+use crate::mistakes::source::Source;
+use std::path::Path;
+
+/// All mistakes of a file, in the order of the text.
+///
+/// [`Display`](std::fmt::Display) renders them without colours; see [`Findings::render`].
+#[derive(Debug, Clone)]
+pub struct Findings {
+    pub(crate) source: Box<Source>,
+    /// At most [`Findings::LIMIT`] mistakes.
+    pub list: Vec<Finding>,
+    /// How many more there are.
+    pub omitted: usize,
+}
+
+impl Findings {
+    /// How many findings are kept; beyond that they are counted.
+    pub const LIMIT: usize = SHOWN_LIMIT;
+
+    /// What was noted about a text, in the order of the text.
+    pub fn new(source: Source, notes: Notes) -> Self {
+        let (mut list, overflow) = notes.into_parts();
+        list.sort_by_key(|finding| finding.span.start);
+        let omitted = list.len().saturating_sub(Self::LIMIT) + overflow;
+        list.truncate(Self::LIMIT);
+        Findings { source: Box::new(source), list, omitted }
+    }
+
+    /// One mistake alone, at a byte of the text.
+    pub fn single(source: Source, kind: FindingKind, at: usize, message: String, remedy: String) -> Self {
+        let mut notes = Notes::default();
+        notes.push(source.finding(kind, String::new(), at..at, message, remedy));
+        Findings::new(source, notes)
+    }
+
+    /// The file they are about.
+    pub fn origin(&self) -> &Path {
+        &self.source.origin
+    }
+
+    /// Number of mistakes, those not kept included.
+    pub fn count(&self) -> usize {
+        self.list.len() + self.omitted
+    }
+}
+
+impl std::error::Error for Findings {}

@@ -1,0 +1,117 @@
+//! Findings for people: file, line, the source line with carets, and the remedy.
+
+use crate::mistakes::finding::Finding;
+use crate::mistakes::findings::Findings;
+use annotate_snippets::renderer::DecorStyle;
+use annotate_snippets::{AnnotationKind, Level, Origin, Renderer, Snippet};
+use std::fmt;
+use std::ops::Range;
+
+/// Longest source line that is shown, bytes.
+const LINE_LIMIT: usize = 400;
+
+/// Width to which messages are wrapped, characters.
+const WIDTH: usize = 100;
+
+impl Findings {
+    /// All findings, each with its place in the file; `colours` only for a terminal.
+    pub fn render(&self, colours: bool) -> String {
+        // ASCII characters in both: the carets are carets, and logs stay legible.
+        let renderer = if colours { Renderer::styled() } else { Renderer::plain() }
+            .decor_style(DecorStyle::Ascii)
+            .term_width(WIDTH + 10);
+        let name = harmless(&self.source.origin.display().to_string());
+        let mut out = String::new();
+        for finding in &self.list {
+            let message = match finding.path.as_str() {
+                "" => finding.message.clone(),
+                path => format!("{path}: {}", finding.message),
+            };
+            let level = if finding.kind.is_warning() { Level::WARNING } else { Level::ERROR };
+            let title = level.primary_title(wrapped(&message));
+            let line = Line::of(self.source.text(), finding);
+            let group = if line.text.len() <= LINE_LIMIT {
+                let span = AnnotationKind::Primary.span(line.span.clone());
+                let snippet =
+                    Snippet::source(&line.text).path(&name).line_start(finding.line).annotation(span);
+                title.element(snippet)
+            } else {
+                title.element(Origin::path(&name).line(finding.line).char_column(finding.column))
+            };
+            let help = Level::HELP.message(wrapped(&finding.remedy));
+            out.push_str(&renderer.render(&[group.element(help)]));
+            out.push_str("\n\n");
+        }
+        let count = self.count();
+        // Warnings never occur together with mistakes: they are looked for in files without any.
+        let warnings = self.list.first().is_some_and(|finding| finding.kind.is_warning());
+        let noun = match (warnings, count) {
+            (false, 1) => "mistake",
+            (false, _) => "mistakes",
+            (true, 1) => "warning",
+            (true, _) => "warnings",
+        };
+        out.push_str(&format!("{name}: {count} {noun}"));
+        if self.omitted > 0 {
+            out.push_str(&format!(", the first {} shown", self.list.len()));
+        }
+        out.push('\n');
+        out
+    }
+}
+
+impl fmt::Display for Findings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.render(false))
+    }
+}
+
+/// The source line of a finding, without its end.
+struct Line {
+    text: String,
+    /// Byte range of the finding in it; a place without extent covers one character.
+    span: Range<usize>,
+}
+
+impl Line {
+    fn of(text: &str, finding: &Finding) -> Self {
+        let at = finding.span.start;
+        let start = text.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |newline| newline + 1);
+        let rest = text.get(start..).unwrap_or_default();
+        let line = rest.split(['\n', '\r']).next().unwrap_or_default();
+        let from = (at - start).min(line.len());
+        let next = line.get(from..).and_then(|rest| rest.chars().next()).map_or(0, char::len_utf8);
+        let to = (finding.span.end.max(at) - start).max(from + next).min(line.len());
+        Line { text: harmless(line), span: from..to }
+    }
+}
+
+/// Without control characters: terminals obey them, and a file must not speak to them. Each is replaced by a character
+/// of the same length, which keeps the byte offsets.
+fn harmless(text: &str) -> String {
+    let one = |c: char| match c {
+        c if !c.is_control() || c == '\t' => c,
+        c if c.len_utf8() == 1 => '?',
+        _ => '¿',
+    };
+    text.chars().map(one).collect()
+}
+
+/// Broken into lines between words.
+fn wrapped(text: &str) -> String {
+    let mut out = String::new();
+    let mut width = 0;
+    for word in harmless(text).split(' ') {
+        let length = word.chars().count();
+        if width > 0 && width + 1 + length > WIDTH {
+            out.push('\n');
+            width = 0;
+        } else if width > 0 {
+            out.push(' ');
+            width += 1;
+        }
+        out.push_str(word);
+        width += length;
+    }
+    out
+}

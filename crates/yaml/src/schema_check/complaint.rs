@@ -1,0 +1,182 @@
+//! Messages of the violated rules.
+
+use crate::mistakes::finding::FindingKind;
+use crate::schema_check::quantity_check::{Complaint, name_of};
+use crate::schema_check::rules::Rule;
+use crate::schema_check::suggestion::guess;
+use serde_json::{Map, Value};
+
+/// What is wrong with a value itself; `None` for rules about its keys and forms, which need their places.
+pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Value) -> Option<Complaint> {
+    let range = |message: String, remedy: String| Complaint { kind: FindingKind::Range, message, remedy };
+    let bound = |message: &str, bound: String| {
+        range(format!("{value} is too {message}"), with_description(bound, Some(schema)))
+    };
+    let thing = if value.is_array() { "list" } else { "mapping" };
+    Some(match rule {
+        Rule::Type => wrong_type(schema, value),
+        Rule::Names(names) => wrong_name(names, schema, value),
+        Rule::Pattern => Complaint {
+            kind: FindingKind::WrongValue,
+            message: format!("{} is not of the form needed", quoted(value)),
+            remedy: with_description(example_sentence(schema), Some(schema)),
+        },
+        Rule::Minimum(limit) => bound("low", format!("it must be at least {limit}")),
+        Rule::Maximum(limit) => bound("high", format!("it must be at most {limit}")),
+        Rule::ExclusiveMinimum(limit) => bound("low", format!("it must be above {limit}")),
+        Rule::ExclusiveMaximum(limit) => bound("high", format!("it must be below {limit}")),
+        Rule::TooShort => {
+            let remedy = with_description(example_sentence(schema), Some(schema));
+            let empty = value.as_array().is_none_or(Vec::is_empty);
+            range(format!("the {thing} {}", if empty { "is empty" } else { "is too short" }), remedy)
+        }
+        Rule::TooLong(limit) if value.is_array() => {
+            let remedy = with_description(format!("it must have at most {limit} entries"), Some(schema));
+            range("the list is too long".to_owned(), remedy)
+        }
+        Rule::TooLong(limit) => {
+            let exactly = schema.get("minProperties") == Some(limit);
+            let count = if exactly { "exactly" } else { "at most" };
+            let remedy = with_description(format!("it must have {count} {limit}"), Some(schema));
+            range("the mapping has too many keys".to_owned(), remedy)
+        }
+        Rule::Repeated => Complaint {
+            kind: FindingKind::Duplicate,
+            message: "an entry appears twice".to_owned(),
+            remedy: "remove one of the two".to_owned(),
+        },
+        Rule::SeveralForms => Complaint {
+            kind: FindingKind::WrongValue,
+            message: format!("{} has more than one meaning here", quoted(value)),
+            remedy: with_description(example_sentence(schema), Some(schema)),
+        },
+        Rule::UnknownKeyword(keyword) => Complaint {
+            kind: FindingKind::Unsupported,
+            message: format!("the program's own schema has the unknown keyword `{keyword}`"),
+            remedy: "this is a fault of the program; please report it".to_owned(),
+        },
+        Rule::UnknownKeys(_) | Rule::MissingKey(_) | Rule::NoForm(_) | Rule::Quantity(_) => return None,
+    })
+}
+
+fn wrong_type(schema: &Map<String, Value>, value: &Value) -> Complaint {
+    let names = match schema.get("type") {
+        Some(Value::Array(names)) => names.as_slice(),
+        Some(name) => std::slice::from_ref(name),
+        None => &[],
+    };
+    let needed: Vec<&str> = names.iter().filter_map(Value::as_str).map(needed).collect();
+    let needed = needed.join(" or ");
+    let remedy = match value {
+        Value::Null => format!("{}, or remove the key", example_sentence(schema)),
+        Value::Number(number) if needed == "text" => format!("put it into quotes: `\"{number}\"`"),
+        _ => example_sentence(schema),
+    };
+    Complaint {
+        kind: FindingKind::WrongType,
+        message: match value {
+            Value::Null => "there is no value".into(),
+            Value::Array(_) | Value::Object(_) => {
+                format!("{} is given where {needed} is needed", name_of(value))
+            }
+            _ => format!("{} is {}, but {needed} is needed", quoted(value), name_of(value)),
+        },
+        remedy: with_description(remedy, Some(schema)),
+    }
+}
+
+fn needed(name: &str) -> &'static str {
+    match name {
+        "object" => "a mapping",
+        "array" => "a list",
+        "number" => "a plain number",
+        "integer" => "a whole number",
+        "string" => "text",
+        "boolean" => "true or false",
+        _ => "nothing",
+    }
+}
+
+/// A name that is none of those allowed.
+pub(crate) fn wrong_name(options: &[&str], schema: &Map<String, Value>, value: &Value) -> Complaint {
+    if let Some(replacement) = value.as_str().and_then(|name| replacement(schema, name)) {
+        let message = format!("{} is no longer known", quoted(value));
+        return Complaint { kind: FindingKind::WrongValue, message, remedy: replacement.to_owned() };
+    }
+    let guess = value.as_str().map(|text| guess(text, options)).unwrap_or_default();
+    Complaint {
+        kind: FindingKind::WrongValue,
+        message: format!("{} is not one of {}", quoted(value), options.join(", ")),
+        remedy: with_description(format!("{guess}write one of {}", options.join(", ")), Some(schema)),
+    }
+}
+
+/// What replaces a key or a name that earlier versions had, by the keyword `x-removed` of its schema.
+pub(crate) fn replacement<'a>(schema: &'a Map<String, Value>, name: &str) -> Option<&'a str> {
+    schema.get("x-removed")?.get(name)?.as_str()
+}
+
+/// The keys that a mapping may have.
+pub(crate) fn keys_of(schema: &Map<String, Value>) -> Vec<&str> {
+    let properties = schema.get("properties").and_then(Value::as_object);
+    properties.map(|properties| properties.keys().map(String::as_str).collect()).unwrap_or_default()
+}
+
+/// The example of a schema, or one made of those of the keys it requires.
+pub(crate) fn example_of(schema: &Value) -> Option<String> {
+    if let Some(example) = schema.get("examples").and_then(|list| list.get(0)) {
+        return Some(example.as_str().map_or_else(|| example.to_string(), str::to_owned));
+    }
+    // Of several forms the first that shows how.
+    if let Some(forms) = schema.get("anyOf").and_then(Value::as_array) {
+        return forms.iter().find_map(example_of);
+    }
+    let properties = schema.get("properties")?;
+    let required: Option<Vec<String>> = schema
+        .get("required")?
+        .as_array()?
+        .iter()
+        .map(|key| Some(format!("{}: {}", key.as_str()?, example_of(properties.get(key.as_str()?)?)?)))
+        .collect();
+    Some(format!("{{{}}}", required?.join(", ")))
+}
+
+/// What to write, as the schema shows it.
+pub(crate) fn example_sentence(schema: &Map<String, Value>) -> String {
+    let example = schema.get("examples").and_then(|list| list.get(0));
+    let example = example.map(|e| e.as_str().map_or_else(|| e.to_string(), str::to_owned));
+    match (example, schema.get("properties").and_then(Value::as_object)) {
+        (Some(example), _) => format!("write e.g. `{example}`"),
+        (None, Some(properties)) => {
+            format!(
+                "write a mapping with the keys {}",
+                properties.keys().cloned().collect::<Vec<_>>().join(", ")
+            )
+        }
+        (None, None) => "write a value of the form described".to_owned(),
+    }
+}
+
+/// A remedy, and what the schema says about the thing.
+pub(crate) fn with_description(remedy: String, schema: Option<&Map<String, Value>>) -> String {
+    match schema.and_then(|schema| schema.get("description")).and_then(Value::as_str) {
+        Some(description) => format!("{remedy}. {description}"),
+        None => remedy,
+    }
+}
+
+/// A value as a message names it.
+pub(crate) fn quoted(value: &Value) -> String {
+    match value {
+        Value::String(text) => format!("`{}`", shortened(text)),
+        Value::Null => "nothing".to_owned(),
+        Value::Array(_) | Value::Object(_) => name_of(value).to_owned(),
+        other => format!("`{other}`"),
+    }
+}
+
+/// A text short enough for a message, without control characters.
+pub(crate) fn shortened(text: &str) -> String {
+    let clean: String = text.chars().take(60).map(|c| if c.is_control() { '?' } else { c }).collect();
+    if text.chars().count() > 60 { format!("{clean}...") } else { clean }
+}

@@ -1,0 +1,82 @@
+//! `drift:` below `virtual_lab`: drifts during the campaign.
+
+use crate::virtual_lab::rig::drift::{Drifting, LabDrift};
+use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
+use mapper_core::{BackendError, Channel};
+use mapper_yaml::units::{Kind, Quantity};
+use serde::Deserialize;
+
+/// One entry: `{cause: T2, change: 0.5 K, over: 4 h, from: 10 min}`, or without `over` a step.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DriftFile {
+    /// A channel, `fouling` or `bearing_friction`.
+    cause: String,
+    /// Size of the change, with its unit.
+    change: String,
+    /// Duration of the change; it continues at this rate afterwards. Default: a step.
+    #[serde(default)]
+    over: Option<Quantity<mapper_yaml::units::Duration>>,
+    /// Begin; default 0, negative for a drift that began before the run.
+    #[serde(default)]
+    from: Option<Quantity<mapper_yaml::units::Duration>>,
+}
+
+/// Drifts with their units resolved.
+pub(crate) fn read(files: &[DriftFile]) -> Result<Vec<LabDrift>, BackendError> {
+    files.iter().enumerate().map(|(index, file)| one(index, file)).collect()
+}
+
+fn one(index: usize, file: &DriftFile) -> Result<LabDrift, BackendError> {
+    let key = |key: &str| format!("drift[{index}].{key}");
+    let what = match file.cause.as_str() {
+        "fouling" => Drifting::Fouling,
+        "bearing_friction" => Drifting::BearingFriction,
+        name => match serde_json::from_value::<Channel>(serde_json::json!(name)) {
+            Ok(channel) if !is_command(channel) => Drifting::Sensor(channel),
+            _ => return Err(SettingProblem::UnknownDrift { cause: name.to_owned() }.at(key("cause"))),
+        },
+    };
+    let change = change(what, &file.change).map_err(|problem| problem.at(key("change")))?;
+    let over_s = file.over.map(|over| over.inside);
+    if let Some(over_s) = over_s.filter(|over_s| *over_s <= 0.0) {
+        return Err(SettingProblem::NoDuration { over_s }.at(key("over")));
+    }
+    Ok(LabDrift { what, change, over_s, from_s: file.from.map_or(0.0, |from| from.inside) })
+}
+
+fn is_command(channel: Channel) -> bool {
+    matches!(channel, Channel::P3Command | Channel::T3Command | Channel::ValveCommand | Channel::TOilCommand)
+}
+
+/// Beyond this limit the machine, or the air supply behind a sensor, would be unphysical.
+const LARGEST_CHANGE_RATIO: f64 = 0.3;
+
+fn change(what: Drifting, text: &str) -> Result<f64, SettingProblem> {
+    const FRICTION: &str = "W s2/rad2";
+    let kind = match what {
+        Drifting::Sensor(channel) => match channel.info().dimension {
+            mapper_core::Dimension::RotationalSpeed => Kind::Speed,
+            mapper_core::Dimension::MassFlow | mapper_core::Dimension::Ratio => Kind::Fraction,
+            mapper_core::Dimension::Pressure => Kind::PressureDifference,
+            mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
+        },
+        Drifting::Fouling => Kind::Fraction,
+        Drifting::BearingFriction => {
+            let number = text.trim().strip_suffix(FRICTION).map(|number| number.trim().parse());
+            return match number {
+                Some(Ok(value)) if f64::is_finite(value) => Ok(value),
+                _ => Err(SettingProblem::NotInUnit { text: text.to_owned(), unit: FRICTION.to_owned() }),
+            };
+        }
+    };
+    let value =
+        mapper_yaml::units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })?;
+    if kind == Kind::Fraction && value.abs() > LARGEST_CHANGE_RATIO {
+        return Err(SettingProblem::DriftTooLarge {
+            text: text.to_owned(),
+            limit_ratio: LARGEST_CHANGE_RATIO,
+        });
+    }
+    Ok(value)
+}

@@ -1,0 +1,104 @@
+//! `effects:` below `virtual_lab`: effects of the true machine that the campaign's nominal model does not have.
+
+use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
+use mapper_core::BackendError;
+use mapper_physics::rig::effect::{self, Effect, EffectParameter, Rig};
+use mapper_yaml::units::Kind;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// One value, or several by name.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+pub(crate) enum EffectValues {
+    Number(f64),
+    Text(String),
+    Named(BTreeMap<String, ValueText>),
+}
+
+/// A bare number, for ratios, or a value with its unit.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+pub(crate) enum ValueText {
+    Number(f64),
+    Text(String),
+}
+
+/// Applies the effects to a rig.
+pub(crate) fn put_in(
+    rig: &mut Rig,
+    wanted: &BTreeMap<String, EffectValues>,
+    known: &[Arc<dyn Effect>],
+) -> Result<(), BackendError> {
+    for (id, values) in wanted {
+        let key = format!("effects.{id}");
+        let Some(effect) = known.iter().find(|effect| effect.info().id == id.as_str()) else {
+            let ids: Vec<&str> = known.iter().map(|effect| effect.info().id.as_ref()).collect();
+            return Err(SettingProblem::UnknownEffect { known: ids.join(", ") }.at(key));
+        };
+        let parameters = &effect.info().parameters;
+        if let Some(name) = values.unknown_name(parameters) {
+            return Err(form(parameters).at(format!("{key}.{name}")));
+        }
+        read_all(parameters, values)
+            .and_then(|values| Ok(effect::add(rig, effect.as_ref(), &values)?))
+            .map_err(|problem| problem.at(key))?;
+    }
+    Ok(())
+}
+
+impl EffectValues {
+    /// The first name that is not a parameter.
+    fn unknown_name(&self, parameters: &[EffectParameter]) -> Option<&str> {
+        let EffectValues::Named(values) = self else { return None };
+        values.keys().map(String::as_str).find(|name| parameters.iter().all(|one| one.name != *name))
+    }
+}
+
+/// A value for each parameter, in their order.
+fn read_all(parameters: &[EffectParameter], values: &EffectValues) -> Result<Vec<f64>, SettingProblem> {
+    let read_one = |parameter: &EffectParameter| {
+        let value = match values {
+            EffectValues::Number(number) if parameters.len() == 1 => &ValueText::Number(*number),
+            EffectValues::Text(text) if parameters.len() == 1 => &ValueText::Text(text.clone()),
+            EffectValues::Named(values) => {
+                values.get(parameter.name.as_ref()).ok_or_else(|| form(parameters))?
+            }
+            EffectValues::Number(_) | EffectValues::Text(_) => return Err(form(parameters)),
+        };
+        read(parameter, value)
+    };
+    parameters.iter().map(read_one).collect()
+}
+
+fn form(parameters: &[EffectParameter]) -> SettingProblem {
+    let names: Vec<String> =
+        parameters.iter().map(|one| format!("{}: a value in {}", one.name, one.unit)).collect();
+    SettingProblem::EffectForm { form: format!("{{{}}}", names.join(", ")) }
+}
+
+fn read(parameter: &EffectParameter, value: &ValueText) -> Result<f64, SettingProblem> {
+    let unit = parameter.unit.as_ref();
+    let ratio = matches!(unit, "1" | "kg/kg");
+    match value {
+        ValueText::Number(number) if ratio => Ok(*number),
+        ValueText::Number(value) => Err(SettingProblem::BareNumber { value: *value, unit: unit.to_owned() }),
+        ValueText::Text(text) => {
+            if let Some(Ok(number)) = text.trim().strip_suffix(unit).map(|number| number.trim().parse()) {
+                return Ok(number);
+            }
+            let kind = match unit {
+                "m" => Kind::Length,
+                "m2" => Kind::Area,
+                "s" => Kind::Duration,
+                "K" => Kind::TemperatureDifference,
+                "Pa" => Kind::PressureDifference,
+                "W/K" => Kind::Conductance,
+                _ if ratio => Kind::Fraction,
+                _ => return Err(SettingProblem::NotInUnit { text: text.clone(), unit: unit.to_owned() }),
+            };
+            mapper_yaml::units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The lab's redundant sensors as declared, and `faults:` below `virtual_lab`: offset, slow or stuck sensors.
+
+use crate::virtual_lab::sensors::draws::{Draws, offset_kind};
+use crate::virtual_lab::sensors::elements::{LabElement, LabElements, stream};
+use crate::virtual_lab::sensors::sensor::SensorErrors;
+use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
+use mapper_core::{BackendError, Channel, DeclaredElement, Element};
+use mapper_physics::rig::nominal_rig::NominalRig;
+use mapper_yaml::units::{Duration, Length, Quantity};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// One entry: `{channel: T2, element: 2, offset: 1.5 K}`, or with `stuck_after`, `probe_diameter` or `lag`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FaultFile {
+    /// A channel with redundant sensors.
+    channel: Channel,
+    /// Number of the sensor, from 1.
+    element: usize,
+    /// Its offset, in place of the drawn one.
+    #[serde(default)]
+    offset: Option<String>,
+    /// Run time at which the reading freezes.
+    #[serde(default)]
+    stuck_after: Option<Quantity<Duration>>,
+    /// Diameter of its tip; for T2 only.
+    #[serde(default)]
+    probe_diameter: Option<Quantity<Length>>,
+    /// Time constant of its lag.
+    #[serde(default)]
+    lag: Option<Quantity<Duration>>,
+}
+
+/// The sensors of all channels with redundant sensors.
+pub(crate) fn read(
+    files: &[FaultFile],
+    nominal: &NominalRig,
+    draws: &Draws,
+    offset_of: &BTreeMap<Channel, f64>,
+) -> Result<BTreeMap<Channel, LabElements>, BackendError> {
+    let mut lab: BTreeMap<Channel, LabElements> = nominal
+        .redundant
+        .keys()
+        .filter_map(|channel| Some((*channel, of_channel(*channel, nominal, draws)?)))
+        .collect();
+    // Settings of a channel apply to each of its sensors.
+    for (channel, offset) in offset_of {
+        let members = lab.get_mut(channel).map(|elements| &mut elements.elements);
+        members.into_iter().flatten().for_each(|member| member.errors.offset = *offset);
+    }
+    for (index, file) in files.iter().enumerate() {
+        put_in(&mut lab, index, file)?;
+    }
+    Ok(lab)
+}
+
+fn of_channel(channel: Channel, nominal: &NominalRig, draws: &Draws) -> Option<LabElements> {
+    let declared = nominal.redundant.get(&channel)?.clone();
+    let common = declared.common_offset_sigma * draws.of(channel as u64).0;
+    // Probes of equal diameter are the machine's own, whose true diameter may differ from the declared one.
+    let first_m = declared.elements.first().map(|element| element.probe_diameter_m);
+    let alike = declared.elements.iter().all(|element| Some(element.probe_diameter_m) == first_m);
+    let of_element = |(index, element): (usize, &DeclaredElement)| {
+        let errors = draws.errors(&element.declared, stream(Element { channel, number: index + 1 }));
+        LabElement {
+            errors: SensorErrors { offset: errors.offset + common, ..errors },
+            probe_diameter_m: (channel == Channel::T2 && !alike).then_some(element.probe_diameter_m),
+            lag_s: 0.0,
+            stuck_after_s: f64::INFINITY,
+        }
+    };
+    let elements = declared.elements.iter().enumerate().map(of_element).collect();
+    Some(LabElements { declared, elements })
+}
+
+fn put_in(
+    lab: &mut BTreeMap<Channel, LabElements>,
+    index: usize,
+    file: &FaultFile,
+) -> Result<(), BackendError> {
+    let key = |key: &str| format!("faults[{index}].{key}");
+    let count = lab.get(&file.channel).map_or(0, |elements| elements.elements.len());
+    let member = lab
+        .get_mut(&file.channel)
+        .and_then(|elements| elements.elements.get_mut(file.element.checked_sub(1)?));
+    let Some(member) = member else {
+        let problem = SettingProblem::NoElement { channel: file.channel, count };
+        return Err(problem.at(key(if count == 0 { "channel" } else { "element" })));
+    };
+    if let Some(text) = &file.offset {
+        let kind = offset_kind(file.channel);
+        member.errors.offset = mapper_yaml::units::parse(kind, text)
+            .map_err(|source| SettingProblem::Quantity { kind, source }.at(key("offset")))?;
+    }
+    if let Some(stuck_after) = file.stuck_after {
+        member.stuck_after_s = stuck_after.inside;
+    }
+    if let Some(diameter) = file.probe_diameter {
+        if file.channel != Channel::T2 {
+            return Err(SettingProblem::NoProbe { channel: file.channel }.at(key("probe_diameter")));
+        }
+        within(1e3 * diameter.inside, "mm", 0.0..=20.0)
+            .map_err(|problem| problem.at(key("probe_diameter")))?;
+        member.probe_diameter_m = Some(diameter.inside);
+    }
+    if let Some(lag) = file.lag {
+        within(lag.inside, "s", 0.0..=3600.0).map_err(|problem| problem.at(key("lag")))?;
+        member.lag_s = lag.inside;
+    }
+    Ok(())
+}

@@ -1,0 +1,473 @@
+//! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
+
+use crate::virtual_lab::rig::actuator::ActuatorDynamics;
+use crate::virtual_lab::rig::boundary_wander::Weather;
+use crate::virtual_lab::sensors::draws::{Draws, draw, offset_kind};
+use crate::virtual_lab::campaign_keys::drift_file::{self, DriftFile};
+use crate::virtual_lab::campaign_keys::effects_file::{EffectValues, put_in};
+use crate::virtual_lab::campaign_keys::elements_file::{self, FaultFile};
+use crate::virtual_lab::rig::precursor::SurgePrecursor;
+use crate::virtual_lab::rig::running::Lumped;
+use crate::virtual_lab::sensors::sensor::SensorErrors;
+use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
+use crate::virtual_lab::settings::{LabSettings, Start};
+use crate::virtual_lab::rig::tolerances::draw_tolerances;
+use mapper_core::{BackendError, Channel};
+use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::instruments::Instruments;
+use mapper_physics::simulation::model::Model;
+use mapper_physics::rig::nominal_rig::NominalRig;
+use mapper_physics::machine::params::Params;
+use mapper_yaml::units::{
+    Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate, Speed,
+    TemperatureRate,
+};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The keys below `virtual_lab`. All are optional.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct SettingsFile {
+    /// Name of the simulated rig, so that rig locks can be rehearsed; default none.
+    rig: Option<String>,
+    /// Samples per second; default 10 Hz.
+    sample_rate: Option<Quantity<Frequency>>,
+    /// `standstill` (cold, the default) or `settled` (in steady state at the first setpoints).
+    start: StartName,
+    /// `declared` (the default) or `none`.
+    noise: NoiseName,
+    /// `drawn` from the declared uncertainty (the default), or `none`.
+    offsets: OffsetsName,
+    /// Offsets of single channels, in their own units, instead of drawn ones.
+    offset_of: BTreeMap<Channel, String>,
+    /// Effects of the true machine that the declared one does not have.
+    effects: BTreeMap<String, EffectValues>,
+    /// Offset, slow or stuck sensors of a redundant channel.
+    faults: Vec<FaultFile>,
+    /// Drifts at run time.
+    drift: Vec<DriftFile>,
+    /// `calm` (the default) or `wandering`.
+    weather: WeatherName,
+    /// `drawn` from the campaign's tolerances, or `none` (the default).
+    tolerances: TolerancesName,
+    /// Seed of that draw, so that a machine stays the same under other noise; default: the campaign's.
+    tolerances_seed: Option<u64>,
+    /// Deviations of the machine within its tolerances, in place of a draw.
+    deviations: DeviationsFile,
+    /// How the actuators follow.
+    actuators: ActuatorsFile,
+    /// Differences of the true machine from the declared one.
+    machine: MachineFile,
+    /// Shaft speed at which the lab cuts its own air; default 1.1 times the campaign's limit.
+    trip_speed: Option<Quantity<Speed>>,
+    /// Swing of the flow in surge; default 8 %.
+    surge_swing: Option<Quantity<Fraction>>,
+    /// Fluctuations of flow and pressures before surge.
+    surge_precursor: PrecursorFile,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct PrecursorFile {
+    /// Surge margin at which it begins; default 25 %.
+    onset: Option<Quantity<Fraction>>,
+    /// Root mean square of the flow's swing at half that margin; default 0.3 %.
+    size: Option<Quantity<Fraction>>,
+    /// Exponent by which the variance grows with the inverse of the margin; default 1.
+    growth: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum StartName {
+    #[default]
+    Standstill,
+    Settled,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum NoiseName {
+    #[default]
+    Declared,
+    None,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum OffsetsName {
+    #[default]
+    Drawn,
+    None,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum WeatherName {
+    #[default]
+    Calm,
+    Wandering,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum TolerancesName {
+    Drawn,
+    #[default]
+    None,
+}
+
+/// Deviations of the machine, as a diagnosis found them.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct DeviationsFile {
+    flow_meter_gain: Option<Quantity<Fraction>>,
+    flow_map: Option<Quantity<Fraction>>,
+    compressor_efficiency: Option<Quantity<Fraction>>,
+    turbine_efficiency: Option<Quantity<Fraction>>,
+    valve_area: Option<Quantity<Fraction>>,
+    convection: Option<Quantity<Fraction>>,
+    external_convection: Option<Quantity<Fraction>>,
+    oil_conductance: Option<Quantity<Fraction>>,
+}
+
+impl DeviationsFile {
+    /// Applies them to a rig.
+    fn put_into(&self, rig: &mut Rig) -> Result<(), BackendError> {
+        let scale = |key: &str, deviation: &Option<Quantity<Fraction>>| {
+            let ratio = deviation.as_ref().map_or(0.0, |deviation| deviation.inside);
+            within(100.0 * ratio, "%", -90.0..=900.0)
+                .map_err(|problem| problem.at(format!("deviations.{key}")))?;
+            Ok::<f64, BackendError>(1.0 + ratio)
+        };
+        let params = &mut rig.model.params;
+        rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *=
+            scale("flow_meter_gain", &self.flow_meter_gain)?;
+        params.compressor.flow_scale_ratio *= scale("flow_map", &self.flow_map)?;
+        params.compressor.efficiency_scale_ratio *=
+            scale("compressor_efficiency", &self.compressor_efficiency)?;
+        params.turbine.peak_efficiency *= scale("turbine_efficiency", &self.turbine_efficiency)?;
+        params.outlet.valve_area_m2 *= scale("valve_area", &self.valve_area)?;
+        params.compressor.nusselt_coefficient *= scale("convection", &self.convection)?;
+        params.external_convection_ratio *= scale("external_convection", &self.external_convection)?;
+        params.bearing.oil_conductance_w_k *= scale("oil_conductance", &self.oil_conductance)?;
+        Ok(())
+    }
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct ActuatorsFile {
+    turbine_inlet_pressure: ActuatorFile<PressureRate>,
+    turbine_inlet_temperature: ActuatorFile<TemperatureRate>,
+    valve: ActuatorFile<RatioRate>,
+    oil_temperature: ActuatorFile<TemperatureRate>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, default, bound(deserialize = ""))]
+struct ActuatorFile<Rate: Dimension> {
+    lag: Option<Quantity<Duration>>,
+    slew: Option<Quantity<Rate>>,
+}
+
+impl<Rate: Dimension> Default for ActuatorFile<Rate> {
+    fn default() -> Self {
+        ActuatorFile { lag: None, slew: None }
+    }
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct MachineFile {
+    /// True share of the internal area before compression, alpha_A.
+    alpha_area: Option<f64>,
+    /// True diameter of the T2 probe.
+    probe_diameter: Option<Quantity<Length>>,
+    /// True conductance to the oil.
+    oil_conductance: Option<Quantity<Conductance>>,
+}
+
+/// Reads a campaign's settings for the virtual lab.
+///
+/// # Errors
+/// [`BackendError::Settings`] with the wrong key and the correct form.
+pub fn read_settings(
+    settings: &serde_json::Value,
+    nominal: &NominalRig,
+) -> Result<LabSettings, BackendError> {
+    let file: SettingsFile = match settings {
+        serde_json::Value::Null => SettingsFile::default(),
+        settings => serde_path_to_error::deserialize(settings).map_err(|error| {
+            let path = error.path().to_string();
+            SettingProblem::Form(error.into_inner()).at(path.trim_start_matches('.'))
+        })?,
+    };
+    let params = &nominal.model.params;
+    let model = Model { params: true_params(*params, &file.machine)?, ..nominal.model.clone() };
+    let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.inside);
+    within(sample_rate_hz, "Hz", 0.1..=1000.0).map_err(|problem| problem.at("sample_rate"))?;
+    let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.inside);
+    within(100.0 * surge_swing_ratio, "%", 0.0..=100.0).map_err(|problem| problem.at("surge_swing"))?;
+    let mut rig = Rig::new(model);
+    if file.tolerances == TolerancesName::Drawn {
+        draw_tolerances(&mut rig, &nominal.tolerances, file.tolerances_seed.unwrap_or(nominal.seed));
+    }
+    file.deviations.put_into(&mut rig)?;
+    put_in(&mut rig, &file.effects, &nominal.effects)?;
+    let actuators = &file.actuators;
+    let draws = Draws {
+        seed: nominal.seed,
+        noise_ratio: if file.noise == NoiseName::Declared { 1.0 } else { 0.0 },
+        drawn: file.offsets == OffsetsName::Drawn,
+    };
+    let offset_of = offsets_of(&file)?;
+    let mut lab = LabSettings {
+        model: rig.model.clone(),
+        instruments: Instruments::default(),
+        weather: match file.weather {
+            WeatherName::Calm => Weather::default(),
+            WeatherName::Wandering => Weather::drawn(nominal.seed),
+        },
+        cell: nominal.boundary,
+        rig: file.rig.clone(),
+        sample_rate_hz,
+        start: match file.start {
+            StartName::Standstill => Start::Standstill,
+            StartName::Settled => Start::Settled,
+        },
+        p3_actuator: actuators.turbine_inlet_pressure.dynamics("turbine_inlet_pressure", 0.3, 200e3)?,
+        t3_actuator: actuators.turbine_inlet_temperature.dynamics("turbine_inlet_temperature", 20.0, 10.0)?,
+        valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
+        oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
+        sensors: sensors(&offset_of, nominal, &draws),
+        redundant: elements_file::read(&file.faults, nominal, &draws, &offset_of)?,
+        uneven_at_rest: match file.offsets {
+            OffsetsName::Drawn => uneven_at_rest(nominal),
+            OffsetsName::None => BTreeMap::new(),
+        },
+        drifts: drift_file::read(&file.drift)?,
+        static_tap_pipe_diameters_m: nominal.static_tap_pipe_diameters_m.clone(),
+        trip_speed_rpm: file.trip_speed.map_or(1.1 * nominal.speed_max_rpm, |speed| speed.inside),
+        structure: Arc::new(Lumped),
+        second_order: BTreeMap::new(),
+        surge_swing_ratio,
+        surge_precursor: file.surge_precursor.precursor()?,
+        seed: nominal.seed,
+    };
+    lab.take(rig);
+    Ok(lab)
+}
+
+impl<Rate: Dimension> ActuatorFile<Rate> {
+    fn dynamics(&self, name: &str, lag_s: f64, slew_per_s: f64) -> Result<ActuatorDynamics, BackendError> {
+        let lag_s = self.lag.map_or(lag_s, |lag| lag.inside);
+        let slew_per_s = self.slew.as_ref().map_or(slew_per_s, |slew| slew.inside);
+        within(lag_s, "s", 0.0..=3600.0).map_err(|problem| problem.at(format!("actuators.{name}.lag")))?;
+        if slew_per_s <= 0.0 {
+            let problem = SettingProblem::NotPositive { value: slew_per_s, unit: rate_unit::<Rate>() };
+            return Err(problem.at(format!("actuators.{name}.slew")));
+        }
+        Ok(ActuatorDynamics { lag_s, slew_per_s })
+    }
+}
+
+impl PrecursorFile {
+    fn precursor(&self) -> Result<SurgePrecursor, BackendError> {
+        let usual = SurgePrecursor::USUAL;
+        let onset_margin_ratio = self.onset.map_or(usual.onset_margin_ratio, |onset| onset.inside);
+        let size_ratio = self.size.map_or(usual.size_ratio, |size| size.inside);
+        let growth = self.growth.unwrap_or(usual.growth);
+        for (key, value, unit, range) in [
+            ("onset", 100.0 * onset_margin_ratio, "%", 0.1..=50.0),
+            ("size", 100.0 * size_ratio, "%", 0.0..=10.0),
+            ("growth", growth, "", 0.2..=4.0),
+        ] {
+            within(value, unit, range).map_err(|problem| problem.at(format!("surge_precursor.{key}")))?;
+        }
+        Ok(SurgePrecursor { onset_margin_ratio, size_ratio, growth })
+    }
+}
+
+fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, BackendError> {
+    if let Some(alpha) = file.alpha_area {
+        within(alpha, "", 0.0..=1.0).map_err(|problem| problem.at("machine.alpha_area"))?;
+        params.compressor.alpha_area_ratio = alpha;
+    }
+    if let Some(diameter) = file.probe_diameter {
+        within(1e3 * diameter.inside, "mm", 0.0..=20.0)
+            .map_err(|problem| problem.at("machine.probe_diameter"))?;
+        params.t2_probe_diameter_m = diameter.inside;
+    }
+    if let Some(conductance) = file.oil_conductance {
+        if conductance.inside < 0.0 {
+            let problem = SettingProblem::Negative { value: conductance.inside, unit: "W/K" };
+            return Err(problem.at("machine.oil_conductance"));
+        }
+        params.bearing.oil_conductance_w_k = conductance.inside;
+    }
+    Ok(params)
+}
+
+/// Offsets of single channels, in their units.
+fn offsets_of(file: &SettingsFile) -> Result<BTreeMap<Channel, f64>, BackendError> {
+    let parse = |(channel, text): (&Channel, &String)| {
+        let kind = offset_kind(*channel);
+        let offset = mapper_yaml::units::parse(kind, text)
+            .map_err(|source| SettingProblem::Quantity { kind, source }.at(format!("offset_of.{channel}")))?;
+        Ok((*channel, offset))
+    };
+    file.offset_of.iter().map(parse).collect()
+}
+
+fn sensors(
+    offset_of: &BTreeMap<Channel, f64>,
+    nominal: &NominalRig,
+    draws: &Draws,
+) -> BTreeMap<Channel, SensorErrors> {
+    let declared = nominal.sensors.iter();
+    let mut sensors: BTreeMap<Channel, SensorErrors> =
+        declared.map(|(channel, declared)| (*channel, draws.errors(declared, *channel as u64))).collect();
+    for (channel, offset) in offset_of {
+        sensors.entry(*channel).or_default().offset = *offset;
+    }
+    sensors
+}
+
+/// Drawn from the declared non-uniformity of the soak; empty without a declaration.
+fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
+    let Some(soak) = nominal.soak else { return BTreeMap::new() };
+    // A separate stream from that of the offsets.
+    let seed = nominal.seed ^ 0x6A09_E667_F3BC_C908;
+    let drawn = |channel: Channel, sigma: f64| (channel, sigma * draw(seed, channel as u64).0);
+    let temperatures = [Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
+    let temperatures = temperatures.map(|channel| drawn(channel, soak.temperature_sigma_k));
+    let pressures = [Channel::P1, Channel::P2].map(|channel| drawn(channel, soak.pressure_sigma_pa));
+    temperatures.into_iter().chain(pressures).collect()
+}
+
+/// The storage unit of a rate.
+fn rate_unit<Rate: Dimension>() -> &'static str {
+    Rate::KIND.units().first().map_or("", |unit| unit.symbol())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mapper_core::{DeclaredUncertainty, ModelTolerances};
+    use mapper_physics::machine::params::BoundaryConditions;
+    use serde_json::json;
+
+    fn nominal() -> NominalRig {
+        let declared = DeclaredUncertainty { noise_sigma: 0.1, offset_sigma: 0.25, gain_sigma_ratio: 0.0 };
+        NominalRig {
+            model: Model::nominal(),
+            boundary: BoundaryConditions::default(),
+            speed_max_rpm: 180e3,
+            sensors: [(Channel::T1, declared), (Channel::T2, declared)].into(),
+            redundant: BTreeMap::new(),
+            static_tap_pipe_diameters_m: BTreeMap::new(),
+            soak: None,
+            tolerances: ModelTolerances::default(),
+            effects: mapper_effects::catalogue(),
+            seed: 5,
+        }
+    }
+
+    #[test]
+    fn effects_are_put_in_by_their_ids_and_values_with_units() {
+        let settings = json!({
+            "start": "settled", "weather": "wandering",
+            "effects": {
+                "area_split": 0.12, "tip_diameter": "1.5 mm", "inner_node": {"phi": 0.35, "G": "15 W/K"},
+                "bearing_friction": "1.5e-6 W s2/rad2", "flowmeter_lag": "2 s", "actuator_lag": "1.1 s", "t2_offset": "-1 K",
+            },
+        });
+        let lab = read_settings(&settings, &nominal()).unwrap();
+        let params = lab.model.params;
+        assert_eq!((params.compressor.alpha_area_ratio, params.t2_probe_diameter_m), (0.12, 1.5e-3));
+        let inner = (params.compressor.inner_capacity_ratio, params.compressor.inner_conductance_w_k);
+        assert_eq!((inner, params.bearing_friction_w_s2), ((0.35, 15.0), 1.5e-6));
+        assert_eq!(lab.instruments.path(Channel::CompressorFlow).lag_s, 2.0);
+        assert_eq!(lab.instruments.path(Channel::T2).offset, -1.0);
+        assert!((lab.p3_actuator.lag_s - 1.1).abs() < 1e-12);
+        assert!(!lab.weather.is_calm());
+    }
+
+    #[test]
+    fn settings_say_how_the_lab_differs_from_the_declared_rig() {
+        let settings = json!({
+            "sample_rate": "20 Hz", "start": "settled", "noise": "none", "offset_of": {"T2": "0.3 K"},
+            "actuators": {"turbine_inlet_pressure": {"lag": "0.5 s", "slew": "20 kPa/s"}},
+            "machine": {"alpha_area": 0.2, "probe_diameter": "1.5 mm"},
+        });
+        let lab = read_settings(&settings, &nominal()).unwrap();
+        assert_eq!(lab.sample_rate_hz, 20.0);
+        assert_eq!(lab.p3_actuator, ActuatorDynamics { lag_s: 0.5, slew_per_s: 20e3 });
+        assert_eq!(lab.model.params.compressor.alpha_area_ratio, 0.2);
+        assert_eq!(lab.model.params.t2_probe_diameter_m, 1.5e-3);
+        assert_eq!(lab.sensors[&Channel::T2].offset, 0.3);
+        assert_eq!(lab.sensors[&Channel::T2].white_sigma, 0.0);
+    }
+
+    #[test]
+    fn drifts_have_units_and_may_have_begun_before_the_run() {
+        let settings = json!({"drift": [
+            {"cause": "T2", "change": "0.5 K", "over": "4 h"},
+            {"cause": "m_c", "change": "1 %", "over": "10 h", "from": "-10 h"},
+            {"cause": "P2", "change": "400 Pa", "from": "25 min"},
+            {"cause": "fouling", "change": "-2 %", "over": "1 h"},
+            {"cause": "bearing_friction", "change": "1e-7 W s2/rad2", "over": "1 h"},
+        ]});
+        let drifts = read_settings(&settings, &nominal()).unwrap().drifts;
+        let at_the_start: Vec<f64> = drifts.iter().map(|drift| drift.at(0.0)).collect();
+        assert_eq!(at_the_start, [0.0, 0.01, 0.0, 0.0, 0.0]);
+        let after_an_hour: Vec<f64> = drifts.iter().map(|drift| drift.at(3600.0)).collect();
+        for (drift, expected) in after_an_hour.iter().zip([0.125, 0.011, 400.0, -0.02, 1e-7]) {
+            assert!((drift - expected).abs() < 1e-9 * expected.abs(), "{drift} {expected}");
+        }
+    }
+
+    #[test]
+    fn drawn_offsets_scatter_as_declared_and_belong_to_seed_and_channel() {
+        let offsets: Vec<f64> = (0..2000)
+            .map(|seed| {
+                let lab = read_settings(&json!({}), &NominalRig { seed, ..nominal() }).unwrap();
+                assert_ne!(lab.sensors[&Channel::T1].offset, lab.sensors[&Channel::T2].offset);
+                lab.sensors[&Channel::T2].offset
+            })
+            .collect();
+        let rms = (offsets.iter().map(|offset| offset * offset).sum::<f64>() / 2000.0).sqrt();
+        // A standard deviation from 2000 draws is accurate to 1.6 %.
+        assert!((rms / 0.25 - 1.0).abs() < 0.06, "{rms}");
+    }
+
+    #[test]
+    fn mistakes_name_their_key() {
+        for (settings, expected) in [
+            (json!({"sampel_rate": "10 Hz"}), "`sampel_rate`"),
+            (json!({"actuators": {"valve": {"lag": "1 K"}}}), "actuators.valve.lag"),
+            (json!({"sample_rate": "10"}), "has no unit"),
+            (json!({"sample_rate": "0 Hz"}), "sample_rate"),
+            (json!({"surge_precursor": {"onset": "80 %"}}), "surge_precursor.onset"),
+            (json!({"surge_precursor": {"growth": "1 K"}}), "surge_precursor.growth"),
+            (json!({"machine": {"alpha_area": 2}}), "machine.alpha_area"),
+            (json!({"offset_of": {"T2": "1 kPa"}}), "offset_of.T2"),
+            (json!({"actuators": {"valve": {"slew": "0 1/s"}}}), "actuators.valve.slew"),
+            (json!({"drift": [{"cause": "T9", "change": "1 K"}]}), "drift[0].cause"),
+            (json!({"drift": [{"cause": "T2", "change": "1 kPa"}]}), "drift[0].change"),
+            (json!({"drift": [{"cause": "T2", "change": "1 K", "over": "0 s"}]}), "leave `over` out"),
+            (json!({"drift": [{"cause": "fouling", "change": "-150 %"}]}), "beyond 30 %"),
+            (json!({"effects": {"area_spilt": 0.1}}), "area_split"),
+            (json!({"effects": {"area_split": 2.0}}), "is not between 0 and 0.6"),
+            (json!({"effects": {"tip_diameter": 1.5}}), "lacks its unit"),
+            (json!({"effects": {"inner_node": {"phi": 0.3}}}), "G: a value in W/K"),
+            (json!({"effects": {"inner_node": {"psi": 0.3}}}), "effects.inner_node.psi"),
+        ] {
+            let error = read_settings(&settings, &nominal()).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Drifts in the lab at run time: of a sensor, or of the machine itself.
+
+use mapper_core::{Channel, Dimension};
+use mapper_physics::machine::params::Params;
+
+/// The drifting quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drifting {
+    /// A sensor's reading; for a flow meter, its gain.
+    Sensor(Channel),
+    /// Efficiency of the compressor, relative, and the flow of its map by 0.6 of it.
+    Fouling,
+    /// Bearing power loss c omega^2: c, W s^2/rad^2.
+    BearingFriction,
+}
+
+/// One drift: a step at its begin, or a steady and unlimited change from then on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LabDrift {
+    /// The drifting quantity.
+    pub what: Drifting,
+    /// Step, or change over [`LabDrift::over_s`]; K, Pa, rpm, ratio or W s^2/rad^2.
+    pub change: f64,
+    /// Duration of the change, s; `None` is a step.
+    pub over_s: Option<f64>,
+    /// Begin, run time, s; below 0 it began before the run.
+    pub from_s: f64,
+}
+
+/// Change of the map's flow by fouling, as a share of its change of efficiency.
+const FOULING_FLOW_SHARE: f64 = 0.6;
+/// Interval between updates of a drifting machine, s.
+pub const MACHINE_HOLDS_S: f64 = 5.0;
+
+impl LabDrift {
+    /// The change at a time.
+    pub fn at(&self, t_s: f64) -> f64 {
+        match self.over_s {
+            None if t_s < self.from_s => 0.0,
+            None => self.change,
+            Some(over_s) => self.change * ((t_s - self.from_s) / over_s).max(0.0),
+        }
+    }
+
+    /// Whether the machine itself drifts.
+    pub fn is_machine(&self) -> bool {
+        !matches!(self.what, Drifting::Sensor(_))
+    }
+}
+
+/// The reading of a sensor with its drifts.
+pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading: f64) -> f64 {
+    let own = drifts.iter().filter(|drift| drift.what == Drifting::Sensor(channel));
+    own.fold(reading, |reading, drift| match channel.info().dimension {
+        Dimension::MassFlow => reading * (1.0 + drift.at(t_s)),
+        _ => reading + drift.at(t_s),
+    })
+}
+
+/// The drifted machine at a time.
+pub fn drifted_machine(drifts: &[LabDrift], mut params: Params, t_s: f64) -> Params {
+    for drift in drifts {
+        let now = drift.at(t_s);
+        match drift.what {
+            Drifting::Fouling => {
+                params.compressor.efficiency_scale_ratio *= 1.0 + now;
+                params.compressor.flow_scale_ratio *= 1.0 + FOULING_FLOW_SHARE * now;
+            }
+            Drifting::BearingFriction => params.bearing_friction_w_s2 += now,
+            Drifting::Sensor(_) => {}
+        }
+    }
+    params
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_over_a_time_goes_on_at_its_rate_and_a_step_stays() {
+        let ramp = LabDrift {
+            what: Drifting::Sensor(Channel::T2),
+            change: 0.5,
+            over_s: Some(4.0 * 3600.0),
+            from_s: 600.0,
+        };
+        assert_eq!([ramp.at(0.0), ramp.at(600.0)], [0.0, 0.0]);
+        // 0.125 K per hour, also after the four hours.
+        assert!((ramp.at(600.0 + 8.0 * 3600.0) - 1.0).abs() < 1e-12);
+        let step = LabDrift { over_s: None, ..ramp };
+        assert_eq!([step.at(599.9), step.at(600.0), step.at(1e6)], [0.0, 0.5, 0.5]);
+    }
+
+    #[test]
+    fn flows_drift_by_their_gain_and_machines_by_their_parameters() {
+        let drift = |what| LabDrift { what, change: -0.02, over_s: None, from_s: 0.0 };
+        let drifts = [drift(Drifting::Sensor(Channel::CompressorFlow)), drift(Drifting::Fouling)];
+        assert!((drifted_reading(&drifts, Channel::CompressorFlow, 1.0, 0.1) - 0.098).abs() < 1e-15);
+        assert_eq!(drifted_reading(&drifts, Channel::T2, 1.0, 400.0), 400.0);
+        let params = Params::default();
+        let now = drifted_machine(&drifts, params, 1.0).compressor;
+        assert!((now.efficiency_scale_ratio / params.compressor.efficiency_scale_ratio - 0.98).abs() < 1e-12);
+        assert!((now.flow_scale_ratio / params.compressor.flow_scale_ratio - 0.988).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,9 @@
+//! Simulated rig of the virtual lab: machine, actuators, wandering test cell, drift, surge precursors, and tolerances.
+
+pub(crate) mod actuator;
+pub(crate) mod boundary_wander;
+pub(crate) mod drift;
+pub(crate) mod inputs;
+pub(crate) mod precursor;
+pub(crate) mod running;
+pub(crate) mod tolerances;

@@ -1,0 +1,60 @@
+//! Draws from declared uncertainty: the errors of a sensor, by the seed and its own stream of random numbers.
+
+use crate::virtual_lab::sensors::sensor::SensorErrors;
+use mapper_core::{Channel, DeclaredUncertainty};
+use mapper_yaml::units::Kind;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+/// Shares of white and of first-order noise (2 s) in the declared standard deviation: 0.8 and 0.6 in quadrature.
+const WHITE_SHARE: f64 = 0.8;
+const COLOURED_SHARE: f64 = 0.6;
+const COLOURED_TIME_CONSTANT_S: f64 = 2.0;
+
+/// How sensor errors follow from declared uncertainties.
+pub(crate) struct Draws {
+    pub(crate) seed: u64,
+    /// Noise over declared noise.
+    pub(crate) noise_ratio: f64,
+    /// Whether offsets and gains are drawn; they are 0 otherwise.
+    pub(crate) drawn: bool,
+}
+
+impl Draws {
+    /// Errors of the sensor with this random stream.
+    pub(crate) fn errors(&self, declared: &DeclaredUncertainty, stream: u64) -> SensorErrors {
+        let (offset, gain) = self.of(stream);
+        SensorErrors {
+            white_sigma: self.noise_ratio * WHITE_SHARE * declared.noise_sigma,
+            coloured_sigma: self.noise_ratio * COLOURED_SHARE * declared.noise_sigma,
+            coloured_time_constant_s: COLOURED_TIME_CONSTANT_S,
+            offset: offset * declared.offset_sigma,
+            gain_ratio: gain * declared.gain_sigma_ratio,
+        }
+    }
+
+    /// Standard normal numbers for offset and gain of a stream.
+    pub(crate) fn of(&self, stream: u64) -> (f64, f64) {
+        if self.drawn { draw(self.seed, stream) } else { (0.0, 0.0) }
+    }
+}
+
+/// Two standard normal numbers that belong to one stream of one seed: for its offset and for its gain.
+pub(crate) fn draw(seed: u64, stream: u64) -> (f64, f64) {
+    // A separate stream from the sensor's noise: that one starts from the same seed with other multipliers.
+    let mixed = seed.wrapping_mul(0xA24B_AED4_963E_E407) ^ (stream + 1).wrapping_mul(0x9FB2_1C65_1E98_DF25);
+    let mut random = Pcg64::seed_from_u64(mixed);
+    (StandardNormal.sample(&mut random), StandardNormal.sample(&mut random))
+}
+
+/// The kind of an offset of a channel.
+pub(crate) fn offset_kind(channel: Channel) -> Kind {
+    match channel.info().dimension {
+        mapper_core::Dimension::RotationalSpeed => Kind::Speed,
+        mapper_core::Dimension::MassFlow => Kind::MassFlow,
+        mapper_core::Dimension::Pressure => Kind::PressureDifference,
+        mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
+        mapper_core::Dimension::Ratio => Kind::Fraction,
+    }
+}

@@ -1,0 +1,145 @@
+//! The time of a row.
+
+use crate::notation::instant::NS_PER_DAY;
+use crate::notation::table_row::Cells;
+use mapper_recording::logs::DateOrder;
+
+/// The source of a group's time.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Clock {
+    /// A counter.
+    Count { column: usize, unit_s: f64 },
+    /// Date and time of day, in one column or in two. A reading without a date begins again after `period_ns`: a day, or an hour
+    /// where the hours are not written.
+    Instant { date: Option<usize>, time: usize, order: DateOrder, period_ns: i64 },
+    /// No clock: rows have a fixed rate.
+    Rate { interval_s: f64 },
+}
+
+/// A clock, its start, and its resolution.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct GroupClock {
+    pub(crate) clock: Clock,
+    /// Clock reading at time 0, s.
+    pub(crate) zero_s: f64,
+    /// The same for dates, ns.
+    pub(crate) zero_ns: i64,
+    /// If several rows share one reading.
+    pub(crate) spread: Option<Spread>,
+    /// Whether rows are out of order and are to be sorted by time.
+    pub(crate) disordered: bool,
+}
+
+/// Rows that share a reading of the clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spread {
+    /// Seconds between them.
+    pub(crate) interval_s: f64,
+    /// Their number.
+    pub(crate) rows: usize,
+    /// How many of those that share the first reading are missing: the log began within it.
+    pub(crate) missing_at_start: usize,
+}
+
+impl Clock {
+    /// Seconds of a counter.
+    pub(crate) fn count_s(&self, cells: &dyn Cells) -> Option<f64> {
+        match self {
+            Clock::Count { column, unit_s } => Some(cells.number(*column))
+                .filter(|value| value.is_finite())
+                .map(|value| scaled(value, *unit_s)),
+            _ => None,
+        }
+    }
+
+    /// Nanoseconds of a date or a time of day.
+    pub(crate) fn instant_ns(&self, cells: &dyn Cells) -> Option<i64> {
+        let Clock::Instant { date, time, order, .. } = self else { return None };
+        let mut instant = cells.instant(*time, *order)?;
+        if let Some(date) = date {
+            instant.day = Some(cells.instant(*date, *order)?.day?);
+        }
+        Some(instant.ns())
+    }
+
+    /// Columns of the clock; a date may have its own column next to the time of day.
+    pub(crate) fn columns(&self) -> Vec<usize> {
+        match self {
+            Clock::Count { column, .. } => vec![*column],
+            Clock::Instant { date, time, .. } => date.iter().copied().chain([*time]).collect(),
+            Clock::Rate { .. } => Vec::new(),
+        }
+    }
+}
+
+/// Milliseconds are divided, so that 100 ms are 0.1 s to the last digit.
+fn scaled(value: f64, unit_s: f64) -> f64 {
+    if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s }
+}
+
+/// Reads a clock row by row.
+#[derive(Debug)]
+pub(crate) struct ClockHand {
+    clock: GroupClock,
+    rows: u64,
+    /// Time added since the start because the readings began again.
+    added_ns: i64,
+    last_ns: Option<i64>,
+    last_s: f64,
+    shared: usize,
+}
+
+impl ClockHand {
+    pub(crate) fn new(clock: GroupClock) -> Self {
+        let shared = clock.spread.map_or(0, |spread| spread.missing_at_start);
+        ClockHand { clock, rows: 0, added_ns: 0, last_ns: None, last_s: f64::NAN, shared }
+    }
+
+    /// The row's time, s; `None` if the group has no sample in it.
+    pub(crate) fn time_s(&mut self, cells: &dyn Cells) -> Option<f64> {
+        let read_s = match &self.clock.clock {
+            Clock::Rate { interval_s } => {
+                self.rows += 1;
+                return Some((self.rows - 1) as f64 * interval_s);
+            }
+            Clock::Count { .. } => self.clock.clock.count_s(cells)? - self.clock.zero_s,
+            Clock::Instant { period_ns, .. } => {
+                let ns = self.clock.clock.instant_ns(cells)?;
+                let last_ns = self.last_ns.replace(ns);
+                self.added_ns = self
+                    .added_ns
+                    .saturating_add(last_ns.map_or(0, |last| begun_again_ns(last, ns, *period_ns)));
+                ns.saturating_add(self.added_ns).saturating_sub(self.clock.zero_ns) as f64 / 1e9
+            }
+        };
+        let Some(spread) = self.clock.spread else { return Some(read_s) };
+        if !self.last_s.is_nan() {
+            self.shared = if read_s == self.last_s { self.shared + 1 } else { 0 };
+        }
+        self.last_s = read_s;
+        let rows = self.shared.min(spread.rows.saturating_sub(1)) as f64 - spread.missing_at_start as f64;
+        Some(read_s + spread.interval_s * rows)
+    }
+}
+
+/// An hour, ns: by so much local time goes back when daylight saving ends.
+pub(crate) const NS_PER_HOUR: i64 = NS_PER_DAY / 24;
+
+/// What has to be added from here on because a clock's readings began again, ns: a period where the reading has no date, an hour
+/// where local time goes back by one at the end of daylight saving; else 0.
+pub(crate) fn begun_again_ns(last_ns: i64, ns: i64, period_ns: i64) -> i64 {
+    let dated = ns >= DATED_FROM_NS;
+    let back_ns = last_ns.saturating_sub(ns);
+    match dated {
+        false if back_ns > period_ns / 2 => period_ns,
+        // Less than an hour by the time between two rows.
+        true if (NS_PER_HOUR - NS_PER_MINUTE..NS_PER_HOUR).contains(&back_ns) => NS_PER_HOUR,
+        _ => 0,
+    }
+}
+
+/// A reading from here on has a date, ns: days of the year and durations are below.
+const DATED_FROM_NS: i64 = 367 * NS_PER_DAY;
+
+/// A minute, ns: logs that are sampled less often have no transients.
+const NS_PER_MINUTE: i64 = NS_PER_HOUR / 60;

@@ -1,0 +1,393 @@
+//! Finds the clocks of a table, selects the ones to read, and assigns columns to them.
+
+use crate::columns::clock::{Clock, GroupClock, NS_PER_HOUR, Spread, begun_again_ns};
+use crate::columns::counter::{count_unit_s, is_clock_name, unit_words};
+use crate::columns::sample::{Sample, SampleRow, cells};
+use crate::columns::table_head::HeadColumn;
+use crate::notation::instant::{NS_PER_DAY, guess_order, minutes_and_seconds, parse_instant};
+use crate::notation::number::parse_number;
+use mapper_recording::logs::{DateOrder, Group, LogOptions};
+
+/// The clocks of a table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Clocks {
+    pub(crate) groups: Vec<(Group, GroupClock)>,
+    /// Group of each column; `None` for clocks.
+    pub(crate) group_of: Vec<Option<usize>>,
+    pub(crate) findings: Vec<String>,
+    /// Time 0 in nanoseconds since 1970, if there is a date.
+    pub(crate) start_time_ns: Option<u64>,
+}
+
+/// Counters above this since some epoch are actually dates, s: eleven days.
+const LONGEST_COUNT_S: f64 = 1e6;
+
+/// One row in so many may go back without more ado: a recording that was restarted.
+const BACK_SHARE: usize = 20;
+
+/// Maximum number of clocks in a table; further columns with clock names are data.
+const CLOCK_LIMIT: usize = 100;
+
+/// A candidate clock, and its readings in the first rows, s.
+#[derive(Debug, Clone)]
+struct Candidate {
+    clock: Clock,
+    at: usize,
+    readings_s: Vec<Option<f64>>,
+    dated: bool,
+}
+
+impl Candidate {
+    fn present(&self) -> impl Iterator<Item = f64> + '_ {
+        self.readings_s.iter().flatten().copied()
+    }
+
+    fn first_s(&self) -> f64 {
+        self.present().next().unwrap_or(0.0)
+    }
+
+    fn distinct(&self) -> usize {
+        let mut readings: Vec<f64> = self.present().collect();
+        readings.dedup();
+        readings.len()
+    }
+
+    /// Whether it hardly ever decreases and does increase, or runs once its rows are sorted.
+    fn runs(&self) -> bool {
+        let readings: Vec<f64> = self.present().collect();
+        // A clock with a resolution of seconds may be constant over these rows; a constant number is not a clock.
+        let moves = readings.len() < 2 || readings.first() < readings.last();
+        let runs = BACK_SHARE * self.back() <= readings.len()
+            && (moves || matches!(self.clock, Clock::Instant { .. }));
+        runs || self.is_disordered()
+    }
+
+    /// How many readings are below the one before.
+    fn back(&self) -> usize {
+        let readings: Vec<f64> = self.present().collect();
+        readings.windows(2).filter(|pair| pair[1] < pair[0]).count()
+    }
+
+    /// Whether the rows of a clock are out of order: readings go back, no two are equal, and yet each quarter of the rows is later
+    /// than the one before it, give or take the rows at its ends.
+    fn is_disordered(&self) -> bool {
+        let readings: Vec<f64> = self.present().collect();
+        let mut distinct = readings.clone();
+        distinct.sort_by(f64::total_cmp);
+        distinct.dedup();
+        let quarter = readings.len() / 4;
+        let middle = |of: &[f64]| {
+            let mut of = of.to_vec();
+            of.sort_by(f64::total_cmp);
+            of.get(of.len() / 2).copied().unwrap_or(f64::NAN)
+        };
+        let middles: Vec<f64> = readings.chunks(quarter.max(1)).take(4).map(middle).collect();
+        quarter >= 2
+            && BACK_SHARE * self.back() > readings.len()
+            && distinct.len() == readings.len()
+            && middles.windows(2).all(|pair| pair[0] < pair[1])
+    }
+
+    /// Minimum step between two readings, s.
+    fn resolution_s(&self) -> f64 {
+        let readings: Vec<f64> = self.present().collect();
+        readings
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|step| *step > 0.0)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether the other has readings in the same rows at the same pace.
+    fn runs_with(&self, other: &Candidate) -> bool {
+        let tolerance_s = 1.01 * self.resolution_s().max(other.resolution_s()).min(60.0);
+        self.readings_s.iter().zip(&other.readings_s).all(|pair| match pair {
+            (Some(a), Some(b)) => ((a - self.first_s()) - (b - other.first_s())).abs() <= tolerance_s,
+            (None, None) => true,
+            _ => false,
+        })
+    }
+}
+
+/// Finds the clocks.
+pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks, String> {
+    let mut clocks = Clocks { group_of: vec![Some(0); sample.columns.len()], ..Clocks::default() };
+    let candidates = match (options.time.as_slice(), options.rate_hz) {
+        ([], Some(rate_hz)) => {
+            clocks.findings.push(format!("clock: none, {rate_hz} samples a second as given (rate)"));
+            let clock = Clock::Rate { interval_s: 1.0 / rate_hz };
+            clocks.groups.push((
+                Group::default(),
+                GroupClock { clock, zero_s: 0.0, zero_ns: 0, spread: None, disordered: false },
+            ));
+            return Ok(clocks);
+        }
+        ([], None) => found(sample, options, &mut clocks.findings),
+        (names, _) => vec![named(names, sample, options)?],
+    };
+    let Some(first) = candidates.first() else {
+        let names: Vec<&str> = sample.columns.iter().map(|column| column.name.as_str()).take(40).collect();
+        return Err(format!(
+            "no column is a clock; name it (`time`) or give the rate (`rate: 10 Hz`); if each row is a steady point, \
+             `mapper map inspect` reads the file; the columns are {}",
+            names.join(", ")
+        ));
+    };
+    // Clocks with the same pace belong together; another pace begins another group.
+    let mut groups: Vec<Vec<&Candidate>> = vec![vec![first]];
+    for candidate in &candidates[1..] {
+        match groups.iter_mut().find(|group| group[0].runs_with(candidate)) {
+            Some(group) => group.push(candidate),
+            None => groups.push(vec![candidate]),
+        }
+    }
+    let name_of = |candidate: &Candidate| {
+        let names = candidate.clock.columns().into_iter().filter_map(|column| sample.columns.get(column));
+        names.map(|column| column.name.as_str()).collect::<Vec<_>>().join(" + ")
+    };
+    for clock in candidates.iter().flat_map(|candidate| candidate.clock.columns()) {
+        clocks.group_of[clock] = None;
+    }
+    let chosen: Vec<&Candidate> = groups.iter().map(|group| finest(group)).collect();
+    // Groups with clocks of different epochs are aligned at their first rows.
+    let is_epoch = |candidate: &Candidate| candidate.first_s().abs() > LONGEST_COUNT_S || candidate.dated;
+    let mixed = chosen.iter().any(|candidate| is_epoch(candidate) != is_epoch(chosen[0]));
+    let common_s = chosen.iter().map(|candidate| candidate.first_s()).fold(f64::INFINITY, f64::min);
+    let dated = groups
+        .iter()
+        .flatten()
+        .find(|candidate| candidate.dated && matches!(candidate.clock, Clock::Instant { .. }));
+    for (index, (group, candidate)) in groups.iter().zip(&chosen).enumerate() {
+        let epoch = is_epoch(candidate) || matches!(candidate.clock, Clock::Instant { .. });
+        let zero_s = if mixed {
+            candidate.first_s()
+        } else if epoch {
+            common_s
+        } else {
+            0.0
+        };
+        let name = if groups.len() == 1 { String::new() } else { name_of(candidate) };
+        let mut words = format!("`{}`", name_of(candidate));
+        if let Clock::Count { unit_s, .. } = candidate.clock {
+            words.push_str(&format!(", counts {}", unit_words(unit_s)));
+        }
+        let spread = spread(candidate);
+        if let Some(Spread { interval_s, rows, .. }) = spread {
+            words.push_str(&format!(
+                ", {rows} rows share each reading and are spread {interval_s:.3} s apart"
+            ));
+        }
+        let disordered = candidate.is_disordered();
+        if disordered {
+            words.push_str(", rows are out of order and are sorted by it");
+        }
+        let others: Vec<String> = group
+            .iter()
+            .filter(|other| other.at != candidate.at)
+            .map(|other| format!("`{}`", name_of(other)))
+            .collect();
+        let others = if others.is_empty() {
+            String::new()
+        } else {
+            format!("; also present: {}", others.join(" and "))
+        };
+        let of = if groups.len() == 1 { "clock".to_owned() } else { format!("clock of group `{name}`") };
+        clocks.findings.push(format!("{of}: {words}{others} (time, time_unit)"));
+        let zero_ns = (zero_s * 1e9).round();
+        let clock = GroupClock {
+            clock: candidate.clock.clone(),
+            zero_s,
+            zero_ns: exact_zero_ns(candidate, sample, zero_ns),
+            spread,
+            disordered,
+        };
+        clocks.groups.push((Group { name, clock: words }, clock));
+        if index > 0 {
+            let from = group.iter().map(|clock| clock.at).min().unwrap_or(candidate.at);
+            for of in clocks.group_of.iter_mut().skip(from).flatten() {
+                *of = index;
+            }
+        }
+    }
+    if mixed {
+        clocks.findings.push("the clocks count from different epochs: each group begins at 0 s".to_owned());
+    }
+    if let (Some(dated), Some((_, first))) = (dated, clocks.groups.first()) {
+        let start_s = dated.first_s()
+            - if matches!(first.clock, Clock::Count { .. }) {
+                chosen[0].first_s() - first.zero_s
+            } else {
+                0.0
+            };
+        let before_s = first.spread.map_or(0.0, |spread| spread.interval_s * spread.missing_at_start as f64);
+        let start_s = start_s + before_s;
+        clocks.start_time_ns = (start_s > 0.0).then_some((start_s * 1e9) as u64);
+    }
+    Ok(clocks)
+}
+
+/// Time 0 of dates to the nanosecond: that of the first row.
+fn exact_zero_ns(candidate: &Candidate, sample: &Sample<'_>, near_ns: f64) -> i64 {
+    let rows = sample.rows.iter().map(|row| SampleRow(row, sample.decimal));
+    let first = rows.filter_map(|row| candidate.clock.instant_ns(&row)).next();
+    first.filter(|ns| (*ns as f64 - near_ns).abs() < 1e6).unwrap_or(near_ns as i64)
+}
+
+/// The clock with the most distinct readings; among equals a counter, then the first.
+fn finest<'a>(group: &[&'a Candidate]) -> &'a Candidate {
+    let rank = |candidate: &Candidate| (candidate.distinct(), matches!(candidate.clock, Clock::Count { .. }));
+    let mut best = group[0];
+    for candidate in &group[1..] {
+        if rank(candidate) > rank(best) {
+            best = candidate;
+        }
+    }
+    best
+}
+
+/// The rows that share a reading, if several do.
+fn spread(candidate: &Candidate) -> Option<Spread> {
+    let readings: Vec<f64> = candidate.present().collect();
+    let runs: Vec<&[f64]> = readings.chunk_by(|a, b| a == b).collect();
+    // The first and the last may be truncated.
+    let whole = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
+    let mut lengths: Vec<usize> = whole.iter().map(|run| run.len()).collect();
+    lengths.sort_unstable();
+    let rows = *lengths.get(lengths.len() / 2)?;
+    let ticks: Vec<f64> = runs.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
+    let tick_s = ticks.iter().copied().filter(|tick| *tick > 0.0).fold(f64::INFINITY, f64::min);
+    let missing_at_start = rows.saturating_sub(runs.first().map_or(0, |run| run.len()));
+    let interval_s = tick_s / rows as f64;
+    (rows >= 2 && tick_s.is_finite()).then_some(Spread { interval_s, rows, missing_at_start })
+}
+
+fn candidate(clock: Clock, at: usize, sample: &Sample<'_>, dated: bool) -> Candidate {
+    let rows = sample.rows.iter().map(|row| SampleRow(row, sample.decimal));
+    let reading = |row: SampleRow<'_>| match &clock {
+        Clock::Instant { .. } => clock.instant_ns(&row).map(|ns| ns as f64 / 1e9),
+        _ => clock.count_s(&row),
+    };
+    let mut readings_s: Vec<Option<f64>> = rows.map(reading).collect();
+    if let Clock::Instant { period_ns, .. } = clock {
+        count_on(&mut readings_s, period_ns);
+    }
+    Candidate { clock, at, readings_s, dated }
+}
+
+/// Adds what [`begun_again_ns`] asks for.
+fn count_on(readings_s: &mut [Option<f64>], period_ns: i64) {
+    let (mut added_ns, mut last_ns) = (0, None);
+    for reading in readings_s.iter_mut().flatten() {
+        let ns = (*reading * 1e9) as i64;
+        added_ns += last_ns.map_or(0, |last| begun_again_ns(last, ns, period_ns));
+        last_ns = Some(ns);
+        *reading += added_ns as f64 / 1e9;
+    }
+}
+
+/// An hour where no cell of a column shows one, else a day, ns.
+fn period_ns(column: usize, sample: &Sample<'_>) -> i64 {
+    let hourless = cells(column, sample).all(|cell| minutes_and_seconds(cell).is_some());
+    if hourless { NS_PER_HOUR } else { NS_PER_DAY }
+}
+
+/// The clock named by the user.
+fn named(names: &[String], sample: &Sample<'_>, options: &LogOptions) -> Result<Candidate, String> {
+    let find = |name: &String| {
+        let is = |column: &HeadColumn| column.name == *name || column.header == *name;
+        sample
+            .columns
+            .iter()
+            .position(is)
+            .ok_or_else(|| format!("the column `{name}`, which `time` names, does not exist"))
+    };
+    let columns: Vec<usize> = names.iter().map(find).collect::<Result<_, _>>()?;
+    let order = options.date_order.unwrap_or_else(|| order_of(columns[0], sample).0);
+    let made = match columns.as_slice() {
+        [date, time] => {
+            let (date, time) = if shows(*time, sample, order).0 { (*time, *date) } else { (*date, *time) };
+            candidate(
+                Clock::Instant { date: Some(date), time, order, period_ns: NS_PER_DAY },
+                date.min(time),
+                sample,
+                true,
+            )
+        }
+        [column] if share(*column, sample, order) > 0.5 => candidate(
+            Clock::Instant { date: None, time: *column, order, period_ns: period_ns(*column, sample) },
+            *column,
+            sample,
+            shows(*column, sample, order).0,
+        ),
+        [column] => {
+            let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(*column, sample));
+            candidate(Clock::Count { column: *column, unit_s }, *column, sample, false)
+        }
+        _ => return Err("`time` names one column, or a date and a time of day".to_owned()),
+    };
+    if made.present().next().is_none() {
+        return Err(format!("`{}`, which `time` names, holds neither numbers nor times", names.join(" + ")));
+    }
+    Ok(made)
+}
+
+fn found(sample: &Sample<'_>, options: &LogOptions, findings: &mut Vec<String>) -> Vec<Candidate> {
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut dates: Vec<usize> = Vec::new();
+    for (at, column) in sample.columns.iter().enumerate() {
+        let (guessed, sure) = order_of(at, sample);
+        let order = options.date_order.unwrap_or(guessed);
+        if share(at, sample, order) > 0.8 {
+            let (has_date, has_time) = shows(at, sample, order);
+            if has_date && !sure && options.date_order.is_none() {
+                findings.push(format!(
+                    "date: `{}` may be read in two ways; the month is taken to stand first (date_order)",
+                    column.name
+                ));
+            }
+            if !has_time {
+                dates.push(at);
+                continue;
+            }
+            let date = dates.pop().filter(|_| !has_date);
+            let clock = Clock::Instant {
+                date,
+                time: at,
+                order: date.map_or(order, |date| options.date_order.unwrap_or(order_of(date, sample).0)),
+                period_ns: period_ns(at, sample),
+            };
+            candidates.push(candidate(clock, date.unwrap_or(at), sample, has_date || date.is_some()));
+        } else if is_clock_name(column) {
+            let unit_s = options.time_unit_s.unwrap_or_else(|| count_unit_s(at, sample));
+            let count = candidate(Clock::Count { column: at, unit_s }, at, sample, false);
+            if 2 * count.present().count() > sample.rows.len().min(4) {
+                candidates.push(count);
+            }
+        }
+    }
+    candidates.retain(Candidate::runs);
+    candidates.truncate(CLOCK_LIMIT);
+    candidates
+}
+
+fn order_of(column: usize, sample: &Sample<'_>) -> (DateOrder, bool) {
+    guess_order(cells(column, sample))
+}
+
+/// Share of cells with dates or times.
+fn share(column: usize, sample: &Sample<'_>, order: DateOrder) -> f64 {
+    let (mut instants, mut all) = (0.0, 0.0);
+    for cell in cells(column, sample) {
+        all += 1.0;
+        if parse_instant(cell, order).is_some() && parse_number(cell.as_bytes(), sample.decimal).is_none() {
+            instants += 1.0;
+        }
+    }
+    if all > 0.0 { instants / all } else { 0.0 }
+}
+
+/// Whether its cells contain a date, and a time of day.
+fn shows(column: usize, sample: &Sample<'_>, order: DateOrder) -> (bool, bool) {
+    let first = cells(column, sample).find_map(|cell| parse_instant(cell, order)).unwrap_or_default();
+    (first.day.is_some(), first.ns_of_day.is_some())
+}

@@ -1,0 +1,338 @@
+//! Names, units and the first row of data of a table, found from its first rows.
+
+use crate::notation::instant::parse_instant;
+use crate::notation::number::{is_missing, number_with_unit, read_number};
+use crate::notation::separator::typical_length;
+use mapper_recording::logs::{DateOrder, LogOptions, header_unit, split_unit};
+use std::collections::BTreeMap;
+
+/// Maximum number of columns in a table.
+pub(crate) const COLUMN_LIMIT: usize = 10_000;
+
+/// The head of a table.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct TableHead {
+    pub(crate) columns: Vec<HeadColumn>,
+    /// Index of the first row of data.
+    pub(crate) data_row: usize,
+    /// Unit behind each number of a column, where cells have one.
+    pub(crate) cell_units: BTreeMap<usize, String>,
+    /// The rows of the head, in words.
+    pub(crate) head: String,
+    pub(crate) findings: Vec<String>,
+}
+
+/// One column of it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct HeadColumn {
+    pub(crate) name: String,
+    pub(crate) header: String,
+    pub(crate) unit: Option<String>,
+    pub(crate) description: String,
+}
+
+/// Analyses the first rows of a table.
+pub(crate) fn look(rows: &[Vec<String>], decimal: u8, options: &LogOptions) -> Result<TableHead, String> {
+    let length = typical_length(rows);
+    let given_row = options.data_row.map(|row| row - 1);
+    let data_row = given_row
+        .or_else(|| first_data_row(rows, length, decimal))
+        .ok_or("no rows of numbers were found; say where they begin (`data_row`)")?;
+    let rows = &without_comment_signs(rows, data_row, length);
+    let header: Vec<usize> = header_rows(rows, data_row, length);
+    let units_row = match options.units_row {
+        Some(row) => row.checked_sub(1),
+        None => header
+            .iter()
+            .copied()
+            .filter(|row| Some(*row + 1) != options.names_row)
+            .find(|row| is_units_row(&rows[*row])),
+    };
+    let group_row = group_row(rows, &header, length);
+    // Names have letters, unless no row has.
+    let named = header.iter().any(|row| Some(*row) != units_row && has_words(&rows[*row]));
+    let others =
+        || header.iter().copied().filter(|row| Some(*row) != units_row && (!named || has_words(&rows[*row])));
+    let filled = |row: &usize| distinct(rows.get(*row));
+    // The first of the rows with the most names: rows after it hold long names.
+    let most = others().map(|row| filled(&row)).max().unwrap_or(0);
+    let names_row = options
+        .names_row
+        .map(|row| row - 1)
+        .or_else(|| others().find(|row| 10 * filled(row) >= 8 * most && most > 0));
+    let width = rows.get(data_row..).unwrap_or_default().iter().map(Vec::len).max().unwrap_or(0).max(length);
+    if width > COLUMN_LIMIT {
+        return Err(format!("it has {width} columns; at most {COLUMN_LIMIT} are read"));
+    }
+    let cell = |row: Option<usize>, column: usize| {
+        row.and_then(|row| rows.get(row)).and_then(|row| row.get(column)).map_or("", String::as_str)
+    };
+    let labels: Vec<usize> =
+        group_row.into_iter().chain(others().filter(|row| Some(*row) != names_row)).collect();
+    let distant_units = if units_row.is_none() && options.units_row.is_none() {
+        distant_units_row(rows, header.first().copied().unwrap_or(data_row), length)
+    } else {
+        None
+    };
+    let preamble = rows.get(..header.first().copied().unwrap_or(0)).unwrap_or_default();
+    let mut cell_units: BTreeMap<usize, String> = BTreeMap::new();
+    let names: Vec<String> =
+        (0..width).map(|column| split_unit(&one_line(cell(names_row, column))).0).collect();
+    let mut columns: Vec<HeadColumn> = Vec::new();
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    let mut repeated = 0;
+    for column in 0..width {
+        let header = one_line(cell(names_row, column));
+        let own_unit = cell(units_row, column).trim_matches(['[', ']', '(', ')', ' ']);
+        let (mut name, mut unit) = split_unit(&header);
+        if units_row.is_some() {
+            // `T2 (upper)` is a name if the units have their own row.
+            (name, unit) =
+                if own_unit.is_empty() && unit.is_some() { (name, unit) } else { (header.clone(), None) };
+            unit = unit.or(Some(own_unit.to_owned()).filter(|unit| !unit.is_empty()));
+        }
+        if let Some(behind) = unit_in_cells(rows.get(data_row..).unwrap_or_default(), column, decimal) {
+            unit = unit.or(Some(behind.clone()));
+            cell_units.insert(column, behind);
+        }
+        unit = unit.or_else(|| {
+            Some(cell(distant_units, column).to_owned()).filter(|unit| header_unit(unit).is_some())
+        });
+        if name.is_empty() {
+            name = format!("column {}", column + 1);
+        }
+        // The group distinguishes columns with the same name.
+        let group = group_row.map_or("", |row| label(rows, row, column));
+        if !group.is_empty() && names.iter().filter(|other| **other == name).count() > 1 {
+            name = format!("{group} {name}");
+        }
+        let count = seen.entry(name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            repeated += 1;
+            name = format!("{name} ({count})");
+        }
+        let listed = listed_name(preamble, &header);
+        let description: Vec<&str> = labels
+            .iter()
+            .map(|row| label(rows, *row, column))
+            .chain(listed)
+            .filter(|text| !text.is_empty())
+            .collect();
+        columns.push(HeadColumn { header, name, unit, description: description.join(", ") });
+    }
+    // Columns without a name and without a cell come from separators at the ends of lines.
+    let empty = |column: usize| {
+        rows.get(data_row..)
+            .unwrap_or_default()
+            .iter()
+            .all(|row| row.get(column).is_none_or(String::is_empty))
+    };
+    while columns.last().is_some_and(|column| column.header.is_empty()) && empty(columns.len() - 1) {
+        columns.pop();
+    }
+    let found = Found { names_row, units_row, distant_units, group_row, header: &header, data_row, repeated };
+    let head = head_words(&found, &columns);
+    let findings = findings(&found, &columns, cell_units.len());
+    Ok(TableHead { columns, data_row, cell_units, head, findings })
+}
+
+/// The rows of a head.
+struct Found<'a> {
+    names_row: Option<usize>,
+    units_row: Option<usize>,
+    /// Row of units that is not next to the names.
+    distant_units: Option<usize>,
+    group_row: Option<usize>,
+    header: &'a [usize],
+    data_row: usize,
+    /// How many names are repeated.
+    repeated: usize,
+}
+
+/// The rows of the head, in words.
+fn head_words(found: &Found<'_>, columns: &[HeadColumn]) -> String {
+    let row_number = |row: Option<usize>| row.map_or("none".to_owned(), |row| (row + 1).to_string());
+    let in_names = found.units_row.is_none() && columns.iter().any(|column| column.unit.is_some());
+    let units = if in_names { "in the names".to_owned() } else { row_number(found.units_row) };
+    format!(
+        "header: names in row {}, units {}{}, data from row {} (names_row, units_row, data_row)",
+        row_number(found.names_row),
+        if found.units_row.is_some() { "in row " } else { "" },
+        units,
+        found.data_row + 1
+    )
+}
+
+/// Everything else about the head, in words.
+fn findings(found: &Found<'_>, columns: &[HeadColumn], cell_units: usize) -> Vec<String> {
+    let mut findings = Vec::new();
+    if let Some(row) = found.distant_units.filter(|_| columns.iter().any(|column| column.unit.is_some())) {
+        findings.push(format!("units of columns without one are in row {}", row + 1));
+    }
+    if cell_units > 0 {
+        findings.push(format!("{} columns have their unit behind each number", cell_units));
+    }
+    let before = found.group_row.or(found.header.first().copied()).unwrap_or(found.data_row);
+    if before > 0 {
+        findings.push(format!("{before} rows before the header are passed over"));
+    }
+    if found.repeated > 0 {
+        findings
+            .push(format!("{} names are repeated; the later ones are numbered: `name (2)`", found.repeated));
+    }
+    findings
+}
+
+/// The long name that a list of channels above the table gives: the cell behind the one that holds the name.
+fn listed_name<'a>(preamble: &'a [Vec<String>], name: &str) -> Option<&'a str> {
+    let row =
+        preamble.iter().find(|row| !name.is_empty() && row.first().is_some_and(|first| first == name))?;
+    row.get(1).map(String::as_str).filter(|text| text.chars().any(char::is_alphabetic))
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Rows whose header is without the signs by which programs mark it as a comment: `# time, p2`, `% t`, `// t`.
+fn without_comment_signs(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<Vec<String>> {
+    let mut rows = rows.to_vec();
+    for row in rows.iter_mut().take(data_row) {
+        let Some(first) = row.first() else { continue };
+        let bare = first.trim_start_matches(['#', '%', '/']).trim_start().to_owned();
+        if bare.len() == first.len() || header_unit(first).is_some() {
+            continue;
+        }
+        if bare.is_empty() && row.len() > length {
+            row.remove(0);
+        } else if let (Some(first), false) = (row.first_mut(), bare.is_empty()) {
+            *first = bare;
+        }
+    }
+    rows
+}
+
+/// The row of groups above the header: words that stand apart, each over the first of its columns.
+fn group_row(rows: &[Vec<String>], header: &[usize], length: usize) -> Option<usize> {
+    let row = header.first()?.checked_sub(1)?;
+    let cells = rows.get(row)?;
+    let filled: Vec<usize> = (0..cells.len()).filter(|column| !cells[*column].is_empty()).collect();
+    let apart = filled.windows(2).all(|pair| pair[1] > pair[0] + 1);
+    // A row of the preamble has a name, and its value next to it.
+    let groups = filled.len() > 1 && apart;
+    let words = filled.iter().all(|column| cells[*column].chars().any(char::is_alphabetic));
+    (groups && words && cells.len() <= length && 2 * filled.len() < length).then_some(row)
+}
+
+/// The last row of units above `before` that is as long as the table.
+fn distant_units_row(rows: &[Vec<String>], before: usize, length: usize) -> Option<usize> {
+    let filled = |row: &[String]| row.iter().filter(|cell| !cell.is_empty()).count();
+    (0..before.min(rows.len())).rev().find(|row| {
+        let row = &rows[*row];
+        row.len() + 2 >= length && 2 * filled(row) > length && is_units_row(row)
+    })
+}
+
+/// The unit behind the numbers of a column; `None` where cells have none or several.
+fn unit_in_cells(rows: &[Vec<String>], column: usize, decimal: u8) -> Option<String> {
+    let cells = rows.iter().filter_map(|row| row.get(column)).filter(|cell| !is_missing(cell.as_bytes()));
+    let (mut unit, mut with, mut all) = (None, 0usize, 0usize);
+    for cell in cells {
+        all += 1;
+        let Some((_, found)) = number_with_unit(cell, decimal) else { continue };
+        with += 1;
+        if *unit.get_or_insert(found) != found {
+            return None;
+        }
+    }
+    unit.filter(|_| 2 * with > all).map(str::to_owned)
+}
+
+/// Cells of a row of labels; a row of groups names only the first column of each.
+fn label(rows: &[Vec<String>], row: usize, column: usize) -> &str {
+    let Some(cells) = rows.get(row) else { return "" };
+    let sparse = 2 * cells.iter().filter(|cell| !cell.is_empty()).count() < cells.len();
+    let own = cells.get(column).map_or("", String::as_str);
+    if !own.is_empty() || !sparse {
+        return own;
+    }
+    cells.get(..column).unwrap_or_default().iter().rfind(|cell| !cell.is_empty()).map_or("", String::as_str)
+}
+
+fn distinct(row: Option<&Vec<String>>) -> usize {
+    let mut cells: Vec<&String> = row.into_iter().flatten().filter(|cell| !cell.is_empty()).collect();
+    cells.sort();
+    cells.dedup();
+    cells.len()
+}
+
+fn is_units_row(row: &[String]) -> bool {
+    let filled: Vec<&String> = row.iter().filter(|cell| !cell.is_empty()).collect();
+    let units = filled
+        .iter()
+        .filter(|cell| header_unit(cell).is_some() || header_unit(cell.trim_matches(['(', ')'])).is_some());
+    let units = units.count();
+    units > 0 && 2 * units >= filled.len()
+}
+
+fn header_rows(rows: &[Vec<String>], data_row: usize, length: usize) -> Vec<usize> {
+    let like_a_header = |row: &usize| {
+        let cells = &rows[*row];
+        let filled = cells.iter().filter(|cell| !cell.is_empty()).count();
+        // A row of the preamble has a name and a value.
+        cells.len() + 2 >= length && (filled > 2 || filled + 1 >= length)
+    };
+    // Something may stand between the header and the data, as the title of a section.
+    let is_header = |row: &usize| like_a_header(row) && has_words(&rows[*row]);
+    let end = (0..data_row.min(rows.len())).rev().find(is_header).map_or(0, |last| last + 1);
+    let mut header: Vec<usize> = (0..end).rev().take_while(like_a_header).take(6).collect();
+    header.reverse();
+    header
+}
+
+fn has_words(row: &[String]) -> bool {
+    row.iter().any(|cell| cell.chars().any(char::is_alphabetic))
+}
+
+fn first_data_row(rows: &[Vec<String>], length: usize, decimal: u8) -> Option<usize> {
+    let mut data: Vec<bool> = rows.iter().map(|row| is_data(row, length, decimal)).collect();
+    // Rows of a preamble may hold numbers behind a name, where the table's own rows have a number or a time in that place.
+    let valued: Vec<bool> = (0..length).map(|column| holds_values(rows, &data, column, decimal)).collect();
+    for (row, is) in rows.iter().zip(&mut data) {
+        let word = |(column, cell): (usize, &String)| {
+            valued.get(column) == Some(&true) && !is_missing(cell.as_bytes()) && !is_value(cell, decimal)
+        };
+        *is &= !row.iter().enumerate().any(word);
+    }
+    (0..rows.len()).find(|row| {
+        let following = data.get(*row..(*row + 10).min(data.len())).unwrap_or_default();
+        data[*row] && 10 * following.iter().filter(|is| **is).count() >= 8 * following.len()
+    })
+}
+
+/// Whether nearly all rows of data have a number or a time in a column.
+fn holds_values(rows: &[Vec<String>], data: &[bool], column: usize, decimal: u8) -> bool {
+    let cells = rows.iter().zip(data).filter(|(_, is)| **is).filter_map(|(row, _)| row.get(column));
+    let (mut values, mut all) = (0usize, 0usize);
+    for cell in cells.filter(|cell| !is_missing(cell.as_bytes())) {
+        all += 1;
+        values += usize::from(is_value(cell, decimal));
+    }
+    all >= 10 && 10 * values >= 9 * all
+}
+
+fn is_value(cell: &str, decimal: u8) -> bool {
+    read_number(cell, decimal).is_some()
+        || parse_instant(cell, DateOrder::DayFirst).is_some()
+        || parse_instant(cell, DateOrder::MonthFirst).is_some()
+}
+
+fn is_data(row: &[String], length: usize, decimal: u8) -> bool {
+    let filled = row.iter().filter(|cell| !is_missing(cell.as_bytes()));
+    let (mut values, mut words) = (0, 0);
+    for cell in filled {
+        *(if is_value(cell, decimal) { &mut values } else { &mut words }) += 1;
+    }
+    row.len() + 2 >= length && values > 0 && values >= words
+}

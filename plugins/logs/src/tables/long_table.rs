@@ -1,0 +1,214 @@
+//! Tables in long form: each row has a time, the name of a quantity, and its value. They are read as if each quantity had a column.
+
+use crate::notation::instant::{Instant, parse_instant};
+use crate::notation::number::{is_missing, number_in, read_number};
+use crate::notation::table_row::{Cells, Rows};
+use crate::tables::row_stream::RowStream;
+use crate::tables::table_log::Table;
+use mapper_recording::logs::{DateOrder, LogError, header_unit};
+use std::collections::BTreeSet;
+
+/// Maximum number of quantities.
+const NAME_LIMIT: usize = 1000;
+
+/// Minimum rows of the sample per quantity; with fewer the column does not contain names.
+const REPEATS: usize = 3;
+
+/// Where a column names the quantity, the name changes from row to row in at least this share of the rows. A column with the state
+/// of a stand keeps its word for many rows.
+const CHANGES: f64 = 0.5;
+
+/// Maximum further numbers in a row, such as a quality, in addition to time, name and value.
+const FURTHER_NUMBERS: usize = 2;
+
+/// Columns of a table in long form.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LongForm {
+    /// Time, in one column or in two.
+    clock: Vec<usize>,
+    name: usize,
+    value: usize,
+    /// First row of data in the file.
+    data_row: usize,
+    /// Header of the table with a column for each quantity: the clock, then names with units.
+    header: Vec<String>,
+    /// The quantities in the order of their columns.
+    names: Vec<String>,
+}
+
+impl LongForm {
+    /// Recognises a table in long form; `table` is what the sample gives when it is read unchanged.
+    pub(crate) fn find(rows: &[Vec<String>], table: &Table, decimal: u8) -> Option<LongForm> {
+        let data_row = table.data_row();
+        let data = rows.get(data_row..)?;
+        let header = rows.get(data_row.checked_sub(1)?)?;
+        let clock = table.clock_columns();
+        let column = |at: usize| {
+            data.iter().filter_map(move |row| row.get(at)).filter(|cell| !is_missing(cell.as_bytes()))
+        };
+        let is_number = |at: usize| {
+            let (numbers, all) = column(at).fold((0usize, 0usize), |(numbers, all), cell| {
+                (numbers + usize::from(read_number(cell, decimal).is_some()), all + 1)
+            });
+            all > 0 && 10 * numbers >= 9 * all
+        };
+        let others: Vec<usize> = (0..header.len()).filter(|at| !clock.contains(at)).collect();
+        let (numbers, words): (Vec<usize>, Vec<usize>) = others.into_iter().partition(|at| is_number(*at));
+        let distinct = |at: usize| column(at).collect::<BTreeSet<_>>().len();
+        let is_unit = |at: usize| column(at).all(|cell| header_unit(cell).is_some());
+        let name = words.iter().copied().filter(|at| !is_unit(*at)).max_by_key(|at| distinct(*at))?;
+        let value = numbers.iter().copied().max_by_key(|at| distinct(*at))?;
+        let count = distinct(name);
+        let names_of_rows: Vec<&String> = column(name).collect();
+        let changes = names_of_rows.windows(2).filter(|pair| pair[0] != pair[1]).count() as f64;
+        if changes < CHANGES * names_of_rows.len() as f64
+            || numbers.len() > 1 + FURTHER_NUMBERS
+            || clock.is_empty()
+            || !(2..=NAME_LIMIT).contains(&count)
+            || REPEATS * count > data.len()
+        {
+            return None;
+        }
+        let unit = words.iter().copied().find(|at| is_unit(*at) && column(*at).next().is_some());
+        let mut names: Vec<String> = Vec::new();
+        let mut heads: Vec<String> =
+            vec![clock.iter().filter_map(|at| header.get(*at)).cloned().collect::<Vec<_>>().join(" ")];
+        for row in data {
+            let Some(name) = row.get(name).filter(|name| !name.is_empty() && !names.contains(name)) else {
+                continue;
+            };
+            let unit = unit.and_then(|unit| row.get(unit)).filter(|unit| !unit.is_empty());
+            heads.push(unit.map_or(name.clone(), |unit| format!("{name} [{unit}]")));
+            names.push(name.clone());
+        }
+        Some(LongForm { clock, name, value, data_row, header: heads, names })
+    }
+
+    /// In words, for what was found.
+    pub(crate) fn words(&self, rows: &[Vec<String>]) -> String {
+        let cell = |at: usize| {
+            let header = self.data_row.checked_sub(1).and_then(|row| rows.get(row));
+            header.and_then(|row| row.get(at)).map_or("", String::as_str)
+        };
+        format!(
+            "long form: `{}` names the quantity of a row and `{}` is its value; {} quantities are in the first rows, and later ones are not read",
+            cell(self.name),
+            cell(self.value),
+            self.names.len()
+        )
+    }
+
+    /// The sample with a column for each quantity.
+    pub(crate) fn wide(&self, rows: &[Vec<String>]) -> Vec<Vec<String>> {
+        let mut gathered = Gathered::new(self);
+        let mut wide = vec![self.header.clone()];
+        for row in rows.get(self.data_row..).unwrap_or_default() {
+            wide.extend(gathered.take(self, row));
+        }
+        wide.extend(gathered.rest());
+        wide
+    }
+}
+
+/// The row that is being gathered: the time, then the values.
+struct Gathered {
+    row: Vec<String>,
+    filled: bool,
+}
+
+impl Gathered {
+    fn new(form: &LongForm) -> Self {
+        Gathered { row: vec![String::new(); form.names.len() + 1], filled: false }
+    }
+
+    /// Takes a row of the file; returns the gathered row if a new one begins.
+    fn take(&mut self, form: &LongForm, row: &[String]) -> Option<Vec<String>> {
+        let cell = |at: usize| row.get(at).map_or("", String::as_str);
+        let at = form.names.iter().position(|name| name == cell(form.name))? + 1;
+        let time = form.clock.iter().map(|clock| cell(*clock)).collect::<Vec<_>>().join(" ");
+        let begins =
+            self.row.first() != Some(&time) || self.row.get(at).is_some_and(|value| !value.is_empty());
+        let done = if begins { self.rest() } else { None };
+        if let Some(place) = self.row.first_mut() {
+            *place = time;
+        }
+        if let Some(place) = self.row.get_mut(at) {
+            cell(form.value).clone_into(place);
+        }
+        self.filled = true;
+        done
+    }
+
+    /// The gathered row, if there is any.
+    fn rest(&mut self) -> Option<Vec<String>> {
+        let empty = vec![String::new(); self.row.len()];
+        let row = std::mem::replace(&mut self.row, empty);
+        std::mem::take(&mut self.filled).then_some(row)
+    }
+}
+
+/// The rows of a file in long form, gathered.
+pub(crate) struct LongRows {
+    stream: RowStream,
+    form: LongForm,
+    decimal: u8,
+    gathered: Gathered,
+    row: Vec<String>,
+    /// Rows of the file before its data that are still to be passed over; `None` before the header was returned.
+    before: Option<usize>,
+    ended: bool,
+}
+
+impl LongRows {
+    pub(crate) fn new(stream: RowStream, form: LongForm, decimal: u8) -> Self {
+        let gathered = Gathered::new(&form);
+        LongRows { stream, gathered, row: Vec::new(), before: None, ended: false, form, decimal }
+    }
+
+    fn cell(&self, column: usize) -> &str {
+        self.row.get(column).map_or("", String::as_str)
+    }
+}
+
+impl Cells for LongRows {
+    fn number(&self, column: usize) -> f64 {
+        crate::notation::number::parse_number(self.cell(column).as_bytes(), self.decimal).unwrap_or(f64::NAN)
+    }
+
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        number_in(self.cell(column), self.decimal, unit)
+    }
+
+    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
+        parse_instant(self.cell(column), order)
+    }
+}
+
+impl Rows for LongRows {
+    fn advance(&mut self) -> Result<bool, LogError> {
+        let Some(before) = &mut self.before else {
+            self.before = Some(self.form.data_row);
+            self.row.clone_from(&self.form.header);
+            return Ok(true);
+        };
+        while *before > 0 {
+            *before -= 1;
+            self.stream.advance()?;
+        }
+        while !self.ended {
+            if !self.stream.advance()? {
+                self.ended = true;
+                break;
+            }
+            if let Some(row) = self.gathered.take(&self.form, &self.stream.texts()) {
+                self.row = row;
+                return Ok(true);
+            }
+        }
+        match self.gathered.rest() {
+            Some(row) => self.row = row,
+            None => return Ok(false),
+        }
+        Ok(true)
+    }
+}

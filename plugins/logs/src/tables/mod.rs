@@ -1,0 +1,11 @@
+//! Log tables in all storage forms, presented to the reader of recordings as one stream of rows in order of time.
+
+#[cfg(any(feature = "parquet", feature = "tdms"))]
+pub(crate) mod column_rows;
+pub(crate) mod long_table;
+#[cfg(feature = "parquet")]
+pub(crate) mod record_batches;
+pub(crate) mod row_sorter;
+pub(crate) mod row_stream;
+pub(crate) mod several_tables;
+pub(crate) mod table_log;

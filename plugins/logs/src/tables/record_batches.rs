@@ -1,0 +1,195 @@
+//! Record batches of Arrow and Parquet, as the rows of one table.
+
+use crate::columns::table_head::COLUMN_LIMIT;
+use crate::notation::instant::{Instant, NS_PER_DAY};
+use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
+use crate::tables::table_log::{Origin, Table};
+use arrow_array::cast::AsArray;
+use arrow_array::temporal_conversions::MILLISECONDS;
+use arrow_array::types::{
+    ArrowPrimitiveType, Date32Type, Date64Type, DurationMicrosecondType, DurationMillisecondType,
+    DurationNanosecondType, DurationSecondType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type,
+    Int64Type, Time32MillisecondType, Time32SecondType, Time64MicrosecondType, Time64NanosecondType,
+    TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType,
+    UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{Array, RecordBatch};
+use arrow_schema::{ArrowError, DataType, Field, Schema, TimeUnit};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, RowSink};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Number of rows in the sample.
+const HEAD_ROWS: usize = 400;
+
+/// The batches of a file.
+pub(crate) type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>>>;
+
+/// Opens a file from its start: its schema and its batches.
+pub(crate) type OpenBatches = fn(&LogFile) -> Result<(Schema, Batches), LogError>;
+
+struct BatchLog {
+    file: LogFile,
+    name: &'static str,
+    open: OpenBatches,
+    table: Table,
+}
+
+/// A file of batches as a log.
+pub(crate) fn open_log(
+    name: &'static str,
+    file: &LogFile,
+    options: &LogOptions,
+    open: OpenBatches,
+) -> Result<Box<dyn Log>, LogError> {
+    options
+        .only(&["time", "time_unit", "date_order", "rate", "missing"])
+        .map_err(|why| file.content(name, why))?;
+    let (schema, batches) = contained(name, file, || open(file))?;
+    let columns = schema.fields().len();
+    if columns > COLUMN_LIMIT {
+        return Err(file.content(name, format!("it has {columns} columns; at most {COLUMN_LIMIT} are read")));
+    }
+    let chunks = BatchChunks { file, name, batches };
+    let rows = ColumnRows::new(head(&schema), chunks).texts(HEAD_ROWS)?;
+    let mut table =
+        Table::look(&rows, b'.', options, Origin::Columns).map_err(|why| file.content(name, why))?;
+    let unread = schema.fields().iter().filter(|field| !is_read(field.data_type())).count();
+    if unread > 0 {
+        let findings = &mut table.layout.findings;
+        findings
+            .push(format!("{unread} columns are left out: lists, structures, or of a type that is not read"));
+    }
+    Ok(Box::new(BatchLog { file: file.clone(), name, open, table }))
+}
+
+/// Names, and units if the metadata of any column has one.
+fn head(schema: &Schema) -> Vec<Vec<String>> {
+    let unit = |field: &Field| field.metadata().get("unit").cloned().unwrap_or_default();
+    let names = schema.fields().iter().map(|field| field.name().clone()).collect();
+    let units: Vec<String> = schema.fields().iter().map(|field| unit(field)).collect();
+    if units.iter().all(String::is_empty) { vec![names] } else { vec![names, units] }
+}
+
+impl Log for BatchLog {
+    fn layout(&self) -> &Layout {
+        &self.table.layout
+    }
+
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
+        let (schema, batches) = contained(self.name, &self.file, || (self.open)(&self.file))?;
+        let chunks = BatchChunks { file: &self.file, name: self.name, batches };
+        self.table.rows(&mut ColumnRows::new(head(&schema), chunks), wanted, sink)
+    }
+}
+
+struct BatchChunks<'a> {
+    file: &'a LogFile,
+    name: &'static str,
+    batches: Batches,
+}
+
+impl Chunks for BatchChunks<'_> {
+    fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
+        let BatchChunks { file, name, batches } = self;
+        contained(name, file, || {
+            let Some(batch) = batches.next() else { return Ok(None) };
+            let batch = batch.map_err(|error| file.content(name, error.to_string()))?;
+            Ok(Some((
+                batch.num_rows(),
+                batch.columns().iter().map(|column| chunk(column.as_ref())).collect(),
+            )))
+        })
+    }
+}
+
+/// Arrow's libraries check sizes and offsets by panicking (one damaged file in a hundred, found by flipping bytes). A panic is
+/// reported as an error of the file. Its intermediate state is dropped, never reused.
+fn contained<T>(
+    name: &'static str,
+    file: &LogFile,
+    reading: impl FnOnce() -> Result<T, LogError>,
+) -> Result<T, LogError> {
+    let damaged =
+        || file.content(name, "it is damaged: a size or an offset in it cannot be; export it again");
+    catch_unwind(AssertUnwindSafe(reading)).unwrap_or_else(|_| Err(damaged()))
+}
+
+/// Whether a column contains numbers, times or texts.
+fn is_read(data_type: &DataType) -> bool {
+    use DataType as T;
+    let number = data_type.is_integer() || matches!(data_type, T::Float32 | T::Float64 | T::Boolean);
+    let time = matches!(
+        data_type,
+        T::Timestamp(..) | T::Date32 | T::Date64 | T::Time32(_) | T::Time64(_) | T::Duration(_)
+    );
+    number || time || matches!(data_type, T::Utf8 | T::LargeUtf8 | T::Utf8View)
+}
+
+/// The values of a column; null values and other types are empty.
+fn chunk(array: &dyn Array) -> Chunk {
+    use DataType as T;
+    use TimeUnit::{Microsecond, Millisecond, Nanosecond, Second};
+    match array.data_type() {
+        T::Float64 => numbers::<Float64Type>(array, |value| value),
+        T::Float32 => numbers::<Float32Type>(array, f64::from),
+        T::Int8 => numbers::<Int8Type>(array, f64::from),
+        T::Int16 => numbers::<Int16Type>(array, f64::from),
+        T::Int32 => numbers::<Int32Type>(array, f64::from),
+        // Counts beyond 2^53 lose their last digit, as everywhere.
+        T::Int64 => numbers::<Int64Type>(array, |value| value as f64),
+        T::UInt8 => numbers::<UInt8Type>(array, f64::from),
+        T::UInt16 => numbers::<UInt16Type>(array, f64::from),
+        T::UInt32 => numbers::<UInt32Type>(array, f64::from),
+        T::UInt64 => numbers::<UInt64Type>(array, |value| value as f64),
+        // Seconds since the start.
+        T::Duration(Second) => numbers::<DurationSecondType>(array, |value| value as f64),
+        T::Duration(Millisecond) => numbers::<DurationMillisecondType>(array, |value| value as f64 / 1e3),
+        T::Duration(Microsecond) => numbers::<DurationMicrosecondType>(array, |value| value as f64 / 1e6),
+        T::Duration(Nanosecond) => numbers::<DurationNanosecondType>(array, |value| value as f64 / 1e9),
+        T::Boolean => {
+            let values = array.as_boolean();
+            Chunk::Numbers(
+                values
+                    .iter()
+                    .map(|value| value.map_or(f64::NAN, |value| f64::from(u8::from(value))))
+                    .collect(),
+            )
+        }
+        T::Timestamp(Second, _) => instants::<TimestampSecondType>(array, 1_000_000_000, true),
+        T::Timestamp(Millisecond, _) => instants::<TimestampMillisecondType>(array, 1_000_000, true),
+        T::Timestamp(Microsecond, _) => instants::<TimestampMicrosecondType>(array, 1_000, true),
+        T::Timestamp(Nanosecond, _) => instants::<TimestampNanosecondType>(array, 1, true),
+        T::Date64 => instants::<Date64Type>(array, NS_PER_DAY / (86_400 * MILLISECONDS), true),
+        T::Date32 => instants::<Date32Type>(array, NS_PER_DAY, true),
+        T::Time32(Second) => instants::<Time32SecondType>(array, 1_000_000_000, false),
+        T::Time32(_) => instants::<Time32MillisecondType>(array, 1_000_000, false),
+        T::Time64(Microsecond) => instants::<Time64MicrosecondType>(array, 1_000, false),
+        T::Time64(_) => instants::<Time64NanosecondType>(array, 1, false),
+        T::Utf8 => texts(array.as_string::<i32>().iter()),
+        T::LargeUtf8 => texts(array.as_string::<i64>().iter()),
+        T::Utf8View => texts(array.as_string_view().iter()),
+        _ => Chunk::Numbers(Vec::new()),
+    }
+}
+
+fn numbers<T: ArrowPrimitiveType>(array: &dyn Array, number: fn(T::Native) -> f64) -> Chunk {
+    Chunk::Numbers(array.as_primitive::<T>().iter().map(|value| value.map_or(f64::NAN, number)).collect())
+}
+
+/// Dates and times, in units of this many nanoseconds since 1970 or since midnight.
+fn instants<T: ArrowPrimitiveType>(array: &dyn Array, unit_ns: i64, dated: bool) -> Chunk
+where
+    i64: From<T::Native>,
+{
+    let instant = |value: T::Native| {
+        let ns = i64::from(value).checked_mul(unit_ns)?;
+        let day = dated.then(|| ns.div_euclid(NS_PER_DAY));
+        // Logs from before 1970 do not exist.
+        (ns >= 0).then_some(Instant { day, ns_of_day: Some(ns.rem_euclid(NS_PER_DAY)) })
+    };
+    Chunk::Instants(array.as_primitive::<T>().iter().map(|value| value.and_then(instant)).collect())
+}
+
+fn texts<'a>(values: impl Iterator<Item = Option<&'a str>>) -> Chunk {
+    Chunk::Texts(values.map(|value| value.unwrap_or_default().to_owned()).collect())
+}

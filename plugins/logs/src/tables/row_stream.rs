@@ -1,0 +1,145 @@
+//! The lines of a delimited file, one after the other.
+
+use crate::notation::encoding::{self, Utf16Reader};
+use crate::notation::instant::{Instant, parse_instant};
+use crate::notation::number::{number_in, parse_number};
+use crate::notation::table_row::{Cells, Rows};
+use mapper_recording::logs::{DateOrder, Encoding, LogError, LogFile};
+use std::cell::Cell;
+use std::io::{self, Read};
+use std::rc::Rc;
+
+/// Maximum length of a line, bytes: an unclosed quote would otherwise extend to the end of the file.
+const LINE_LIMIT: usize = 1 << 20;
+
+/// Notation of a delimited file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Dialect {
+    pub(crate) encoding: Encoding,
+    /// Bytes of the byte order mark.
+    pub(crate) mark: usize,
+    pub(crate) separator: u8,
+    pub(crate) decimal: u8,
+}
+
+/// Counts bytes since the last complete line.
+struct Limited<R> {
+    inner: R,
+    left: Rc<Cell<usize>>,
+}
+
+impl<R: Read> Read for Limited<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.inner.read(buffer)?;
+        let left = self.left.get().checked_sub(count);
+        self.left.set(
+            left.ok_or_else(|| io::Error::other("a line is longer than 1 MiB; is a quote never closed?"))?,
+        );
+        Ok(count)
+    }
+}
+
+/// See the module.
+pub(crate) struct RowStream {
+    file: LogFile,
+    reader: csv::Reader<Box<dyn Read>>,
+    left: Rc<Cell<usize>>,
+    dialect: Dialect,
+    record: csv::ByteRecord,
+    /// With blanks as separators, the cells that are not empty.
+    filled: Vec<usize>,
+}
+
+impl RowStream {
+    pub(crate) fn open(file: &LogFile, dialect: Dialect) -> Result<Self, LogError> {
+        Ok(Self::over(file, Box::new(file.open()?), dialect))
+    }
+
+    /// The rows in a range of the file.
+    pub(crate) fn over(file: &LogFile, mut bytes: Box<dyn Read>, dialect: Dialect) -> Self {
+        let left = Rc::new(Cell::new(LINE_LIMIT));
+        let mark = u64::try_from(dialect.mark).unwrap_or(0);
+        // An error in the mark shows at the first line.
+        drop(io::copy(&mut bytes.by_ref().take(mark), &mut io::sink()));
+        let text: Box<dyn Read> = match dialect.encoding {
+            Encoding::Utf16Le => Box::new(Utf16Reader::new(bytes, false)),
+            Encoding::Utf16Be => Box::new(Utf16Reader::new(bytes, true)),
+            Encoding::Utf8 | Encoding::Latin1 => bytes,
+        };
+        let limited: Box<dyn Read> = Box::new(Limited { inner: text, left: left.clone() });
+        let reader = csv::ReaderBuilder::new()
+            .delimiter(dialect.separator)
+            .has_headers(false)
+            .flexible(true)
+            .buffer_capacity(1 << 16)
+            .from_reader(limited);
+        RowStream {
+            file: file.clone(),
+            reader,
+            left,
+            dialect,
+            record: csv::ByteRecord::new(),
+            filled: Vec::new(),
+        }
+    }
+
+    fn cell(&self, column: usize) -> &[u8] {
+        let at = if self.dialect.separator == b' ' { self.filled.get(column).copied() } else { Some(column) };
+        at.and_then(|at| self.record.get(at)).unwrap_or_default()
+    }
+
+    /// The cells of the row as text.
+    pub(crate) fn texts(&self) -> Vec<String> {
+        let count = if self.dialect.separator == b' ' { self.filled.len() } else { self.record.len() };
+        (0..count)
+            .map(|column| encoding::text(self.cell(column), self.dialect.encoding).trim().to_owned())
+            .collect()
+    }
+}
+
+impl Cells for RowStream {
+    fn number(&self, column: usize) -> f64 {
+        parse_number(self.cell(column), self.dialect.decimal).unwrap_or(f64::NAN)
+    }
+
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        let text = encoding::text(self.cell(column), self.dialect.encoding);
+        number_in(&text, self.dialect.decimal, unit)
+    }
+
+    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
+        match std::str::from_utf8(self.cell(column)) {
+            Ok(text) => parse_instant(text, order),
+            // Names of months in Latin-1.
+            Err(_) => parse_instant(&encoding::text(self.cell(column), self.dialect.encoding), order),
+        }
+    }
+}
+
+impl Rows for RowStream {
+    /// Skips rows without any cell.
+    fn advance(&mut self) -> Result<bool, LogError> {
+        loop {
+            self.left.set(LINE_LIMIT);
+            let more = self.reader.read_byte_record(&mut self.record).map_err(|error| {
+                self.file.error(match error.into_kind() {
+                    csv::ErrorKind::Io(error) => error,
+                    other => io::Error::other(format!("{other:?}")),
+                })
+            })?;
+            if !more {
+                return Ok(false);
+            }
+            if self.dialect.separator == b' ' {
+                self.filled.clear();
+                let record = &self.record;
+                self.filled.extend(
+                    (0..record.len()).filter(|at| record.get(*at).is_some_and(|cell| !cell.is_empty())),
+                );
+            }
+            if self.record.iter().any(|cell| !cell.trim_ascii().is_empty()) {
+                return Ok(true);
+            }
+        }
+    }
+}

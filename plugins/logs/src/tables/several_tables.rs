@@ -1,0 +1,74 @@
+//! Several tables of one file as one log: the sheets of a workbook, the groups of a measurement.
+
+use crate::tables::table_log::Table;
+use mapper_recording::logs::{Layout, LogError, Row, RowSink};
+
+/// A table of the file.
+#[derive(Debug)]
+pub(crate) struct Part {
+    pub(crate) name: String,
+    pub(crate) table: Table,
+    first_group: usize,
+    first_column: usize,
+    /// Delay of its time 0 after the earliest table, s.
+    later_s: f64,
+}
+
+impl Part {
+    /// The table's columns among the wanted columns of the log, as indices of the table.
+    pub(crate) fn own(&self, wanted: &[usize]) -> Vec<usize> {
+        let columns = self.first_column..self.first_column + self.table.layout.columns.len();
+        wanted
+            .iter()
+            .filter(|column| columns.contains(column))
+            .map(|column| column - self.first_column)
+            .collect()
+    }
+
+    /// Passes a row of the table on as a row of the log.
+    pub(crate) fn give(&self, row: Row<'_>, sink: &mut RowSink<'_>) -> Result<(), LogError> {
+        sink(Row { group: row.group + self.first_group, t_s: row.t_s + self.later_s, ..row })
+    }
+}
+
+/// Puts tables side by side; `word` is the format's term for a table. Returns the layout of the log and its parts, the tables in their
+/// original order, or the errors if no table is left.
+pub(crate) fn side_by_side(
+    word: &str,
+    found: Vec<(String, Table)>,
+    problems: Vec<String>,
+) -> Result<(Layout, Vec<Part>), String> {
+    if found.is_empty() {
+        let why = if problems.is_empty() { format!("no {word} holds anything") } else { problems.join("; ") };
+        return Err(why);
+    }
+    let several = found.len() > 1;
+    let mut layout = Layout::default();
+    let starts: Option<Vec<u64>> = found.iter().map(|(_, table)| table.layout.start_time_ns).collect();
+    layout.start_time_ns = found.iter().filter_map(|(_, table)| table.layout.start_time_ns).min();
+    let mut parts = Vec::new();
+    for (index, (name, mut table)) in found.into_iter().enumerate() {
+        let (first_group, first_column) = (layout.groups.len(), layout.columns.len());
+        for group in &table.layout.groups {
+            let mut group = group.clone();
+            group.name = match (several, group.name.is_empty()) {
+                (false, _) => group.name,
+                (true, true) => name.clone(),
+                (true, false) => format!("{name}: {}", group.name),
+            };
+            layout.groups.push(group);
+        }
+        layout.columns.extend(table.layout.columns.iter().cloned().map(|mut column| {
+            column.group += first_group;
+            column
+        }));
+        let findings = table.layout.findings.drain(..);
+        layout.findings.extend(findings.map(|finding| format!("{word} `{name}`: {finding}")));
+        // If one table has no date, all are assumed to begin together.
+        let start = starts.as_ref().and_then(|starts| starts.get(index)).copied();
+        let later_s = start.zip(layout.start_time_ns).map_or(0.0, |(own, first)| (own - first) as f64 / 1e9);
+        parts.push(Part { name, table, first_group, first_column, later_s });
+    }
+    layout.findings.extend(problems);
+    Ok((layout, parts))
+}

@@ -1,0 +1,186 @@
+//! A table as a log: its clocks, its columns, and its stream of rows.
+
+use crate::columns::clock::ClockHand;
+use crate::columns::clock_choice::{Clocks, choose};
+use crate::columns::sample::Sample;
+use crate::columns::table_head::{TableHead, look};
+use crate::notation::instant::Instant;
+use crate::notation::table_row::{Cells, Rows};
+use crate::tables::row_sorter::RowSorter;
+use mapper_recording::logs::{Column, DateOrder, Layout, LogError, LogOptions, Row, RowSink};
+use std::collections::BTreeMap;
+
+/// A group while its rows are read.
+struct Rolling {
+    group: usize,
+    hand: ClockHand,
+    /// Of a group whose rows are out of order.
+    sorter: Option<RowSorter>,
+    sources: Vec<usize>,
+    values: Vec<f64>,
+}
+
+/// A row some of whose columns have their unit behind each number.
+struct InUnits<'a> {
+    row: &'a dyn Rows,
+    units: &'a BTreeMap<usize, String>,
+}
+
+impl Cells for InUnits<'_> {
+    fn number(&self, column: usize) -> f64 {
+        match self.units.get(&column) {
+            None => self.row.number(column),
+            Some(unit) => self.row.number_in(column, unit),
+        }
+    }
+
+    fn number_in(&self, column: usize, unit: &str) -> f64 {
+        self.row.number_in(column, unit)
+    }
+
+    fn instant(&self, column: usize, order: DateOrder) -> Option<Instant> {
+        self.row.instant(column, order)
+    }
+}
+
+/// The analysis of a table.
+#[derive(Debug)]
+pub(crate) struct Table {
+    pub(crate) layout: Layout,
+    clocks: Clocks,
+    /// Column of the table for each column of the layout.
+    sources: Vec<usize>,
+    data_row: usize,
+    missing: Vec<f64>,
+    /// Unit behind each number of a column, where cells have one.
+    cell_units: BTreeMap<usize, String>,
+}
+
+/// Where a table comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// A text or a sheet: its head is in rows.
+    Rows,
+    /// A file of columns, which has no rows of a head.
+    #[cfg_attr(
+        not(any(feature = "parquet", feature = "tdms")),
+        allow(dead_code, reason = "only files of columns need it")
+    )]
+    Columns,
+    /// As `Columns`; the file gives the interval of the samples too.
+    Waveform,
+}
+
+impl Table {
+    /// Analyses the first rows of a table.
+    pub(crate) fn look(
+        rows: &[Vec<String>],
+        decimal: u8,
+        options: &LogOptions,
+        origin: Origin,
+    ) -> Result<Table, String> {
+        let TableHead { columns, data_row, cell_units, head, mut findings } = look(rows, decimal, options)?;
+        if origin == Origin::Rows {
+            findings.insert(0, head);
+        }
+        let sample = Sample { columns: &columns, rows: rows.get(data_row..).unwrap_or_default(), decimal };
+        let mut clocks = choose(&sample, options)?;
+        if origin != Origin::Waveform {
+            findings.append(&mut clocks.findings);
+        }
+        let mut layout = Layout {
+            groups: clocks.groups.iter().map(|(group, _)| group.clone()).collect(),
+            columns: Vec::new(),
+            findings,
+            start_time_ns: clocks.start_time_ns,
+        };
+        let mut sources = Vec::new();
+        for (source, column) in columns.into_iter().enumerate() {
+            let Some(group) = clocks.group_of.get(source).copied().flatten() else { continue };
+            sources.push(source);
+            layout.columns.push(Column {
+                name: column.name,
+                header: column.header,
+                unit: column.unit,
+                description: column.description,
+                group,
+            });
+        }
+        Ok(Table { layout, clocks, sources, data_row, missing: options.missing.clone(), cell_units })
+    }
+
+    /// Columns of the table with dates, times or counts.
+    pub(crate) fn clock_columns(&self) -> Vec<usize> {
+        let of = self.clocks.group_of.iter().enumerate();
+        of.filter(|(_, group)| group.is_none()).map(|(column, _)| column).collect()
+    }
+
+    /// Index of the first row of data.
+    pub(crate) fn data_row(&self) -> usize {
+        self.data_row
+    }
+
+    /// Columns of the table that are columns of the layout too, with their names.
+    pub(crate) fn named_columns(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.sources.iter().copied().zip(self.layout.columns.iter().map(|column| column.name.as_str()))
+    }
+
+    /// Returns the rows of the wanted columns; `rows` must be before the first row of the table.
+    pub(crate) fn rows(
+        &self,
+        rows: &mut dyn Rows,
+        wanted: &[usize],
+        sink: &mut RowSink<'_>,
+    ) -> Result<(), LogError> {
+        for _ in 0..self.data_row {
+            if !rows.advance()? {
+                return Ok(());
+            }
+        }
+        let mut groups: Vec<Rolling> = Vec::new();
+        for (index, (_, clock)) in self.clocks.groups.iter().enumerate() {
+            let of_group = |column: &&usize| {
+                self.layout.columns.get(**column).is_some_and(|column| column.group == index)
+            };
+            let sources: Vec<usize> = wanted
+                .iter()
+                .filter(of_group)
+                .filter_map(|column| self.sources.get(*column).copied())
+                .collect();
+            if !sources.is_empty() {
+                groups.push(Rolling {
+                    group: index,
+                    sorter: clock.disordered.then(RowSorter::default),
+                    hand: ClockHand::new(clock.clone()),
+                    sources,
+                    values: Vec::new(),
+                });
+            }
+        }
+        while rows.advance()? {
+            let row = InUnits { row: &*rows, units: &self.cell_units };
+            for rolling in &mut groups {
+                let Some(t_s) = rolling.hand.time_s(&row) else { continue };
+                rolling.values.clear();
+                for source in &rolling.sources {
+                    let value = row.number(*source);
+                    rolling.values.push(if self.missing.contains(&value) { f64::NAN } else { value });
+                }
+                match &mut rolling.sorter {
+                    None => sink(Row { group: rolling.group, t_s, values: &rolling.values })?,
+                    Some(sorter) => {
+                        if let Some((t_s, values)) = sorter.exchange(t_s, &rolling.values) {
+                            sink(Row { group: rolling.group, t_s, values: &values })?;
+                        }
+                    }
+                }
+            }
+        }
+        for rolling in groups {
+            for (t_s, values) in rolling.sorter.unwrap_or_default().rest() {
+                sink(Row { group: rolling.group, t_s, values: &values })?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,136 @@
+//! The Python package: its tests on the library that was built with everything else, and the wheel.
+
+use crate::environment::machine_offers::{Offered, with_program};
+use crate::error::Error;
+use crate::step::{command, run, say};
+use crate::{environment::python_env, workspace};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Types, style, tests and notebooks, with the package put together from its Python files and the debug build. The wheel differs in
+/// the optimisation alone; building it would double the time.
+pub fn check(offered: &Offered) -> Result<(), Error> {
+    let home = workspace::target_dir().join("python-package");
+    let package = home.join("mapper");
+    if package.exists() {
+        fs::remove_dir_all(&package).map_err(|source| Error::File { path: package.clone(), source })?;
+    }
+    copy_files(&workspace::root().join("python/python/mapper"), &package)?;
+    let library = workspace::target_dir().join("debug/lib_mapper.so");
+    copy(&library, &package.join("_mapper.abi3.so"))?;
+    let of = |arguments: &[&str]| {
+        let mut command = with_program(command(&offered.python, arguments));
+        command
+            .env("PYTHONPATH", &home)
+            .env("MPLBACKEND", "agg")
+            .current_dir(workspace::root().join("python"));
+        command
+    };
+    let tests = || {
+        run(of(&["-m", "ruff", "check", "."]))?;
+        run(of(&["-m", "mypy"]))?;
+        run(of(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))
+    };
+    // Both at once: neither keeps two processors busy.
+    let (tested, executed) = std::thread::scope(|scope| {
+        let tests = scope.spawn(tests);
+        let executed = execute_notebooks(&of);
+        (tests.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), executed)
+    });
+    tested.and(executed)
+}
+
+/// Runs every notebook in its directory; they write into temporary ones.
+fn execute_notebooks(of: &dyn Fn(&[&str]) -> Command) -> Result<(), Error> {
+    let script = "import nbformat, nbclient, sys\n\
+                  book = nbformat.read(sys.argv[1], as_version=4)\n\
+                  nbclient.NotebookClient(book, timeout=600, kernel_name='python3').execute()";
+    let notebooks = workspace::root().join("examples/notebooks");
+    for notebook in files(&notebooks)? {
+        let mut execute = of(&["-c", script, &notebook.to_string_lossy()]);
+        execute.current_dir(&notebooks);
+        run(execute)?;
+    }
+    Ok(())
+}
+
+/// Builds the wheel, adds the command to it, installs it into an empty environment and runs its tests there, with that command.
+pub fn wheel() -> Result<(), Error> {
+    let python = python_env::prepare()?;
+    let (wheels, empty) = (workspace::target_dir().join("wheels"), workspace::target_dir().join("wheel-env"));
+    for old in [&wheels, &empty] {
+        if old.exists() {
+            fs::remove_dir_all(old).map_err(|source| Error::File { path: old.clone(), source })?;
+        }
+    }
+    let folder = wheels.to_string_lossy();
+    let mut build = command(&python, &["-m", "maturin", "build", "--release", "--out", &folder]);
+    build.current_dir(workspace::root().join("python"));
+    run(build)?;
+    add_command(&python, &wheels)?;
+    run(command("python3", &["-m", "venv", &empty.to_string_lossy()]))?;
+    let mut install: Command = command(empty.join("bin/python"), &["-m", "pip", "install", "--quiet"]);
+    for wheel in files(&wheels)? {
+        install.arg(format!("{}[test]", wheel.display()));
+    }
+    run(install)?;
+    let mut tests = command(empty.join("bin/python"), &["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]);
+    tests.current_dir(workspace::root().join("python"));
+    tests.env("MAPPER_TEST_PROGRAM", empty.join("bin/mapper")).env("MPLBACKEND", "agg");
+    run(tests)?;
+    say(&format!("the wheel is in {folder}\n"));
+    Ok(())
+}
+
+/// Adds the command to the wheel in a directory, so that users without Rust have both.
+fn add_command(python: &Path, wheels: &Path) -> Result<(), Error> {
+    run(command(workspace::cargo(), &["build", "--release", "--package", "mapper-cli", "--bin", "mapper"]))?;
+    let unpacked = workspace::target_dir().join("wheel-unpacked");
+    if unpacked.exists() {
+        fs::remove_dir_all(&unpacked).map_err(|source| Error::File { path: unpacked.clone(), source })?;
+    }
+    let (into, out) = (unpacked.to_string_lossy(), wheels.to_string_lossy());
+    for wheel in files(wheels)? {
+        run(command(python, &["-m", "wheel", "unpack", &wheel.to_string_lossy(), "--dest", &into]))?;
+        fs::remove_file(&wheel).map_err(|source| Error::File { path: wheel.clone(), source })?;
+    }
+    let failed = |source| Error::File { path: unpacked.clone(), source };
+    for package in fs::read_dir(&unpacked).map_err(failed)?.flatten().map(|entry| entry.path()) {
+        let name = package.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let scripts = package.join(format!("{name}.data/scripts"));
+        fs::create_dir_all(&scripts).map_err(|source| Error::File { path: scripts.clone(), source })?;
+        copy(&workspace::target_dir().join("release/mapper"), &scripts.join("mapper"))?;
+        run(command(python, &["-m", "wheel", "pack", &package.to_string_lossy(), "--dest-dir", &out]))?;
+    }
+    Ok(())
+}
+
+fn copy_files(from: &Path, to: &Path) -> Result<(), Error> {
+    fs::create_dir_all(to).map_err(|source| Error::File { path: to.to_owned(), source })?;
+    for file in files(from)? {
+        let name = file.file_name().unwrap_or_default();
+        // A library from a development build of the package.
+        if file.extension().is_none_or(|extension| extension != "so") {
+            copy(&file, &to.join(name))?;
+        }
+    }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), Error> {
+    fs::copy(from, to).map(drop).map_err(|source| Error::File { path: from.to_owned(), source })
+}
+
+/// The plain files of a directory.
+fn files(directory: &Path) -> Result<Vec<PathBuf>, Error> {
+    let failed = |source| Error::File { path: directory.to_owned(), source };
+    let mut found: Vec<PathBuf> = fs::read_dir(directory)
+        .map_err(failed)?
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.is_file())
+        .collect();
+    found.sort();
+    Ok(found)
+}

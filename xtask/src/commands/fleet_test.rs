@@ -1,0 +1,37 @@
+//! `cargo xtask fleet-test`: the tests of fleets alone, that on a cluster with them.
+
+use crate::checks::tally::Tally;
+use crate::environment::machine_offers::{Offered, with_program};
+use crate::error::Error;
+use crate::step::{Steps, command, run};
+use crate::{
+    checks::test_programs,
+    environment::{machine, python_env},
+    workspace,
+};
+
+/// Builds, and runs what concerns fleets: the contract, the studies and the commands, and a cluster of this one machine. Unlike
+/// `cargo xtask test` it does not leave the cluster out.
+pub fn fleet_test() -> Result<(), Error> {
+    machine::need_slurm()?;
+    let offered = Offered::with(python_env::prepare()?);
+    let mut steps = Steps::default();
+    steps.run("building", || {
+        let all = ["build", "--workspace", "--all-features", "--bins", "--tests", "--quiet"];
+        run(offered.to(command(workspace::cargo(), &all)))
+    });
+    steps.run("tests", || {
+        let (mut tally, mut well) = (Tally::default(), true);
+        for tests in [
+            &["-p", "mapper-fleet", "-p", "mapper-validation", "--tests"][..],
+            &["-p", "mapper-tests", "--test", "all", "fleet"],
+        ] {
+            let arguments = [&["test", "--all-features", "--no-fail-fast"], tests].concat();
+            let tests = with_program(offered.to(command(workspace::cargo(), &arguments)));
+            well &= test_programs::run(tests, &mut tally)?;
+        }
+        test_programs::close(&tally, well);
+        if well { Ok(()) } else { Err(Error::Failed { command: "the tests".to_owned() }) }
+    });
+    steps.finish()
+}

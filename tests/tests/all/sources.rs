@@ -17,7 +17,7 @@ const RULES: &[Rule] = &[
         why: "what only a simulator knows is read by scoring alone",
     },
     Rule {
-        word: ("record::", "score"),
+        word: ("recording::", "score"),
         places: &["crates/recording/", "crates/report/", "crates/session/"],
         why: "whatever identifies, corrects or diagnoses never sees what only a simulator knows",
     },

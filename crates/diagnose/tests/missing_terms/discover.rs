@@ -31,7 +31,7 @@ const VISITS: Visits =
     Visits { speeds_rpm: &[90e3, 140e3, 60e3, 120e3, 70e3, 130e3, 80e3, 110e3, 60e3], dwell_s: 60.0 };
 
 fn ask(rig: &Rig, seed: u64) -> Diagnosed {
-    let recording = common::record_of(rig, &VISITS, seed);
+    let recording = crate::gap::common::record_of(rig, &VISITS, seed);
     // Candidates unrelated to the planted law.
     let candidates = ["tip_diameter", "flowmeter_gain"];
     diagnose(Question {
@@ -49,7 +49,7 @@ fn ask(rig: &Rig, seed: u64) -> Diagnosed {
 }
 
 fn study(visits: &Visits, effects: Vec<Arc<dyn Effect>>) -> Study {
-    let recording = common::record_of(&Rig::new(Model::nominal()), visits, 3);
+    let recording = crate::gap::common::record_of(&Rig::new(Model::nominal()), visits, 3);
     let table = Table::new(&recording).unwrap();
     Study::new(&recording, table, declared(), Model::nominal(), effects)
 }

@@ -325,3 +325,18 @@ fn the_readme_has_the_measured_errors() {
         assert_eq!([minutes, median, worst], [&theirs[2], &theirs[6], &theirs[8]], "{theirs:?}");
     }
 }
+
+/// Paths in the tables of the structure and of what to add where.
+#[test]
+fn every_file_that_the_architecture_names_exists() {
+    let text = std::fs::read_to_string(repository().join("ARCHITECTURE.md")).unwrap();
+    let quoted = text.split('`').skip(1).step_by(2);
+    let paths: Vec<_> =
+        quoted.filter(|word| word.contains('/') && !word.contains(char::is_whitespace)).collect();
+    assert!(paths.len() > 60, "{} paths", paths.len());
+    let missing: Vec<_> = paths
+        .into_iter()
+        .filter(|path| !path.starts_with('/') && !repository().join(path).exists())
+        .collect();
+    assert!(missing.is_empty(), "ARCHITECTURE.md names files that do not exist: {missing:?}");
+}

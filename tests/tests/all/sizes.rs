@@ -2,18 +2,28 @@
 
 use mapper_tests::repository;
 use mapper_tests::tree::{packages, production_lines};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 
 /// Half of all files have at most so many lines before their tests.
 const MEDIAN_LINES: usize = 120;
 /// No file has more, unless its first comment says why.
 const LONGEST_LINES: usize = 500;
 /// All of the program's own crate, tests included: what decides anything lies below it.
-/// Raised from 3000 for the eight commands of `mapper fleet` and for `mapper history fleet`, each options, one call and its words;
-/// from 3700 for `mapper map fmu` and `mapper map correct`, from 3800 for `mapper map inspect`, conversion of efficiencies and `mapper init`,
-/// from 4050 for the help by task and lines as wide as the terminal.
 const CLI_LINES: usize = 4_800;
 /// Files that are longer without saying why: to be emptied.
 const KNOWN: &[&str] = &[];
+
+/// Entries of a folder of sources, its own `mod.rs`, `lib.rs` or `main.rs` not counted: as many as a reader keeps in view.
+const FOLDER_ENTRIES: usize = 12;
+/// Folders with one file per thing.
+const ONE_FILE_PER_THING: &[&str] = &[
+    "crates/cli/src/commands",
+    "plugins/backends/src",
+    "plugins/effects/src",
+    "plugins/formats/src",
+    "plugins/logs/src",
+];
 
 /// The word by which a first comment says why a file is as long as it is.
 const REASON: &str = "One file because";
@@ -55,4 +65,30 @@ fn the_program_holds_words_and_no_decisions() {
     let lines: usize =
         cli.files.iter().map(|file| std::fs::read_to_string(file).unwrap().lines().count()).sum();
     assert!(lines <= CLI_LINES, "crates/cli has {lines} lines; what decides belongs into crates/session");
+}
+
+#[test]
+fn folders_of_sources_are_small() {
+    let mut entries: BTreeMap<PathBuf, BTreeSet<PathBuf>> = BTreeMap::new();
+    for file in packages().into_iter().flat_map(|package| package.files) {
+        let inside = file.strip_prefix(repository()).unwrap().to_owned();
+        for below in inside.ancestors().filter(|path| path.components().any(|part| part.as_os_str() == "src"))
+        {
+            let module = below.with_extension("");
+            let stem = module.file_name().unwrap().to_string_lossy().into_owned();
+            if !["src", "mod", "lib", "main"].contains(&stem.as_str()) {
+                entries.entry(below.parent().unwrap().to_owned()).or_default().insert(module);
+            }
+        }
+    }
+    assert!(entries.len() > 100, "only {} folders were found", entries.len());
+    let too_full: Vec<_> = entries
+        .iter()
+        .filter(|(folder, modules)| {
+            let one_per_thing = ONE_FILE_PER_THING.iter().any(|name| folder.ends_with(name));
+            modules.len() > FOLDER_ENTRIES && !one_per_thing
+        })
+        .map(|(folder, modules)| format!("{}: {}", folder.display(), modules.len()))
+        .collect();
+    assert!(too_full.is_empty(), "folders of more than {FOLDER_ENTRIES} modules:\n{}", too_full.join("\n"));
 }

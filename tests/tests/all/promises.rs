@@ -180,7 +180,7 @@ fn what_is_promised_is_built_and_seen() {
         .args(["--bin", "mapper", "--test", "turbine"])
         // What is built again here only answers questions about itself.
         .args(
-            ["backends", "effects", "formats", "blind", "studies"]
+            ["backends", "effects", "formats", "validation"]
                 .map(|name| format!("--config=profile.dev.package.mapper-{name}.opt-level=0")),
         )
         .env("CARGO_BUILD_BUILD_DIR", target())

@@ -1,5 +1,0 @@
-//! All integration tests of `mapper-report`: one program, since each further one would be compiled and linked by itself.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
-
-mod reference_pages;
-mod turbine;

@@ -20,6 +20,15 @@ pub struct Identified {
     json: String,
 }
 
+impl Identified {
+    /// Points of one recording of a machine.
+    pub fn of(found: Found, recorded: &Recorded, machine: String) -> Identified {
+        let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
+        let json = found.json(Some(&recorded.path), &warnings).to_string();
+        Identified { found: Arc::new(found), machine, json }
+    }
+}
+
 #[pymethods]
 impl Identified {
     /// What `mapper identify --json` prints.
@@ -80,6 +89,6 @@ fn machine_of(recorded: &[Recorded]) -> String {
     first.campaign.as_ref().map_or_else(named, |campaign| campaign.machine.name.clone())
 }
 
-fn named_method(name: String) -> Result<Method, SessionError> {
+pub fn named_method(name: String) -> Result<Method, SessionError> {
     serde_json::from_value(Value::from(name.clone())).map_err(|source| SessionError::Method { name, source })
 }

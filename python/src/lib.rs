@@ -22,7 +22,7 @@ mod _mapper {
     #[pymodule_export]
     use crate::campaign::{Campaign, write_template};
     #[pymodule_export]
-    use crate::diagnosis::diagnose;
+    use crate::diagnosis::{correct, diagnose};
     #[pymodule_export]
     use crate::error::{CampaignError, IdentificationError, MapperError, RecordingError};
     #[pymodule_export]

@@ -182,3 +182,7 @@ def test_a_gap_is_diagnosed_as_by_the_command(command: Callable[..., Any], tmp_p
     assert diagnosis.verdict == diagnosis.json["verdict"]
     assert len(diagnosis.causes) == len(diagnosis.json["candidates"])
     assert "progress" in seen
+    # Nothing was planted: the diagnosis names no cause, and the points stay as they are.
+    corrected = diagnosis.corrected()
+    assert corrected.json["correction"]["refused"] == {"reason": "no_cause"}
+    assert corrected.json["points"] == mapper.identify(run, campaign=campaign).json["points"]

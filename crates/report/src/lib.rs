@@ -18,6 +18,7 @@ mod reference_pages;
 mod test_report;
 
 pub use diagnosis::corrected_points::corrected_csv;
+pub use diagnosis::correction_text::correction_text;
 pub use diagnosis::drift_text::drift_text;
 pub use diagnosis::gap_page::{gap_page, gap_part};
 pub use diagnosis::gap_text::{gap_text, headline};

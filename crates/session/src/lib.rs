@@ -51,6 +51,7 @@ pub use analysis::calibrated_model_files::{SealedForecast, found_in};
 pub use analysis::drift::Drift;
 pub use analysis::further_results::RigFiles;
 pub use analysis::gap::Gap;
+pub use analysis::gap_correction::GapCorrection;
 pub use analysis::identification::{Identified, SoughtSurge};
 pub use analysis::results::{Results, compressor_map};
 pub use analysis::transient::{Transient, write_transient};

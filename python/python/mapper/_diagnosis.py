@@ -16,6 +16,7 @@ from mapper._campaign import Campaign
 from mapper._effect import Effect
 from mapper._progress import Progress, observer
 from mapper._recording import Recording
+from mapper._result import Result
 from mapper._run import Run
 
 
@@ -28,8 +29,9 @@ class Diagnosis:
         What ``mapper gap diagnose --json`` prints.
     """
 
-    def __init__(self, diagnosis: dict[str, Any]) -> None:
+    def __init__(self, diagnosis: dict[str, Any], correct: Callable[[str | None], tuple[str, _mapper.Identified]]) -> None:
         self.json = diagnosis
+        self._correct = correct
 
     @property
     def verdict(self) -> str:
@@ -56,6 +58,22 @@ class Diagnosis:
     def places(self) -> pd.DataFrame:
         """Locations of the gap, largest first; ``size`` is in the unit of the column ``unit``."""
         return _tables.table(self.json["where"])
+
+    def corrected(self, method: str | None = None) -> Result:
+        """Identify the recording again without the causes found, as ``mapper gap correct`` does.
+
+        The intervals contain the uncertainty of the correction. ``json["correction"]`` has each point before and after, and the reason
+        under ``refused`` where nothing was corrected: the points are then as recorded. It takes as long as the diagnosis.
+
+        Parameters
+        ----------
+        method
+            ``steady``, ``dynamic`` or ``joint``; the campaign's if none is given.
+        """
+        correction, inner = self._correct(method)
+        result = Result(inner)
+        result.json["correction"] = json.loads(correction)
+        return result
 
     @property
     def warnings(self) -> list[str]:
@@ -104,9 +122,17 @@ def diagnose(
     inner = _recorded(recording)
     reference = None if healthy is None else _recorded(healthy)
     with Progress.of(progress) as shown, TemporaryDirectory(prefix="mapper-") as scripts:
-        files = [effect.write(Path(scripts)) if isinstance(effect, Effect) else Path(effect) for effect in effects]
-        found = _mapper.diagnose(inner, campaign._inner, files, reference, observer(shown))
-    return Diagnosis(json.loads(found))
+        found = _mapper.diagnose(inner, campaign._inner, _files(effects, scripts), reference, observer(shown))
+
+    def correct(method: str | None) -> tuple[str, _mapper.Identified]:
+        with TemporaryDirectory(prefix="mapper-") as scripts:
+            return _mapper.correct(inner, campaign._inner, _files(effects, scripts), method)
+
+    return Diagnosis(json.loads(found), correct)
+
+
+def _files(effects: Sequence[Effect | str | os.PathLike[str]], scripts: str) -> list[Path]:
+    return [effect.write(Path(scripts)) if isinstance(effect, Effect) else Path(effect) for effect in effects]
 
 
 def _recorded(given: Recording | Run) -> _mapper.Recording:

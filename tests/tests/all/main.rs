@@ -38,6 +38,7 @@ mod sensors;
 mod sequences;
 mod shipped_campaign;
 mod sizes;
+mod sound_rigs;
 mod sources;
 mod speed_lines;
 mod step_numbers;

@@ -14,6 +14,7 @@ pub struct Gap {
 
 subcommands! { GapCommand:
     diagnose::Diagnose,
+    correct::Correct,
     apply::Apply,
     predict::Predict,
     blind::Blind,

@@ -3,6 +3,7 @@
 
 pub mod best_fit;
 pub mod causes;
+pub mod correction;
 pub mod diagnose;
 pub mod findings;
 pub mod gap_reduction;

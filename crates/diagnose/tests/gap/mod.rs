@@ -2,6 +2,7 @@
 
 mod catalogue;
 pub(crate) mod common;
+mod correction;
 mod diagnose;
 mod healthy;
 mod near_surge;

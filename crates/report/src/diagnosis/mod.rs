@@ -1,6 +1,7 @@
 //! Results of gap and drift diagnosis for the engineer: probable causes, next steps, checked predictions, corrected points.
 
 pub(crate) mod corrected_points;
+pub(crate) mod correction_text;
 pub(crate) mod drift_text;
 pub(crate) mod gap_next;
 pub(crate) mod gap_page;

@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 const UNUSED_REST_S: f64 = 600.0;
 
 /// Identification result of a recording.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Identified {
     /// The identified recording: joined from several files, with fused sensors and the isothermal zero subtracted.
     pub recording: Recording,

@@ -7,6 +7,7 @@ pub(crate) mod drift;
 pub(crate) mod experiments;
 pub(crate) mod further_results;
 pub(crate) mod gap;
+pub(crate) mod gap_correction;
 pub(crate) mod identification;
 pub(crate) mod results;
 pub(crate) mod transient;

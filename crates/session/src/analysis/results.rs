@@ -199,6 +199,16 @@ impl Session<'_> {
         method: Option<Method>,
         directory: &Path,
     ) -> Result<Results, SessionError> {
+        self.identified_into(recorded, directory, |recorded| self.identify(recorded, map, method))
+    }
+
+    /// The same for recordings that are identified in another way.
+    pub(crate) fn identified_into(
+        &self,
+        recorded: Vec<Recorded>,
+        directory: &Path,
+        identify: impl FnOnce(Vec<Recorded>) -> Result<Identified, SessionError>,
+    ) -> Result<Results, SessionError> {
         for name in [run_directory::POINTS, run_directory::REPORT] {
             let path = directory.join(name);
             if path.exists() {
@@ -210,7 +220,7 @@ impl Session<'_> {
         let first = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();
         let origin = Provenance::of(&recorded);
-        let identified = self.identify(recorded, map, method)?;
+        let identified = identify(recorded)?;
         std::fs::create_dir_all(directory).map_err(SessionError::file("create", directory))?;
         let (results, written) = self.written(&origin, identified, (first, further), remarks, directory)?;
         written.map(|()| results)

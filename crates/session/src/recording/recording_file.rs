@@ -10,7 +10,7 @@ use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
 use std::path::{Path, PathBuf};
 
 /// A recording, its file and its campaign.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Recorded {
     /// The file.
     pub path: PathBuf,

@@ -7,7 +7,8 @@
 use crate::gap::best_fit::fit::Fit;
 use crate::gap::findings::report::Place;
 use crate::gap::residuals::nuisance::OUTPUTS;
-use crate::gap::residuals::study::{PointState, Study, members};
+use crate::gap::residuals::point_state::PointState;
+use crate::gap::residuals::study::{Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_physics::rig::effect::Submodel;
 

@@ -1,5 +1,8 @@
 //! Model state at one instant, in map coordinates.
 
+use crate::gap::residuals::nuisance::Circumstances;
+use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
+use mapper_physics::rig::effect::Rig;
 use mapper_physics::simulation::model::{Outputs, State};
 
 /// Model state at the end of a step.
@@ -23,5 +26,61 @@ impl PointState {
             h_w_m2k: outputs.h_w_m2k,
             surge_position_ratio: outputs.surge_position_ratio,
         }
+    }
+}
+
+impl Study {
+    /// For each step, its blocks' times after its start, s, and their position on the speed line (beyond 1: surge).
+    pub(crate) fn surge_positions(
+        &self,
+        hypothesis: &Hypothesis,
+    ) -> Result<Vec<Vec<(f64, f64)>>, PredictError> {
+        let mut positions = vec![Vec::new(); self.steps.len()];
+        self.drive(hypothesis, &self.times_s, |index, _, _, _, outputs| {
+            if let Some((step, block)) = self.places[index] {
+                let since_s = self.steps[step].blocks[block].since_jump_s;
+                positions[step].push((since_s, outputs.surge_position_ratio));
+            }
+        })?;
+        Ok(positions)
+    }
+
+    /// Model state at the end of each step.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
+        Ok(self.points_beside(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
+    }
+
+    /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
+    /// temperatures.
+    ///
+    /// # Errors
+    /// [`PredictError`].
+    pub fn points_beside(
+        &self,
+        hypothesis: &Hypothesis,
+        others: &[&Hypothesis],
+    ) -> Result<Vec<(PointState, Vec<PointState>)>, PredictError> {
+        let times_s: Vec<f64> = self
+            .steps
+            .iter()
+            .map(|step| step.blocks.last().map_or(step.marker.end_s, |block| block.mean_s + block.spread_s))
+            .collect();
+        let mut rigs = Vec::with_capacity(times_s.len());
+        for step in 0..times_s.len() {
+            let of_step: Result<Vec<_>, _> = others.iter().map(|other| self.rig(other, step)).collect();
+            rigs.push(of_step?);
+        }
+        let mut points = vec![(PointState::default(), Vec::new()); times_s.len()];
+        self.drive(hypothesis, &times_s, |index, _, prepared, state, outputs| {
+            let other_point = |(rig, _): &(Rig, Circumstances)| {
+                let outputs = rig.model.prepare(prepared.boundary()).evaluate(state);
+                PointState::of(state, &outputs)
+            };
+            points[index] = (PointState::of(state, outputs), rigs[index].iter().map(other_point).collect());
+        })?;
+        Ok(points)
     }
 }

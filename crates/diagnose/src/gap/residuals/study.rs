@@ -5,7 +5,6 @@ use crate::gap::residuals::effect_timing::Course;
 pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
 use crate::gap::residuals::initial_state::{rested, with_metal_held};
 use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
-pub use crate::gap::residuals::point_state::PointState;
 use crate::gap::residuals::shape::{SHAPES, ShapedMap};
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::averages::block::{Block, block_mean, blocks};
@@ -104,9 +103,9 @@ pub struct Study {
     rested: bool,
     grid: FrozenGrid,
     /// Times at which the model is evaluated: two per block, and one at each jump.
-    times_s: Vec<f64>,
+    pub(crate) times_s: Vec<f64>,
     /// Step and block of each time; `None` at a jump.
-    places: Vec<Option<(usize, usize)>>,
+    pub(crate) places: Vec<Option<(usize, usize)>>,
     /// Row of each output in each step's blocks.
     pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
     /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
@@ -252,13 +251,23 @@ impl Study {
         }
     }
 
+    /// Start and end of the part of the recording that the model follows, s.
+    pub(crate) fn followed_s(&self) -> (f64, f64) {
+        let nodes_s = self.grid.nodes_s();
+        (nodes_s.first().copied().unwrap_or(0.0), nodes_s.last().copied().unwrap_or(0.0))
+    }
+
     /// The null hypothesis.
     pub fn nothing(&self) -> Hypothesis {
         Hypothesis { nuisances: vec![0.0; self.nuisances.len()], effects: Vec::new() }
     }
 
     /// The rig of a hypothesis in one step, and its operating circumstances.
-    fn rig(&self, hypothesis: &Hypothesis, step: usize) -> Result<(Rig, Circumstances), EffectError> {
+    pub(crate) fn rig(
+        &self,
+        hypothesis: &Hypothesis,
+        step: usize,
+    ) -> Result<(Rig, Circumstances), EffectError> {
         let mut rig = self.nominal.clone();
         let mut circumstances = Circumstances::default();
         for (index, values) in &hypothesis.effects {
@@ -307,9 +316,20 @@ impl Study {
 
     /// Drives the model of a hypothesis through the recording. `on_sample` receives the index of each of `times_s`, the rig, its
     /// circumstances, and the model state.
-    fn drive(
+    pub(crate) fn drive(
         &self,
         hypothesis: &Hypothesis,
+        times_s: &[f64],
+        on_sample: impl FnMut(usize, &(Rig, Circumstances), &PreparedModel<'_>, &State, &Outputs),
+    ) -> Result<(), PredictError> {
+        self.drive_rigs(hypothesis, |step| self.rig(hypothesis, step), times_s, on_sample)
+    }
+
+    /// The same for a rig that differs from that of the hypothesis and changes where it does.
+    fn drive_rigs(
+        &self,
+        hypothesis: &Hypothesis,
+        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
         times_s: &[f64],
         mut on_sample: impl FnMut(usize, &(Rig, Circumstances), &PreparedModel<'_>, &State, &Outputs),
     ) -> Result<(), PredictError> {
@@ -317,7 +337,7 @@ impl Study {
         let mut state: Option<State> = None;
         let mut done = 0;
         for (place, first) in stretches.iter().enumerate() {
-            let there = self.rig(hypothesis, *first)?;
+            let there = rig_in(*first)?;
             let (rig, circumstances) = &there;
             let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
             let start = match state {
@@ -352,43 +372,61 @@ impl Study {
         Ok(())
     }
 
+    /// Readings of the outputs of these rigs at `times_s`; `on_reading` receives the index of the time, of the output, and the reading.
+    pub(crate) fn read(
+        &self,
+        hypothesis: &Hypothesis,
+        rig_in: impl Fn(usize) -> Result<(Rig, Circumstances), EffectError>,
+        times_s: &[f64],
+        mut on_reading: impl FnMut(usize, usize, f64, &Circumstances),
+    ) -> Result<(), PredictError> {
+        let mut followers =
+            OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
+        let mut command: Option<LaggedCommand> = None;
+        self.drive_rigs(
+            hypothesis,
+            rig_in,
+            times_s,
+            |index, (rig, circumstances), prepared, state, outputs| {
+                let t_s = times_s[index];
+                if command.as_ref().is_none_or(|command| command.p3.lag_s != rig.instruments.p3_lag_s) {
+                    let p3 = Response { lag_s: rig.instruments.p3_lag_s, ..self.actuators.p3 };
+                    let levels = self.inputs.command.levels().to_vec();
+                    command = Some(LaggedCommand::new(levels, p3, self.actuators.valve));
+                }
+                for (output, channel) in OUTPUTS.iter().enumerate() {
+                    let seen = match &command {
+                        Some(command) if *channel == Channel::P3 => command.p3_pa(t_s),
+                        _ => true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN),
+                    };
+                    // T4 is T3' minus a temperature drop that is known only to a few per cent.
+                    let seen = if *channel == Channel::T4 {
+                        seen - circumstances.t4_drop_ratio
+                            * (outputs.turbine.t3_prime_k - outputs.turbine.t4_k)
+                    } else {
+                        seen
+                    };
+                    followers[output].turn_to(*rig.instruments.path(*channel));
+                    on_reading(index, output, followers[output].read(t_s, seen), circumstances);
+                }
+            },
+        )
+    }
+
     /// Predicts the recording.
     ///
     /// # Errors
     /// [`PredictError`] if a value is out of its range or the model cannot follow.
     pub fn predict(&self, hypothesis: &Hypothesis) -> Result<Prediction, PredictError> {
-        let mut followers =
-            OUTPUTS.map(|channel| ChannelFollower::new(*self.nominal.instruments.path(channel)));
         let mut values = vec![0.0; self.measured.len()];
         let mut delay_s = [0.0; OUTPUTS.len()];
-        let mut command: Option<LaggedCommand> = None;
-        self.drive(hypothesis, &self.times_s, |index, (rig, circumstances), prepared, state, outputs| {
+        let rig_in = |step| self.rig(hypothesis, step);
+        self.read(hypothesis, rig_in, &self.times_s, |index, output, reading, circumstances| {
             delay_s = circumstances.delay_s;
-            let t_s = self.times_s[index];
-            let place = self.places[index];
-            if command.as_ref().is_none_or(|command| command.p3.lag_s != rig.instruments.p3_lag_s) {
-                let p3 = Response { lag_s: rig.instruments.p3_lag_s, ..self.actuators.p3 };
-                let levels = self.inputs.command.levels().to_vec();
-                command = Some(LaggedCommand::new(levels, p3, self.actuators.valve));
-            }
-            for (output, channel) in OUTPUTS.iter().enumerate() {
-                let seen = match &command {
-                    Some(command) if *channel == Channel::P3 => command.p3_pa(t_s),
-                    _ => true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN),
-                };
-                // T4 is T3' minus a temperature drop that is known only to a few per cent.
-                let seen = if *channel == Channel::T4 {
-                    seen - circumstances.t4_drop_ratio * (outputs.turbine.t3_prime_k - outputs.turbine.t4_k)
-                } else {
-                    seen
-                };
-                followers[output].turn_to(*rig.instruments.path(*channel));
-                let reading = followers[output].read(t_s, seen);
-                let Some((step, block)) = place else { continue };
-                let Some(row) = self.rows[step][block][output] else { continue };
-                let single = self.steps[step].blocks[block].spread_s == 0.0;
-                values[row as usize] += if single { reading } else { 0.5 * reading };
-            }
+            let Some((step, block)) = self.places[index] else { return };
+            let Some(row) = self.rows[step][block][output] else { return };
+            let single = self.steps[step].blocks[block].spread_s == 0.0;
+            values[row as usize] += if single { reading } else { 0.5 * reading };
         })?;
         let slopes = self.slopes(&values);
         for group in &self.groups {
@@ -400,60 +438,6 @@ impl Study {
             }
         }
         Ok(Prediction { values, slopes })
-    }
-
-    /// For each step, its blocks' times after its start, s, and their position on the speed line (beyond 1: surge).
-    pub(crate) fn surge_positions(
-        &self,
-        hypothesis: &Hypothesis,
-    ) -> Result<Vec<Vec<(f64, f64)>>, PredictError> {
-        let mut positions = vec![Vec::new(); self.steps.len()];
-        self.drive(hypothesis, &self.times_s, |index, _, _, _, outputs| {
-            if let Some((step, block)) = self.places[index] {
-                let since_s = self.steps[step].blocks[block].since_jump_s;
-                positions[step].push((since_s, outputs.surge_position_ratio));
-            }
-        })?;
-        Ok(positions)
-    }
-
-    /// Model state at the end of each step.
-    ///
-    /// # Errors
-    /// [`PredictError`].
-    pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
-        Ok(self.points_beside(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
-    }
-
-    /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
-    /// temperatures.
-    ///
-    /// # Errors
-    /// [`PredictError`].
-    pub fn points_beside(
-        &self,
-        hypothesis: &Hypothesis,
-        others: &[&Hypothesis],
-    ) -> Result<Vec<(PointState, Vec<PointState>)>, PredictError> {
-        let times_s: Vec<f64> = self
-            .steps
-            .iter()
-            .map(|step| step.blocks.last().map_or(step.marker.end_s, |block| block.mean_s + block.spread_s))
-            .collect();
-        let mut rigs = Vec::with_capacity(times_s.len());
-        for step in 0..times_s.len() {
-            let of_step: Result<Vec<_>, _> = others.iter().map(|other| self.rig(other, step)).collect();
-            rigs.push(of_step?);
-        }
-        let mut points = vec![(PointState::default(), Vec::new()); times_s.len()];
-        self.drive(hypothesis, &times_s, |index, _, prepared, state, outputs| {
-            let other_point = |(rig, _): &(Rig, Circumstances)| {
-                let outputs = rig.model.prepare(prepared.boundary()).evaluate(state);
-                PointState::of(state, &outputs)
-            };
-            points[index] = (PointState::of(state, outputs), rigs[index].iter().map(other_point).collect());
-        })?;
-        Ok(points)
     }
 
     /// Slopes of predicted values, from block to block.

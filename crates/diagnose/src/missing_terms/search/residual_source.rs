@@ -4,7 +4,8 @@
 //! smooth over speed and opening, and a small free part per step. The evidence determines their size.
 
 use crate::gap::residuals::nuisance::OUTPUTS;
-use crate::gap::residuals::study::{PointState, Study};
+use crate::gap::residuals::point_state::PointState;
+use crate::gap::residuals::study::Study;
 use crate::gap::residuals::whiten::rows_of_step;
 use crate::missing_terms::search::columns::{Base, Products};
 use crate::missing_terms::search::evidence::{Posterior, weigh_process};

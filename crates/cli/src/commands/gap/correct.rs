@@ -1,0 +1,64 @@
+//! `mapper gap correct`: the map of a recording without the causes that its diagnosis names.
+
+use crate::command_line::shared_arguments::channel_map;
+use crate::commands::identify::MethodArgument;
+use crate::output::failure::Failure;
+use crate::output::{output_options, standard_output};
+use crate::registry;
+use clap::Args;
+use mapper_core::Method;
+use mapper_report::correction_text;
+use mapper_session::{Recorded, Session};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Diagnose a recording, identify it again without the causes found, and show the map before and after
+#[derive(Debug, Args)]
+pub struct Correct {
+    /// Campaign with machine, declared uncertainties and tolerances (YAML)
+    pub campaign: PathBuf,
+    /// Run directory, MCAP file, or log of another program
+    pub recording: PathBuf,
+    /// Leave the corrected points, map, pictures and report in this directory; existing files are not replaced
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Channel map: where a recording made by another program holds the rig's channels (YAML)
+    #[arg(long, value_name = "MAP")]
+    pub channels: Option<PathBuf>,
+    /// Also try a suspected effect written in rhai; may be repeated
+    #[arg(long = "effect", value_name = "FILE")]
+    pub effects: Vec<PathBuf>,
+    /// How to identify [default: the campaign's method, or joint]
+    #[arg(long, value_enum)]
+    pub method: Option<MethodArgument>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Correct {
+    /// Corrects one recording.
+    pub fn run(&self) -> Result<(), Failure> {
+        let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
+        let map = channel_map(self.channels.as_deref())?;
+        let registry = registry::registry();
+        let effects = registry.effects_with(&self.effects)?;
+        let recorded = Recorded::read(&registry, &self.recording, &map, Some(&campaign))?;
+        let progress = output_options::progress();
+        let on_event = |event: &_| progress.show(event);
+        let session = Session { on_event: &on_event, ..Session::new(&registry) };
+        let method = self.method.map(Method::from);
+        let corrected =
+            session.correct_gap(&recorded, (&campaign, &map), effects, method, self.out.as_deref())?;
+        progress.clear();
+        if self.json {
+            let warnings: Vec<String> = recorded.read.warnings.iter().map(ToString::to_string).collect();
+            return standard_output::print_json(&json!({
+                "correction": corrected.map,
+                "diagnosis": corrected.gap.json()?,
+                "identified": corrected.identified.json(Some(&recorded.path), &warnings),
+            }));
+        }
+        standard_output::print(&correction_text(&corrected.map, &corrected.gap.diagnosed.diagnosis))
+    }
+}

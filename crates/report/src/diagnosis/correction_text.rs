@@ -1,0 +1,84 @@
+//! A map before and after its correction for the causes of a gap, for a terminal.
+
+use crate::diagnosis::gap_next::next_text;
+use crate::diagnosis::gap_text::{cause, headline};
+use crate::formatting::table::with_heads;
+use mapper_diagnose::gap::correction::{CorrectedMap, NEEDED_PROBABILITY, NotCorrected, PointCorrection};
+use mapper_diagnose::gap::findings::report::{Diagnosis, law_found};
+
+/// The text.
+pub fn correction_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
+    let mut text = format!("{}\n\n", headline(diagnosis));
+    if let Some(refused) = &map.refused {
+        text += &format!("Nothing was corrected: {}.\n", refusal(refused));
+        for cause_of_map in &map.causes {
+            text += &format!("  {}\n", cause(cause_of_map));
+        }
+        if law_found(diagnosis).is_some() {
+            text += "A law was found: write it with `mapper gap diagnose --laws DIR`, and correct with `--effect`.\n";
+        }
+        return text + next_text(diagnosis).as_str();
+    }
+    for (place, cause_of_map) in map.causes.iter().enumerate() {
+        let word = if place == 0 { "Corrected for" } else { "or, not distinguished," };
+        text += &format!("{word} {} ({:.0} %)\n", cause(cause_of_map), 100.0 * cause_of_map.probability);
+    }
+    text += "\nEfficiency, %, with its 95 % interval\n";
+    let heads = ["step", "krpm", "valve", "as recorded", "corrected", "change, points"].map(str::to_owned);
+    let mut table = with_heads(&heads);
+    let value = |[eta, low, high]: [f64; 3]| format!("{:.1} +/- {:.1}", 100.0 * eta, 50.0 * (high - low));
+    for point in &map.points {
+        let change = point.before.zip(point.after).map(|(before, after)| 100.0 * (after[0] - before[0]));
+        table.add_row([
+            point.step.to_string(),
+            format!("{:.1}", point.speed_rpm / 1e3),
+            format!("{:.3}", point.valve),
+            point.before.map_or_else(|| "-".to_owned(), value),
+            point.after.map_or_else(|| "-".to_owned(), value),
+            change.map_or_else(|| "-".to_owned(), |change| format!("{change:+.2}")),
+        ]);
+    }
+    text += &format!("{table}\n");
+    text += &consequence(&map.points);
+    text += "The corrected map rests on this cause: if the machine differs in another way, the efficiencies as recorded\nare as likely.\n";
+    text
+}
+
+/// What happens to those who use the map as recorded.
+fn consequence(points: &[PointCorrection]) -> String {
+    let both = points.iter().filter_map(|point| Some((point, point.before?, point.after?)));
+    let changes: Vec<(usize, f64, bool)> = both
+        .map(|(point, [before, low, high], [after, ..])| {
+            (point.step, before - after, !(low..=high).contains(&after))
+        })
+        .collect();
+    let Some((step, largest, _)) = changes.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) else {
+        return String::new();
+    };
+    format!(
+        "\nIf ignored, efficiencies are up to {:.2} points too {} (step {step}); {} of {} by more than their interval.\n",
+        100.0 * largest.abs(),
+        if *largest > 0.0 { "high" } else { "low" },
+        changes.iter().filter(|(.., is_outside)| *is_outside).count(),
+        changes.len()
+    )
+}
+
+fn refusal(refused: &NotCorrected) -> String {
+    let needed = 100.0 * NEEDED_PROBABILITY;
+    match refused {
+        NotCorrected::NoCause => "the diagnosis names no cause of its library".to_owned(),
+        NotCorrected::Improbable { probability } => {
+            format!(
+                "the open causes have {:.0} % together, and {needed:.0} % are needed",
+                100.0 * probability
+            )
+        }
+        NotCorrected::Ambiguous { step, difference, half_interval } => format!(
+            "the recording does not distinguish these causes, and at step {step} their corrections differ by {:.2} points where the interval is \
+             +/- {:.2}",
+            100.0 * difference,
+            100.0 * half_interval
+        ),
+    }
+}

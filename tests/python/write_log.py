@@ -14,6 +14,7 @@ FORMAT is one of
   tdms      npTDMS: one group a device, all channels waveforms with a start and an increment
   tdms_time npTDMS: one group a device, each with a channel of seconds
   tdms_date npTDMS: the same with a channel of dates
+  mat       SciPy: a structure of vectors, compressed; SI units in the names
   parquet   polars: names with units in brackets, seconds
   arrow     polars: the same as Arrow's file, with dates instead of seconds
 
@@ -131,6 +132,16 @@ def frame(times, groups, name):
     import polars
 
     return polars.DataFrame({name: times} | {f"{name} [{unit}]": values for name, (values, unit) in flat(groups).items()})
+
+
+def write_mat(target, times, groups):
+    import scipy.io
+
+    # The name of a variable has no brackets: the unit stands behind it.
+    words = {"rpm": "_rpm", "kg/s": "_kg_s", "Pa": "_Pa", "K": "_kelvin"}
+    columns = {f"{name}{words.get(unit, '')}": values for name, (values, unit) in flat(groups).items()}
+    log = {"time_s": times} | columns
+    scipy.io.savemat(target, {"log": log, "comment": "not a number", "rig": 7.0}, do_compression=True, long_field_names=True)
 
 
 def write_parquet(target, times, groups):
@@ -254,6 +265,8 @@ def main():
             write_mdf(target, times, groups, "3.30")
         case "tdms" | "tdms_time" | "tdms_date":
             write_tdms(target, times, groups, {"tdms_time": np.asarray, "tdms_date": stamps}.get(kind))
+        case "mat":
+            write_mat(target, times, groups)
         case "parquet":
             write_parquet(target, times, groups)
         case "arrow":

@@ -35,9 +35,8 @@ pub use identification::uncertainty_budget::{BudgetRow, PointBudgets, Uncertaint
 pub use identification::window_rule::WindowRule;
 pub use maps::efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
 pub use maps::fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
-pub use maps::imported_map::{ImportRemark, ImportedColumn, ImportedMap};
+pub use maps::imported_map::{ImportRemark, ImportedColumn, ImportedMap, LineEnd, MeasuredPoint};
 pub use maps::map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
-pub use maps::map_columns::MAP_COLUMNS;
 pub use maps::map_description::{DescribedColumn, DesignPoint, MapDescription, StaticTaps};
 pub use maps::map_format::{
     DrawMap, MAP_FILE_SIZE_LIMIT, MapFormat, MapFormats, MapUnits, ReadMap, ReadTurbine, TurbineFormat,

@@ -200,7 +200,11 @@ fn points_with_budgets(
     let of_steps = points.iter().zip(estimates).zip(&recording.steps);
     let budgets = of_steps
         .filter_map(|((point, estimate), step)| {
-            Some(budgets::of_point(point.as_ref().ok()?, estimate, (recording, step), config))
+            let start_s = step.end_s - config.thresholds.end_mean_s;
+            let samples = |channel: Channel| {
+                recording.series.get(&channel).map_or(1, |series| series.range(start_s, step.end_s).len())
+            };
+            Some(budgets::of_point(point.as_ref().ok()?, estimate, samples, config))
         })
         .collect();
     (points, budgets)
@@ -269,7 +273,7 @@ pub(crate) fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
     }
 }
 
-fn point(
+pub(crate) fn point(
     step: &StepMarker,
     state: &EndState,
     estimate: &Estimate,

@@ -15,6 +15,7 @@ mod needs;
 mod nominal_rig;
 mod objections;
 mod one_fit;
+mod reduce;
 mod single_step;
 mod step_data;
 mod step_outcome;
@@ -38,6 +39,7 @@ pub use needs::{method_for, needs};
 pub use nominal_rig::NominalRig;
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
+pub use reduce::{KnownHeat, method_of_table, reduce};
 pub use single_step::expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use single_step::t2_course::{T2Course, t2_course};
 pub use step_outcome::error::{IdentifyError, StepError};

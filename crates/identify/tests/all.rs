@@ -17,6 +17,7 @@ mod lab;
 mod moist;
 mod nonsense;
 mod recovery;
+mod reduce;
 mod robust;
 mod together;
 mod zero;

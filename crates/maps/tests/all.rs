@@ -4,6 +4,7 @@
 mod assemble;
 mod efficiency;
 mod heat_correction;
+mod line_ends;
 mod map_fit;
 mod support;
 mod table;

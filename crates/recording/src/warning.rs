@@ -136,6 +136,12 @@ pub enum ReadWarning {
         /// The first of these times, s.
         first_s: f64,
     },
+    /// Something about the log that its reader found while reading.
+    #[error("{finding}")]
+    Log {
+        /// The sentence.
+        finding: String,
+    },
     /// A fast log was averaged during reading.
     #[error("the log is faster than identification needs: it was averaged to 10 samples a second")]
     Averaged,

@@ -40,6 +40,7 @@ mod machine;
 mod nights;
 mod plan;
 pub mod recording;
+mod reduce;
 mod registry;
 mod rig;
 mod run;

@@ -4,4 +4,5 @@
 mod common;
 mod hostile_plans;
 mod joint_plan;
+mod reduce;
 mod speed;

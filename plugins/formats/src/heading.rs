@@ -22,7 +22,7 @@ pub(crate) fn heading(map: &CompressorMap, mark: &str) -> String {
 pub(crate) fn efficiency_name(method: Method) -> &'static str {
     match method {
         Method::Steady => "apparent: heat transfer not removed",
-        Method::Dynamic | Method::Joint => "adiabatic: heat transfer removed",
+        Method::Dynamic | Method::Joint | Method::Corrected => "adiabatic: heat transfer removed",
         Method::Imported => "as the map file has it",
     }
 }

@@ -97,7 +97,7 @@ fn add_measured_lines(panel: &mut Panel, map: &CompressorMap, units: &MapUnits) 
 fn efficiency_panel(map: &CompressorMap, units: &MapUnits) -> Panel {
     let name = match map.method {
         Method::Steady => "apparent efficiency, %",
-        Method::Dynamic | Method::Joint => "adiabatic efficiency, %",
+        Method::Dynamic | Method::Joint | Method::Corrected => "adiabatic efficiency, %",
         Method::Imported => "isentropic efficiency, %",
     };
     let mut panel =

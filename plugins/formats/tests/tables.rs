@@ -252,3 +252,103 @@ fn units_of_reduced_flow() {
         assert!((flow(unit, value) / expected - 1.0).abs() < 1e-12, "{unit}");
     }
 }
+
+/// SAE text without headings may have more columns behind the efficiency: temperatures, a vane position.
+#[test]
+fn columns_behind_the_efficiency_are_left_out() {
+    let plain = "Compressor\n50000 0.05 1.3 0.61\n50000 0.04 1.4 0.66\n80000 0.07 1.9 0.7\n";
+    let expected = numbers(&read_bytes("x.sae", plain.as_bytes(), Some(ReferenceState::SAE)).unwrap().map);
+    for (further, columns) in [(" 298.1\n", 1), (" 298.1 0.4\n", 2)] {
+        let text = plain.replace("Compressor\n", "Compressor;").replace('\n', further).replace(';', "\n");
+        let found = read_bytes("x.sae", text.as_bytes(), Some(ReferenceState::SAE)).unwrap();
+        assert_eq!(numbers(&found.map), expected);
+        assert!(found.remarks.contains(&ImportRemark::FurtherColumns { count: columns }));
+    }
+    // A row that is cut short, and measured points without headings.
+    let cut = "50000 0.05 1.3 0.61 298\n50000 0.04 1.4 0.66\n";
+    assert!(read_bytes("x.sae", cut.as_bytes(), Some(ReferenceState::SAE)).is_err());
+    let measured = "60000 96.4 293.2 110.7 316.8 0.1323\n60000 96.4 293.2 118.2 321.4 0.1118\n";
+    assert!(read_bytes("x.txt", measured.as_bytes(), Some(ReferenceState::SAE)).is_err());
+}
+
+/// Tables of GSP and GasTurb: rows.columns, the coordinate, then each speed with its values, over several lines.
+#[test]
+fn tables_of_gsp() {
+    let table = |name: &str, values: [[f64; 3]; 2]| {
+        let row = |speed: f64, row: [f64; 3]| {
+            format!("  {speed:.5} {:.5} {:.5}\n  {:.5}\n", row[0], row[1], row[2])
+        };
+        format!(
+            "{name}\n  3.00400 0.00000 0.50000\n  1.00000\n{}{}\n",
+            row(0.7, values[0]),
+            row(1.0, values[1])
+        )
+    };
+    let text = [
+        "99 Radial compressor\nReynolds: RNI=0.1 f=0.95 RNI=1 f=1\n".to_owned(),
+        table("Mass Flow", [[0.06, 0.05, 0.04], [0.1, 0.09, 0.07]]),
+        table("Efficiency", [[0.6, 0.7, 0.65], [0.62, 0.74, 0.7]]),
+        table("Pressure Ratio", [[1.2, 1.4, 1.5], [1.6, 2.0, 2.2]]),
+        "Surge Line\n  2.00300 0.04 0.07\n  1.00000 1.5 2.2\n".to_owned(),
+    ]
+    .concat();
+    let read = |text: &str, keys: &[(&str, &str)]| {
+        let mut given = mapper_core::MapDescription::from(Some(ReferenceState::SAE));
+        keys.iter().for_each(|(key, value)| mapper_maps::table::set_key(&mut given, key, value).unwrap());
+        FORMATS.read_from("map").unwrap().read(text.as_bytes(), given)
+    };
+    let found = read(&text, &[("design_speed", "150000 rpm"), ("flow", "kg/s")]).unwrap();
+    let row = |speed: f64, flow: f64, ratio: f64, eta: f64| [Some(speed), Some(flow), Some(ratio), Some(eta)];
+    let expected = [
+        row(105e3, 0.04, 1.5, 0.65),
+        row(105e3, 0.05, 1.4, 0.7),
+        row(105e3, 0.06, 1.2, 0.6),
+        row(150e3, 0.07, 2.2, 0.7),
+        row(150e3, 0.09, 2.0, 0.74),
+        row(150e3, 0.1, 1.6, 0.62),
+    ];
+    for (a, b) in numbers(&found.map).iter().flatten().zip(expected.iter().flatten()) {
+        assert!((a.unwrap() / b.unwrap() - 1.0).abs() < 1e-12, "{a:?} {b:?}");
+    }
+    // The speeds are relative, and the file names no unit.
+    assert!(matches!(read(&text, &[]), Err(ImportError::RelativeSpeed { .. })));
+    assert!(matches!(read(&text, &[("design_speed", "150000 rpm")]), Err(ImportError::FlowUnit)));
+    let cut = text.replacen("  0.04000\n", "", 1);
+    assert!(matches!(read(&cut, &[]), Err(ImportError::RowForm { line: 3, .. })));
+}
+
+/// A measured table with a housing temperature, humidity and ends of lines; the plain map needs none of them.
+#[test]
+fn a_measured_table_keeps_what_was_measured() {
+    let text = "N [rpm];m [kg/s];P1 [kPa];T1 [degC];P2 [kPa];T2 [degC];T_housing [degC];RH [%];note\n\
+        60000;0.0449;96.4;20;125.5;55;48;50;surge\n60000;0.1323;96.4;20;110.7;43.6;45;50;\n";
+    let found = read_bytes("x.csv", text.as_bytes(), Some(ReferenceState::SAE)).unwrap();
+    let [first, second] = found.measured.as_slice() else { panic!("{:?}", found.measured) };
+    assert_eq!((first.tc_k, first.end), (Some(48.0 + 273.15), Some(mapper_core::LineEnd::Surge)));
+    assert_eq!((second.line, second.end), (3, None));
+    // 50 % at 20 degC: 7.3 g/kg at sea level (psychrometric chart), at 96.4 kPa 5 % more.
+    assert!((first.humidity_kg_kg.unwrap() - 0.0077).abs() < 2e-4);
+    let wrong = text.replace("RH [%]", "humidity [kg/kg]");
+    assert!(read_bytes("x.csv", wrong.as_bytes(), Some(ReferenceState::SAE)).is_err());
+}
+
+/// Units below the names, of every quantity that a table may have: humidity, volumes and reduced parameters too.
+#[test]
+fn units_below_the_names_of_any_quantity() {
+    let text = "Shaft Speed,Air Mass Flow,P1,T1,P2,T2,Casing temp,Abs. humidity\nkrpm,lb/min,inHg,degF,psia,degF,degF,g/kg\n\
+        60,5.9525,28.940,71.33,18.336,131.1,122.1,8\n60,17.196,28.940,71.33,15.919,106.4,97.4,8\n";
+    let found = read_bytes("x.csv", text.as_bytes(), Some(ReferenceState::SAE)).unwrap();
+    let first = found.measured[0];
+    // 5.9525 lb/min is 45 g/s, 28.94 inHg 98.0 kPa, 71.33 degF 294.99 K.
+    assert!((first.flow_kg_s - 0.045).abs() < 1e-5 && (first.p1_pa - 98.0e3).abs() < 10.0);
+    assert!((first.t1_k - 294.999).abs() < 1e-2 && first.humidity_kg_kg == Some(0.008));
+    let reduced =
+        "N/sqrt(T),m*sqrt(T)/p,PR,eta\nrpm/K^0.5,kg/s*K^0.5/kPa,-,-\n3000,0.02,1.3,0.6\n4000,0.02,1.5,0.6\n";
+    let flow = numbers(&read_bytes("x.csv", reduced.as_bytes(), None).unwrap().map)[0][1].unwrap();
+    assert!((flow / (0.02 * 100.0 / 298f64.sqrt()) - 1.0).abs() < 1e-12);
+    let volume = "n;V;pi;eta\n1/min;m3/h;-;%\n60000;400;1,3;60\n60000;300;1,4;65\n";
+    let flow = numbers(&read_bytes("x.csv", volume.as_bytes(), Some(ReferenceState::SAE)).unwrap().map)[1][1]
+        .unwrap();
+    // 400 m3/h at 298 K and 100 kPa.
+    assert!((flow / (400.0 / 3600.0 * 1e5 / 287.05 / 298.0) - 1.0).abs() < 1e-9);
+}

@@ -24,8 +24,12 @@ const HEAD_ROWS: usize = 400;
 fn recognises(head: &[u8]) -> bool {
     let (encoding, _) = encoding::guess(head);
     let utf16 = matches!(encoding, Encoding::Utf16Le | Encoding::Utf16Be);
-    let control = head.iter().filter(|byte| **byte < 0x20 && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0C)).count();
-    utf16 || !head.is_empty() && control == 0 && head.iter().any(|byte| SEPARATORS.contains(byte) || *byte == b'\n')
+    let control =
+        head.iter().filter(|byte| **byte < 0x20 && !matches!(byte, b'\t' | b'\n' | b'\r' | 0x0C)).count();
+    utf16
+        || !head.is_empty()
+            && control == 0
+            && head.iter().any(|byte| SEPARATORS.contains(byte) || *byte == b'\n')
 }
 
 struct Delimited {
@@ -69,12 +73,14 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     };
     let (found_decimal, seen) = decimal(&rows);
     let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
-    let mut table = Table::look(&rows, decimal, options, Origin::Rows).map_err(|message| file.content(NAME, message))?;
+    let mut table =
+        Table::look(&rows, decimal, options, Origin::Rows).map_err(|message| file.content(NAME, message))?;
     let long = LongForm::find(&rows, &table, decimal);
     if let Some(form) = &long {
         // The header of the gathered table is in its first row, wherever that of the file is.
         let gathered = LogOptions { names_row: None, units_row: None, data_row: None, ..options.clone() };
-        table = Table::look(&form.wide(&rows), decimal, &gathered, Origin::Rows).map_err(|message| file.content(NAME, message))?;
+        table = Table::look(&form.wide(&rows), decimal, &gathered, Origin::Rows)
+            .map_err(|message| file.content(NAME, message))?;
         table.layout.findings.insert(0, form.words(&rows));
     }
     let dialect = Dialect { encoding, mark, separator, decimal };
@@ -95,7 +101,9 @@ fn dialect_words(dialect: Dialect, decimal_seen: bool) -> String {
     };
     let decimal = if decimal_seen { "" } else { ", no cell shows it" };
     let sign = char::from(dialect.decimal);
-    format!("text: separator {separator}, decimal sign `{sign}`{decimal}, letters in {encoding} (separator, decimal, encoding)")
+    format!(
+        "text: separator {separator}, decimal sign `{sign}`{decimal}, letters in {encoding} (separator, decimal, encoding)"
+    )
 }
 
 impl Log for Delimited {
@@ -105,11 +113,14 @@ impl Log for Delimited {
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
         let mut stream = RowStream::open(&self.file, self.dialect)?;
-        match &self.long {
-            None => self.table.rows(&mut stream, wanted, sink),
+        let remark = match &self.long {
+            None => self.table.rows(&mut stream, wanted, sink)?,
             Some(form) => {
-                self.table.rows(&mut LongRows::new(stream, form.clone(), self.dialect.decimal), wanted, sink)
+                let mut rows = LongRows::new(stream, form.clone(), self.dialect.decimal);
+                self.table.rows(&mut rows, wanted, sink)?
             }
-        }
+        };
+        self.table.layout.add_finding(remark);
+        Ok(())
     }
 }

@@ -25,6 +25,7 @@ macro_rules! logs {
 logs! {
     mdf3,
     mdf4,
+    mat5,
     #[cfg(feature = "tdms")]
     tdms,
     #[cfg(feature = "parquet")]

@@ -57,8 +57,13 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     };
     // A list of blocks may name the same packed block again and again.
     let samples_max = unpacked_max(path.size_bytes()?) / VALUE_BYTES;
-    let (mut left_out, mut without_clock) = (0usize, 0usize);
+    let (mut left_out, mut without_clock, mut has_frames) = (0usize, 0usize, false);
     for (index, group) in log.file.data_groups().iter().flat_map(|data| &data.channel_groups).enumerate() {
+        let is_frame = |channel: &Channel| FRAMES.iter().any(|frame| channel.name.starts_with(frame));
+        if group.channels.iter().any(is_frame) {
+            has_frames = true;
+            continue;
+        }
         let named = |channel: &&Channel| options.time.contains(&channel.name);
         let clock = group
             .channels
@@ -109,6 +114,9 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     distinct_names(&mut log.layout);
     let findings = &mut log.layout.findings;
     findings.push(format!("clocks: {} groups, each with its own (time, time_unit)", log.masters.len()));
+    if has_frames {
+        findings.push(UNDECODED.to_owned());
+    }
     if left_out > 0 {
         findings.push(format!("{left_out} channels are left out: texts, arrays, or not readable"));
     }
@@ -119,13 +127,16 @@ fn open(path: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     }
     log.layout.start_time_ns = u64::try_from(log.file.start_time().timestamp_ns).ok().filter(|ns| *ns > 0);
     if log.layout.groups.is_empty() {
-        return Err(path.content(
-            NAME,
-            "it holds no group of numbers with a clock; name the clock's channel with `time`",
-        ));
+        let without_clock = "it holds no group of numbers with a clock; name the clock's channel with `time`";
+        return Err(path.content(NAME, if has_frames { UNDECODED } else { without_clock }));
     }
     Ok(Box::new(log))
 }
+
+/// Channels of undecoded frames (ASAM MDF, bus logging): their numbers are identifiers and bytes.
+const FRAMES: [&str; 5] = ["CAN_DataFrame", "CAN_RemoteFrame", "LIN_Frame", "FLX_Frame", "ETH_Frame"];
+const UNDECODED: &str = "it holds frames of a bus (CAN, LIN, FlexRay, Ethernet) that are not decoded and have no signals: decode them with the database \
+     of the bus (DBC, ARXML) in the measuring program, or with asammdf (`MDF(FILE).extract_bus_logging({\"CAN\": [(DBC, 0)]}).save(NEW)`)";
 
 fn name_of(group: &ChannelGroup, index: usize) -> String {
     let source = group.source.as_ref().map(|source| source.name.clone());

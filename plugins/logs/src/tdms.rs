@@ -155,13 +155,19 @@ fn plain(name: &str) -> String {
 /// date, and would read the following channels at wrong positions.
 fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Result<Option<Channel>, String> {
     let Some(length) = source.channel_length(&path).filter(|length| *length > 0) else { return Ok(None) };
-    let Some((value_bytes, read)) = READERS.into_iter().find(|(_, read)| read(source, &path, 0, 1).is_ok()) else {
+    let Some((value_bytes, read)) = READERS.into_iter().find(|(_, read)| read(source, &path, 0, 1).is_ok())
+    else {
         let name = path.channel_name();
-        return Err(format!("channel `{name}` holds no plain numbers (dates, say): leave it out of the file, or export it as CSV or MDF 4"));
+        return Err(format!(
+            "channel `{name}` holds no plain numbers (dates, say): leave it out of the file, or export it as CSV or MDF 4"
+        ));
     };
     // A damaged file declares more values than it has bytes; missing ones would be read as zeros.
     if length > file_bytes / value_bytes {
-        return Err(format!("channel `{}` has {length} values in a file of {file_bytes} bytes", path.channel_name()));
+        return Err(format!(
+            "channel `{}` has {length} values in a file of {file_bytes} bytes",
+            path.channel_name()
+        ));
     }
     let of_path = PropertyPath::channel(path.group_name(), path.channel_name());
     let property = |name: &str| source.read_property(&of_path, name).ok().flatten();
@@ -170,25 +176,30 @@ fn channel(source: &mut Source, path: ChannelPath, file_bytes: u64) -> Result<Op
         PropertyValue::SingleFloat(value) => Some(f64::from(*value)),
         _ => None,
     };
-    let unit = ["unit_string", "NI_UnitDescription", "unit", "Unit"].into_iter().find_map(|name| match property(name)? {
-        PropertyValue::String(unit) if !unit.trim().is_empty() => Some(unit.trim().to_owned()),
-        _ => None,
+    let unit = ["unit_string", "NI_UnitDescription", "unit", "Unit"].into_iter().find_map(|name| {
+        match property(name)? {
+            PropertyValue::String(unit) if !unit.trim().is_empty() => Some(unit.trim().to_owned()),
+            _ => None,
+        }
     });
     let start = match property("wf_start_time") {
         Some(PropertyValue::Timestamp(stamp)) => instant(stamp.to_parts()),
         _ => None,
     };
-    let waveform = number("wf_increment").filter(|interval_s| *interval_s > 0.0 && interval_s.is_finite()).map(|interval_s| Waveform {
-        interval_s,
-        start_offset_s: number("wf_start_offset").filter(|offset_s| offset_s.is_finite()).unwrap_or(0.0),
-        start,
-    });
+    let waveform = number("wf_increment")
+        .filter(|interval_s| *interval_s > 0.0 && interval_s.is_finite())
+        .map(|interval_s| Waveform {
+            interval_s,
+            start_offset_s: number("wf_start_offset").filter(|offset_s| offset_s.is_finite()).unwrap_or(0.0),
+            start,
+        });
     Ok(Some(Channel { path, unit: unit.unwrap_or_default(), length, read, waveform }))
 }
 
 /// Channels by clock: those of the same waveform, and all those without one. A clock or rate named by the user takes precedence.
 fn by_clock(channels: Vec<Channel>, options: &LogOptions) -> Vec<Vec<Channel>> {
-    let named = options.rate_hz.is_some() || channels.iter().any(|channel| options.time.iter().any(|name| name == channel.path.channel_name()));
+    let named = options.rate_hz.is_some()
+        || channels.iter().any(|channel| options.time.iter().any(|name| name == channel.path.channel_name()));
     let mut groups: Vec<Vec<Channel>> = Vec::new();
     for mut channel in channels {
         channel.waveform = channel.waveform.filter(|_| !named);
@@ -213,7 +224,8 @@ fn look(
         options.rate_hz = Some(1.0 / waveform.interval_s);
         options.time.clear();
     }
-    let head = ColumnRows::new(head(channels), GroupChunks::new(file, source, channels, HEAD_ROWS)).texts(HEAD_ROWS)?;
+    let head = ColumnRows::new(head(channels), GroupChunks::new(file, source, channels, HEAD_ROWS))
+        .texts(HEAD_ROWS)?;
     let origin = if waveform.is_some() { Origin::Waveform } else { Origin::Columns };
     let mut table = match Table::look(&head, b'.', &options, origin) {
         Ok(table) => table,
@@ -223,7 +235,8 @@ fn look(
         let findings = &mut table.layout.findings;
         findings.push(format!("clock: a waveform with a value every {} s (time, rate)", waveform.interval_s));
         let start_ns = waveform.start.map(|start| start.ns() as f64 + 1e9 * waveform.start_offset_s);
-        table.layout.start_time_ns = start_ns.filter(|ns| *ns > 0.0 && *ns < i64::MAX as f64).map(|ns| ns as u64);
+        table.layout.start_time_ns =
+            start_ns.filter(|ns| *ns > 0.0 && *ns < i64::MAX as f64).map(|ns| ns as u64);
     }
     Ok(Ok(table))
 }
@@ -251,7 +264,8 @@ impl Log for Tdms {
             let at_once = (VALUES_AT_ONCE / channels.len().max(1)).max(1);
             let chunks = GroupChunks::new(&self.file, &mut self.source, channels, at_once);
             let mut of_file = |row: Row<'_>| part.give(row, sink);
-            part.table.rows(&mut ColumnRows::new(head(channels), chunks), &own, &mut of_file)?;
+            let mut rows = ColumnRows::new(head(channels), chunks);
+            self.layout.add_finding(part.table.rows(&mut rows, &own, &mut of_file)?);
         }
         Ok(())
     }
@@ -274,7 +288,9 @@ impl<'a> GroupChunks<'a> {
 
 impl Chunks for GroupChunks<'_> {
     fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
-        let left = |channel: &Channel| usize::try_from(channel.length.saturating_sub(self.from)).unwrap_or(usize::MAX).min(self.at_once);
+        let left = |channel: &Channel| {
+            usize::try_from(channel.length.saturating_sub(self.from)).unwrap_or(usize::MAX).min(self.at_once)
+        };
         let count = self.channels.iter().map(left).max().unwrap_or(0);
         if count == 0 {
             return Ok(None);
@@ -282,7 +298,11 @@ impl Chunks for GroupChunks<'_> {
         let mut chunks = Vec::with_capacity(self.channels.len());
         for channel in self.channels {
             let rows = left(channel);
-            let chunk = if rows == 0 { Ok(Chunk::Numbers(Vec::new())) } else { (channel.read)(self.source, &channel.path, self.from, rows) };
+            let chunk = if rows == 0 {
+                Ok(Chunk::Numbers(Vec::new()))
+            } else {
+                (channel.read)(self.source, &channel.path, self.from, rows)
+            };
             chunks.push(chunk.map_err(|error| failed(self.file, &error))?);
         }
         self.from += count as u64;

@@ -4,13 +4,13 @@ mod check;
 
 use crate::notation::table_row::{Cells, Rows};
 use crate::notation::instant::{Instant, NS_PER_DAY};
-use crate::tables::several_tables::{Part, side_by_side};
-use crate::columns::table_head::COLUMN_LIMIT;
 use crate::notation::number::number_in;
+use crate::tables::several_tables::{Part, side_by_side};
 use crate::notation::separator::decimal;
+use crate::columns::table_head::COLUMN_LIMIT;
 use crate::tables::table_log::{Origin, Table};
 use crate::notation::typed_cell::Value;
-use calamine::{Cell, DataRef, DataType, Reader, Xlsx, XlsxCellReader};
+use calamine::{Cell, DataRef, DataType, Reader, SheetVisible, Xlsx, XlsxCellReader};
 use mapper_recording::logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 
 /// The format.
@@ -60,9 +60,22 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     check::check(file)?;
     let mut book_of = book(file)?;
     let names: Vec<String> = book_of.sheet_names();
-    let wanted: Vec<String> = names.iter().filter(|name| options.sheet.as_ref().is_none_or(|sheet| sheet == *name)).cloned().collect();
+    let hidden = |name: &String| {
+        book_of
+            .sheets_metadata()
+            .iter()
+            .any(|sheet| sheet.name == *name && sheet.visible != SheetVisible::Visible)
+    };
+    // A hidden sheet is read only if it is named: it may hold an earlier state of the data.
+    let (hidden, visible): (Vec<String>, Vec<String>) = names.iter().cloned().partition(hidden);
+    let wanted = match &options.sheet {
+        Some(sheet) => names.iter().filter(|name| *name == sheet).cloned().collect(),
+        None => visible,
+    };
     if let (Some(sheet), []) = (&options.sheet, wanted.as_slice()) {
-        return Err(file.content(NAME, format!("it has no sheet `{sheet}`; its sheets are {}", names.join(", "))));
+        return Err(
+            file.content(NAME, format!("it has no sheet `{sheet}`; its sheets are {}", names.join(", ")))
+        );
     }
     let mut found: Vec<(String, Table, u8)> = Vec::new();
     let mut problems: Vec<String> = Vec::new();
@@ -79,7 +92,9 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             continue;
         }
         // Numbers that are stored as text have a decimal sign.
-        let texts = |row: &Vec<Value>| row.iter().filter(|cell| matches!(cell, Value::Text(_))).map(|cell| cell.text(b'.')).collect();
+        let texts = |row: &Vec<Value>| {
+            row.iter().filter(|cell| matches!(cell, Value::Text(_))).map(|cell| cell.text(b'.')).collect()
+        };
         let (decimal, _) = decimal(&cells.iter().map(texts).collect::<Vec<Vec<String>>>());
         let head: Vec<Vec<String>> =
             cells.iter().map(|row| row.iter().map(|cell| cell.text(decimal)).collect()).collect();
@@ -93,6 +108,9 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     }
     let decimals = found.iter().map(|(.., decimal)| *decimal).collect();
     let found = found.into_iter().map(|(name, table, _)| (name, table)).collect();
+    if let (None, false) = (&options.sheet, hidden.is_empty()) {
+        problems.push(format!("hidden, and read only if named by `sheet`: {}", hidden.join(", ")));
+    }
     let (layout, sheets) = side_by_side("sheet", found, problems).map_err(|why| file.content(NAME, why))?;
     Ok(Box::new(Workbook { file: file.clone(), layout, sheets, decimals }))
 }
@@ -111,7 +129,8 @@ impl Log for Workbook {
             }
             let reader = book.worksheet_cells_reader(&sheet.name).map_err(failed(&self.file))?;
             let mut of_book = |row: Row<'_>| sheet.give(row, sink);
-            sheet.table.rows(&mut SheetRows::new(&self.file, reader, *decimal), &own, &mut of_book)?;
+            let mut rows = SheetRows::new(&self.file, reader, *decimal);
+            self.layout.add_finding(sheet.table.rows(&mut rows, &own, &mut of_book)?);
         }
         Ok(())
     }
@@ -119,7 +138,9 @@ impl Log for Workbook {
 
 /// Remarks columns with a name and no value: formulas that were never calculated.
 fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
-    let empty = |column: usize| head.iter().skip(table.data_row()).all(|row| row.get(column).is_none_or(String::is_empty));
+    let empty = |column: usize| {
+        head.iter().skip(table.data_row()).all(|row| row.get(column).is_none_or(String::is_empty))
+    };
     let names = table.named_columns().filter(|(column, _)| empty(*column));
     let names: Vec<String> = names.map(|(_, name)| format!("`{name}`")).collect();
     if !names.is_empty() {
@@ -134,7 +155,9 @@ fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
 fn value_of(data: &DataRef<'_>) -> Value {
     match data {
         DataRef::DateTime(date) => instant_of(date.as_f64()).map_or(Value::Empty, Value::Instant),
-        DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => Value::Text(start(text)),
+        DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => {
+            Value::Text(start(text))
+        }
         DataRef::SharedString(text) => Value::Text(start(text)),
         data => data.as_f64().filter(|value| value.is_finite()).map_or(Value::Empty, Value::Number),
     }

@@ -338,3 +338,103 @@ proptest! {
         }
     }
 }
+
+/// A hidden sheet may hold an earlier state of the data: it is read only if it is named.
+#[test]
+fn a_hidden_sheet_is_read_only_if_it_is_named() {
+    let mut with_hidden = parts(HEADER, SHARED_STRINGS);
+    let sheet = with_hidden.iter().find(|(name, _)| name.ends_with("sheet1.xml")).unwrap().1.clone();
+    with_hidden.push(("xl/worksheets/sheet2.xml".to_owned(), sheet.replace(".5</v>", ".25</v>")));
+    for (name, text) in &mut with_hidden {
+        if name.ends_with("workbook.xml.rels") {
+            let second = text.split("<Relationship ").nth(1).unwrap().split("/>").next().unwrap();
+            let second = second.replace("r1", "r2").replace("sheet1", "sheet2");
+            *text = text.replace("</Relationships>", &format!("<Relationship {second}/></Relationships>"));
+        } else if name == "xl/workbook.xml" {
+            let second = "<sheet name=\"Old\" sheetId=\"2\" state=\"hidden\" r:id=\"r2\"/></sheets>";
+            *text = text.replace("</sheets>", second);
+        }
+    }
+    let file = LogFile::of_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
+    let first = |options: &LogOptions| {
+        let (_, mut log) = LOG_FORMATS.open(&file, options).unwrap();
+        let (mut values, findings) = (Vec::new(), log.layout().findings.join("; "));
+        log.rows(&[0], &mut |row| {
+            values.push(row.values[0]);
+            Ok(())
+        })
+        .unwrap();
+        (values[0], values.len(), findings)
+    };
+    let (value, rows, findings) = first(&LogOptions::default());
+    assert_eq!((value, rows), (2.5, 38));
+    assert!(findings.contains("Old"), "{findings}");
+    let (value, ..) = first(&LogOptions { sheet: Some("Old".to_owned()), ..LogOptions::default() });
+    assert_eq!(value, 2.25);
+}
+
+/// MATLAB data of level 5: vectors in a structure, and by themselves.
+fn mat() -> Vec<u8> {
+    let element = |kind: u32, data: &[u8]| {
+        let mut bytes = [kind.to_le_bytes(), u32::try_from(data.len()).unwrap().to_le_bytes()].concat();
+        bytes.extend_from_slice(data);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    };
+    let matrix = |class: u8, size: [i32; 2], name: &str, rest: &[u8]| {
+        let flags = [[class, 0, 0, 0], [0; 4]].concat();
+        let size = size.map(i32::to_le_bytes).concat();
+        element(
+            14,
+            &[element(6, &flags), element(5, &size), element(1, name.as_bytes()), rest.to_vec()].concat(),
+        )
+    };
+    let vector = |name: &str, value: fn(i32) -> f64| {
+        let values: Vec<u8> = (0..40).flat_map(|row| value(row).to_le_bytes()).collect();
+        matrix(6, [40, 1], name, &element(9, &values))
+    };
+    // The length of a name stands in the tag.
+    let length = [&0x0004_0005u32.to_le_bytes()[..], &8u32.to_le_bytes()].concat();
+    let fields = [
+        length,
+        element(1, b"time\0\0\0\0n_TC_rpm"),
+        vector("", f64::from),
+        vector("", |row| 6e4 + f64::from(row)),
+    ];
+    let text = matrix(4, [1, 3], "note", &element(4, &[b'a', 0, b'b', 0, b'c', 0]));
+    let mut bytes = b"MATLAB 5.0 MAT-file, made here".to_vec();
+    bytes.resize(124, b' ');
+    bytes.extend_from_slice(&[0, 1, b'I', b'M']);
+    [bytes, text, matrix(2, [1, 1], "log", &fields.concat())].concat()
+}
+
+#[test]
+fn matlab_data_are_read() {
+    let file = LogFile::of_bytes(Path::new("log.mat"), &mat());
+    let (format, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+    let columns = &log.layout().columns;
+    assert_eq!((format.name, columns.len(), columns[0].unit.as_deref()), ("MATLAB", 1, Some("rpm")));
+    let mut rows = Vec::new();
+    log.rows(&[0], &mut |row| {
+        rows.push((row.t_s, row.values[0]));
+        Ok(())
+    })
+    .unwrap();
+    assert_eq!((rows.len(), rows[39]), (40, (39.0, 60_039.0)));
+}
+
+proptest! {
+    /// Any damage to MATLAB data gives a log or an error.
+    #[test]
+    fn damaged_matlab_data_are_read_or_refused(at in prop::collection::vec((120..1200usize, any::<u8>()), 1..6), end in 0..1200usize) {
+        let mut bytes = mat();
+        for (at, value) in at {
+            if let Some(byte) = bytes.get_mut(at) {
+                *byte = value;
+            }
+        }
+        look(&bytes);
+        bytes.truncate(end);
+        look(&bytes);
+    }
+}

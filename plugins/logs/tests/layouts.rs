@@ -3,6 +3,7 @@
 
 use mapper_log_formats::LOG_FORMATS;
 use mapper_recording::logs::{Layout, LogFile, LogOptions};
+use std::io::Write;
 use std::path::Path;
 
 const ROWS: usize = 150;
@@ -247,4 +248,54 @@ fn a_unit_that_changes_gives_no_number() {
     }));
     assert_eq!(layout.columns[0].name, "p2");
     assert!(rows[149].1[0].is_nan() || layout.columns[0].unit.is_none());
+}
+
+#[test]
+fn a_compressed_log_is_its_content() {
+    let plain =
+        text("time [s],p2 [kPa],T2 [degC]\n", |row| format!("{row},{},{}", p2_kpa(row), t2_degc(row)));
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packer.write_all(plain.as_bytes()).unwrap();
+    let packed = packer.finish().unwrap();
+    let open = |bytes: &[u8]| {
+        let file = LogFile::of_bytes(Path::new("log.csv.gz"), bytes);
+        LOG_FORMATS
+            .open(&file, &LogOptions::default())
+            .map(|(format, log)| (format.name, log.layout().clone()))
+    };
+    assert_eq!(open(&packed).unwrap(), open(plain.as_bytes()).unwrap());
+    assert!(open(&packed[..packed.len() / 2]).is_err(), "cut short");
+}
+
+/// The hour that local time repeats is corrected, wherever in the log it is, with a remark.
+#[test]
+fn the_end_of_daylight_saving_is_remarked() {
+    let rows = 2000;
+    let line = |row: usize| {
+        let second = 9000 + row;
+        let second = if second < 10_800 { second } else { second - 3600 };
+        format!(
+            "26.10.2025 {:02}:{:02}:{:02};{};20.5\n",
+            second / 3600,
+            second / 60 % 60,
+            second % 60,
+            100 + row
+        )
+    };
+    let log =
+        |rows: usize| (0..rows).fold("Time;p2 [kPa];T2 [degC]\n".to_owned(), |text, row| text + &line(row));
+    let remarks = |text: &str| {
+        let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
+        let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+        let before = log.layout().findings.len();
+        let mut last_s = 0.0;
+        log.rows(&[0], &mut |row| {
+            last_s = row.t_s;
+            Ok(())
+        })
+        .unwrap();
+        (last_s, log.layout().findings.len() - before)
+    };
+    assert_eq!(remarks(&log(rows)), (1999.0, 1));
+    assert_eq!(remarks(&log(1000)), (999.0, 0));
 }

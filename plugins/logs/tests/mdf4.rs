@@ -57,3 +57,27 @@ fn keys_of_other_formats_are_refused() {
         assert!(error.contains(key) && error.contains("time, time_unit, missing"), "{error}");
     }
 }
+
+/// Frames of a bus are named; signals next to them are read.
+#[test]
+fn undecoded_frames_of_a_bus_are_no_channels() {
+    let open = |with_signals: bool| {
+        let mut writer = falcon_mdf::Mf4Writer::new();
+        let times = [0.0, 0.1, 0.2];
+        let frames = writer.add_group(&times).unwrap();
+        frames.add_channel("CAN_DataFrame.ID", "", &[256.0, 257.0, 256.0]).unwrap();
+        frames.add_channel("CAN_DataFrame.DLC", "", &[8.0, 8.0, 8.0]).unwrap();
+        if with_signals {
+            writer.add_group(&times).unwrap().add_channel("n_TC", "rpm", &[1e5, 1e5, 1e5]).unwrap();
+        }
+        let mut bytes = Vec::new();
+        writer.write(&mut bytes).unwrap();
+        let file = LogFile::of_bytes(Path::new("bus.mf4"), &bytes);
+        LOG_FORMATS.open(&file, &LogOptions::default()).map(|(_, log)| log.layout().clone())
+    };
+    assert!(open(false).unwrap_err().to_string().contains("asammdf"));
+    let layout = open(true).unwrap();
+    let names: Vec<&str> = layout.columns.iter().map(|column| column.name.as_str()).collect();
+    assert_eq!(names, ["n_TC"]);
+    assert!(layout.findings.iter().any(|finding| finding.contains("asammdf")));
+}

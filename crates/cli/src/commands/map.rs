@@ -17,6 +17,7 @@ subcommands! { MapCommand:
     fit::Fit,
     convert::Convert,
     compare::Compare,
+    reduce::Reduce,
     correct::Correct,
     rig::Rig,
     fmu::Fmu,

@@ -9,7 +9,7 @@ use mapper_core::terminal_text;
 use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use terminal_size::terminal_size_of;
 
@@ -38,6 +38,29 @@ impl Replace {
     /// Writes a file.
     pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
         write_file(path, bytes, self.existing())
+    }
+}
+
+/// A file for the map of a command.
+#[derive(Debug, Args)]
+pub struct MapTarget {
+    /// Write the map to this new file; its extension gives the format unless `--to` does
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Format of `--out`
+    #[arg(long, value_name = "FORMAT", requires = "out")]
+    pub to: Option<String>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub replace: Replace,
+}
+
+impl MapTarget {
+    /// The file, if asked for.
+    pub fn map(&self) -> Option<MapOut<'_>> {
+        self.out.as_deref().map(|out| self.replace.map(out, self.to.as_deref()))
     }
 }
 

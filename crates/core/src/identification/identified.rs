@@ -13,6 +13,8 @@ pub enum Method {
     Dynamic,
     /// All points of a campaign together: like `Dynamic`, with shared parameters fitted over all of them.
     Joint,
+    /// Steady points, with the heat to the measured housing removed by eqs. 1-3 and a known law of convection.
+    Corrected,
     /// Read from a map that does not state how its efficiency was found.
     Imported,
 }
@@ -23,6 +25,7 @@ impl std::fmt::Display for Method {
             Method::Steady => "steady",
             Method::Dynamic => "dynamic",
             Method::Joint => "joint",
+            Method::Corrected => "corrected",
             Method::Imported => "imported",
         })
     }

@@ -12,11 +12,48 @@ pub struct ImportedMap {
     pub columns: Vec<ImportedColumn>,
     /// What the reader assumed or computed.
     pub remarks: Vec<ImportRemark>,
+    /// The points of a table of measured ones, in its order; empty for any other file.
+    pub measured: Vec<MeasuredPoint>,
+}
+
+/// A steady point as measured, in total values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredPoint {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Mass flow, kg/s.
+    pub flow_kg_s: f64,
+    /// Inlet temperature, K.
+    pub t1_k: f64,
+    /// Outlet temperature, K.
+    pub t2_k: Option<f64>,
+    /// Inlet pressure, Pa.
+    pub p1_pa: f64,
+    /// Outlet pressure, Pa.
+    pub p2_pa: f64,
+    /// Temperature of the compressor housing, K.
+    pub tc_k: Option<f64>,
+    /// Water per dry air, kg/kg.
+    pub humidity_kg_kg: Option<f64>,
+    /// End of its speed line, if its row names one.
+    pub end: Option<LineEnd>,
+}
+
+/// An end of a speed line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LineEnd {
+    /// Smallest flow.
+    Surge,
+    /// Largest flow.
+    Choke,
 }
 
 impl From<CompressorMap> for ImportedMap {
     fn from(map: CompressorMap) -> Self {
-        ImportedMap { map, columns: Vec::new(), remarks: Vec::new() }
+        ImportedMap { map, columns: Vec::new(), remarks: Vec::new(), measured: Vec::new() }
     }
 }
 
@@ -45,6 +82,11 @@ pub struct ImportedColumn {
 pub enum ImportRemark {
     /// The columns have no headings: rpm, kg/s, pressure ratio, efficiency were assumed.
     NoHeading,
+    /// Columns without headings behind the efficiency were left out.
+    FurtherColumns {
+        /// Their number.
+        count: usize,
+    },
     /// Efficiencies are percentages, from their size.
     EfficiencyInPercent,
     /// A row without speed has that of the row above.

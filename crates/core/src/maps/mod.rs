@@ -4,7 +4,6 @@ pub(crate) mod efficiency_definition;
 pub(crate) mod fitted_map;
 pub(crate) mod imported_map;
 pub(crate) mod map;
-pub(crate) mod map_columns;
 pub(crate) mod map_description;
 pub(crate) mod map_format;
 pub(crate) mod map_format_error;

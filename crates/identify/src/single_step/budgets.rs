@@ -4,8 +4,7 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{
-    BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, Recording, StepMarker,
-    UncertaintyBudget, half_width_95,
+    BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, UncertaintyBudget, half_width_95,
 };
 
 /// A source that is known in the unit of the number only.
@@ -20,11 +19,11 @@ pub(crate) fn own_row(source: &str, contribution: f64, unit: &str) -> BudgetRow 
     }
 }
 
-/// The budgets of a point from its estimate.
+/// The budgets of a point from its estimate. `samples`: number of samples that its state is the mean of.
 pub(crate) fn of_point(
     point: &IdentifiedPoint,
     estimate: &Estimate,
-    (recording, step): (&Recording, &StepMarker),
+    samples: impl Fn(Channel) -> usize,
     config: &IdentifyConfig,
 ) -> PointBudgets {
     let of =
@@ -37,7 +36,7 @@ pub(crate) fn of_point(
         step: point.step,
         eta: of(point.eta, point.eta_low, point.eta_high, eta, point.eta_uncertainty, "1"),
         h_w_m2k: of(point.h_w_m2k, point.h_low_w_m2k, point.h_high_w_m2k, h, point.h_uncertainty, "W/(m2 K)"),
-        pressure_ratio: pressure_ratio(point, (recording, step), config),
+        pressure_ratio: pressure_ratio(point, samples, config),
     }
 }
 
@@ -51,7 +50,7 @@ fn by_origin(error: EstimateUncertainty, unit: &str) -> Vec<BudgetRow> {
 
 fn pressure_ratio(
     point: &IdentifiedPoint,
-    (recording, step): (&Recording, &StepMarker),
+    samples: impl Fn(Channel) -> usize,
     config: &IdentifyConfig,
 ) -> UncertaintyBudget {
     let (ratio, p1_pa) = (point.pressure_ratio, point.p1_pa);
@@ -69,17 +68,14 @@ fn pressure_ratio(
             });
         }
     };
-    let start_s = step.end_s - config.thresholds.end_mean_s;
     for (channel, reading_pa, by_reading) in
         [(Channel::P1, p1_pa, -ratio / p1_pa), (Channel::P2, p2_pa, ratio / p2_pa)]
     {
         let declared = config.declared.get(&channel).copied().unwrap_or_default();
         push(format!("offset of {channel}"), declared.offset_sigma, "Pa", by_reading);
         push(format!("gain of {channel}"), declared.gain_sigma_ratio, "1", by_reading * reading_pa);
-        let samples =
-            recording.series.get(&channel).map_or(1, |series| series.range(start_s, step.end_s).len());
-        let mean =
-            coloured(config.noise_colour).variance_of_mean(samples, config.thresholds.end_mean_s).sqrt();
+        let colour = coloured(config.noise_colour);
+        let mean = colour.variance_of_mean(samples(channel), config.thresholds.end_mean_s).sqrt();
         push(format!("noise of {channel}"), declared.noise_sigma * mean, "Pa", by_reading);
     }
     push("barometer".to_owned(), config.barometer_sigma_pa, "Pa", (1.0 - ratio) / p1_pa);

@@ -229,7 +229,7 @@ fn judge_width(view: &View<'_>, eta: EstimateUncertainty, dt2_k: Option<f64>, fi
 }
 
 /// Checks that the assumed alpha_A is known well enough. `off_eta`: its error of eta, one standard deviation.
-fn judge_assumption(off_eta: f64, config: &IdentifyConfig, findings: &mut Findings) {
+pub(crate) fn judge_assumption(off_eta: f64, config: &IdentifyConfig, findings: &mut Findings) {
     if off_eta.abs() <= config.thresholds.sigma_eta {
         return;
     }

@@ -61,7 +61,7 @@ pub fn correct_for_heat(
     mut map: CompressorMap,
     given_w: Option<f64>,
 ) -> Result<(CompressorMap, HeatCorrection), HeatCorrectionError> {
-    if matches!(map.method, Method::Dynamic | Method::Joint) {
+    if matches!(map.method, Method::Dynamic | Method::Joint | Method::Corrected) {
         return Err(HeatCorrectionError::Adiabatic { method: map.method });
     }
     let used = work_points(&map);

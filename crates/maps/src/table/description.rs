@@ -47,7 +47,7 @@ const fn column(name: &'static str, example: &'static str) -> DescriptionKey {
 }
 
 /// Every key.
-pub const DESCRIPTION_KEYS: [DescriptionKey; 20] = [
+pub const DESCRIPTION_KEYS: [DescriptionKey; 22] = [
     DescriptionKey {
         name: "reference",
         description: "Reference state of the corrected quantities: SAE, Garrett, BorgWarner, or temperature and pressure.",
@@ -122,6 +122,8 @@ pub const DESCRIPTION_KEYS: [DescriptionKey; 20] = [
     column("p2", "P2 [kPa]"),
     column("t1", "T1 [degC]"),
     column("t2", "T2 [degC]"),
+    column("tc", "Tc [degC]"),
+    column("humidity", "RH [%]"),
 ];
 
 fn set<T>(place: &mut Option<T>, value: Option<T>) -> Option<()> {

@@ -9,6 +9,7 @@ mod read_turbine;
 mod reference;
 mod rows_to_lines;
 mod sheet;
+mod units_row;
 
 pub use description::{
     DESCRIPTION_KEYS, DescriptionError, DescriptionKey, KeyError, describe, describe_turbine,

@@ -5,7 +5,7 @@ use crate::table::columns::column::Machine;
 use crate::table::columns::described_columns::Given;
 use crate::table::columns::quantity::Quantity;
 use crate::table::efficiency_comment::efficiency_in_comment;
-use crate::table::gas_turbine::beta_tables::{read_arrays, read_modelica, read_nested};
+use crate::table::gas_turbine::beta_tables::{read_arrays, read_gsp, read_modelica, read_nested};
 use crate::table::gas_turbine::design_point::{MapDesign, scale_to_design};
 use crate::table::reference;
 use crate::table::rows_to_lines::{Row, map_of_rows};
@@ -14,7 +14,7 @@ use crate::table::sheet::layout::{self, Layout};
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
 use mapper_core::{
     CompressorMap, EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription,
-    ReferenceState, StaticTaps,
+    MeasuredPoint, ReferenceState, StaticTaps,
 };
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
@@ -38,6 +38,8 @@ pub fn read_any_text(text: &str, given: &MapDescription) -> Result<ImportedMap, 
         read_nested(text, given)
     } else if text.lines().next() == Some("#1") && text.contains("\ndouble ") {
         read_modelica(text, given)
+    } else if text.lines().take(GSP_HEAD).any(|line| line.trim_start().starts_with("Reynolds:")) {
+        read_gsp(text, given)
     } else if has_arrays(text) {
         read_arrays(text, given)
     } else {
@@ -55,6 +57,9 @@ pub fn read_any_bytes(bytes: &[u8], given: &MapDescription) -> Result<ImportedMa
 
 /// How every table of an NPSS map begins.
 const NPSS_TABLE: &str = "Table TB_";
+
+/// Lines above the tables of GSP and GasTurb: the title, which begins with 99, and the effect of the Reynolds number.
+const GSP_HEAD: usize = 10;
 
 /// Whether a script assigns arrays.
 fn has_arrays(text: &str) -> bool {
@@ -105,9 +110,15 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
             problem: "but the table has no P1 and P2; leave them out".to_owned(),
         });
     }
-    let mut rows = Vec::with_capacity(points.len());
+    let (mut rows, mut measured) = (Vec::with_capacity(points.len()), Vec::new());
     for point in &points {
-        rows.push(row(point, &layout, reference, in_percent, taps)?);
+        let mut row = row(point, &layout, reference, in_percent)?;
+        if layout.is_measured() {
+            let as_measured = as_measured(point, &row, reference, taps)?;
+            correct(&mut row, &as_measured, reference);
+            measured.push(as_measured);
+        }
+        rows.push(row);
     }
     scale_to_design(&mut rows, MapDesign::default(), description.design, &mut remarks)?;
     rows.iter().try_for_each(Row::check)?;
@@ -117,58 +128,101 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     let map = map_of_rows(notes.machine, &rows, Some(reference), None)?;
     let efficiency =
         if layout.is_measured() { Some(EfficiencyDefinition::Enthalpy) } else { notes.efficiency };
-    Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns, remarks })
+    Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns, remarks, measured })
 }
 
-/// The four numbers of a point.
+/// A value that a point needs.
+fn needed(point: &Point<'_>, quantity: Quantity, value: Option<f64>) -> Result<f64, ImportError> {
+    value.ok_or_else(|| ImportError::NotANumber {
+        line: point.at,
+        quantity: quantity.name().to_owned(),
+        text: String::new(),
+    })
+}
+
+/// The four numbers of a point; speed and flow of a measured one are not corrected yet, and its pressure ratio is unknown.
 fn row(
     point: &Point<'_>,
     layout: &Layout,
     reference: ReferenceState,
     in_percent: bool,
-    taps: StaticTaps,
 ) -> Result<Row, ImportError> {
     let any =
         |quantities: &[Quantity]| quantities.iter().find_map(|quantity| point.value(*quantity, reference));
-    let needed = |value: Option<f64>, quantity: Quantity| {
-        value.ok_or_else(|| ImportError::NotANumber {
-            line: point.at,
-            quantity: quantity.name().to_owned(),
-            text: String::new(),
-        })
-    };
     let own_speed = any(&[Quantity::Speed, Quantity::ReducedSpeed]);
-    let speed_rpm = needed(own_speed.or(point.speed), Quantity::Speed)?;
-    let flow_kg_s =
-        needed(any(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow]), Quantity::Flow)?;
-    let mut row = Row {
+    let flow = any(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow]);
+    let ratio = any(&[Quantity::PressureRatio]);
+    Ok(Row {
         at: point.at,
-        speed_corrected_rpm: speed_rpm,
-        flow_corrected_kg_s: flow_kg_s,
-        pressure_ratio: f64::NAN,
+        speed_corrected_rpm: needed(point, Quantity::Speed, own_speed.or(point.speed))?,
+        flow_corrected_kg_s: needed(point, Quantity::Flow, flow)?,
+        pressure_ratio: match layout.is_measured() {
+            true => f64::NAN,
+            false => needed(point, Quantity::PressureRatio, ratio)?,
+        },
         eta: any(&[Quantity::Efficiency]).map(|eta| if in_percent { 0.01 * eta } else { eta }),
-    };
-    if layout.is_measured() {
-        let t1_k = needed(any(&[Quantity::T1]), Quantity::T1)?;
-        let t2_k = any(&[Quantity::T2]);
-        let mut p1_pa = needed(any(&[Quantity::P1]), Quantity::P1)?;
-        let mut p2_pa = needed(any(&[Quantity::P2]), Quantity::P2)?;
-        if let Some(diameter_m) = taps.inlet_diameter_m {
-            p1_pa = static_to_total_pa(p1_pa, flow_kg_s, t1_k, diameter_m);
-        }
-        if let Some(diameter_m) = taps.outlet_diameter_m {
-            p2_pa = static_to_total_pa(p2_pa, flow_kg_s, needed(t2_k, Quantity::T2)?, diameter_m);
-        }
-        row.pressure_ratio = p2_pa / p1_pa;
-        row.speed_corrected_rpm = reference.corrected_speed_rpm(speed_rpm, t1_k);
-        row.flow_corrected_kg_s = reference.corrected_flow_kg_s(flow_kg_s, t1_k, p1_pa);
-        let t2_k = t2_k.filter(|t2_k| *t2_k > t1_k && p2_pa > p1_pa);
-        let apparent = t2_k.map(|t2_k| apparent_efficiency(row.pressure_ratio, t1_k, t2_k, Air::DRY));
-        row.eta = row.eta.or(apparent);
-    } else {
-        row.pressure_ratio = needed(any(&[Quantity::PressureRatio]), Quantity::PressureRatio)?;
+    })
+}
+
+/// The measured values of a point, static pressures converted to total ones.
+fn as_measured(
+    point: &Point<'_>,
+    row: &Row,
+    reference: ReferenceState,
+    taps: StaticTaps,
+) -> Result<MeasuredPoint, ImportError> {
+    let value = |quantity: Quantity| point.value(quantity, reference);
+    let of = |quantity: Quantity| needed(point, quantity, value(quantity));
+    let flow_kg_s = row.flow_corrected_kg_s;
+    let (t1_k, t2_k) = (of(Quantity::T1)?, value(Quantity::T2));
+    let (mut p1_pa, mut p2_pa) = (of(Quantity::P1)?, of(Quantity::P2)?);
+    if let Some(diameter_m) = taps.inlet_diameter_m {
+        p1_pa = static_to_total_pa(p1_pa, flow_kg_s, t1_k, diameter_m);
     }
-    Ok(row)
+    if let Some(diameter_m) = taps.outlet_diameter_m {
+        p2_pa = static_to_total_pa(p2_pa, flow_kg_s, needed(point, Quantity::T2, t2_k)?, diameter_m);
+    }
+    let humidity = point.of(Quantity::Humidity).map(|(column, written)| match column.is_relative() {
+        true if column.unit.is_empty() => {
+            Air::of_relative_humidity(0.01 * written, t1_k, p1_pa).humidity_kg_kg
+        }
+        true => Air::of_relative_humidity(column.plain(written), t1_k, p1_pa).humidity_kg_kg,
+        false => column.plain(written),
+    });
+    if let Some(humidity) = humidity.filter(|humidity| !(0.0..=MAX_HUMIDITY_KG_KG).contains(humidity)) {
+        return Err(ImportError::Value {
+            line: point.at,
+            quantity: "humidity",
+            value: humidity,
+            needed: "from 0 to 0.1 kg/kg; write its unit, %, g/kg or kg/kg, into the heading",
+        });
+    }
+    Ok(MeasuredPoint {
+        line: point.at,
+        speed_rpm: row.speed_corrected_rpm,
+        flow_kg_s,
+        t1_k,
+        t2_k,
+        p1_pa,
+        p2_pa,
+        tc_k: value(Quantity::Tc),
+        humidity_kg_kg: humidity,
+        end: point.end,
+    })
+}
+
+/// Saturated air of 50 degC at 100 kPa has 0.088 kg/kg.
+const MAX_HUMIDITY_KG_KG: f64 = 0.1;
+
+/// Corrects a measured point; its efficiency is the apparent one if the table has none.
+fn correct(row: &mut Row, point: &MeasuredPoint, reference: ReferenceState) {
+    let air = Air { humidity_kg_kg: point.humidity_kg_kg.unwrap_or(0.0), ..Air::DRY };
+    row.pressure_ratio = point.p2_pa / point.p1_pa;
+    row.speed_corrected_rpm = reference.corrected_speed_rpm(point.speed_rpm, point.t1_k);
+    row.flow_corrected_kg_s =
+        reference.corrected_flow_kg_s(point.flow_kg_s * air.dry_flow_ratio(), point.t1_k, point.p1_pa);
+    let t2_k = point.t2_k.filter(|t2_k| *t2_k > point.t1_k && point.p2_pa > point.p1_pa);
+    row.eta = row.eta.or(t2_k.map(|t2_k| apparent_efficiency(row.pressure_ratio, point.t1_k, t2_k, air)));
 }
 
 /// Looks through the rows outside the table.

@@ -1,6 +1,7 @@
 //! A log as a file or as bytes in memory.
 
 use crate::logs::LogError;
+use crate::logs::limits::{UNPACKED_BYTES, unpacked_max};
 use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,6 +10,9 @@ use std::sync::Arc;
 pub trait ReadSeek: Read + Seek {}
 
 impl<T: Read + Seek> ReadSeek for T {}
+
+/// The first bytes of a file compressed by gzip.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// A log's bytes, which may be read several times.
 #[derive(Debug, Clone)]
@@ -26,6 +30,27 @@ impl LogFile {
     /// Bytes in memory; `name` stands for the file in messages.
     pub fn of_bytes(name: &Path, bytes: &[u8]) -> Self {
         LogFile { path: name.to_owned(), bytes: Some(bytes.into()) }
+    }
+
+    /// The content of a file compressed by gzip, in memory; `None` for any other.
+    ///
+    /// # Errors
+    /// [`LogError::Read`] if the file cannot be read or unpacked, or unpacks to more than a file of its size may.
+    pub(crate) fn unpacked(&self) -> Result<Option<LogFile>, LogError> {
+        if self.head(GZIP.len())? != GZIP {
+            return Ok(None);
+        }
+        let limit = unpacked_max(self.size_bytes()?).min(UNPACKED_BYTES);
+        let mut content = Vec::new();
+        flate2::read::MultiGzDecoder::new(self.open()?)
+            .take(limit + 1)
+            .read_to_end(&mut content)
+            .map_err(|error| self.error(error))?;
+        if content.len() as u64 > limit {
+            let why = format!("it unpacks to more than {} MiB; unpack it to a file", limit >> 20);
+            return Err(self.error(io::Error::new(io::ErrorKind::FileTooLarge, why)));
+        }
+        Ok(Some(LogFile { path: self.path.clone(), bytes: Some(content.into()) }))
     }
 
     /// The file, for messages.

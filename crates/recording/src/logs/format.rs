@@ -65,6 +65,8 @@ impl LogFormats {
         file: &LogFile,
         options: &LogOptions,
     ) -> Result<(&'static LogFormat, Box<dyn Log>), LogError> {
+        let unpacked = file.unpacked()?;
+        let file = unpacked.as_ref().unwrap_or(file);
         let head = file.head(Self::HEAD_BYTES)?;
         let format = self.of_head(&head).ok_or_else(|| LogError::Unknown {
             path: file.path().to_owned(),
@@ -82,7 +84,7 @@ impl LogFormats {
 }
 
 /// Formats that people have and that are not read, by their first bytes, with what to do.
-const OTHERS: [(&[u8], &str); 9] = [
+const OTHERS: [(&[u8], &str); 8] = [
     (
         b"\x89MCAP",
         "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
@@ -101,10 +103,9 @@ const OTHERS: [(&[u8], &str); 9] = [
         "it is Arrow, which this program was built without: `cargo build --release --features parquet`, or export it as CSV, e.g. \
          with `polars.read_ipc(FILE).write_csv(NEW)`",
     ),
-    (b"\x89HDF", "it is HDF5 or a newer MATLAB file; export it as CSV"),
-    (b"MATLAB", "it is a MATLAB file; export it as CSV"),
+    (b"\x89HDF", "it is HDF5; export it as CSV"),
+    (b"MATLAB 7.3", "it is MATLAB data of version 7.3; save it by `save -v7`, or export it as CSV"),
     (b"\xD0\xCF\x11\xE0", "it is a workbook of Excel before 2007; save it as .xlsx"),
-    (b"\x1F\x8B", "it is packed with gzip; unpack it"),
     (b"PK", "it is a zip archive, and no whole workbook of Excel; unpack it, or save the workbook again"),
 ];
 

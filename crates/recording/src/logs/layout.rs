@@ -40,6 +40,12 @@ pub struct Column {
 }
 
 impl Layout {
+    /// Adds what was found while the rows were read, once.
+    pub fn add_finding(&mut self, finding: Option<&str>) {
+        let known = |finding: &&str| self.findings.iter().any(|other| other == finding);
+        self.findings.extend(finding.filter(|finding| !known(finding)).map(str::to_owned));
+    }
+
     /// Columns of that name, or with that header as a whole, in a group of that name (any if `topic` is empty).
     pub fn find(&self, topic: &str, field: &str) -> Vec<usize> {
         let in_group = |column: &Column| {

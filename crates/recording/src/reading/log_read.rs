@@ -115,6 +115,8 @@ pub(crate) fn read_log(
         took.map_err(|restart| file.content(format.name, restart_words(restart, &layout, row.group)))
     };
     log.rows(&columns, &mut take_row)?;
+    let found_later = log.layout().findings.iter().filter(|finding| !layout.findings.contains(finding));
+    read.warnings.extend(found_later.map(|finding| ReadWarning::Log { finding: finding.clone() }));
     for ((clock, blocks), places) in clocks.iter_mut().zip(&mut blocks).zip(&places) {
         let mut keep = |t_s: f64, values: &[f64]| read.take(places, t_s, values);
         clock.finish(&mut |t_s, values| blocks.push(t_s, values, &mut keep));

@@ -70,6 +70,9 @@ pub fn import_remark_text(remark: ImportRemark) -> String {
         ImportRemark::NoHeading => {
             "The columns have no headings; taken as rpm, kg/s, pressure ratio and efficiency.".to_owned()
         }
+        ImportRemark::FurtherColumns { count } => format!(
+            "{count} columns behind the efficiency have no headings and were left out; name them by `--with`, e.g. `--with efficiency=#5`."
+        ),
         ImportRemark::EfficiencyInPercent => {
             "The efficiencies are taken as percentages, from their size.".to_owned()
         }

@@ -1,7 +1,7 @@
 //! Why a command on map files ended early.
 
 use mapper_maps::table::{DescriptionError, KeyError};
-use mapper_maps::{MapFitError, TurbineFitError};
+use mapper_maps::{AssembleError, HeatCorrectionError, MapFitError, TurbineFitError};
 use std::path::PathBuf;
 
 /// Errors of commands on map files.
@@ -31,6 +31,31 @@ pub enum MapWorkError {
         path: PathBuf,
         /// The reason.
         source: TurbineFitError,
+    },
+    /// A table whose points are corrected already.
+    #[error(
+        "{} is not a table of measured points, which has N, flow, P1, T1, P2 and T2; the columns that were found are shown by `mapper map inspect`",
+        .path.display()
+    )]
+    NotMeasured {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Points that are not a map.
+    #[error("{}: {source}", .path.display())]
+    NotAssembled {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: AssembleError,
+    },
+    /// A map that cannot be corrected for heat.
+    #[error("{}: {source}", .path.display())]
+    NotCorrected {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: HeatCorrectionError,
     },
     /// A conversion of efficiencies without their definition.
     #[error(

@@ -120,7 +120,7 @@ impl Session<'_> {
 }
 
 /// Declared parameters, replaced by the identified values if they exist.
-fn with_found(declared: &Params, found: &ThermalModel) -> Params {
+pub(crate) fn with_found(declared: &Params, found: &ThermalModel) -> Params {
     let mut params = *declared;
     let compressor = &mut params.compressor;
     compressor.internal_area_m2 = found.internal_area_m2;

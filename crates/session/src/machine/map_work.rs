@@ -9,10 +9,12 @@ use mapper_core::{
     MapDescription, MapFormat, ReferenceState, TurbineMap,
 };
 use mapper_maps::table::{describe, describe_turbine};
-use mapper_maps::{MapFitOptions, compare, compare_turbines, convert_efficiency, fit_map, fit_turbine};
+use mapper_maps::{
+    MapFitOptions, compare, compare_turbines, convert_efficiency, correct_for_heat, fit_map, fit_turbine,
+};
 use mapper_report::{
-    distinct_names, import_remark_text, imported_map_text, imported_turbine_text, map_comparison_figure,
-    map_comparison_text, map_fit_text, turbine_comparison_text, turbine_fit_text,
+    distinct_names, heat_correction_text, import_remark_text, imported_map_text, imported_turbine_text,
+    map_comparison_figure, map_comparison_text, map_fit_text, turbine_comparison_text, turbine_fit_text,
 };
 use serde_json::{Value, json};
 use std::path::Path;
@@ -49,12 +51,12 @@ pub struct MapOut<'a> {
 }
 
 impl MapOut<'_> {
-    fn format(&self, registry: &Registry) -> Result<&'static MapFormat, SessionError> {
+    pub(crate) fn format(&self, registry: &Registry) -> Result<&'static MapFormat, SessionError> {
         registry.format_of(self.path, self.format)
     }
 }
 
-fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
+pub(crate) fn warnings(path: &Path, remarks: &[ImportRemark]) -> Vec<String> {
     remarks.iter().map(|remark| format!("{}: {}", path.display(), import_remark_text(*remark))).collect()
 }
 
@@ -236,6 +238,30 @@ impl Registry {
                 Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
             }
         }
+    }
+
+    /// Removes the heat that a hot map shows, or a given one (W), and writes the map if asked.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map`], [`MapWorkError::NotCorrected`], and those of writing.
+    pub fn correct_map_file(
+        &self,
+        path: &Path,
+        given: &MapDescription,
+        heat_w: Option<f64>,
+        out: Option<MapOut<'_>>,
+    ) -> Result<MapWork, SessionError> {
+        let format = out.map(|out| out.format(self)).transpose()?;
+        let found = self.inspect_map(path, given)?;
+        let (map, correction) = correct_for_heat(found.map, heat_w)
+            .map_err(|source| MapWorkError::NotCorrected { path: path.to_owned(), source })?;
+        let mut text = heat_correction_text(&correction);
+        if let Some((out, format)) = out.zip(format) {
+            write_map_fitted_if_needed(out.path, format, map, out.existing)?;
+            text.push_str(&format!("map        {}\n", out.path.display()));
+        }
+        let json = json!({"map": path, "correction": correction, "file": out.map(|out| out.path)});
+        Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
     }
 
     /// Compares two maps of the same machine; `picture` is a new file with both.

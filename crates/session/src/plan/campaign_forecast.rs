@@ -227,7 +227,7 @@ fn probe(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
                     campaign.identification.window.of_step_s(predicted.settle_s, step.dwell_s);
                 end_s - start_s
             }
-            Method::Steady | Method::Imported => step.dwell_s,
+            Method::Steady | Method::Corrected | Method::Imported => step.dwell_s,
         };
         (time_constant_s(diameter_m, pipe_m, predicted.flow_kg_s, predicted.t2_k), window_s, step.to)
     };

@@ -110,7 +110,7 @@ fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
         Method::Joint if config.joint != JointSettings::all_off() => Scope::AllSteps,
         Method::Dynamic | Method::Joint => Scope::EachStep,
         Method::Steady => Scope::Settled,
-        Method::Imported => return None,
+        Method::Corrected | Method::Imported => return None,
     };
     Some(Box::new(Forecaster::of(config, scope)))
 }

@@ -2,7 +2,8 @@
 
 use mapper_campaign::Campaign;
 use mapper_core::{
-    ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, Method, ReferenceState, WindowRule,
+    ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, Method, ModelTolerances, ReferenceState,
+    WindowRule,
 };
 use mapper_identify::{IdentifyConfig, PressureTap};
 use mapper_observe::declared_uncertainties;
@@ -74,6 +75,23 @@ pub fn declared(campaign: &Campaign, map: &ChannelMap) -> BTreeMap<Channel, Decl
 /// Gain error of a pressure transducer without a declared one, ratio, one standard deviation: accuracy class 0.1, the best of EN 837-1, as the
 /// limits of a rectangular distribution (GUM 4.3.7).
 const PRESSURE_GAIN_RATIO: f64 = 5.8e-4;
+
+/// Standard uncertainty of a thermometer at 100 degC, K: tolerance class A of IEC 60751, 0.35 K, as the limits of a rectangular distribution.
+const THERMOMETER_K: f64 = 0.2;
+
+/// Sensors of a table of points that come without a declaration.
+pub(crate) fn assumed_sensors() -> BTreeMap<Channel, DeclaredUncertainty> {
+    let offset = |offset_sigma| DeclaredUncertainty { offset_sigma, ..DeclaredUncertainty::default() };
+    let gain = |gain_sigma_ratio| DeclaredUncertainty { gain_sigma_ratio, ..DeclaredUncertainty::default() };
+    let flow_ratio = ModelTolerances::default().flow_meter_gain_ratio;
+    BTreeMap::from([
+        (Channel::T1, offset(THERMOMETER_K)),
+        (Channel::T2, offset(THERMOMETER_K)),
+        (Channel::P1, gain(PRESSURE_GAIN_RATIO)),
+        (Channel::P2, gain(PRESSURE_GAIN_RATIO)),
+        (Channel::CompressorFlow, gain(flow_ratio)),
+    ])
+}
 
 fn add_pressure_gain(channel: Channel, declared: &mut DeclaredUncertainty) {
     if channel.info().dimension == Dimension::Pressure && declared.gain_sigma_ratio == 0.0 {

@@ -6,14 +6,11 @@
 //! the definitions of its units.
 
 mod header_unit;
-mod heading;
 mod kind;
 mod parse;
 mod quantity;
-mod table_text;
 
 pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit, volume_flow_m3_s};
-pub use heading::{FoundColumn, HeadingError, WantedColumn, find_columns};
 pub use kind::{BARE_RATIO, Kind, Unit};
 pub use parse::{UnitError, parse, parse_with};
 pub use quantity::{
@@ -21,4 +18,3 @@ pub use quantity::{
     MassFlow, Pressure, PressureDifference, PressureRate, Quantity, RatioRate, Speed, Temperature,
     TemperatureDifference, TemperatureRate, Volume,
 };
-pub use table_text::{TableText, with_units_row};

@@ -253,7 +253,7 @@ fn own_point(
 }
 
 fn method_of(name: &str) -> Option<Method> {
-    [Method::Steady, Method::Dynamic, Method::Joint, Method::Imported]
+    [Method::Steady, Method::Dynamic, Method::Joint, Method::Corrected, Method::Imported]
         .into_iter()
         .find(|method| method.to_string() == name.trim())
 }

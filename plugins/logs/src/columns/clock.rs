@@ -87,12 +87,22 @@ pub(crate) struct ClockHand {
     last_ns: Option<i64>,
     last_s: f64,
     shared: usize,
+    /// Whether a reading with a date went back by an hour.
+    hour_back: bool,
 }
 
 impl ClockHand {
     pub(crate) fn new(clock: GroupClock) -> Self {
         let shared = clock.spread.map_or(0, |spread| spread.missing_at_start);
-        ClockHand { clock, rows: 0, added_ns: 0, last_ns: None, last_s: f64::NAN, shared }
+        ClockHand { clock, rows: 0, added_ns: 0, last_ns: None, last_s: f64::NAN, shared, hour_back: false }
+    }
+
+    /// A remark if local time went back at the end of daylight saving.
+    pub(crate) fn remark(&self) -> Option<&'static str> {
+        self.hour_back.then_some(
+            "clock: a date goes back by an hour, as where daylight saving ends; the rows after it are taken as an hour later \
+             (name a clock without daylight saving by `time` if that is wrong)",
+        )
     }
 
     /// The row's time, s; `None` if the group has no sample in it.
@@ -106,9 +116,9 @@ impl ClockHand {
             Clock::Instant { period_ns, .. } => {
                 let ns = self.clock.clock.instant_ns(cells)?;
                 let last_ns = self.last_ns.replace(ns);
-                self.added_ns = self
-                    .added_ns
-                    .saturating_add(last_ns.map_or(0, |last| begun_again_ns(last, ns, *period_ns)));
+                let added_ns = last_ns.map_or(0, |last| begun_again_ns(last, ns, *period_ns));
+                self.hour_back |= added_ns > 0 && ns >= DATED_FROM_NS;
+                self.added_ns = self.added_ns.saturating_add(added_ns);
                 ns.saturating_add(self.added_ns).saturating_sub(self.clock.zero_ns) as f64 / 1e9
             }
         };

@@ -129,7 +129,7 @@ pub(crate) fn choose(sample: &Sample<'_>, options: &LogOptions) -> Result<Clocks
         let names: Vec<&str> = sample.columns.iter().map(|column| column.name.as_str()).take(40).collect();
         return Err(format!(
             "no column is a clock; name it (`time`) or give the rate (`rate: 10 Hz`); if each row is a steady point, \
-             `mapper map inspect` reads the file; the columns are {}",
+             `mapper map reduce` makes a map of the file; the columns are {}",
             names.join(", ")
         ));
     };

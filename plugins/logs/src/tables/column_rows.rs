@@ -8,6 +8,7 @@ use mapper_recording::logs::{DateOrder, LogError};
 
 /// Some rows of a column. Rows after its end are empty.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(not(feature = "parquet"), allow(dead_code, reason = "MATLAB data have numbers only"))]
 pub(crate) enum Chunk {
     Numbers(Vec<f64>),
     Instants(Vec<Option<Instant>>),

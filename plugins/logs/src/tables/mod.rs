@@ -1,6 +1,5 @@
 //! Log tables in all storage forms, presented to the reader of recordings as one stream of rows in order of time.
 
-#[cfg(any(feature = "parquet", feature = "tdms"))]
 pub(crate) mod column_rows;
 pub(crate) mod long_table;
 #[cfg(feature = "parquet")]

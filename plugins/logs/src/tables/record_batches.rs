@@ -78,7 +78,9 @@ impl Log for BatchLog {
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
         let (schema, batches) = contained(self.name, &self.file, || (self.open)(&self.file))?;
         let chunks = BatchChunks { file: &self.file, name: self.name, batches };
-        self.table.rows(&mut ColumnRows::new(head(&schema), chunks), wanted, sink)
+        let remark = self.table.rows(&mut ColumnRows::new(head(&schema), chunks), wanted, sink)?;
+        self.table.layout.add_finding(remark);
+        Ok(())
     }
 }
 

@@ -62,12 +62,9 @@ pub(crate) enum Origin {
     /// A text or a sheet: its head is in rows.
     Rows,
     /// A file of columns, which has no rows of a head.
-    #[cfg_attr(
-        not(any(feature = "parquet", feature = "tdms")),
-        allow(dead_code, reason = "only files of columns need it")
-    )]
     Columns,
     /// As `Columns`; the file gives the interval of the samples too.
+    #[cfg_attr(not(feature = "tdms"), allow(dead_code, reason = "only TDMS has waveforms"))]
     Waveform,
 }
 
@@ -125,16 +122,16 @@ impl Table {
         self.sources.iter().copied().zip(self.layout.columns.iter().map(|column| column.name.as_str()))
     }
 
-    /// Returns the rows of the wanted columns; `rows` must be before the first row of the table.
+    /// Gives the rows of the wanted columns, and returns a remark on their clock; `rows` must be before the first row of the table.
     pub(crate) fn rows(
         &self,
         rows: &mut dyn Rows,
         wanted: &[usize],
         sink: &mut RowSink<'_>,
-    ) -> Result<(), LogError> {
+    ) -> Result<Option<&'static str>, LogError> {
         for _ in 0..self.data_row {
             if !rows.advance()? {
-                return Ok(());
+                return Ok(None);
             }
         }
         let mut groups: Vec<Rolling> = Vec::new();
@@ -176,11 +173,13 @@ impl Table {
                 }
             }
         }
+        let mut remark = None;
         for rolling in groups {
+            remark = remark.or(rolling.hand.remark());
             for (t_s, values) in rolling.sorter.unwrap_or_default().rest() {
                 sink(Row { group: rolling.group, t_s, values: &values })?;
             }
         }
-        Ok(())
+        Ok(remark)
     }
 }

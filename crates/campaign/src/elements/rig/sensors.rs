@@ -113,124 +113,94 @@ fn declaration<D: Dimension>(
 pub(crate) const CALIBRATED: [&str; 15] =
     ["N", "m_c", "P1", "T1", "P2", "T2", "Tc", "m_t", "P3", "T3", "P4", "T4", "Tt", "T_oil", "T_amb"];
 
-/// Speed sensor.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct SpeedSensor {
-    /// Noise of one sample.
-    #[schemars(extend("x-min" = "0 rpm"), example = &"30 rpm")]
-    noise: Quantity<Speed>,
-    /// Fixed offset left after calibration; 0 if none is given.
-    #[schemars(extend("x-min" = "0 rpm"), example = &"0 rpm")]
-    offset: Option<Quantity<Speed>>,
-    /// Fixed error of the gain; 0 if none is given.
-    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
-    gain: Option<Quantity<Fraction>>,
-    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
-    #[schemars(range(min = 1, max = 16), example = 4)]
-    count: Option<usize>,
-    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
-    #[schemars(regex(pattern = r"^.{1,40}$"))]
-    name: Option<String>,
-    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
-    #[schemars(extend("x-min" = "0 rpm"))]
-    common_offset: Option<Quantity<Speed>>,
-}
-
-impl Sensor for SpeedSensor {
-    fn declaration(&self) -> SensorDeclaration {
-        declaration(self.noise, self.offset, self.gain)
-    }
-
-    fn several(&self) -> Several<'_> {
-        Several {
-            count: self.count.unwrap_or(1),
-            name: self.name.as_deref(),
-            common_offset: or(self.common_offset, 0.0),
+/// Declares a kind of sensor: its dimension, the `schemars` attributes of its noise, its offset and its common offset, the text on its
+/// gain, keys of its own, and what they add to the declaration.
+macro_rules! sensor {
+    (
+        $(#[$doc:meta])* $sensor:ident: $dimension:ty,
+        noise: [$($noise:tt)*], offset: [$($offset:tt)*], common: [$($common:tt)*], gain: $gain:tt,
+        { $($own:tt)* } $declaration:expr
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub(crate) struct $sensor {
+            /// Noise of one sample.
+            #[schemars($($noise)*)]
+            noise: Quantity<$dimension>,
+            /// Fixed offset left after calibration; 0 if none is given.
+            #[schemars($($offset)*)]
+            offset: Option<Quantity<$dimension>>,
+            #[doc = $gain]
+            #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
+            gain: Option<Quantity<Fraction>>,
+            $($own)*
+            /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
+            #[schemars(range(min = 1, max = 16), example = 4)]
+            count: Option<usize>,
+            /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
+            #[schemars(regex(pattern = r"^.{1,40}$"))]
+            name: Option<String>,
+            /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
+            #[schemars($($common)*)]
+            common_offset: Option<Quantity<$dimension>>,
         }
-    }
-}
 
-/// Flow meter.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct FlowSensor {
-    /// Noise of one sample.
-    #[schemars(extend("x-min" = "0 kg/s"))]
-    noise: Quantity<MassFlow>,
-    /// Fixed offset left after calibration; 0 if none is given.
-    #[schemars(extend("x-min" = "0 kg/s"), example = &"0 kg/s")]
-    offset: Option<Quantity<MassFlow>>,
-    /// Fixed error of the gain; 0 if none is given.
-    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
-    gain: Option<Quantity<Fraction>>,
-    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
-    #[schemars(range(min = 1, max = 16), example = 4)]
-    count: Option<usize>,
-    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
-    #[schemars(regex(pattern = r"^.{1,40}$"))]
-    name: Option<String>,
-    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
-    #[schemars(extend("x-min" = "0 kg/s"))]
-    common_offset: Option<Quantity<MassFlow>>,
-}
+        impl Sensor for $sensor {
+            fn declaration(&self) -> SensorDeclaration {
+                let own: fn(&$sensor, SensorDeclaration) -> SensorDeclaration = $declaration;
+                own(self, declaration(self.noise, self.offset, self.gain))
+            }
 
-impl Sensor for FlowSensor {
-    fn declaration(&self) -> SensorDeclaration {
-        declaration(self.noise, self.offset, self.gain)
-    }
-
-    fn several(&self) -> Several<'_> {
-        Several {
-            count: self.count.unwrap_or(1),
-            name: self.name.as_deref(),
-            common_offset: or(self.common_offset, 0.0),
+            fn several(&self) -> Several<'_> {
+                Several {
+                    count: self.count.unwrap_or(1),
+                    name: self.name.as_deref(),
+                    common_offset: or(self.common_offset, 0.0),
+                }
+            }
         }
-    }
+    };
 }
 
-/// Pressure sensor.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct PressureSensor {
-    /// Noise of one sample.
-    #[schemars(extend("x-min" = "0 Pa"), example = &"20 Pa")]
-    noise: Quantity<PressureDifference>,
-    /// Fixed offset left after calibration; 0 if none is given.
-    #[schemars(extend("x-min" = "0 Pa"))]
-    offset: Option<Quantity<PressureDifference>>,
-    /// Fixed error of the gain; if none is given, identification takes 0.058 % (accuracy class 0.1).
-    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
-    gain: Option<Quantity<Fraction>>,
-    /// What the tap measures: `total` (the default), or `static`, converted with `pipe_diameter`.
-    tap: Option<TapName>,
-    /// Inner diameter of the pipe at the tap; needed for a static tap.
-    #[schemars(extend("x-above" = "0 mm", "x-max" = "1 m"), example = &"40 mm")]
-    pipe_diameter: Option<Quantity<Length>>,
-    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
-    #[schemars(range(min = 1, max = 16), example = 4)]
-    count: Option<usize>,
-    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
-    #[schemars(regex(pattern = r"^.{1,40}$"))]
-    name: Option<String>,
-    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
-    #[schemars(extend("x-min" = "0 Pa"))]
-    common_offset: Option<Quantity<PressureDifference>>,
+sensor! {
+    /// Speed sensor.
+    SpeedSensor: Speed,
+    noise: [extend("x-min" = "0 rpm"), example = &"30 rpm"],
+    offset: [extend("x-min" = "0 rpm"), example = &"0 rpm"],
+    common: [extend("x-min" = "0 rpm")],
+    gain: " Fixed error of the gain; 0 if none is given.",
+    {} |_, declaration| declaration
 }
 
-impl Sensor for PressureSensor {
-    fn declaration(&self) -> SensorDeclaration {
-        let diameter = self.pipe_diameter.map(|diameter| diameter.inside);
-        let static_tap_pipe_diameter_m = diameter.filter(|_| self.tap == Some(TapName::Static));
-        SensorDeclaration { static_tap_pipe_diameter_m, ..declaration(self.noise, self.offset, self.gain) }
-    }
+sensor! {
+    /// Flow meter.
+    FlowSensor: MassFlow,
+    noise: [extend("x-min" = "0 kg/s")],
+    offset: [extend("x-min" = "0 kg/s"), example = &"0 kg/s"],
+    common: [extend("x-min" = "0 kg/s")],
+    gain: " Fixed error of the gain; 0 if none is given.",
+    {} |_, declaration| declaration
+}
 
-    fn several(&self) -> Several<'_> {
-        Several {
-            count: self.count.unwrap_or(1),
-            name: self.name.as_deref(),
-            common_offset: or(self.common_offset, 0.0),
-        }
+sensor! {
+    /// Pressure sensor.
+    PressureSensor: PressureDifference,
+    noise: [extend("x-min" = "0 Pa"), example = &"20 Pa"],
+    offset: [extend("x-min" = "0 Pa")],
+    common: [extend("x-min" = "0 Pa")],
+    gain: " Fixed error of the gain; if none is given, identification takes 0.058 % (accuracy class 0.1).",
+    {
+        /// What the tap measures: `total` (the default), or `static`, converted with `pipe_diameter`.
+        tap: Option<TapName>,
+        /// Inner diameter of the pipe at the tap; needed for a static tap.
+        #[schemars(extend("x-above" = "0 mm", "x-max" = "1 m"), example = &"40 mm")]
+        pipe_diameter: Option<Quantity<Length>>,
+    }
+    |sensor, declaration| {
+        let diameter = sensor.pipe_diameter.map(|diameter| diameter.inside);
+        let static_tap_pipe_diameter_m = diameter.filter(|_| sensor.tap == Some(TapName::Static));
+        SensorDeclaration { static_tap_pipe_diameter_m, ..declaration }
     }
 }
 
@@ -241,86 +211,29 @@ pub(crate) enum TapName {
     Static,
 }
 
-/// Temperature sensor.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct TemperatureSensor {
-    /// Noise of one sample.
-    #[schemars(extend("x-min" = "0 K"), example = &"0.1 K")]
-    noise: Quantity<TemperatureDifference>,
-    /// Fixed offset left after calibration; 0 if none is given.
-    #[schemars(extend("x-min" = "0 K"))]
-    offset: Option<Quantity<TemperatureDifference>>,
-    /// Fixed error of the gain; 0 if none is given.
-    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
-    gain: Option<Quantity<Fraction>>,
-    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
-    #[schemars(range(min = 1, max = 16), example = 4)]
-    count: Option<usize>,
-    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
-    #[schemars(regex(pattern = r"^.{1,40}$"))]
-    name: Option<String>,
-    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
-    #[schemars(extend("x-min" = "0 K"))]
-    common_offset: Option<Quantity<TemperatureDifference>>,
+sensor! {
+    /// Temperature sensor.
+    TemperatureSensor: TemperatureDifference,
+    noise: [extend("x-min" = "0 K"), example = &"0.1 K"],
+    offset: [extend("x-min" = "0 K")],
+    common: [extend("x-min" = "0 K")],
+    gain: " Fixed error of the gain; 0 if none is given.",
+    {} |_, declaration| declaration
 }
 
-impl Sensor for TemperatureSensor {
-    fn declaration(&self) -> SensorDeclaration {
-        declaration(self.noise, self.offset, self.gain)
+sensor! {
+    /// Temperature probe with its own inertia.
+    ProbeSensor: TemperatureDifference,
+    noise: [extend("x-min" = "0 K"), example = &"0.1 K"],
+    offset: [extend("x-min" = "0 K")],
+    common: [extend("x-min" = "0 K")],
+    gain: " Fixed error of the gain; 0 if none is given.",
+    {
+        /// Diameter of the probe's tip; 0 mm, the default, is a probe without inertia.
+        #[schemars(extend("x-min" = "0 mm", "x-max" = "20 mm"), example = &"1.5 mm")]
+        probe_diameter: Option<Quantity<Length>>,
     }
-
-    fn several(&self) -> Several<'_> {
-        Several {
-            count: self.count.unwrap_or(1),
-            name: self.name.as_deref(),
-            common_offset: or(self.common_offset, 0.0),
-        }
-    }
-}
-
-/// Temperature probe with its own inertia.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct ProbeSensor {
-    /// Noise of one sample.
-    #[schemars(extend("x-min" = "0 K"), example = &"0.1 K")]
-    noise: Quantity<TemperatureDifference>,
-    /// Fixed offset left after calibration; 0 if none is given.
-    #[schemars(extend("x-min" = "0 K"))]
-    offset: Option<Quantity<TemperatureDifference>>,
-    /// Fixed error of the gain; 0 if none is given.
-    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"))]
-    gain: Option<Quantity<Fraction>>,
-    /// Diameter of the probe's tip; 0 mm, the default, is a probe without inertia.
-    #[schemars(extend("x-min" = "0 mm", "x-max" = "20 mm"), example = &"1.5 mm")]
-    probe_diameter: Option<Quantity<Length>>,
-    /// Number of sensors like this one on the channel, 1 to 16; 1 if none is given.
-    #[schemars(range(min = 1, max = 16), example = 4)]
-    count: Option<usize>,
-    /// Display name of this sensor in a list of several; `T2/3` and so on if none is given.
-    #[schemars(regex(pattern = r"^.{1,40}$"))]
-    name: Option<String>,
-    /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
-    #[schemars(extend("x-min" = "0 K"))]
-    common_offset: Option<Quantity<TemperatureDifference>>,
-}
-
-impl Sensor for ProbeSensor {
-    fn declaration(&self) -> SensorDeclaration {
-        SensorDeclaration {
-            probe_diameter_m: or(self.probe_diameter, 0.0),
-            ..declaration(self.noise, self.offset, self.gain)
-        }
-    }
-
-    fn several(&self) -> Several<'_> {
-        Several {
-            count: self.count.unwrap_or(1),
-            name: self.name.as_deref(),
-            common_offset: or(self.common_offset, 0.0),
-        }
-    }
+    |sensor, declaration| SensorDeclaration { probe_diameter_m: or(sensor.probe_diameter, 0.0), ..declaration }
 }
 
 /// Checks that a static tap has the diameter of its pipe.

@@ -76,6 +76,11 @@ impl Column {
         }
     }
 
+    /// Whether a humidity is relative: in %, or without a unit.
+    pub(crate) fn is_relative(&self) -> bool {
+        !self.unit.to_lowercase().contains("kg")
+    }
+
     /// Whether the heading names a unit.
     pub(crate) fn has_unit(&self) -> bool {
         !self.unit.is_empty()
@@ -204,11 +209,16 @@ pub fn flow_unit_kg_s(text: &str) -> Option<f64> {
     Some(unit_of(Kind::MassFlow, text)?.to_inside(1.0))
 }
 
-fn says_nothing(unit: &str) -> bool {
+pub(crate) fn says_nothing(unit: &str) -> bool {
     matches!(
         unit.to_lowercase().as_str(),
         "" | "-" | "--" | "1" | "ratio" | "fraction" | "frac" | "dimensionless" | "dec" | "nd"
     )
+}
+
+/// Whether a text is a unit of any quantity of a table.
+pub(crate) fn is_known_unit(unit: &str) -> bool {
+    header_unit(unit).is_some() || quantity_of_unit(unit).is_some() || is_unit(Quantity::Humidity, unit)
 }
 
 /// What a unit measures.
@@ -258,6 +268,8 @@ fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
         }
         // Positions are only compared with each other.
         Quantity::Vane if matches!(lower.as_str(), "deg" | "°" | "mm") => Some(Scale::Factor(1.0)),
+        Quantity::Humidity if lower == "g/kg" => Some(Scale::Factor(1e-3)),
+        Quantity::Humidity if lower == "kg/kg" => Some(Scale::Factor(1.0)),
         // Speeds over that of the design point.
         Quantity::Speed if lower == "%" => Some(Scale::Factor(0.01)),
         _ => unit_of(quantity.kind(), unit).map(Scale::Unit),

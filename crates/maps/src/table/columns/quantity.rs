@@ -29,11 +29,15 @@ pub enum Quantity {
     T1,
     /// Measured outlet temperature.
     T2,
+    /// Temperature of the compressor housing.
+    Tc,
+    /// Humidity of the air: water per dry air, or relative.
+    Humidity,
 }
 
 impl Quantity {
     /// Every quantity.
-    pub(crate) const ALL: [Quantity; 12] = [
+    pub(crate) const ALL: [Quantity; 14] = [
         Quantity::Speed,
         Quantity::ReducedSpeed,
         Quantity::Flow,
@@ -46,6 +50,8 @@ impl Quantity {
         Quantity::P2,
         Quantity::T1,
         Quantity::T2,
+        Quantity::Tc,
+        Quantity::Humidity,
     ];
 
     /// Its key in a map description.
@@ -63,12 +69,19 @@ impl Quantity {
             Quantity::P2 => "p2",
             Quantity::T1 => "t1",
             Quantity::T2 => "t2",
+            Quantity::Tc => "tc",
+            Quantity::Humidity => "humidity",
         }
     }
 
     /// The quantity of a key.
     pub(crate) fn of_key(key: &str) -> Option<Quantity> {
         Quantity::ALL.into_iter().find(|quantity| quantity.key() == key)
+    }
+
+    /// Whether a point does not need it: a cell without a number is empty.
+    pub(crate) fn is_extra(self) -> bool {
+        matches!(self, Quantity::Tc | Quantity::Humidity)
     }
 
     /// Whether two are forms of the same quantity.
@@ -86,6 +99,7 @@ impl Quantity {
         match self {
             Quantity::VolumeFlow => "m3/s, m3/min, m3/h, l/s, CFM".to_owned(),
             Quantity::ReducedFlow => "kg/s*K^0.5/kPa, kg/s*K^0.5/MPa, kg/s*K^0.5/bar".to_owned(),
+            Quantity::Humidity => "%, g/kg, kg/kg".to_owned(),
             _ => self.kind().unit_list(),
         }
     }
@@ -105,6 +119,8 @@ impl Quantity {
             Quantity::P2 => "P2",
             Quantity::T1 => "T1",
             Quantity::T2 => "T2",
+            Quantity::Tc => "housing temperature",
+            Quantity::Humidity => "humidity",
         }
     }
 
@@ -113,9 +129,11 @@ impl Quantity {
         match self {
             Quantity::Speed | Quantity::ReducedSpeed => Kind::Speed,
             Quantity::Flow | Quantity::VolumeFlow | Quantity::ReducedFlow => Kind::MassFlow,
-            Quantity::PressureRatio | Quantity::Efficiency | Quantity::Vane => Kind::Fraction,
+            Quantity::PressureRatio | Quantity::Efficiency | Quantity::Vane | Quantity::Humidity => {
+                Kind::Fraction
+            }
             Quantity::P1 | Quantity::P2 => Kind::Pressure,
-            Quantity::T1 | Quantity::T2 => Kind::Temperature,
+            Quantity::T1 | Quantity::T2 | Quantity::Tc => Kind::Temperature,
         }
     }
 }

@@ -124,6 +124,13 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
     {
         return Some(Quantity::Speed);
     }
+    if has(&["humid", "feuchte", "humedad", "umidit"]) || is(&["rh", "relhum"]) {
+        return Some(Quantity::Humidity);
+    }
+    let is_wall = has(&["housing", "gehäuse", "gehaeuse", "casing", "carter", "carcasa", "carcassa"]);
+    if is(&["tc", "tch", "thc"]) || is_wall && !has(&["turb", "bearing", "lager", "palier"]) {
+        return Some(Quantity::Tc);
+    }
     for (quantity, stem) in
         [(Quantity::P1, "p1"), (Quantity::P2, "p2"), (Quantity::T1, "t1"), (Quantity::T2, "t2")]
     {

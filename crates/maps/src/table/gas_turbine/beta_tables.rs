@@ -126,6 +126,36 @@ pub(crate) fn read_modelica(text: &str, given: &MapDescription) -> Result<Import
     tables.map(text, &code, given)
 }
 
+/// The tables of GSP and GasTurb: below the name of a quantity `10.021` is a table of 10 rows and 21 columns, the first row the auxiliary
+/// coordinate, the first column the speeds; a row may fill several lines (as GSPy reads them, github.com/wvisser1958/GSPy).
+pub(crate) fn read_gsp(text: &str, given: &MapDescription) -> Result<ImportedMap, ImportError> {
+    let mut tables = BetaTables::default();
+    let mut sections: Vec<(&str, usize, Vec<f64>)> = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let name = line.trim();
+        if name.starts_with(|c: char| c.is_alphabetic()) {
+            sections.push((name, index + 1, Vec::new()));
+        } else if let Some((.., numbers)) = sections.last_mut() {
+            numbers.extend(bracketed(line, ('[', ']'), index + 1)?);
+        }
+    }
+    for (name, line, numbers) in sections {
+        let Some(place) = tables.place(&name.to_lowercase().replace(' ', "_")) else { continue };
+        let Some((size, numbers)) = numbers.split_first() else { continue };
+        let (rows, columns) = (size.floor() as usize, (1000.0 * size.fract()).round() as usize);
+        // The first number stands for the corner of the table.
+        if rows < 2 || columns < 2 || numbers.len() + 1 != rows * columns {
+            let form = "a table of GSP: rows.columns (10.021), the coordinates, then a speed and its values in each row";
+            return Err(ImportError::RowForm { line, text: name.to_owned(), form });
+        }
+        let (beta, lines) = numbers.split_at(columns - 1);
+        *place = lines.chunks(columns).flat_map(|line| line.iter().skip(1)).copied().collect();
+        tables.beta = beta.to_vec();
+        tables.speeds = lines.chunks(columns).filter_map(|line| line.first()).copied().collect();
+    }
+    tables.map(text, text, given)
+}
+
 /// Line of a place in a text, from 1.
 fn line_of(text: &str, at: usize) -> usize {
     1 + text[..at].matches('\n').count()
@@ -174,11 +204,16 @@ impl BetaTables {
             | "corrected_speed_rpm"
             | "x_c_map_ncvec" => Some(&mut self.speeds),
             "rlinevec" | "rlinemap" | "rline" | "beta" => Some(&mut self.beta),
-            "wcarray" | "wcmap" | "wc" | "wc_map" | "corrected_flow_kg_s" | "flow_corrected_kg_s" | "mc" => {
-                Some(&mut self.flow)
-            }
+            "wcarray"
+            | "wcmap"
+            | "wc"
+            | "wc_map"
+            | "corrected_flow_kg_s"
+            | "flow_corrected_kg_s"
+            | "mc"
+            | "mass_flow" => Some(&mut self.flow),
             "prarray" | "prmap" | "pr" | "pr_map" | "pressure_ratio" => Some(&mut self.pressure_ratio),
-            "effarray" | "effmap" | "eff" | "eff_map" | "isentropic_efficiency" | "eta" => {
+            "effarray" | "effmap" | "eff" | "eff_map" | "isentropic_efficiency" | "efficiency" | "eta" => {
                 Some(&mut self.efficiency)
             }
             _ => None,
@@ -222,7 +257,12 @@ impl BetaTables {
         let machine = machine.map(|(_, name)| name.trim().chars().take(200).collect());
         let efficiency = text.lines().find_map(efficiency_in_comment);
         let map = map_of_rows(machine.unwrap_or_default(), &rows, found, given.reference)?;
-        Ok(ImportedMap { map: CompressorMap { efficiency, ..map }, columns: Vec::new(), remarks })
+        Ok(ImportedMap {
+            map: CompressorMap { efficiency, ..map },
+            columns: Vec::new(),
+            remarks,
+            measured: Vec::new(),
+        })
     }
 
     /// The points of the tables, as written.

@@ -4,8 +4,9 @@ use crate::table::columns::column::{Column, ColumnError, Machine, column};
 use crate::table::columns::described_columns::Given;
 use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow, is_missing};
+use crate::table::units_row::with_units_row;
 use mapper_core::{ImportError, ImportRemark};
-use mapper_yaml::units::{header_unit, with_units_row};
+use mapper_yaml::units::header_unit;
 
 /// Columns that belong together: all of a table, or those of one speed line of a table with its lines side by side.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,8 +14,8 @@ pub(crate) struct Group {
     pub(crate) columns: Vec<Column>,
     /// Speed above the columns, rpm.
     pub(crate) speed_rpm: Option<f64>,
-    /// Whether the columns have no headings.
-    pub(crate) is_bare: bool,
+    /// Cells of every row of a table without headings; 0 if there are headings.
+    pub(crate) bare_cells: usize,
 }
 
 impl Group {
@@ -90,7 +91,7 @@ pub(crate) fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, Impor
             Err(error) if is_reported(given, row, &error) => return Err(wrong(row, error)),
             Err(_) => continue,
         };
-        let group = Group { columns: known, speed_rpm: None, is_bare: false };
+        let group = Group { columns: known, speed_rpm: None, bare_cells: 0 };
         if group.is_complete() && (!row.is_comment || group.columns.len() >= 3) {
             return with_heading(grid, given, index, row, group).map(Some);
         }
@@ -182,7 +183,7 @@ pub(crate) fn is_heading(given: &Given, row: &GridRow) -> bool {
 
 fn missing(given: &Given, row: &GridRow) -> &'static str {
     let known = columns(given, &row.cells).unwrap_or_default();
-    let group = Group { columns: known, speed_rpm: None, is_bare: false };
+    let group = Group { columns: known, speed_rpm: None, bare_cells: 0 };
     if group.has_flow() { "pressure ratio (or P1, P2 and T1)" } else { "flow" }
 }
 
@@ -243,7 +244,7 @@ fn side_by_side(grid: &Grid, given: &Given, index: usize, row: &GridRow) -> Opti
         let Some(column) = quantity(*index, cell) else { continue };
         match groups.last_mut().filter(|group| !group.has(&[column.quantity])) {
             Some(group) => group.columns.push(column),
-            None => groups.push(Group { columns: vec![column], speed_rpm: None, is_bare: false }),
+            None => groups.push(Group { columns: vec![column], speed_rpm: None, bare_cells: 0 }),
         }
     }
     if groups.len() < 2
@@ -315,7 +316,7 @@ fn speed_in(grid: &Grid, text: &str) -> Option<f64> {
 /// The layout of a table whose columns are described by their numbers.
 fn numbered(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     let columns = given.numbered().map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
-    let group = Group { columns, speed_rpm: None, is_bare: false };
+    let group = Group { columns, speed_rpm: None, bare_cells: 0 };
     if !group.is_complete() || group.speed_column().is_none() {
         return Ok(None);
     }
@@ -327,6 +328,9 @@ fn numbered(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     let first_row = grid.rows.iter().position(is_point);
     Ok(first_row.map(|first_row| Layout { groups: vec![group], first_row, remarks: Vec::new() }))
 }
+
+/// SAE text may have a temperature or a vane position behind the efficiency; more columns are another table.
+const MAX_BARE_CELLS: usize = 6;
 
 /// The layout without headings: corrected rpm, corrected kg/s, pressure ratio, and the efficiency if there is a fourth column.
 fn bare(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
@@ -347,7 +351,7 @@ fn bare(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     };
     let order = [Quantity::Speed, Quantity::Flow, Quantity::PressureRatio, Quantity::Efficiency];
     let row = grid.rows.get(first_row).map_or(&[][..], |row| row.cells.as_slice());
-    if row.len() != order.len() {
+    if row.len() < order.len() || row.len() > MAX_BARE_CELLS {
         let at = grid.rows.get(first_row).map_or(1, |row| row.at);
         return Err(ImportError::RowForm {
             line: at,
@@ -359,6 +363,10 @@ fn bare(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     let columns = columns.map(|(index, quantity)| given.with_unit(Column::bare(index, quantity)));
     let columns: Result<_, _> = columns.collect();
     let columns = columns.map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
-    let group = Group { columns, speed_rpm: None, is_bare: true };
-    Ok(Some(Layout { groups: vec![group], first_row, remarks: vec![ImportRemark::NoHeading] }))
+    let group = Group { columns, speed_rpm: None, bare_cells: row.len() };
+    let mut remarks = vec![ImportRemark::NoHeading];
+    if row.len() > order.len() {
+        remarks.push(ImportRemark::FurtherColumns { count: row.len() - order.len() });
+    }
+    Ok(Some(Layout { groups: vec![group], first_row, remarks }))
 }

@@ -6,7 +6,7 @@ use crate::table::columns::quantity::Quantity;
 use crate::table::rows_to_lines::room_for_one_more;
 use crate::table::sheet::grid::{Grid, GridRow, is_missing};
 use crate::table::sheet::layout::{self, Layout};
-use mapper_core::{ImportError, ImportRemark, ImportedColumn, ReferenceState};
+use mapper_core::{ImportError, ImportRemark, ImportedColumn, LineEnd, ReferenceState};
 
 /// The values of a point by column, as written.
 pub(crate) struct Point<'a> {
@@ -18,6 +18,8 @@ pub(crate) struct Point<'a> {
     /// Vane position from the title of the block.
     pub(crate) vane: Option<f64>,
     values: Vec<Option<f64>>,
+    /// End of its line that a cell of its row names.
+    pub(crate) end: Option<LineEnd>,
 }
 
 impl Point<'_> {
@@ -84,7 +86,7 @@ pub(crate) fn points<'a>(
                     }
                 }
             }
-            points.push(Point { at: row.at, group, speed, vane, values });
+            points.push(Point { at: row.at, group, speed, vane, values, end: end_of_line(row) });
         }
     }
     if extrapolated > 0 {
@@ -102,7 +104,7 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
     for column in &group.columns {
         let text = row.cells.get(column.index).map_or("", String::as_str);
         let value = grid.number(text);
-        if value.is_none() && !is_missing(text) {
+        if value.is_none() && !is_missing(text) && !column.quantity.is_extra() {
             return Err(ImportError::NotANumber {
                 line: row.at,
                 quantity: column.quantity.name().to_owned(),
@@ -114,11 +116,23 @@ fn values(grid: &Grid, row: &GridRow, group: &layout::Group) -> Result<Vec<Optio
     let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
     // A row without headings has no column to spare, and one between blanks no empty cell: what is cut short is a mistake.
     let needed = group.columns.iter().map(|column| column.index + 1).max().unwrap_or(0);
-    if group.is_bare && filled != group.columns.len() || grid.by_blanks && filled < needed {
+    if group.bare_cells > 0 && filled != group.bare_cells || grid.by_blanks && filled < needed {
         let text = row.text().chars().take(60).collect();
         return Err(ImportError::RowForm { line: row.at, text, form: ROW_FORM });
     }
     Ok(values)
+}
+
+/// The end of a speed line that a cell names, in the words of several languages.
+fn end_of_line(row: &GridRow) -> Option<LineEnd> {
+    let named = |words: &[&str]| {
+        let has = |cell: &String| words.iter().any(|word| cell.to_lowercase().contains(word));
+        row.cells.iter().any(has)
+    };
+    if named(&["surge", "pump", "pompage", "bombeo", "pompaggio"]) {
+        return Some(LineEnd::Surge);
+    }
+    named(&["choke", "stopf", "schluck", "blocage", "gavage", "bloqueo"]).then_some(LineEnd::Choke)
 }
 
 /// The form of a row without headings.

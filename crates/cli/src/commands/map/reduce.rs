@@ -1,0 +1,36 @@
+//! `mapper map reduce`: a table of steady points becomes a map.
+
+use crate::output::failure::Failure;
+use crate::command_line::shared_arguments::MapReading;
+use crate::output::standard_output::MapTarget;
+use crate::{output::standard_output, registry};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Make a map of a table of steady points: corrected, with uncertainty by source, without heat if Tc was measured
+#[derive(Debug, Args)]
+pub struct Reduce {
+    /// Table of N, flow, P1, T1, P2, T2, optionally Tc and humidity, in any layout of `mapper map inspect`
+    pub points: PathBuf,
+    #[command(flatten)]
+    pub reading: MapReading,
+    /// Campaign with sensors, machine and reference state, or run directory whose identified thermal model is used
+    #[arg(long, value_name = "CAMPAIGN|RUN")]
+    pub machine: Option<PathBuf>,
+    /// Write the uncertainty budget of every point to this new file (CSV)
+    #[arg(long, value_name = "FILE")]
+    pub budget: Option<PathBuf>,
+    #[command(flatten)]
+    pub target: MapTarget,
+}
+
+impl Reduce {
+    /// Reduces a table.
+    pub fn run(&self) -> Result<(), Failure> {
+        let (given, target) = (self.reading.description()?, &self.target);
+        let budget = self.budget.as_deref().map(|file| (file, target.replace.existing()));
+        let machine = self.machine.as_deref();
+        let work = registry::registry().reduce_points(&self.points, &given, machine, target.map(), budget)?;
+        standard_output::print_map_work(&work, target.json)
+    }
+}

@@ -1,0 +1,370 @@
+//! Points of a table of steady ones: the apparent efficiency, or the adiabatic one of a machine whose convection is known.
+//!
+//! Each source of uncertainty is moved by one standard deviation to both sides, and the efficiency is computed again.
+
+use crate::config::coloured;
+use crate::identify::point;
+use crate::single_step::dynamic::{Estimate, judge_assumption};
+use crate::single_step::expected::DECLARED_INTERVAL_S;
+use crate::step_data::end_state::EndState;
+use crate::step_outcome::findings::{Findings, code};
+use crate::{IdentifyConfig, IdentifyError, single_step::budgets, step_outcome::interval_width};
+use mapper_core::{
+    BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, MeasuredPoint, Method, PointBudgets,
+    ReferenceState, StepKind, StepMarker,
+};
+use mapper_numerics::root::root_between;
+use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
+use mapper_physics::gas::air::Air;
+use mapper_physics::laws::compression::apparent_efficiency;
+use mapper_physics::machine::boundary::BoundaryConditions;
+use mapper_physics::machine::params::Params;
+use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
+use std::sync::Arc;
+
+/// Efficiencies between which the adiabatic one is searched for.
+const EFFICIENCIES: (f64, f64) = (0.05, 1.5);
+
+/// A machine whose heat transfer is known.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownHeat<'a> {
+    /// Its parameters: convection, alpha_A, the T2 probe.
+    pub params: &'a Params,
+    /// Standard uncertainty of h, ratio.
+    pub convection_ratio: f64,
+    /// Origin of the law, for people: "declared in a.yaml".
+    pub origin: &'a str,
+}
+
+/// Points and budgets of steady points, in order. `config.method` says whether their heat is removed, which needs `heat` and a housing
+/// temperature at every point; see [`method_of_table`].
+///
+/// # Errors
+/// [`IdentifyError`] if the configuration is out of range.
+pub fn reduce(
+    measured: &[MeasuredPoint],
+    heat: Option<KnownHeat<'_>>,
+    config: &IdentifyConfig,
+) -> Result<Vec<(IdentifiedPoint, PointBudgets)>, IdentifyError> {
+    crate::identify::check(config)?;
+    let heat = heat.filter(|_| config.method == Method::Corrected);
+    Ok(measured.iter().enumerate().map(|(index, measured)| of_point(index, measured, heat, config)).collect())
+}
+
+/// What the points of a table allow: heat can be removed where the housing temperature was measured at every point.
+pub fn method_of_table(measured: &[MeasuredPoint], has_heat: bool) -> Method {
+    match has_heat && measured.iter().all(|point| point.tc_k.is_some()) {
+        true => Method::Corrected,
+        false => Method::Steady,
+    }
+}
+
+fn of_point(
+    index: usize,
+    measured: &MeasuredPoint,
+    heat: Option<KnownHeat<'_>>,
+    config: &IdentifyConfig,
+) -> (IdentifiedPoint, PointBudgets) {
+    let air =
+        measured.humidity_kg_kg.map_or(config.air, |humidity_kg_kg| Air { humidity_kg_kg, ..config.air });
+    let config = &IdentifyConfig { air, ..config.clone() };
+    let mut findings = Findings::new();
+    let state = EndState {
+        speed_rpm: measured.speed_rpm,
+        flow_kg_s: measured.flow_kg_s,
+        t1_k: measured.t1_k,
+        p1_pa: measured.p1_pa,
+        pressure_ratio: measured.p2_pa / measured.p1_pa,
+    };
+    let estimate = estimate(measured, heat, config, &mut findings);
+    let step = StepMarker {
+        index,
+        kind: StepKind::Point,
+        start_s: 0.0,
+        end_s: config.thresholds.steady_mean_s,
+        from: None,
+        to: None,
+        p3_pa: f64::NAN,
+        valve_opening_ratio: f64::NAN,
+    };
+    let point = point(&step, &state, &estimate, findings, config);
+    let budgets = budgets::of_point(&point, &estimate, |_| samples(config), config);
+    (point, budgets)
+}
+
+/// Samples of a mean over the end of a point.
+fn samples(config: &IdentifyConfig) -> usize {
+    (config.thresholds.steady_mean_s / DECLARED_INTERVAL_S).round() as usize
+}
+
+fn estimate(
+    measured: &MeasuredPoint,
+    heat: Option<KnownHeat<'_>>,
+    config: &IdentifyConfig,
+    findings: &mut Findings,
+) -> Estimate {
+    let mut estimate = Estimate::default();
+    let (Some(t2_k), Some(tc_k)) = (measured.t2_k, measured.tc_k.or(heat.is_none().then_some(f64::NAN)))
+    else {
+        findings
+            .refuse(code::NO_COMPRESSION, "the table has no T2 at this point: no efficiency can be derived");
+        return estimate;
+    };
+    let params = heat.map(|heat| *heat.params);
+    let inputs = Inputs { point: *measured, t2_k, tc_k, air: config.air, params };
+    let Some(eta) = inputs.efficiency() else {
+        let message = format!(
+            "T2 - T1 is {:.2} K at a pressure ratio of {:.4}: no efficiency can be derived",
+            t2_k - measured.t1_k,
+            measured.p2_pa / measured.p1_pa
+        );
+        findings.refuse(code::NO_COMPRESSION, message);
+        return estimate;
+    };
+    let mut uncertainty = EstimateUncertainty::default();
+    let (mut rows, mut known_square) = (Vec::new(), 0.0_f64);
+    for source in inputs.sources(heat, config) {
+        let contribution = inputs.change(&source, eta);
+        if matches!(source.what, Moved::AlphaArea) {
+            judge_assumption(contribution, config, findings);
+        } else {
+            known_square += contribution * contribution;
+        }
+        let error = match source.is_shared {
+            true => &mut uncertainty.bias_standard_error,
+            false => &mut uncertainty.noise_standard_error,
+        };
+        *error = error.hypot(contribution);
+        if source.is_shared {
+            estimate.common[0].push(contribution);
+        }
+        rows.push(BudgetRow {
+            source: source.name,
+            standard_uncertainty: source.sigma,
+            unit: source.unit.to_owned(),
+            sensitivity: contribution / source.sigma,
+            contribution,
+            degrees_of_freedom: None,
+        });
+    }
+    if known_square.sqrt() > config.thresholds.sigma_eta {
+        let (code, message) = interval_width::cause_of_rise(uncertainty, t2_k - measured.t1_k);
+        findings.doubt(code, message);
+    }
+    match heat {
+        Some(heat) => {
+            let h_w_m2k = inputs.outputs(heat.params, eta).h_w_m2k;
+            let bias_standard_error = heat.convection_ratio * h_w_m2k;
+            let error = EstimateUncertainty { noise_standard_error: 0.0, bias_standard_error };
+            estimate.h_w_m2k = Some((h_w_m2k, Some(error)));
+            let message = format!("heat removed by eqs. 1-3 with the convection law {}", heat.origin);
+            findings.remark(code::THROUGH_THE_LAW, message);
+        }
+        None => findings
+            .remark(code::APPARENT, "apparent efficiency: heat exchanged with the housing counts as work"),
+    }
+    findings.remark_undeclared(config);
+    estimate.eta = Some((eta, Some(uncertainty)));
+    estimate.budgets[0] = rows;
+    estimate
+}
+
+/// All that the efficiency of a point depends on.
+#[derive(Debug, Clone, Copy)]
+struct Inputs {
+    point: MeasuredPoint,
+    t2_k: f64,
+    tc_k: f64,
+    air: Air,
+    /// The machine, if its heat is removed.
+    params: Option<Params>,
+}
+
+/// A source of uncertainty, one standard deviation.
+struct Source {
+    name: String,
+    sigma: f64,
+    unit: &'static str,
+    /// Whether all points share the error.
+    is_shared: bool,
+    what: Moved,
+}
+
+/// What an error moves.
+#[derive(Debug, Clone, Copy)]
+enum Moved {
+    Reading(Channel),
+    /// By a ratio.
+    Gain(Channel),
+    Barometer,
+    Humidity,
+    /// By a ratio.
+    Convection,
+    AlphaArea,
+}
+
+impl Inputs {
+    /// The efficiency; `None` if there is none.
+    fn efficiency(&self) -> Option<f64> {
+        let MeasuredPoint { t1_k, p1_pa, p2_pa, .. } = self.point;
+        let eta = match &self.params {
+            None => apparent_efficiency(p2_pa / p1_pa, t1_k, self.t2_k, self.air),
+            Some(params) => {
+                let excess_k = |eta: f64| self.outputs(params, eta).t2_probe_target_k - self.t2_k;
+                root_between(EFFICIENCIES.0, EFFICIENCIES.1, 1e-10, excess_k)?
+            }
+        };
+        (eta.is_finite() && eta > 0.0 && p2_pa > p1_pa).then_some(eta)
+    }
+
+    /// The machine at this point with an efficiency.
+    fn outputs(&self, params: &Params, eta: f64) -> Outputs {
+        let mut params = *params;
+        let compressor = &mut params.compressor;
+        (compressor.humidity_kg_kg, compressor.efficiency) = (self.air.humidity_kg_kg, self.air.efficiency);
+        (compressor.flow_scale_ratio, compressor.efficiency_scale_ratio) = (1.0, 1.0);
+        let map = OnePoint {
+            // At the state of the inlet itself corrected flow is measured flow; the wheel pumps what recirculates, too.
+            reference: ReferenceState { t_ref_k: self.point.t1_k, p_ref_pa: self.point.p1_pa },
+            flow_kg_s: self.point.flow_kg_s
+                * self.air.dry_flow_ratio()
+                * (1.0 + compressor.recirculation_ratio),
+            eta,
+        };
+        let boundary = BoundaryConditions {
+            t1_k: self.point.t1_k,
+            p1_pa: self.point.p1_pa,
+            ..BoundaryConditions::default()
+        };
+        let speed_rad_s = rad_s_of_rpm(self.point.speed_rpm);
+        let state = State::new(speed_rad_s, self.point.p2_pa, self.tc_k, self.tc_k, self.t2_k);
+        Model::new(params, Arc::new(map)).prepare(&boundary).evaluate(&state)
+    }
+
+    /// Change of the efficiency by one standard deviation of a source: mean of both sides, if both have an efficiency.
+    fn change(&self, source: &Source, eta: f64) -> f64 {
+        let moved = |by: f64| self.moved(source.what, by).efficiency();
+        // An area of a share below 0 has no meaning: towards the middle, as all methods do.
+        let alpha = self.params.map(|params| params.compressor.alpha_area_ratio);
+        let (above, below) = match source.what {
+            Moved::AlphaArea if alpha.is_some_and(|alpha| alpha > 0.5) => (None, moved(-source.sigma)),
+            Moved::AlphaArea => (moved(source.sigma), None),
+            _ => (moved(source.sigma), moved(-source.sigma)),
+        };
+        match (above, below) {
+            (Some(above), Some(below)) => 0.5 * (above - below),
+            (Some(above), None) => above - eta,
+            (None, Some(below)) => eta - below,
+            // An error that leaves no efficiency says nothing of it.
+            (None, None) => EFFICIENCIES.1,
+        }
+    }
+
+    fn sources(&self, heat: Option<KnownHeat<'_>>, config: &IdentifyConfig) -> Vec<Source> {
+        let mut sources = Vec::new();
+        let mut push = |name: String, sigma: f64, unit: &'static str, is_shared: bool, what: Moved| {
+            if sigma > 0.0 {
+                sources.push(Source { name, sigma, unit, is_shared, what });
+            }
+        };
+        let averaging = coloured(config.noise_colour)
+            .variance_of_mean(samples(config), config.thresholds.steady_mean_s)
+            .sqrt();
+        let of_heat = [Channel::CompressorFlow, Channel::Tc];
+        for channel in [Channel::T1, Channel::T2, Channel::P1, Channel::P2].into_iter().chain(of_heat) {
+            if heat.is_none() && of_heat.contains(&channel) {
+                continue;
+            }
+            let declared = config.declared.get(&channel).copied().unwrap_or_default();
+            let unit = channel.unit();
+            push(format!("offset of {channel}"), declared.offset_sigma, unit, true, Moved::Reading(channel));
+            push(format!("gain of {channel}"), declared.gain_sigma_ratio, "1", true, Moved::Gain(channel));
+            let noise = averaging * declared.noise_sigma;
+            push(format!("noise of {channel}"), noise, unit, false, Moved::Reading(channel));
+        }
+        push("barometer".to_owned(), config.barometer_sigma_pa, "Pa", true, Moved::Barometer);
+        if self.point.humidity_kg_kg.is_none() {
+            push("humidity".to_owned(), config.humidity_sigma_kg_kg, "kg/kg", true, Moved::Humidity);
+        }
+        if let Some(heat) = heat {
+            push("convection law".to_owned(), heat.convection_ratio, "1", true, Moved::Convection);
+            push("alpha_A".to_owned(), config.alpha_area_sigma_ratio, "1", true, Moved::AlphaArea);
+        }
+        sources
+    }
+
+    fn moved(&self, what: Moved, by: f64) -> Inputs {
+        let mut moved = *self;
+        let reading = match what {
+            Moved::Reading(channel) | Moved::Gain(channel) => moved.reading(channel),
+            _ => None,
+        };
+        match (what, reading) {
+            (Moved::Reading(_), Some(reading)) => *reading += by,
+            (Moved::Gain(_), Some(reading)) => *reading *= 1.0 + by,
+            (Moved::Barometer, _) => {
+                moved.point.p1_pa += by;
+                moved.point.p2_pa += by;
+            }
+            (Moved::Humidity, _) => moved.air.humidity_kg_kg += by,
+            (Moved::Convection, _) => {
+                if let Some(params) = &mut moved.params {
+                    params.compressor.nusselt_coefficient *= 1.0 + by;
+                }
+            }
+            (Moved::AlphaArea, _) => {
+                if let Some(params) = &mut moved.params {
+                    params.compressor.alpha_area_ratio += by;
+                }
+            }
+            (_, None) => {}
+        }
+        moved
+    }
+
+    fn reading(&mut self, channel: Channel) -> Option<&mut f64> {
+        match channel {
+            Channel::T1 => Some(&mut self.point.t1_k),
+            Channel::T2 => Some(&mut self.t2_k),
+            Channel::P1 => Some(&mut self.point.p1_pa),
+            Channel::P2 => Some(&mut self.point.p2_pa),
+            Channel::CompressorFlow => Some(&mut self.point.flow_kg_s),
+            Channel::Tc => Some(&mut self.tc_k),
+            _ => None,
+        }
+    }
+}
+
+/// The map of a machine at one point.
+#[derive(Debug, Clone, Copy)]
+struct OnePoint {
+    reference: ReferenceState,
+    flow_kg_s: f64,
+    eta: f64,
+}
+
+impl CompressorCharacteristic for OnePoint {
+    fn reference(&self) -> ReferenceState {
+        self.reference
+    }
+
+    fn evaluate(&self, _: f64, _: f64) -> CharacteristicPoint {
+        CharacteristicPoint {
+            flow_corrected_kg_s: self.flow_kg_s,
+            efficiency: self.eta,
+            surge_position_ratio: 0.0,
+        }
+    }
+
+    fn surge_point(&self, _: f64) -> (f64, f64) {
+        (self.flow_kg_s, f64::NAN)
+    }
+
+    fn choke_flow_corrected_kg_s(&self, _: f64) -> f64 {
+        self.flow_kg_s
+    }
+
+    fn fingerprint(&self) -> String {
+        String::new()
+    }
+}

@@ -1,0 +1,122 @@
+//! The ends of the speed lines of a map: where surge and choke were reached.
+
+use mapper_core::{CompressorMap, LineEnd, MapPoint, SpeedLine, Warning};
+use serde::Serialize;
+
+/// Efficiency below which a compressor counts as choked (Garrett, Turbo Tech 103).
+const CHOKE_ETA: f64 = 0.58;
+/// A line is vertical where the flow rises by less than this ratio of it per ratio of the pressure rise that is lost: at the zero-slope
+/// point the value is above 1, in choke it goes to 0.
+const VERTICAL: f64 = 0.1;
+/// Part of the pressure rise that has to be lost, so that the scatter of repeated points (0.2 % of it) does not count.
+const VERTICAL_LOSS: f64 = 0.05;
+/// Points with flows nearer than this are one point that was repeated.
+const REPEAT_RATIO: f64 = 0.01;
+
+/// An end of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FoundEnd {
+    /// Corrected flow, kg/s.
+    pub flow_corrected_kg_s: f64,
+    /// Total pressure ratio.
+    pub pressure_ratio: f64,
+    /// Evidence.
+    pub by: EndEvidence,
+}
+
+/// Evidence for an end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndEvidence {
+    /// The row of the point names it.
+    Named,
+    /// The pressure ratio does not rise any more towards smaller flow.
+    ZeroSlope,
+    /// The efficiency falls below 58 %.
+    Efficiency,
+    /// The pressure ratio falls without more flow.
+    Vertical,
+    /// The outermost point: the end lies beyond it.
+    NotReached,
+}
+
+/// Both ends of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LineEnds {
+    /// Corrected speed of the line, rpm.
+    pub speed_corrected_rpm: f64,
+    /// Side of the smallest flow.
+    pub surge: FoundEnd,
+    /// Side of the largest flow.
+    pub choke: FoundEnd,
+}
+
+/// Finds the ends of every line, and marks those that were reached at their points. `named`: the end that the row of a step names.
+pub fn mark_line_ends(map: &mut CompressorMap, named: impl Fn(usize) -> Option<LineEnd>) -> Vec<LineEnds> {
+    let mut found = Vec::new();
+    for line in &mut map.lines {
+        let place =
+            |end: LineEnd| line.points.iter().position(|point| named(point.identified.step) == Some(end));
+        let last = line.points.len().saturating_sub(1);
+        let (surge_at, surge_by) = match place(LineEnd::Surge) {
+            Some(at) => (at, EndEvidence::Named),
+            None => (0, surge_evidence(line)),
+        };
+        let (choke_at, choke_by) = match place(LineEnd::Choke) {
+            Some(at) => (at, EndEvidence::Named),
+            None => choke_evidence(line).unwrap_or((last, EndEvidence::NotReached)),
+        };
+        let end = |at: usize, by: EndEvidence| {
+            let point = line.points.get(at)?;
+            let (flow_corrected_kg_s, pressure_ratio) = (point.flow_corrected_kg_s, point.pressure_ratio);
+            Some(FoundEnd { flow_corrected_kg_s, pressure_ratio, by })
+        };
+        let Some((surge, choke)) = end(surge_at, surge_by).zip(end(choke_at, choke_by)) else { continue };
+        found.push(LineEnds { speed_corrected_rpm: line.speed_corrected_rpm, surge, choke });
+        mark(line.points.get_mut(surge_at), surge_by, "surge_end", "the surge side of its line ends here");
+        mark(line.points.get_mut(choke_at), choke_by, "choke_end", "the line is choked from here on");
+    }
+    found
+}
+
+fn surge_evidence(line: &SpeedLine) -> EndEvidence {
+    let Some(first) = line.points.first() else { return EndEvidence::NotReached };
+    let apart =
+        |point: &&MapPoint| point.flow_corrected_kg_s > (1.0 + REPEAT_RATIO) * first.flow_corrected_kg_s;
+    match line.points.iter().find(apart) {
+        Some(next) if first.pressure_ratio <= next.pressure_ratio => EndEvidence::ZeroSlope,
+        _ => EndEvidence::NotReached,
+    }
+}
+
+/// The first point in choke, towards larger flow.
+fn choke_evidence(line: &SpeedLine) -> Option<(usize, EndEvidence)> {
+    let best = line.points.iter().filter_map(|point| point.eta).fold(0.0, f64::max);
+    let top = line.points.iter().map(|point| point.pressure_ratio).fold(1.0, f64::max);
+    let peak = line.points.iter().position(|point| point.eta == Some(best)).unwrap_or(0);
+    let evidence = |(at, point): (usize, &MapPoint)| {
+        // Heat keeps the apparent efficiency of slow lines below any limit: there only the slope shows choke.
+        if at > peak && best >= CHOKE_ETA && point.eta.is_some_and(|eta| eta < CHOKE_ETA) {
+            return Some((at, EndEvidence::Efficiency));
+        }
+        let lost = |other: &MapPoint| (other.pressure_ratio - point.pressure_ratio) / (top - 1.0);
+        let above = line.points.get(..at)?.iter().rev().find(|other| lost(other) >= VERTICAL_LOSS)?;
+        let more_flow = point.flow_corrected_kg_s / above.flow_corrected_kg_s - 1.0;
+        (more_flow < VERTICAL * lost(above)).then_some((at, EndEvidence::Vertical))
+    };
+    line.points.iter().enumerate().find_map(evidence)
+}
+
+fn mark(point: Option<&mut MapPoint>, by: EndEvidence, code: &str, words: &str) {
+    let why = match by {
+        EndEvidence::Named => "its row names it",
+        EndEvidence::ZeroSlope => "the pressure ratio does not rise towards smaller flow",
+        EndEvidence::Efficiency => "the efficiency falls below 58 %",
+        EndEvidence::Vertical => "the pressure ratio falls without more flow",
+        EndEvidence::NotReached => return,
+    };
+    if let Some(point) = point {
+        let message = format!("{words}: {why}");
+        point.identified.warnings.push(Warning { code: code.to_owned(), message });
+    }
+}

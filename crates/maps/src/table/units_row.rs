@@ -1,0 +1,35 @@
+//! A row of units below the names of a table.
+
+use crate::table::columns::column::{is_known_unit, says_nothing};
+
+/// Headings with the units from a row of their own below them: `flow` and `g/s` become `flow [g/s]`. `None` if the row below is
+/// no row of units. A heading that names its unit itself keeps it.
+pub(super) fn with_units_row(headings: &[&str], below: &[&str]) -> Option<Vec<String>> {
+    let bare = |text: &str| text.trim().trim_matches(['[', ']', '(', ')']).trim().to_owned();
+    let units: Vec<String> = below.iter().map(|text| bare(text)).collect();
+    let all_known = units.iter().all(|unit| says_nothing(unit) || is_known_unit(unit));
+    let some_known = units.iter().any(|unit| !says_nothing(unit));
+    if !(all_known && some_known) || units.len() > headings.len() {
+        return None;
+    }
+    let joined = headings.iter().enumerate().map(|(index, heading)| match units.get(index) {
+        Some(unit) if !says_nothing(unit) && !heading.contains(['[', '(']) => format!("{heading} [{unit}]"),
+        _ => (*heading).to_owned(),
+    });
+    Some(joined.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_may_have_a_row_of_their_own() {
+        let names = ["speed", "flow", "PR", "eta (is)"];
+        let joined = with_units_row(&names, &["[krpm]", "g/s", "-", "%"]).unwrap();
+        assert_eq!(joined, ["speed [krpm]", "flow [g/s]", "PR", "eta (is)"]);
+        for none in [["60", "38", "1.2", "70"], ["krpm", "slugs", "-", "%"], ["", "-", "", ""]] {
+            assert_eq!(with_units_row(&names, &none), None);
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Tables of steady points: from N, flow, P1, T1, P2, T2 to a map with uncertainties, without heat if the housing was measured.
+
+use crate::analysis::budget_file::budget_csv;
+use crate::machine::fmu_file::with_found;
+use crate::machine::map_work::{MapOut, MapWork, warnings};
+use crate::recording::files::Existing;
+use crate::recording::identification_config::{assumed_sensors, identification};
+use crate::{
+    MapWorkError, Registry, SessionError, recording::run_directory, write_file, write_map_fitted_if_needed,
+};
+use mapper_campaign::Campaign;
+use mapper_core::{
+    CompressorMap, MapDescription, MeasuredPoint, Method, PointBudgets, StaticTaps, ThermalModel,
+};
+use mapper_identify::{IdentifyConfig, KnownHeat, PressureTap, method_of_table};
+use mapper_maps::{Grouping, assemble, mark_line_ends};
+use mapper_physics::gas::air::Air;
+use mapper_physics::machine::params::Params;
+use mapper_report::reduced_text;
+use serde::Deserialize;
+use serde_json::json;
+use std::path::Path;
+
+/// The machine and the sensors of a table.
+struct Stand {
+    name: String,
+    config: IdentifyConfig,
+    /// The thermal model: parameters, standard uncertainty of h as a ratio, origin.
+    heat: Option<(Params, f64, String)>,
+    remarks: Vec<String>,
+}
+
+/// The part of `points.json` that counts here.
+#[derive(Deserialize)]
+struct PointsFile {
+    thermal: Option<ThermalModel>,
+}
+
+impl Stand {
+    /// Nothing but the table is known.
+    fn unknown(table: &Path) -> Stand {
+        let config =
+            IdentifyConfig { air: Air::DRY, declared: assumed_sensors(), ..IdentifyConfig::default() };
+        let remark = "No sensors are declared: temperatures count as class A of IEC 60751, pressures as class 0.1, the flow as 0.5 %; \
+                      declare your own in a campaign and give it by `--machine`.";
+        let name = table.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Stand { name, config, heat: None, remarks: vec![remark.to_owned()] }
+    }
+
+    /// A campaign, or a run directory with its identified thermal model.
+    fn read(path: &Path) -> Result<Stand, SessionError> {
+        if !path.is_dir() {
+            return Ok(Stand::of(&mapper_campaign::load(path)?, path, None));
+        }
+        let campaign = mapper_campaign::load(&path.join(run_directory::CAMPAIGN))?;
+        let points = path.join(run_directory::POINTS);
+        let bytes = std::fs::read(&points).map_err(SessionError::file("read", &points))?;
+        let file: PointsFile = serde_json::from_slice(&bytes)
+            .map_err(|error| SessionError::file("read", &points)(error.into()))?;
+        Ok(Stand::of(&campaign, path, file.thermal.as_ref()))
+    }
+
+    fn of(campaign: &Campaign, path: &Path, found: Option<&ThermalModel>) -> Stand {
+        let mut config = identification(campaign);
+        let declared = (campaign.machine.params, campaign.tolerances.convection_ratio);
+        let law = found.and_then(|found| Some((found, found.convection.as_ref()?)));
+        let ((params, ratio), origin) = match law {
+            Some((found, law)) => {
+                let a = &law.coefficient;
+                let of_a = a.value.map_or(0.0, |value| a.uncertainty.combined_standard_error() / value);
+                config.alpha_area_ratio = found.alpha_area_ratio.value.unwrap_or(config.alpha_area_ratio);
+                config.alpha_area_sigma_ratio = found.alpha_area_ratio.uncertainty.combined_standard_error();
+                ((with_found(&declared.0, found), of_a.hypot(law.deviation_ratio)), "identified")
+            }
+            None => (declared, "declared"),
+        };
+        let heat = Some((params, ratio, format!("{origin} in {}", path.display())));
+        Stand { name: campaign.machine.name.clone(), config, heat, remarks: Vec::new() }
+    }
+}
+
+impl Registry {
+    /// Makes a map of a table of steady points. `machine`: a campaign, or a run directory whose thermal model was identified; `budget`: a
+    /// new file for the uncertainties by source.
+    ///
+    /// # Errors
+    /// As [`Registry::read_map`], [`MapWorkError`], [`SessionError::Campaign`], and those of writing.
+    pub fn reduce_points(
+        &self,
+        path: &Path,
+        given: &MapDescription,
+        machine: Option<&Path>,
+        out: Option<MapOut<'_>>,
+        budget: Option<(&Path, Existing)>,
+    ) -> Result<MapWork, SessionError> {
+        let format = out.map(|out| out.format(self)).transpose()?;
+        let Stand { name, mut config, heat, mut remarks } =
+            machine.map_or_else(|| Ok(Stand::unknown(path)), Stand::read)?;
+        let tap = |tap: PressureTap| match tap {
+            PressureTap::Static { pipe_diameter_m } => Some(pipe_diameter_m),
+            PressureTap::Total => None,
+        };
+        let description = MapDescription {
+            reference: given.reference.or(machine.map(|_| config.reference)),
+            static_taps: StaticTaps {
+                inlet_diameter_m: given.static_taps.inlet_diameter_m.or(tap(config.inlet_tap)),
+                outlet_diameter_m: given.static_taps.outlet_diameter_m.or(tap(config.outlet_tap)),
+            },
+            ..given.clone()
+        };
+        let found = self.inspect_map(path, &description)?;
+        let measured = found.measured.as_slice();
+        if measured.is_empty() {
+            return Err(MapWorkError::NotMeasured { path: path.to_owned() }.into());
+        }
+        config.reference = found.map.reference;
+        config.thresholds.end_mean_s = config.thresholds.steady_mean_s;
+        config.method = method_of_table(measured, heat.is_some());
+        remarks.extend(why_apparent(measured, heat.is_some(), config.method));
+        let known = heat.as_ref().map(|(params, convection_ratio, origin)| KnownHeat {
+            params,
+            convection_ratio: *convection_ratio,
+            origin,
+        });
+        let (points, budgets): (Vec<_>, Vec<PointBudgets>) =
+            mapper_identify::reduce(measured, known, &config)?.into_iter().unzip();
+        let map = assemble(&points, &name, config.reference, config.method, Grouping::default())
+            .map_err(|source| MapWorkError::NotAssembled { path: path.to_owned(), source })?;
+        let mut map = CompressorMap { efficiency: Some(config.air.efficiency), ..map };
+        let ends = mark_line_ends(&mut map, |step| measured.get(step)?.end);
+        let mut text = reduced_text(&map, &ends, &budgets, &remarks);
+        let json = json!({
+            "points": path,
+            "method": config.method,
+            "reference": config.reference,
+            "efficiency": config.air.efficiency,
+            "lines": map.lines,
+            "ends": ends,
+            "budgets": budgets,
+            "remarks": remarks,
+            "file": out.map(|out| out.path),
+        });
+        if let Some((file, existing)) = budget {
+            write_file(file, &budget_csv(&budgets)?, existing)?;
+        }
+        if let Some((out, format)) = out.zip(format) {
+            write_map_fitted_if_needed(out.path, format, map, out.existing)?;
+            text.push_str(&format!("map        {}\n", out.path.display()));
+        }
+        let assumed =
+            found.remarks.into_iter().filter(|remark| *remark != mapper_core::ImportRemark::Measured);
+        Ok(MapWork { text, json, warnings: warnings(path, &assumed.collect::<Vec<_>>()) })
+    }
+}
+
+/// Why heat could not be removed, and the remedy.
+fn why_apparent(measured: &[MeasuredPoint], has_heat: bool, method: Method) -> Option<String> {
+    let without = measured.iter().filter(|point| point.tc_k.is_none()).count();
+    let why = match (method, has_heat) {
+        (Method::Corrected, _) => return None,
+        (_, false) if without == 0 => {
+            "the table has the housing temperature, but the convection of the machine is not known: give its campaign or a run by `--machine`"
+                .to_owned()
+        }
+        _ if without == measured.len() => {
+            "the table has no housing temperature (Tc); `mapper map correct` removes the heat that the lines show".to_owned()
+        }
+        _ => format!("{without} of {} points have no housing temperature (Tc); fill it in, or leave them out", measured.len()),
+    };
+    Some(format!("The efficiencies are apparent, heat included: {why}."))
+}

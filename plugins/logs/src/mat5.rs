@@ -1,0 +1,311 @@
+//! MATLAB data of level 5 (`save`, `save -v7`): vectors of numbers, also in structures. Vectors of equal length form a table.
+//!
+//! Format: MathWorks, MAT-File Format (2005-2024), chapter 1. Matrices become one column for each of theirs; texts, cells, objects and complex or
+//! sparse numbers are left out.
+
+use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
+use crate::tables::several_tables::{Part, side_by_side};
+use crate::columns::table_head::COLUMN_LIMIT;
+use crate::tables::table_log::{Origin, Table};
+use mapper_recording::logs::limits::UNPACKED_BYTES;
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+use std::io::Read;
+
+/// The format.
+pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
+
+const NAME: &str = "MATLAB";
+
+/// Size of the header, bytes; its last two say the order of bytes.
+const HEADER: usize = 128;
+/// Nesting of structures: logs of Simulink have three levels.
+const DEPTH_LIMIT: usize = 8;
+/// Elements of one array of structures.
+const ELEMENT_LIMIT: usize = 1000;
+/// Rows of a table in the sample.
+const HEAD_ROWS: usize = 400;
+
+/// Types of data elements.
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+/// Classes of arrays.
+const STRUCTURE: u8 = 2;
+const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15;
+/// Flag of a complex array.
+const COMPLEX: u8 = 8;
+
+/// Octave and SciPy write the same first words.
+fn recognises(head: &[u8]) -> bool {
+    head.starts_with(b"MATLAB 5.0 MAT-file")
+}
+
+/// A column and its name.
+type Named = (String, Vec<f64>);
+
+struct MatLog {
+    layout: Layout,
+    parts: Vec<Part>,
+    /// The columns of each part.
+    columns: Vec<Vec<Named>>,
+}
+
+fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
+    let wrong = |why: String| file.content(NAME, why);
+    options.only(&["time", "time_unit", "date_order", "rate", "missing"]).map_err(wrong)?;
+    if file.size_bytes()? > UNPACKED_BYTES {
+        return Err(wrong(format!("it has more than {} MiB; export it in parts", UNPACKED_BYTES >> 20)));
+    }
+    let bytes = file.head(usize::try_from(UNPACKED_BYTES).unwrap_or(usize::MAX))?;
+    let mut reader =
+        Reader { is_big: bytes.get(126) == Some(&b'M'), left: UNPACKED_BYTES, ..Reader::default() };
+    reader
+        .elements(bytes.get(HEADER..).unwrap_or_default(), "", 0)
+        .map_err(|why| file.content(NAME, format!("it is damaged: {why}; save it again")))?;
+    let mut tables: Vec<Vec<Named>> = Vec::new();
+    for column in reader.columns {
+        match tables.iter_mut().find(|table| table.iter().any(|(_, first)| first.len() == column.1.len())) {
+            Some(table) => table.push(column),
+            None => tables.push(vec![column]),
+        }
+    }
+    let (mut found, mut problems, mut columns) = (Vec::new(), Vec::new(), Vec::new());
+    for mut table in tables {
+        without_common_prefix(&mut table);
+        let title = format!("{} values", table.first().map_or(0, |(_, values)| values.len()));
+        let head = rows(&table).texts(HEAD_ROWS)?;
+        match Table::look(&head, b'.', options, Origin::Columns) {
+            Ok(looked) => {
+                found.push((title, looked));
+                columns.push(table);
+            }
+            Err(problem) => problems.push(format!("vectors of {title} are passed over: {problem}")),
+        }
+    }
+    if reader.left_out > 0 {
+        problems.push(format!(
+            "{} variables are left out: texts, cells, objects, complex or single numbers",
+            reader.left_out
+        ));
+    }
+    let (layout, parts) = side_by_side("vectors", found, problems).map_err(wrong)?;
+    Ok(Box::new(MatLog { layout, parts, columns }))
+}
+
+impl Log for MatLog {
+    fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
+        for (part, columns) in self.parts.iter().zip(&self.columns) {
+            let own = part.own(wanted);
+            if own.is_empty() {
+                continue;
+            }
+            let mut of_file = |row: Row<'_>| part.give(row, sink);
+            self.layout.add_finding(part.table.rows(&mut rows(columns), &own, &mut of_file)?);
+        }
+        Ok(())
+    }
+}
+
+fn rows(columns: &[Named]) -> ColumnRows<Once> {
+    let names = columns.iter().map(|(name, _)| name.clone()).collect();
+    let count = columns.first().map_or(0, |(_, values)| values.len());
+    let chunks = columns.iter().map(|(_, values)| Chunk::Numbers(values.clone())).collect();
+    ColumnRows::new(vec![names], Once(Some((count, chunks))))
+}
+
+/// All rows at once.
+struct Once(Option<(usize, Vec<Chunk>)>);
+
+impl Chunks for Once {
+    fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
+        Ok(self.0.take())
+    }
+}
+
+/// `log.t`, `log.T2` of one structure are `t` and `T2`.
+fn without_common_prefix(table: &mut [Named]) {
+    let prefix = |name: &str| name.rfind('.').map(|at| name[..=at].to_owned());
+    let Some(first) = table.first().and_then(|(name, _)| prefix(name)) else { return };
+    if table.iter().all(|(name, _)| prefix(name).as_deref() == Some(&first)) {
+        table.iter_mut().for_each(|(name, _)| *name = name.split_off(first.len()));
+    }
+}
+
+/// Collects the columns of a file.
+#[derive(Default)]
+struct Reader {
+    is_big: bool,
+    /// Bytes that may still be unpacked.
+    left: u64,
+    columns: Vec<Named>,
+    left_out: usize,
+}
+
+impl Reader {
+    /// Reads the elements one after the other.
+    fn elements(&mut self, mut bytes: &[u8], prefix: &str, depth: usize) -> Result<(), String> {
+        while !bytes.is_empty() {
+            let (kind, data, rest) = self.element(bytes)?;
+            bytes = rest;
+            match kind {
+                COMPRESSED => {
+                    let mut unpacked = Vec::new();
+                    let unpacking =
+                        flate2::read::ZlibDecoder::new(data).take(self.left + 1).read_to_end(&mut unpacked);
+                    unpacking.map_err(|error| error.to_string())?;
+                    self.left = self
+                        .left
+                        .checked_sub(unpacked.len() as u64)
+                        .ok_or_else(|| format!("it unpacks to more than {} MiB", UNPACKED_BYTES >> 20))?;
+                    if depth >= DEPTH_LIMIT {
+                        return Err("it is packed several times".to_owned());
+                    }
+                    self.elements(&unpacked, prefix, depth + 1)?;
+                }
+                MATRIX => self.matrix(data, None, prefix, depth)?,
+                _ => self.left_out += 1,
+            }
+        }
+        Ok(())
+    }
+
+    /// Type and data of an element, and what follows it.
+    fn element<'a>(&self, bytes: &'a [u8]) -> Result<(u32, &'a [u8], &'a [u8]), String> {
+        let cut = || "an element is cut short".to_owned();
+        let (kind, size) = (self.word(bytes, 0).ok_or_else(cut)?, self.word(bytes, 4).ok_or_else(cut)?);
+        // Up to four bytes of data may stand in the tag itself.
+        let (kind, start, size, end): (u32, usize, usize, usize) = match kind >> 16 {
+            0 => {
+                let size = size as usize;
+                let padded = if kind == COMPRESSED { size } else { size.next_multiple_of(8) };
+                (kind, 8, size, 8usize.saturating_add(padded))
+            }
+            small => (kind & 0xffff, 4, small as usize, 8),
+        };
+        let data = bytes.get(start..start.saturating_add(size)).ok_or_else(cut)?;
+        Ok((kind, data, bytes.get(end..).unwrap_or_default()))
+    }
+
+    fn word(&self, bytes: &[u8], at: usize) -> Option<u32> {
+        let word = bytes.get(at..at + 4)?.try_into().ok()?;
+        Some(if self.is_big { u32::from_be_bytes(word) } else { u32::from_le_bytes(word) })
+    }
+
+    /// An array: its numbers become columns, the fields of a structure are read in turn. `field`: its name in a structure.
+    fn matrix(&mut self, data: &[u8], field: Option<&str>, prefix: &str, depth: usize) -> Result<(), String> {
+        if data.is_empty() {
+            return Ok(());
+        }
+        let (_, flags, rest) = self.element(data)?;
+        let flags = self.word(flags, 0).ok_or("an array has no class")?;
+        let (class, is_complex) = (flags.to_le_bytes()[0], flags.to_le_bytes()[1] & COMPLEX != 0);
+        let (_, dimensions, rest) = self.element(rest)?;
+        let dimensions: Vec<usize> = (0..dimensions.len() / 4)
+            .filter_map(|at| Some(self.word(dimensions, 4 * at)? as usize))
+            .collect();
+        let (_, own, rest) = self.element(rest)?;
+        let name = format!(
+            "{prefix}{}",
+            field.map_or_else(|| String::from_utf8_lossy(own), std::borrow::Cow::Borrowed)
+        );
+        match dimensions.as_slice() {
+            [rows, columns] if NUMBERS.contains(&class) && !is_complex => {
+                let (kind, numbers, _) = self.element(rest)?;
+                let values = self.numbers(kind, numbers)?;
+                if rows.checked_mul(*columns) != Some(values.len()) {
+                    return Err(format!(
+                        "`{name}` has {} numbers in {rows} x {columns} places",
+                        values.len()
+                    ));
+                }
+                self.take(&name, values, *rows, *columns)
+            }
+            [rows, columns] if class == STRUCTURE => {
+                let count = rows.saturating_mul(*columns);
+                if depth >= DEPTH_LIMIT || count > ELEMENT_LIMIT {
+                    self.left_out += 1;
+                    return Ok(());
+                }
+                self.structure(rest, &name, count, depth)
+            }
+            _ => {
+                self.left_out += 1;
+                Ok(())
+            }
+        }
+    }
+
+    fn structure(&mut self, data: &[u8], name: &str, count: usize, depth: usize) -> Result<(), String> {
+        let (_, length, rest) = self.element(data)?;
+        let length =
+            self.word(length, 0).filter(|length| *length > 0).ok_or("a structure has no names")? as usize;
+        let (_, names, mut rest) = self.element(rest)?;
+        for element in 1..=count {
+            let prefix = if count == 1 { format!("{name}.") } else { format!("{name}({element}).") };
+            for field in names.chunks(length) {
+                let field =
+                    String::from_utf8_lossy(field.split(|byte| *byte == 0).next().unwrap_or_default())
+                        .into_owned();
+                let (_, data, after) = self.element(rest)?;
+                self.matrix(data, Some(&field), &prefix, depth + 1)?;
+                rest = after;
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, name: &str, values: Vec<f64>, rows: usize, columns: usize) -> Result<(), String> {
+        let count = if rows == 1 || columns == 1 { 1 } else { columns };
+        if values.len() / count.max(1) < 2 {
+            self.left_out += 1;
+            return Ok(());
+        }
+        if self.columns.len() + count > COLUMN_LIMIT {
+            return Err(format!("it has more than {COLUMN_LIMIT} columns"));
+        }
+        if count == 1 {
+            self.columns.push((name.to_owned(), values));
+        } else {
+            // Column by column, as MATLAB stores them.
+            let named = values.chunks(rows).enumerate();
+            self.columns
+                .extend(named.map(|(index, column)| (format!("{name}_{}", index + 1), column.to_vec())));
+        }
+        Ok(())
+    }
+
+    #[allow(clippy::unnecessary_cast, reason = "one of the types is f64 already")]
+    fn numbers(&self, kind: u32, data: &[u8]) -> Result<Vec<f64>, String> {
+        macro_rules! of {
+            ($number:ty) => {
+                data.chunks_exact(size_of::<$number>())
+                    .filter_map(|bytes| {
+                        let bytes = bytes.try_into().ok()?;
+                        let value = if self.is_big {
+                            <$number>::from_be_bytes(bytes)
+                        } else {
+                            <$number>::from_le_bytes(bytes)
+                        };
+                        Some(value as f64)
+                    })
+                    .collect()
+            };
+        }
+        Ok(match kind {
+            1 => of!(i8),
+            2 => of!(u8),
+            3 => of!(i16),
+            4 => of!(u16),
+            5 => of!(i32),
+            6 => of!(u32),
+            7 => of!(f32),
+            9 => of!(f64),
+            12 => of!(i64),
+            13 => of!(u64),
+            other => return Err(format!("numbers of the unknown type {other}")),
+        })
+    }
+}

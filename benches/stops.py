@@ -1,11 +1,10 @@
-"""How long a signal takes, in each phase of a run, and in the other commands.
+"""How long a stop takes, in each phase of a run and for each way to ask for it, and in the other commands.
 
     cargo build --release
     target/python-env/bin/python benches/stops.py --mapper target/release/mapper
 
-Each row: the phase, the signal, and the time to what it promises, median and worst of several. In a run with a rig this is the first
-command of the safe state, which is sent before it is reported: the time to its event is an upper bound. Elsewhere it is the end of the
-process, or the message that results are still written.
+In a run with a rig, the time is that from the request to the event of the first command of the safe state, which is sent before it is
+reported: an upper bound. Elsewhere it is the end of the process, or the message that results are still written.
 """
 
 import argparse
@@ -14,27 +13,50 @@ import os
 import queue
 import random
 import signal
+import socket
 import statistics
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import urllib.request
 from pathlib import Path
 
 from machines import ROOT
 
-INT, TERM = signal.SIGINT, signal.SIGTERM
+INT, TERM, HUP, QUIT, USR1 = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1
+SAFE, STOP = "/ask/safe", "/ask/stop"
+ARMS_S = 2.0
+# It computes for most of its time.
+LONG_SCRIPT = "for p in grid() { jump(p); let s = 0.0; for i in 0..200000 { s += i.to_float(); } }\n"
+# The Python example rig, which takes its time to be armed.
+SLOW_RIG = f"""#!{sys.executable}
+import importlib.machinery, importlib.util, pathlib, sys, time
+sys.path.insert(0, {str(ROOT / "plugins/drivers/python")!r})
+loader = importlib.machinery.SourceFileLoader("rig", {str(ROOT / "plugins/drivers/python/mapper-backend-python_rig")!r})
+module = importlib.util.module_from_spec(importlib.util.spec_from_loader("rig", loader))
+loader.exec_module(module)
+class Slow(module.PythonRig):
+    def arm(self):
+        pathlib.Path(__file__).with_name("arms").touch()
+        time.sleep({ARMS_S})
+        return super().arm()
+if __name__ == "__main__":
+    module.serve("slow_rig", "1.0", Slow)
+"""
 
 
 class Process:
     """A command with its progress as events."""
 
     def __init__(self, mapper, arguments, folder):
-        environment = {**os.environ, "MAPPER_STATE_DIR": str(folder / "state")}
+        path = f"{folder}{os.pathsep}{os.environ['PATH']}"
+        environment = {**os.environ, "MAPPER_STATE_DIR": str(folder / "state"), "PATH": path}
         self.child = subprocess.Popen(
             [mapper, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment, cwd=ROOT
         )
+        self.page = None
         self.lines = queue.Queue()
         threading.Thread(target=self.read, daemon=True).start()
 
@@ -57,9 +79,20 @@ class Process:
         self.child.wait(timeout=300)
         return time.monotonic()
 
-    def send(self, number):
-        self.child.send_signal(number)
-        return time.monotonic()
+    def ask(self, requests):
+        """Asks to stop by signals or buttons of the page; the time of the last request."""
+        for number, request in enumerate(requests):
+            if number > 0:
+                # Two equal signals that wait for one process are one.
+                time.sleep(0.05)
+            if self.child.poll() is not None:
+                raise EOFError
+            asked = time.monotonic()
+            if isinstance(request, str):
+                urllib.request.urlopen(urllib.request.Request(self.page + request, b"", {"Origin": self.page}), timeout=10)
+            else:
+                self.child.send_signal(request)
+        return asked
 
 
 def campaign(folder, *replaced):
@@ -86,85 +119,66 @@ def event(*kinds):
 
 
 SHORT_SOAK = ("soak: 30 min", "soak: 5 min")
+NO_SOAK = ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}", "")
+SHORT_WARM_UP = ("warm_up: 2 min", "warm_up: 1 s")
 SURGE = ("seed: 1 ", "surge_search: {}\nseed: 1 ")
+SCRIPT = ("seed: 1 ", "sequence: long.rhai\nseed: 1 ")
+SLOW = ("  virtual_lab: {}", "  slow_rig: {real_time: true}")
 
 
-def in_run(mapper, folder, replaced, pace, begins, signals, rng):
-    """From the last signal to the event of the interruption."""
-    arguments = ["run", campaign(folder, *replaced), "--out", folder / "runs", "--progress", "json"]
-    process = Process(mapper, [*arguments, *(["--pace", pace] if pace else [])], folder)
-    process.until(begins)
-    time.sleep(rng.uniform(0.05, 0.5))
-    for number in signals[:-1]:
-        process.send(number)
-        # Two equal signals that wait for one process are one.
-        time.sleep(0.05)
-    sent = process.send(signals[-1])
-    at = process.until(event("interrupted"))
-    process.ended()
-    return at - sent
+def in_run(replaced, pace, begins):
+    """From the last request to the event of the interruption."""
+
+    def measure(mapper, folder, requests, rng):
+        (folder / "long.rhai").write_text(LONG_SCRIPT)
+        driver = folder / "mapper-backend-slow_rig"
+        driver.write_text(SLOW_RIG)
+        driver.chmod(0o755)
+        arguments = ["run", campaign(folder, *replaced), "--out", folder / "runs", "--progress", "json"]
+        arguments += ["--pace", pace] if pace else []
+        page = None
+        if any(isinstance(request, str) for request in requests):
+            with socket.socket() as free:
+                free.bind(("127.0.0.1", 0))
+                address = f"127.0.0.1:{free.getsockname()[1]}"
+            arguments, page = [*arguments, f"--live={address}"], f"http://{address}"
+        process = Process(mapper, arguments, folder)
+        process.page = page
+        if begins is None:
+            while not (folder / "arms").exists():
+                time.sleep(0.005)
+        else:
+            process.until(begins)
+        time.sleep(rng.uniform(0.05, 0.5))
+        asked = process.ask(requests)
+        at = process.until(event("interrupted"))
+        # The run-down takes seconds in real time.
+        process.child.kill()
+        process.child.wait()
+        return at - asked
+
+    return measure
 
 
-def to_end(mapper, folder, arguments, delay_s, signals):
-    process = Process(mapper, arguments, folder)
-    time.sleep(delay_s)
-    if process.child.poll() is not None:
-        raise EOFError
-    for number in signals[:-1]:
-        process.send(number)
-        time.sleep(0.05)
-    sent = process.send(signals[-1])
-    return process.ended() - sent
+def to_end(arguments, wait_s):
+    def measure(mapper, folder, requests, rng):
+        process = Process(mapper, arguments(mapper, folder), folder)
+        time.sleep(rng.uniform(*wait_s))
+        asked = process.ask(requests)
+        return process.ended() - asked
+
+    return measure
 
 
-def results(mapper, folder, signals, rng):
-    """Identification and report: from the last step's end."""
-    text = ("method: joint ", "method: joint ")
-    process = Process(mapper, ["run", campaign(folder, text, SHORT_SOAK), "--out", folder / "runs", "--progress", "json"], folder)
+def results(mapper, folder, requests, rng):
+    """Identification and report: the message after one request, the end after two."""
+    process = Process(mapper, ["run", campaign(folder, SHORT_SOAK), "--out", folder / "runs", "--progress", "json"], folder)
     process.until(event("rig_released"))
-    for number in signals:
-        time.sleep(0.05)
-        sent = process.send(number)
-    if len(signals) == 1:
-        at = process.until(lambda line: "results are being written" in line)
-        process.ended()
-        return at - sent
-    return process.ended() - sent
-
-
-def phases(mapper):
-    step, soak = event("step_started"), event("soak_started")
-    run = lambda *more: lambda folder, rng: in_run(mapper, folder, *more, rng)
-    script = ("seed: 1 ", "sequence: long.rhai\nseed: 1 ")
-
-    def scripted(signals):
-        def measure(folder, rng):
-            (folder / "long.rhai").write_text("for p in grid() { jump(p); let s = 0.0; for i in 0..200000 { s += i.to_float(); } }\n")
-            return in_run(mapper, folder, [script, SHORT_SOAK], 200, event("step_ended"), signals, rng)
-
-        return measure
-
-    plan = lambda signals: lambda folder, rng: to_end(mapper, folder, ["run", ROOT / "campaigns/turbo_a.yaml", "--out", folder / "runs"], rng.uniform(0.1, 0.4), signals)
-    command = lambda arguments, signals, wait: lambda folder, rng: to_end(mapper, folder, arguments(folder), rng.uniform(*wait), signals)
-    fleet = lambda folder: ["fleet", "run", made_fleet(mapper, folder)]
-    nightly = lambda folder: ["nightly", ROOT / "campaigns/nightly.yaml", "--db", folder / "history.db"]
-    return [
-        ("planning", "Ctrl-C", plan([INT])),
-        ("planning", "SIGTERM", plan([TERM])),
-        ("soak (zero), real time", "Ctrl-C", run([], 1, soak, [INT])),
-        ("soak (zero), real time", "SIGTERM", run([], 1, soak, [TERM])),
-        ("step, real time", "SIGTERM", run([("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}", ""), ("warm_up: 2 min", "warm_up: 1 s")], 1, step, [TERM])),
-        ("step, real time", "Ctrl-C twice", run([("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}", ""), ("warm_up: 2 min", "warm_up: 1 s")], 1, step, [INT, INT])),
-        ("a script computes", "Ctrl-C", scripted([INT])),
-        ("a script computes", "SIGTERM", scripted([TERM])),
-        ("surge search", "SIGTERM", run([SURGE, SHORT_SOAK], 300, lambda line: '"approach"' in line, [TERM])),
-        ("identification and report", "Ctrl-C (message)", lambda folder, rng: results(mapper, folder, [INT], rng)),
-        ("identification and report", "twice (end)", lambda folder, rng: results(mapper, folder, [INT, INT], rng)),
-        ("nightly", "Ctrl-C twice", command(nightly, [INT, INT], (1.0, 3.0))),
-        ("nightly", "SIGTERM", command(nightly, [TERM], (1.0, 3.0))),
-        ("fleet run", "Ctrl-C twice", command(fleet, [INT, INT], (0.5, 2.0))),
-        ("fleet run", "SIGTERM", command(fleet, [TERM], (0.5, 2.0))),
-    ]
+    time.sleep(0.05)
+    asked = process.ask(requests)
+    at = process.until(lambda line: "results are being written" in line) if len(requests) == 1 else process.ended()
+    process.ended()
+    return at - asked
 
 
 def made_fleet(mapper, folder):
@@ -172,7 +186,30 @@ def made_fleet(mapper, folder):
     study.write_text(f"fleet: stops\nstudy: maps\ncampaigns: [{ROOT / 'campaigns/nightly/turbo_a.yaml'}]\nseeds: [1, 2, 3, 4, 5, 6, 7, 8]\n")
     made = subprocess.run([mapper, "fleet", "make", str(study), "--out", str(folder / "fleet")], capture_output=True, text=True, cwd=ROOT)
     assert made.returncode == 0, made.stderr
-    return folder / "fleet"
+    return ["fleet", "run", folder / "fleet"]
+
+
+COLUMNS = {"Ctrl-C": [INT], "Ctrl-C twice": [INT, INT], "SIGTERM": [TERM], "SIGHUP": [HUP], "SIGQUIT": [QUIT], "SIGUSR1": [USR1],
+           "page: stop": [STOP], "page: safe": [SAFE]}
+NOW = ["Ctrl-C", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1", "page: stop", "page: safe"]
+IN_STEP = ["Ctrl-C twice", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1", "page: safe"]
+ENDS = ["Ctrl-C", "SIGTERM", "SIGHUP"]
+PLAN = lambda _, folder: ["run", ROOT / "campaigns/turbo_a.yaml", "--out", folder / "runs"]
+NIGHTLY = lambda _, folder: ["nightly", ROOT / "campaigns/nightly.yaml", "--db", folder / "history.db"]
+PHASES = [
+    ("planning", to_end(PLAN, (0.1, 0.4)), ENDS),
+    (f"connecting, {ARMS_S:.0f} s", in_run([SLOW, NO_SOAK], None, None), ["Ctrl-C", "SIGTERM"]),
+    ("soak (zero)", in_run([], 1, event("soak_started")), NOW),
+    ("warm-up", in_run([NO_SOAK], 1, event("rig_time")), NOW),
+    ("step", in_run([NO_SOAK, SHORT_WARM_UP], 1, event("step_started")), IN_STEP),
+    ("step, rig behind a driver", in_run([SLOW, NO_SOAK, SHORT_WARM_UP], None, event("step_started")), IN_STEP),
+    ("a script computes", in_run([SCRIPT, SHORT_SOAK], 200, event("step_ended")), NOW),
+    ("surge search", in_run([SURGE, SHORT_SOAK], 300, lambda line: '"approach"' in line), IN_STEP),
+    ("results: message", results, ["Ctrl-C", "SIGTERM"]),
+    ("results: end", results, ["Ctrl-C twice"]),
+    ("`nightly`", to_end(NIGHTLY, (1.0, 3.0)), ["Ctrl-C twice", "SIGTERM"]),
+    ("`fleet run`", to_end(made_fleet, (0.5, 2.0)), ["Ctrl-C twice", "SIGTERM"]),
+]
 
 
 def main():
@@ -182,19 +219,22 @@ def main():
     parser.add_argument("--only", default="")
     arguments = parser.parse_args()
     mapper = str(Path(arguments.mapper).resolve())
-    print("| phase | signal | median, ms | worst, ms |\n|---|---|---:|---:|", flush=True)
-    for phase, name, measure in phases(mapper):
+    print("Median and worst of", arguments.tries, "in ms\n")
+    print("| phase | " + " | ".join(COLUMNS) + " |\n|---|" + "---:|" * len(COLUMNS), flush=True)
+    for phase, measure, columns in PHASES:
         if arguments.only not in phase:
             continue
-        times = []
-        for seed in range(arguments.tries):
-            with tempfile.TemporaryDirectory() as scratch:
-                try:
-                    times.append(1e3 * measure(Path(scratch), random.Random(seed)))
-                except (EOFError, queue.Empty) as error:
-                    print(f"{phase}, {name}: {type(error).__name__}", file=sys.stderr, flush=True)
-        if times:
-            print(f"| {phase} | {name} | {statistics.median(times):.0f} | {max(times):.0f} |", flush=True)
+        cells = []
+        for column, requests in COLUMNS.items():
+            times = []
+            for seed in range(arguments.tries if column in columns else 0):
+                with tempfile.TemporaryDirectory() as scratch:
+                    try:
+                        times.append(1e3 * measure(mapper, Path(scratch), requests, random.Random(seed)))
+                    except (EOFError, OSError, queue.Empty) as error:
+                        print(f"{phase}, {column}: {type(error).__name__} {error}", file=sys.stderr, flush=True)
+            cells.append(f"{statistics.median(times):.0f}, {max(times):.0f}" if times else "")
+        print(f"| {phase} | " + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":

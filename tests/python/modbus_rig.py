@@ -24,9 +24,10 @@ READ_HOLDING, WRITE_HOLDING = 3, 16
 ALL_DEVICES = 0
 WATCHDOG_S = 2.0
 MISDEED = 150
-# Of writes below register 150: acknowledges another register, fewer registers, is busy each other time (exception 6), fails for ever
-# (exception 4); of all: closes the connection after each answer.
-MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, DEVICE_FAILURE, CLOSES = range(6)
+# Of writes below register 150: acknowledges another register, fewer registers, is busy each other time (exception 6); of all: closes the
+# connection after each answer; from 100 on writes, from 200 on reads are refused for ever with the exception of the rest.
+MISDEEDS = HONEST, OTHER_REGISTER, FEWER_REGISTERS, BUSY_ONCE, CLOSES = range(5)
+OF_WRITES, OF_READS = 100, 200
 
 root = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(root / "plugins/drivers/python"))
@@ -55,6 +56,9 @@ class Misdeeds:
         if self.kind == CLOSES:
             for connection in list(self.server.active_connections.values()):
                 asyncio.get_running_loop().call_later(0.002, connection.close)
+        # The test itself reads one register at a time.
+        if self.kind >= OF_READS and pdu.function_code == READ_HOLDING and len(pdu.registers) > 1:
+            return self.refusal(pdu, self.kind - OF_READS)
         if pdu.function_code != WRITE_HOLDING or pdu.address >= MISDEED:
             return pdu
         self.writes += 1
@@ -62,11 +66,17 @@ class Misdeeds:
             pdu.address += 1
         elif self.kind == FEWER_REGISTERS:
             pdu.count -= 1
-        elif self.kind == DEVICE_FAILURE or (self.kind == BUSY_ONCE and self.writes % 2):
-            refusal = ExceptionResponse(pdu.function_code, exception_code=6 if self.kind == BUSY_ONCE else 4)
-            refusal.transaction_id, refusal.dev_id = pdu.transaction_id, pdu.dev_id
-            return refusal
+        elif self.kind == BUSY_ONCE and self.writes % 2:
+            return self.refusal(pdu, 6)
+        elif OF_WRITES <= self.kind < OF_READS:
+            return self.refusal(pdu, self.kind - OF_WRITES)
         return pdu
+
+    @staticmethod
+    def refusal(pdu, code):
+        refusal = ExceptionResponse(pdu.function_code, exception_code=code)
+        refusal.transaction_id, refusal.dev_id = pdu.transaction_id, pdu.dev_id
+        return refusal
 
 
 async def live(server, filled, misdeeds):

@@ -8,7 +8,7 @@ With --secure it takes signed and encrypted sessions alone, of the user `lab` wi
 if it has none yet, valid for a year or for N days. With --stamps it prints `SECONDS read RPM` for each speed that it hands out and `SECONDS told NAMES` for each set-point that it
 takes, on the clock of time.monotonic(): behind its decryption, so that a session may be encrypted. With --sessions it holds so many sessions at a time and
 refuses others with BadTooManySessions, as small PLCs do: a session, also one without a successful login, is held until its client closes it.
-With --misdeed, from the first time that the air is on: `boolean`, T2 becomes a truth value; `future`, readings are stamped an hour ahead; `uncertain`, all of them are. With --answers CODE writes of
+With --misdeed, from the first time that the air is on: `boolean`, T2 becomes a truth value; `future`, readings are stamped an hour ahead; the name of a status code, all of them have it. With --answers CODE writes of
 setpoints are answered with that status.
 """
 
@@ -186,7 +186,7 @@ async def live(server, nodes, seed, filled, misdeed):
     async def put(name, value, kind, misdeed=None):
         now = datetime.datetime.now(datetime.timezone.utc)
         taken = now + datetime.timedelta(hours=1) if misdeed == "future" else now
-        status = ua.StatusCode(ua.StatusCodes.UncertainLastUsableValue if misdeed == "uncertain" else ua.StatusCodes.Good)
+        status = ua.StatusCode(getattr(ua.StatusCodes, misdeed or "Good", ua.StatusCodes.Good))
         if misdeed == "boolean" and name == "T2":
             value, kind = True, ua.VariantType.Boolean
         stamped = ua.DataValue(ua.Variant(value, kind), status, SourceTimestamp=taken, ServerTimestamp=now)
@@ -228,7 +228,7 @@ async def main():
     parser.add_argument("--password", default="hunter2")
     parser.add_argument("--days", type=int, default=365)
     parser.add_argument("--sessions", type=int)
-    parser.add_argument("--misdeed", choices=["boolean", "future", "uncertain"])
+    parser.add_argument("--misdeed")
     parser.add_argument("--answers")
     arguments = parser.parse_args()
     logging.disable(logging.ERROR)

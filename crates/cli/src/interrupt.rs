@@ -32,15 +32,30 @@ fn obey(stop: &RunStop, gentle: bool) {
     }
 }
 
-/// The flags that signals raise while a rig is run.
+/// The flags that signals raise while a rig is run: every signal that would end or suspend the process and that can be caught.
+/// Faults of the program itself (SIGSEGV and its like) cannot be.
 #[cfg(unix)]
 pub fn run_stop() -> Result<RunStop, Failure> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::consts::*;
     use signal_hook::iterator::Signals;
     let stop = RunStop::default();
     let raised = stop.clone();
-    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(failed)?;
-    let watch = move || signals.forever().for_each(|signal| obey(&raised, signal == SIGINT));
+    // SIGXFSZ: a limit of file sizes; the write then fails with an error.
+    let ends = [
+        SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU,
+        SIGXFSZ, SIGABRT,
+    ];
+    let mut signals = Signals::new(ends.into_iter().chain([SIGTSTP])).map_err(failed)?;
+    let watch = move || {
+        signals.forever().for_each(|signal| match signal {
+            SIGTSTP if raised.has_the_rig() => standard_output::warn(
+                "A suspended program could not protect the rig: it goes on. Press Ctrl-C to stop the run.\n",
+            ),
+            // If it fails, the process just goes on.
+            SIGTSTP => drop(signal_hook::low_level::emulate_default_handler(SIGTSTP)),
+            _ => obey(&raised, signal == SIGINT),
+        });
+    };
     std::thread::Builder::new().name("signals".to_owned()).spawn(watch).map_err(failed)?;
     Ok(stop)
 }

@@ -1,6 +1,6 @@
 //! Sound readings of jumps, surge and rest are good; jumps that no sensor of that lag can make are bad, for as long as they last.
 
-use mapper_core::{Channel, ChannelColumn, Quality, Reaction, SampleBatch};
+use mapper_core::{Channel, ChannelColumn, Element, ElementColumn, Quality, Reaction, SampleBatch};
 use mapper_runner::{Commanded, PlausibilityWatch, ReadingBounds, Trip};
 
 const INTERVAL_S: f64 = 0.1;
@@ -75,6 +75,36 @@ fn a_jump_that_the_probe_cannot_make_is_bad_until_it_is_back() {
     // The housing has a lag without any declaration.
     let housing = |t_s: f64| vec![(Channel::Tc, if t_s < 4.95 { 360.0 } else { 400.0 })];
     assert!(judged(&mut watch(0.0), 20.0, Channel::Tc, housing).1.is_some());
+}
+
+/// One of three T2 probes fails while the rig's combined reading, without it, stays right: the probe has no reading, the others keep
+/// theirs, and the run goes on with a note. Out of range, colder than isentropic compression, and faster than its lag.
+#[test]
+fn one_of_several_sensors_is_judged_by_itself() {
+    for wrong_k in [5.0, 1e12, 330.0, 470.0] {
+        let (mut watch, mut trips, mut read) = (watch(2.0), Vec::new(), [0; 3]);
+        for sample in 0..100_u32 {
+            let t_s = INTERVAL_S * f64::from(sample);
+            let value_k = |number| if number == 3 && t_s > 2.95 { wrong_k } else { 376.0 };
+            let element = |number| ElementColumn {
+                element: Element { channel: Channel::T2, number },
+                values: vec![value_k(number)],
+            };
+            let mut batch = SampleBatch {
+                t_s: vec![t_s],
+                columns: STEADY.map(|row| ChannelColumn { channel: row.0, values: vec![row.1] }).to_vec(),
+                elements: [1, 2, 3].map(element).to_vec(),
+                ..SampleBatch::default()
+            };
+            trips.extend(watch.judge(&mut batch, &RUNNING));
+            assert!(batch.provenance.is_empty(), "{wrong_k} K at {t_s} s: {:?}", batch.provenance);
+            let values = batch.elements.iter().map(|one| one.values[0]);
+            read.iter_mut().zip(values).for_each(|(read, value)| *read += u32::from(value.is_finite()));
+        }
+        assert_eq!(read, [100, 100, 30], "{wrong_k} K");
+        let noted = trips.iter().all(|trip| trip.reaction == Reaction::Note && trip.reason.contains("T2/3"));
+        assert!(noted && !trips.is_empty(), "{wrong_k} K: {trips:?}");
+    }
 }
 
 #[test]

@@ -334,8 +334,11 @@ impl Backend for SafeAt<'_> {
 /// In warm-up and steps of a rig in real time, the safe command follows a stop within 20 ms, not at the next sample of 10 Hz.
 #[test]
 fn a_stop_does_not_wait_for_the_next_sample() {
-    for stop_s in [3.013, 17.508, 33.3333, 49.9871] {
-        let stop = AtomicBool::new(false);
+    // A gentle stop waits for the end of a step, and outside of steps for nothing.
+    for (stop_s, gentle) in
+        [(3.013, false), (17.508, false), (33.3333, false), (49.9871, false), (3.013, true), (8.7654, true)]
+    {
+        let (stop, never) = (AtomicBool::new(false), AtomicBool::new(false));
         let wall = StopsAt { now_s: Mutex::new(0.0), stop_s, stop: &stop };
         let lab = VirtualLab::new(LabSettings::ideal(Model::nominal(), BoundaryConditions::default()));
         let mut rig = SafeAt { lab, wall: &wall, safe_s: None };
@@ -347,9 +350,13 @@ fn a_stop_does_not_wait_for_the_next_sample() {
             guards: Vec::new(),
             observer: &mut notebook,
             speed: None,
-            stop: &stop,
+            stop: if gentle { &never } else { &stop },
         }
-        .run_under(&Protection { each_sample: true, ..Protection::default() })
+        .run_under(&Protection {
+            each_sample: !gentle,
+            stop_after_step: if gentle { &stop } else { &never },
+            ..Protection::default()
+        })
         .unwrap();
         assert!(matches!(end, RunEnd::Interrupted { .. }), "{stop_s}: {end:?}");
         let late_s = rig.safe_s.unwrap() - stop_s;

@@ -109,12 +109,17 @@ fn two_runners_on_one_rig_and_one_that_was_killed_with_it() {
     done(run_of(&campaign, &[])).exits(0);
 }
 
-/// SIGHUP and SIGTERM, and Ctrl-C in the soak, which has no step to end: safe, in order, and now.
+/// Every signal that would end the process, and Ctrl-C in the soak, which has no step to end: safe, in order, and now. A terminal's
+/// Ctrl-Z does not leave the rig without guards.
 #[test]
 fn signals_make_the_rig_safe() {
-    for signal in ["HUP", "TERM", "INT"] {
+    for signal in ["HUP", "TERM", "INT", "QUIT", "USR1", "XFSZ"] {
         let campaign = short(&[]);
-        let (running, recording) = soaking(&campaign);
+        let (mut running, recording) = soaking(&campaign);
+        if signal == "TERM" {
+            running.signal("TSTP");
+            running.recorded(recording.metadata().unwrap().len() + 100_000);
+        }
         running.signal(signal);
         let finished = running.finished().exits(130);
         assert!(finished.stderr.contains("stopped by the operator"), "{signal}: {}", finished.stderr);

@@ -88,6 +88,17 @@ fn what_the_journal_alone_says_is_run_again() {
     let run = only_run(&runs);
     let expected = points(&run);
     let bytes = run.join("recording.mcap").metadata().unwrap().len();
+    // A part that a simulated rig repeated to the last bit, after a kill between the recording's end and the journal's, counts once.
+    let journal = std::fs::read_to_string(run.join("journal.jsonl")).unwrap();
+    std::fs::copy(run.join("recording.mcap"), run.join("recording-2.mcap")).unwrap();
+    let twice = format!("{journal}{}", journal.replace("recording.mcap", "recording-2.mcap"));
+    std::fs::write(run.join("journal.jsonl"), twice).unwrap();
+    mapper(["identify".as_ref(), run.as_os_str(), "--out".as_ref(), runs.join("again").as_os_str()]).exits(0);
+    assert_eq!(points(&runs.join("again")), expected);
+    // A command that follows one recording does not take the first for the run, nor does any if the journal is gone.
+    mapper(["transient".as_ref(), run.as_os_str()]).exits(3);
+    std::fs::remove_file(run.join("journal.jsonl")).unwrap();
+    mapper(["identify".as_ref(), run.as_os_str()]).exits(3);
     let campaign = campaign();
     let mut running = Running::start_with(&campaign, &[]);
     let recording = running.recorded((0.4 * bytes as f64) as u64);

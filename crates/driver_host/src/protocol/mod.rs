@@ -28,8 +28,6 @@ pub const HOLD_SINCE_MINOR: u32 = 1;
 pub const FRAME_LIMIT_BYTES: u32 = 1 << 20;
 /// Largest frame that either side may send before it knows the limit of the other, bytes.
 pub const FIRST_FRAME_LIMIT_BYTES: u32 = 1 << 16;
-/// Time for the hello of the other side, s.
-pub const HELLO_S: f64 = 5.0;
 /// An armed driver that has heard nothing for so long flies its safe trajectory, s.
 pub const LEASE_S: f64 = 2.0;
 /// How often the host renews the lease, s.

@@ -12,15 +12,22 @@
 //! | m_c | a compressor that holds a pressure ratio delivers; backflow of surge is shorter than its cycle |
 //! | P3, T3 | expansion lowers pressure and temperature; only the housing heats the gas |
 //!
-//! Pressures and shaft speed have no lag that bounds a jump between two samples; only the rules that combine channels judge them.
+//! Each of several sensors of a channel is judged by itself. An impossible one is recorded as without a reading, and only noted: the
+//! others go on.
+//!
+//! Pressures, flow and shaft speed have no lag that bounds a jump between two samples, so only the rules that combine channels judge
+//! them. A pressure wave changes a pressure by `rho a du`, 20 kPa for 50 m/s, within milliseconds, and the plenum of a turbocharger
+//! (1 l) fills by 20 MPa/s. Flow in a pipe of 0.5 m changes by 200 kg/s2 at 100 kPa. The shaft (16e-6 kg m2) is accelerated by 30 kW at
+//! 95 krpm by 1.8 Mrpm/s: all of it is more than the range within one sample at 10 Hz.
 
 use crate::guards::first_look::NEEDED;
 use crate::guards::guard::{Commanded, Trip};
 use crate::guards::recent_extreme::RecentExtreme;
 use mapper_core::{
-    CHANNELS, Channel, Dimension, GuardName, Provenance, Quality, Reaction, SampleBatch, measurable,
+    Channel, Dimension, Element, GuardName, Provenance, Quality, Reaction, SampleBatch, measurable,
     plausible, readable,
 };
+use std::collections::BTreeMap;
 
 /// Time after which a contradiction ends the run, s. Cycles of surge and electrical interference are shorter, and the usual age limit of a
 /// guarded signal (3 s) is longer.
@@ -63,17 +70,47 @@ const RESOLUTION_K: f64 = 1.0;
 pub struct ReadingBounds {
     /// Diameter of the compressor wheel, m; `None`: not declared.
     pub wheel_diameter_m: Option<f64>,
-    /// Lag of the T2 probe at the highest and the lowest possible flow, s; 0: a probe without inertia.
+    /// Lag of the thinnest T2 probe at the highest possible flow and of the thickest at the lowest, s; 0: a probe without inertia.
     pub t2_lag_s: (f64, f64),
-    /// Noise of T2, Tc and Tt, K, one standard deviation.
+    /// Noise of the noisiest sensor of T2, Tc and Tt, K, one standard deviation.
     pub noise_k: [f64; 3],
+}
+
+/// The reading of a channel (number 0), or one of its several sensors, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Sensor {
+    channel: Channel,
+    number: usize,
+}
+
+impl Sensor {
+    /// The reading of a channel.
+    fn of(channel: Channel) -> Sensor {
+        Sensor { channel, number: 0 }
+    }
+
+    fn name(self) -> String {
+        let Sensor { channel, number } = self;
+        if number == 0 { channel.to_string() } else { Element { channel, number }.to_string() }
+    }
+}
+
+/// The readings of a sensor so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Track {
+    /// Time and value of the last reading that is in its range.
+    last: (f64, f64),
+    /// Where it was before it jumped too fast, with the time.
+    jumped: Option<(f64, f64)>,
 }
 
 /// The rules, in the order of their states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rule {
-    Range(Channel),
-    Jump(Channel),
+    Range(Sensor),
+    Jump(Sensor),
+    /// One of several T2 sensors.
+    OutletProbe(Sensor),
     OutletTemperature,
     Head,
     Flow,
@@ -82,24 +119,26 @@ enum Rule {
 }
 
 impl Rule {
-    /// The channels of which at least one is wrong.
-    fn channels(self) -> Vec<Channel> {
+    /// The readings of which at least one is wrong.
+    fn sensors(self) -> Vec<Sensor> {
         use Channel as C;
-        match self {
-            Rule::Range(channel) | Rule::Jump(channel) => vec![channel],
+        let channels = match self {
+            Rule::Range(sensor) | Rule::Jump(sensor) | Rule::OutletProbe(sensor) => return vec![sensor],
             Rule::OutletTemperature => vec![C::P1, C::T1, C::P2, C::T2],
             Rule::Head => vec![C::ShaftSpeed, C::P1, C::T1, C::P2],
             Rule::Flow => vec![C::CompressorFlow],
             Rule::TurbinePressure => vec![C::P3, C::P4],
             Rule::TurbineTemperature => vec![C::T3, C::T4],
-        }
+        };
+        channels.into_iter().map(Sensor::of).collect()
     }
 
-    /// Whether the run depends on one of the channels: identification needs it, or a limit of the rig relates to it.
+    /// Whether the run depends on one of the readings: identification needs the channel, or a limit of the rig relates to it. One of
+    /// several sensors has others.
     fn ends_the_run(self) -> bool {
-        self.channels()
-            .iter()
-            .any(|channel| NEEDED.contains(channel) || matches!(channel, Channel::P3 | Channel::T3))
+        self.sensors().iter().any(|Sensor { channel, number }| {
+            *number == 0 && (NEEDED.contains(channel) || matches!(channel, Channel::P3 | Channel::T3))
+        })
     }
 }
 
@@ -116,10 +155,7 @@ struct Violation {
 #[derive(Debug, Clone)]
 pub struct PlausibilityWatch {
     bounds: ReadingBounds,
-    /// Time and value of the last reading of each channel that is in its range.
-    last: [Option<(f64, f64)>; CHANNELS.len()],
-    /// Where each channel was before it jumped too fast, with the time.
-    jumped: [Option<(f64, f64)>; CHANNELS.len()],
+    tracks: BTreeMap<Sensor, Track>,
     violations: Vec<Violation>,
     /// Lowest isentropic outlet temperature while the probe follows, K.
     isentropic_k: RecentExtreme,
@@ -137,8 +173,7 @@ impl PlausibilityWatch {
     pub fn new(bounds: ReadingBounds) -> Self {
         PlausibilityWatch {
             bounds,
-            last: [None; CHANNELS.len()],
-            jumped: [None; CHANNELS.len()],
+            tracks: BTreeMap::new(),
             violations: Vec::new(),
             isentropic_k: RecentExtreme::default(),
             work_j_kg: RecentExtreme::default(),
@@ -150,16 +185,16 @@ impl PlausibilityWatch {
 
     /// Marks the impossible readings of a batch, and reports what has been impossible for too long.
     pub fn judge(&mut self, batch: &mut SampleBatch, state: &Commanded) -> Option<Trip> {
-        let mut marks: Vec<(Channel, usize)> = Vec::new();
+        let mut marks: Vec<(Sensor, usize)> = Vec::new();
         let mut trip: Option<Trip> = None;
         for index in 0..batch.t_s.len() {
             let Some(t_s) = batch.t_s.get(index).copied().filter(|t_s| t_s.is_finite()) else { continue };
             let found = self.sample(batch, index, t_s, state);
-            let channels = found.iter().flat_map(|(rule, _)| rule.channels());
-            marks.extend(channels.map(|channel| (channel, index)));
+            let sensors = found.iter().flat_map(|(rule, _)| rule.sensors());
+            marks.extend(sensors.map(|sensor| (sensor, index)));
             trip = trip.or(self.lasting(t_s, found));
         }
-        marks.into_iter().for_each(|(channel, index)| mark(batch, channel, index));
+        marks.into_iter().for_each(|(sensor, index)| mark(batch, sensor, index));
         trip
     }
 
@@ -172,30 +207,36 @@ impl PlausibilityWatch {
         state: &Commanded,
     ) -> Vec<(Rule, String)> {
         let mut found: Vec<(Rule, String)> = Vec::new();
-        for column in &batch.columns {
-            let channel = column.channel;
-            let bad = batch
-                .provenance_of(channel)
-                .is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad));
-            let Some(value) = column.values.get(index).copied().filter(|value| value.is_finite() && !bad)
-            else {
-                continue;
-            };
+        let is_bad = |channel| {
+            batch.provenance_of(channel).is_some_and(|from| from.quality.get(index) == Some(&Quality::Bad))
+        };
+        let combined = batch.columns.iter().map(|one| (Sensor::of(one.channel), &one.values));
+        let each = batch.elements.iter().map(|one| {
+            let Element { channel, number } = one.element;
+            (Sensor { channel, number }, &one.values)
+        });
+        for (sensor, values) in combined.chain(each) {
+            let channel = sensor.channel;
+            let value = values.get(index).copied().filter(|value| value.is_finite() && !is_bad(channel));
+            let Some(value) = value else { continue };
             if !can_be(channel, value, state.running) {
-                found.push((Rule::Range(channel), format!("{channel} reads {}", shown(channel, value))));
+                found.push((
+                    Rule::Range(sensor),
+                    format!("{} reads {}", sensor.name(), shown(channel, value)),
+                ));
                 continue;
             }
-            if let Some(from) = self.jump(channel, t_s, value) {
+            let jumped = self.jump(sensor, t_s, value);
+            if let Some((_, from)) = jumped {
                 let reason = format!(
-                    "{channel} jumped from {} to {}, faster than its sensor can follow",
+                    "{} jumped from {} to {}, faster than its sensor can follow",
+                    sensor.name(),
                     shown(channel, from),
                     shown(channel, value)
                 );
-                found.push((Rule::Jump(channel), reason));
+                found.push((Rule::Jump(sensor), reason));
             }
-            if let Some(last) = self.last.get_mut(channel as usize) {
-                *last = Some((t_s, value));
-            }
+            self.tracks.insert(sensor, Track { last: (t_s, value), jumped });
         }
         if state.running {
             found.extend(self.compressor(t_s));
@@ -206,39 +247,41 @@ impl PlausibilityWatch {
         found
     }
 
-    /// The value before a jump that the sensor's lag excludes, until the reading is back.
-    fn jump(&mut self, channel: Channel, t_s: f64, value: f64) -> Option<f64> {
-        let (lag_s, noise_k) = match channel {
+    /// Time and value before a jump that the sensor's lag excludes, until the reading is back.
+    fn jump(&self, sensor: Sensor, t_s: f64, value: f64) -> Option<(f64, f64)> {
+        let (lag_s, noise_k) = match sensor.channel {
             Channel::T2 => (self.bounds.t2_lag_s.0, self.bounds.noise_k[0]),
             Channel::Tc => (HOUSING_LAG_S, self.bounds.noise_k[1]),
             Channel::Tt => (HOUSING_LAG_S, self.bounds.noise_k[2]),
             _ => return None,
         };
-        let (then_s, then) = self.last.get(channel as usize).copied().flatten()?;
-        let range = plausible(channel).running;
+        let Track { last: (then_s, then), jumped } = *self.tracks.get(&sensor)?;
+        let range = plausible(sensor.channel).running;
         let reaches = |from: f64, duration_s: f64| {
             let end = if value > from { *range.end() } else { *range.start() };
             let share = if lag_s > 0.0 { 1.0 - (-duration_s.max(0.0) / lag_s).exp() } else { 1.0 };
             let noise_k = NOISE_SIGMAS * noise_k + RESOLUTION_K;
             (value - from).abs() <= noise_k + share * (end - from).abs()
         };
-        let jumped = self.jumped.get_mut(channel as usize)?;
         let step_s = t_s - then_s;
         let jumps = !reaches(then, step_s);
-        *jumped = match *jumped {
+        match jumped {
             None if jumps => Some((then_s, then)),
             None => None,
             // It is back after a jump to a place that the gas may have reached meanwhile, or where it was.
             Some((since_s, from)) if jumps && reaches(from, t_s - since_s) => None,
             Some((_, from)) if reaches(from, step_s) => None,
             still => still,
-        };
-        jumped.map(|(_, from)| from)
+        }
     }
 
     /// A recent possible reading.
     fn now(&self, channel: Channel, t_s: f64) -> Option<f64> {
-        let (then_s, value) = self.last.get(channel as usize).copied().flatten()?;
+        self.reading(Sensor::of(channel), t_s)
+    }
+
+    fn reading(&self, sensor: Sensor, t_s: f64) -> Option<f64> {
+        let (then_s, value) = self.tracks.get(&sensor)?.last;
         (t_s - then_s <= FRESH_S).then_some(value)
     }
 
@@ -253,15 +296,16 @@ impl PlausibilityWatch {
         let at = || format!("P2/P1 = {pr:.2} and T1 = {}", shown(C::T1, t1_k));
         let follows_s = FOLLOWS_S + LAGS * self.bounds.t2_lag_s.1;
         let lowest_k = self.isentropic_k.lowest(t_s, isentropic_k, follows_s);
-        if let Some(t2_k) = self.now(C::T2, t_s) {
-            // Without Tc the housing is taken for as cold as the inlet.
-            let housing_k = self.now(C::Tc, t_s).unwrap_or(t1_k).min(lowest_k);
-            let bound_k = lowest_k - COOLED_RATIO * (lowest_k - housing_k) - OFFSETS_K;
-            if t2_k < bound_k {
-                let (t2, bound) = (shown(C::T2, t2_k), shown(C::T2, bound_k));
-                let reason = format!("T2 reads {t2}, although {} heat the air to {bound} at least", at());
-                found.push((Rule::OutletTemperature, reason));
-            }
+        // Without Tc the housing is taken for as cold as the inlet.
+        let housing_k = self.now(C::Tc, t_s).unwrap_or(t1_k).min(lowest_k);
+        let bound_k = lowest_k - COOLED_RATIO * (lowest_k - housing_k) - OFFSETS_K;
+        for sensor in self.tracks.keys().copied().filter(|sensor| sensor.channel == C::T2) {
+            let Some(t2_k) = self.reading(sensor, t_s).filter(|t2_k| *t2_k < bound_k) else { continue };
+            let (t2, bound) = (shown(C::T2, t2_k), shown(C::T2, bound_k));
+            let name = sensor.name();
+            let reason = format!("{name} reads {t2}, although {} heat the air to {bound} at least", at());
+            let all = sensor.number == 0;
+            found.push((if all { Rule::OutletTemperature } else { Rule::OutletProbe(sensor) }, reason));
         }
         let work_j_kg = self.work_j_kg.lowest(t_s, CP_J_KGK * (isentropic_k - t1_k), FOLLOWS_S);
         if let (Some(speed_rpm), Some(diameter_m)) =
@@ -356,8 +400,13 @@ fn shown(channel: Channel, value: f64) -> String {
     readable(value, channel.unit())
 }
 
-/// Marks one reading as bad.
-fn mark(batch: &mut SampleBatch, channel: Channel, index: usize) {
+/// Marks one reading as bad. One of several sensors has no quality of its own: it is left without a reading.
+fn mark(batch: &mut SampleBatch, Sensor { channel, number }: Sensor, index: usize) {
+    let element = batch.elements.iter_mut().find(|one| one.element == Element { channel, number });
+    if let Some(value) = element.and_then(|one| one.values.get_mut(index)) {
+        *value = f64::NAN;
+        return;
+    }
     if batch.column(channel).is_none() {
         return;
     }

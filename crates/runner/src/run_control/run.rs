@@ -15,7 +15,7 @@ use mapper_core::{
     Setpoints, Soak, StepMarker,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Interval at which observers and steps receive samples, s of run time.
 const POLL_INTERVAL_S: f64 = 1.0;
@@ -171,9 +171,6 @@ impl Run<'_, '_> {
         }
         while let Some(step) = next {
             self.step(&step)?;
-            if self.protection.stop_after_step.load(Ordering::Relaxed) {
-                return Err(Halt::Interrupted);
-            }
             next = self.next_step()?;
             self.pass_notes()?;
         }
@@ -183,10 +180,14 @@ impl Run<'_, '_> {
         self.watch(end_s, false, false)
     }
 
-    /// The next step. While waiting for it, the runner obeys a stop and watches a rig that runs in real time.
+    /// The next step, unless a stop was requested: while the rig was connected, in the last step, or while waiting for this one. A rig
+    /// that runs in real time is watched meanwhile.
     fn next_step(&mut self) -> Result<Option<PlanStep>, Halt> {
-        while !self.with.steps.is_ready() {
+        loop {
             self.look_for_a_stop(false, self.now_s)?;
+            if self.with.steps.is_ready() {
+                break;
+            }
             if self.sent.is_some() && self.with.clock.goes_on_by_itself() {
                 self.watch(self.now_s + self.sample_s, false, true)?;
             }
@@ -375,7 +376,7 @@ impl Run<'_, '_> {
         while self.now_s < until_s {
             self.look_for_a_stop(in_step, until_s)?;
             let before_s = self.now_s;
-            let (batch, trips) = self.acquire(until_s)?;
+            let (batch, trips) = self.acquire(until_s, in_step)?;
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
                 return Err(Halt::Tripped(trip.clone(), Some(Box::new(batch))));
             }
@@ -437,13 +438,13 @@ impl Run<'_, '_> {
     }
 
     /// Samples of one second, up to `until_s`, or up to the sample at which a guard trips.
-    fn acquire(&mut self, until_s: f64) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
+    fn acquire(&mut self, until_s: f64, in_step: bool) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
         let end_s = (self.now_s + POLL_INTERVAL_S).min(until_s);
         let mut whole: Option<SampleBatch> = None;
         loop {
             let alert = self.protection.each_sample || Bench::new(&mut self.with.guards).is_alert();
             let next_s = if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s };
-            if !self.waited_until(next_s) {
+            if !self.waited_until(next_s, in_step) {
                 return Ok((whole.unwrap_or_default(), Vec::new()));
             }
             let mut batch = self.with.backend.poll(next_s)?;

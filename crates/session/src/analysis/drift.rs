@@ -51,10 +51,20 @@ impl Session<'_> {
         model.params.t2_probe_diameter_m = config.probe_diameter_m;
         let (recordings, config, zero) = zeroed_alike(recordings, config, campaign);
         let fingerprints: Vec<Option<String>> = recorded.iter().map(fingerprint).collect();
+        // Of a run that was resumed after its soak, the first recording has only that.
+        let directory = |place: usize| recorded.get(place).map(|one| one.path.parent());
+        let rests = |(place, recording): (usize, &Recording)| {
+            recording.steps.is_empty() && directory(place) == directory(place + 1)
+        };
         let runs: Vec<RecordedRun<'_>> = recordings
             .iter()
             .zip(&fingerprints)
-            .map(|(recording, fingerprint)| RecordedRun { recording, fingerprint: fingerprint.as_deref() })
+            .enumerate()
+            .filter(|(place, (recording, _))| !rests((*place, recording)))
+            .map(|(_, (recording, fingerprint))| RecordedRun {
+                recording,
+                fingerprint: fingerprint.as_deref(),
+            })
             .collect();
         let report = diagnose(&DriftRequest {
             runs: &runs,

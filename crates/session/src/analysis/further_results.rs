@@ -32,12 +32,13 @@ impl Session<'_> {
     /// [`SessionError`] if the machine is unknown, the recording cannot be identified or a file cannot be written.
     pub fn rig_files(
         &self,
-        recorded: Recorded,
+        recorded: Vec<Recorded>,
         map: &ChannelMap,
         out: &Path,
     ) -> Result<RigFiles, SessionError> {
-        let campaign = recorded.known("Give `--campaign FILE`")?.clone();
-        let identified = self.identify(vec![recorded], map, None)?;
+        let first = recorded.first().ok_or(SessionError::NoRecording)?;
+        let campaign = first.known("Give `--campaign FILE`")?.clone();
+        let identified = self.identify(recorded, map, None)?;
         let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
         let (machine, params) = (&campaign.machine.name, &campaign.machine.params);
         let thermal = ThermalExport { machine, params, found: identified.thermal.as_ref() };

@@ -136,7 +136,7 @@ impl Session<'_> {
     }
 
     /// Same as [`identify`](Session::identify), and compares with the truths in the recordings.
-    pub(crate) fn identify_and_score(
+    fn identify_and_score(
         &self,
         recorded: Vec<Recorded>,
         map: &ChannelMap,

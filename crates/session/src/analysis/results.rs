@@ -4,7 +4,7 @@ use crate::analysis::budget_file::budget_csv;
 use crate::analysis::identification::{Identified, SoughtSurge};
 use crate::recording::files::{json_text, write_new};
 use crate::recording::program::program_and_commit;
-use crate::recording::recording_file::Recorded;
+use crate::recording::recording_file::{Recorded, together};
 use crate::{Gap, Registry, Session, SessionError, recording::run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
@@ -15,7 +15,7 @@ use mapper_core::{
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_maps::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_observe::FusedChannel;
-use mapper_recording::score::{ScoreSummary, ScoredPoint, beside_truths};
+use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::page::{OtherRun, RunPage, run_page};
 use mapper_report::{
@@ -133,6 +133,8 @@ impl Provenance {
 /// One recording of a run.
 pub(crate) struct RunPart {
     pub(crate) recording: PathBuf,
+    /// Whether it has the soak.
+    pub(crate) soaked: bool,
     /// Valid steps of it; `None`: all.
     pub(crate) saved: Option<BTreeSet<usize>>,
 }
@@ -154,19 +156,14 @@ impl Session<'_> {
     ) -> Result<Results, SessionError> {
         let paths: Vec<PathBuf> = parts.iter().map(|part| part.recording.clone()).collect();
         let mut remarks = Vec::new();
-        let identified = beside_truths(&paths, |truths| {
-            let mut together = Vec::new();
-            for part in parts {
-                let mut read =
-                    read_recording(&part.recording, &ChannelMap::native(), &ReadOptions::default())?;
-                remarks.extend(read.warnings.iter().map(ToString::to_string));
-                if let Some(saved) = &part.saved {
-                    read.recording.steps.retain(|step| saved.contains(&step.index));
-                }
-                together.push(Recorded::of(part.recording.clone(), read, Some(campaign.clone())));
-            }
-            self.identify_and_score(together, &ChannelMap::native(), None, truths)
-        })?;
+        let mut all = Vec::new();
+        for RunPart { recording, .. } in parts {
+            let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
+            remarks.extend(read.warnings.iter().map(ToString::to_string));
+            all.push(Recorded::of(recording.clone(), read, Some(campaign.clone())));
+        }
+        let all = together(parts.iter().map(|part| (part.soaked, part.saved.as_ref())).zip(all));
+        let identified = self.identify(all, &ChannelMap::native(), None)?;
         let mut files = paths.into_iter();
         let recording = files.next().ok_or(SessionError::NoRecording)?;
         let further: Vec<PathBuf> = files.collect();

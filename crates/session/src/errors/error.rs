@@ -141,15 +141,13 @@ pub enum SessionError {
     /// A recording was given twice.
     #[error(
         "{} and {} hold the same readings; give each recording once, or its noise would count as new evidence",
-        .first.display(),
-        .second.display()
+        .0[0].display(),
+        .0[1].display()
     )]
-    SameRecording {
-        /// One of them.
-        first: PathBuf,
-        /// The other.
-        second: PathBuf,
-    },
+    SameRecording([PathBuf; 2]),
+    /// A resumed run was given to a command that follows one recording.
+    #[error("{run} was resumed and has several recordings; give one of them, e.g. {run}/recording.mcap", run = .0.display())]
+    Resumed(PathBuf),
     /// A run cannot be resumed.
     #[error("{} cannot be resumed: {why}", .run.display())]
     NotResumable {
@@ -451,7 +449,8 @@ impl SessionError {
             | E::Drift(DriftError::NoRun)
             | E::Export(ExportError::NeedsFit { .. })
             | E::Script(_)
-            | E::SameRecording { .. } => ErrorKind::BadInput,
+            | E::SameRecording(_)
+            | E::Resumed(_) => ErrorKind::BadInput,
             E::Unguarded { .. }
             | E::GuardBlind { .. }
             | E::RigInUse { .. }

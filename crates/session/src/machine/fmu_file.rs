@@ -71,14 +71,15 @@ impl Session<'_> {
     /// [`SessionError`] if the machine is unknown or identification fails, [`SessionError::Fmu`] if the result is not a complete machine.
     pub fn identified_fmu(
         &self,
-        recorded: Recorded,
+        recorded: Vec<Recorded>,
         channels: &ChannelMap,
         compile: bool,
         out: &Path,
         existing: Existing,
     ) -> Result<WrittenFmu, SessionError> {
-        let campaign = recorded.known("Give `--campaign FILE`")?.clone();
-        let identified = self.identify(vec![recorded], channels, None)?;
+        let first = recorded.first().ok_or(SessionError::NoRecording)?;
+        let campaign = first.known("Give `--campaign FILE`")?.clone();
+        let identified = self.identify(recorded, channels, None)?;
         // Points without map coordinates are skipped; they do not prevent a map.
         let has_place = |point: &&IdentifiedPoint| {
             let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];

@@ -7,6 +7,7 @@ use mapper_campaign::{Campaign, CampaignError};
 use mapper_core::Recording;
 use mapper_observe::OtherMachine;
 use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A recording, its file and its campaign.
@@ -27,13 +28,17 @@ impl Recorded {
     /// campaign, the `machine` of the channel map, the campaign attached to the recording.
     ///
     /// # Errors
-    /// [`SessionError::Record`] if the recording cannot be read, [`SessionError::Campaign`] if the attached campaign has mistakes.
+    /// [`SessionError::Record`] if the recording cannot be read, [`SessionError::Campaign`] if the attached campaign has mistakes,
+    /// [`SessionError::Resumed`] if a run has several.
     pub fn read(
         registry: &Registry,
         path: &Path,
         map: &ChannelMap,
         given: Option<&Campaign>,
     ) -> Result<Recorded, SessionError> {
+        if broken_off(path)?.is_some() {
+            return Err(SessionError::Resumed(path.to_owned()));
+        }
         let file = run_directory::recording_of(path);
         let options = ReadOptions { logs: registry.logs, ..ReadOptions::default() };
         let read = read_recording(&file, map, &options)?;
@@ -56,25 +61,16 @@ impl Recorded {
         map: &ChannelMap,
         given: Option<&Campaign>,
     ) -> Result<Vec<Recorded>, SessionError> {
-        let Some(parts) = broken_off(path) else {
+        let Some(mut broken_off) = broken_off(path)? else {
             return Ok(vec![Recorded::read(registry, path, map, given)?]);
         };
-        let first = Recorded::read(registry, &path.join(run_directory::RECORDING), map, given)?;
-        let mut broken_off = parts;
-        if let Some(campaign) = &first.campaign {
+        let files = broken_off.parts.iter().map(|part| path.join(&part.recording));
+        let read = files.map(|file| Recorded::read(registry, &file, map, given));
+        let read = read.collect::<Result<Vec<_>, _>>()?;
+        if let Some(campaign) = read.first().and_then(|first| first.campaign.as_ref()) {
             broken_off.keep_what_goes_on(campaign)?;
         }
-        let last = broken_off.parts.len() - 1;
-        let mut all = Vec::new();
-        for (place, part) in broken_off.parts.iter().enumerate() {
-            let mut recorded = Recorded::read(registry, &path.join(&part.recording), map, given)?;
-            // The last part may have ended normally or been interrupted: all its complete steps are valid.
-            if place < last {
-                recorded.read.recording.steps.retain(|step| part.saved.contains(&step.index));
-            }
-            all.push(recorded);
-        }
-        Ok(all)
+        Ok(together(broken_off.parts.iter().map(|part| (part.soaked, Some(&part.saved))).zip(read)))
     }
 
     /// The contents of a file, with the surge approaches separated.
@@ -92,10 +88,41 @@ impl Recorded {
     }
 }
 
+/// The recordings of a run, each with its valid steps: of the last, which may have been interrupted, every complete one. A part that has
+/// neither a step nor the soak adds nothing, nor does one that a simulated rig has repeated to the last bit.
+pub(crate) fn together<'a>(
+    parts: impl ExactSizeIterator<Item = ((bool, Option<&'a BTreeSet<usize>>), Recorded)>,
+) -> Vec<Recorded> {
+    let last = parts.len().saturating_sub(1);
+    let mut all: Vec<Recorded> = Vec::with_capacity(parts.len());
+    for (place, ((soaked, saved), mut recorded)) in parts.enumerate() {
+        if let Some(saved) = saved.filter(|_| place < last) {
+            let approaches = recorded.approaches.iter_mut().map(|approaches| &mut approaches.steps);
+            let steps = std::iter::once(&mut recorded.read.recording.steps).chain(approaches);
+            steps.for_each(|steps| steps.retain(|step| saved.contains(&step.index)));
+            if !soaked && saved.is_empty() {
+                continue;
+            }
+        }
+        let series = &recorded.read.recording.series;
+        all.retain(|earlier| earlier.read.recording.series != *series || series.is_empty());
+        all.push(recorded);
+    }
+    all
+}
+
 /// The journal of a run that was resumed; `None` for anything else.
-fn broken_off(path: &Path) -> Option<BrokenOff> {
-    let broken_off = path.is_dir().then(|| BrokenOff::read(path).ok())??;
-    (broken_off.parts.len() > 1).then_some(broken_off)
+///
+/// # Errors
+/// [`SessionError::Resumed`] if the run has a second recording, and its journal cannot be read.
+fn broken_off(path: &Path) -> Result<Option<BrokenOff>, SessionError> {
+    match BrokenOff::read(path) {
+        Ok(broken_off) => Ok(Some(broken_off).filter(|broken_off| broken_off.parts.len() > 1)),
+        Err(_) if path.join(run_directory::further_recording(2)).exists() => {
+            Err(SessionError::Resumed(path.to_owned()))
+        }
+        Err(_) => Ok(None),
+    }
 }
 
 /// Rejects a recording that was given twice: its noise would count as new evidence.
@@ -107,10 +134,7 @@ pub(crate) fn all_differ(recorded: &[Recorded]) -> Result<(), SessionError> {
         let series = &second.read.recording.series;
         let same = |first: &&Recorded| !series.is_empty() && first.read.recording.series == *series;
         if let Some(first) = recorded[..place].iter().find(same) {
-            return Err(SessionError::SameRecording {
-                first: first.path.clone(),
-                second: second.path.clone(),
-            });
+            return Err(SessionError::SameRecording([first.path.clone(), second.path.clone()]));
         }
     }
     Ok(())

@@ -27,6 +27,11 @@ pub const REPORT: &str = "report.md";
 /// The extended report as a page for a browser.
 pub const PAGE: &str = "report.html";
 
+/// The recording of a part of a resumed run, from 2.
+pub(crate) fn further_recording(part: usize) -> String {
+    format!("recording-{part}.mcap")
+}
+
 /// Whether a file of this name is a result: points, map, report, page, or executed steps of a script.
 pub(crate) fn is_result(name: &str) -> bool {
     [POINTS, BUDGET, REPORT, PAGE, EXECUTED].contains(&name) || name.starts_with("map.")

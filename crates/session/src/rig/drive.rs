@@ -112,15 +112,26 @@ const PROBE_K: f64 = 300.0;
 fn reading_bounds(campaign: &Campaign) -> ReadingBounds {
     let (machine, compressor) = (&campaign.machine, &campaign.machine.params.compressor);
     let area_m2 = 0.25 * std::f64::consts::PI * compressor.outlet_diameter_m.powi(2);
-    let tip_m = machine.params.t2_probe_diameter_m;
-    let lag_s = |flux_kg_m2s: f64| {
+    let several = |channel| {
+        let redundant = campaign.sensors.get(&channel).and_then(|sensor| sensor.redundant.as_ref());
+        redundant.map(|redundant| redundant.elements.as_slice()).unwrap_or_default()
+    };
+    let tips_m = several(Channel::T2).iter().map(|one| one.probe_diameter_m);
+    let tips_m = tips_m.chain([machine.params.t2_probe_diameter_m]);
+    let lag_s = |flux_kg_m2s: f64, tip_m: f64| {
         let flow_kg_s = flux_kg_m2s * area_m2;
         thermocouple::time_constant_s(tip_m, compressor.outlet_diameter_m, flow_kg_s, PROBE_K)
     };
-    let noise_k = |channel| campaign.sensors.get(&channel).map_or(0.0, |sensor| sensor.declared.noise_sigma);
+    let noise_k = |channel| {
+        let all = campaign.sensors.get(&channel).map(|sensor| sensor.declared);
+        let each = several(channel).iter().map(|one| one.declared);
+        all.into_iter().chain(each).map(|one| one.noise_sigma).fold(0.0, f64::max)
+    };
+    let (thinnest_m, thickest_m) =
+        tips_m.fold((f64::INFINITY, 0.0_f64), |(low, high), tip_m| (tip_m.min(low), tip_m.max(high)));
     ReadingBounds {
         wheel_diameter_m: machine.wheel_is_declared.then_some(compressor.wheel_diameter_m),
-        t2_lag_s: (lag_s(SONIC_KG_M2S), lag_s(SLOW_KG_M2S)),
+        t2_lag_s: (lag_s(SONIC_KG_M2S, thinnest_m), lag_s(SLOW_KG_M2S, thickest_m)),
         noise_k: [Channel::T2, Channel::Tc, Channel::Tt].map(noise_k),
     }
 }

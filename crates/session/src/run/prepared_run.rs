@@ -200,7 +200,7 @@ impl PreparedRun<'_> {
         let mut parts = self.parts_before(&directory);
         let name = match parts.len() {
             0 => run_directory::RECORDING.to_owned(),
-            before => format!("recording-{}.mcap", before + 1),
+            before => run_directory::further_recording(before + 1),
         };
         let recording = directory.join(&name);
         let path = directory.join(run_directory::JOURNAL);
@@ -239,7 +239,7 @@ impl PreparedRun<'_> {
         if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
             finished?;
         }
-        parts.push(RunPart { recording: recording.clone(), saved: None });
+        parts.push(RunPart { recording: recording.clone(), soaked: true, saved: None });
         set_aside(&directory)?;
         let executed = self.executed(&directory);
         let results = self.results(session, executed, &end, &directory, &parts);
@@ -326,6 +326,7 @@ impl PreparedRun<'_> {
         parts
             .map(|part| RunPart {
                 recording: directory.join(&part.recording),
+                soaked: part.soaked,
                 saved: Some(part.saved.clone()),
             })
             .collect()

@@ -31,7 +31,7 @@ pub enum Signalled {
 pub struct RunStop {
     /// Stop at the end of the step: Ctrl-C once.
     pub after_step: Arc<AtomicBool>,
-    /// Stop now: Ctrl-C twice, SIGTERM, SIGHUP. Nothing ends the process before the rig is safe.
+    /// Stop now: Ctrl-C twice, SIGTERM and other signals. Nothing ends the process before the rig is safe.
     pub now: Arc<AtomicBool>,
     phase: Arc<AtomicU8>,
     /// Whether a signal has already arrived while results are made.
@@ -53,6 +53,11 @@ impl RunStop {
     /// Enters a phase.
     pub fn enter(&self, phase: Phase) {
         self.phase.store(phase as u8, Ordering::SeqCst);
+    }
+
+    /// Whether the rig is in use, so that the process must not be suspended.
+    pub fn has_the_rig(&self) -> bool {
+        self.phase.load(Ordering::SeqCst) == Phase::Rig as u8
     }
 
     /// Handles a signal; `gentle`: the rig may finish its step first.

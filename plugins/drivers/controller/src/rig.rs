@@ -15,7 +15,7 @@ const COMMANDS: [Channel; 4] =
     [Channel::P3Command, Channel::T3Command, Channel::ValveCommand, Channel::TOilCommand];
 
 /// One reading.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// SI; NaN without a value.
     pub value: f64,
@@ -23,12 +23,14 @@ pub struct Reading {
     pub source_t_s: Option<f64>,
     /// Quality as reported by the controller.
     pub quality: Quality,
+    /// Why it is not good, as the controller reports it; may be empty.
+    pub why: String,
 }
 
 impl Reading {
     /// A good reading with its time of arrival.
     pub fn good(value: f64) -> Reading {
-        Reading { value, source_t_s: None, quality: Quality::Good }
+        Reading { value, source_t_s: None, quality: Quality::Good, why: String::new() }
     }
 }
 
@@ -101,8 +103,8 @@ struct Armed {
     heartbeat: u16,
     /// Time of the last heartbeat, s.
     beaten_s: f64,
-    /// Readings already reported as not good.
-    reported: BTreeSet<(Channel, Quality)>,
+    /// Readings already reported as not good, with the reason.
+    reported: BTreeSet<(Channel, Quality, String)>,
 }
 
 impl<C: Controller> Rig<C> {
@@ -130,16 +132,16 @@ impl<C: Controller> Rig<C> {
         let _ = self.write(&[(Target::Heartbeat, count)]);
     }
 
-    /// Reports the channels that the controller does not mark as good, once for each quality.
+    /// Reports the channels that the controller does not mark as good, once for each quality and reason.
     fn doubts(&mut self, readings: &BTreeMap<Channel, Reading>) -> Option<String> {
         let reported = &mut self.armed.as_mut()?.reported;
-        let of = |(channel, reading): (&Channel, &Reading)| (*channel, reading.quality);
-        let doubted = readings.iter().map(of).filter(|(_, quality)| *quality != Quality::Good);
+        let doubted = readings.iter().filter(|(_, reading)| reading.quality != Quality::Good);
         let new: Vec<String> = doubted
-            .filter(|doubt| reported.insert(*doubt))
-            .map(|(channel, quality)| {
-                let word = if quality == Quality::Uncertain { "uncertain" } else { "bad" };
-                format!("{} {word}", channel.symbol())
+            .filter(|(channel, reading)| reported.insert((**channel, reading.quality, reading.why.clone())))
+            .map(|(channel, Reading { quality, why, .. })| {
+                let word = if *quality == Quality::Uncertain { "uncertain" } else { "bad" };
+                let why = if why.is_empty() { String::new() } else { format!(" ({why})") };
+                format!("{} {word}{why}", channel.symbol())
             })
             .collect();
         (!new.is_empty()).then(|| {

@@ -98,8 +98,13 @@ pub(crate) fn listen(mut host: impl Read + Send + 'static, sender: SyncSender<Ca
 
 #[cfg(unix)]
 pub(crate) fn heed_signals(sender: SyncSender<Came>) -> std::io::Result<()> {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-    let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGHUP, SIGINT])?;
+    use signal_hook::consts::*;
+    // All that would end the process with the rig armed.
+    let ends = [
+        SIGTERM, SIGHUP, SIGINT, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU,
+        SIGXFSZ, SIGABRT,
+    ];
+    let mut signals = signal_hook::iterator::Signals::new(ends)?;
     let heed = move || {
         for _ in signals.forever() {
             if sender.send(Came::Terminate).is_err() {

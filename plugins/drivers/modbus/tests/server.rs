@@ -224,8 +224,12 @@ const HONEST: u8 = 0;
 const OTHER_REGISTER: u8 = 1;
 const FEWER_REGISTERS: u8 = 2;
 const BUSY_ONCE: u8 = 3;
-const DEVICE_FAILURE: u8 = 4;
-const CLOSES: u8 = 5;
+const CLOSES: u8 = 4;
+/// Plus the number of the exception.
+const WRITES_REFUSED: u8 = 100;
+const READS_REFUSED: u8 = 200;
+/// All of the standard except those that ask for patience (5, 6), and one that no standard has.
+const EXCEPTIONS: [u8; 8] = [1, 2, 3, 4, 8, 10, 11, 42];
 
 /// A wrong acknowledgement is an error, for setpoints and for the safe state; a controller that is busy once is retried;
 /// the message gives the number of an exception.
@@ -238,13 +242,29 @@ fn only_what_was_written_counts_as_acknowledged() {
         Err(BackendError::Lost { source, .. }) => source.to_string(),
         other => panic!("{other:?}"),
     };
-    for misdeed in [OTHER_REGISTER, FEWER_REGISTERS, DEVICE_FAILURE] {
+    let refused = EXCEPTIONS.map(|code| WRITES_REFUSED + code);
+    for misdeed in [OTHER_REGISTER, FEWER_REGISTERS].into_iter().chain(refused) {
         stand.misbehave(misdeed);
         lost(rig.make_safe());
         let message = lost(rig.set(&SETPOINTS));
-        assert_eq!(message.contains("exception 4"), misdeed == DEVICE_FAILURE, "{message}");
+        if let Some(code) = misdeed.checked_sub(WRITES_REFUSED) {
+            assert!(message.contains(&format!("exception {code}")), "{code}: {message}");
+        }
         stand.misbehave(HONEST);
         rig.set(&SETPOINTS).unwrap();
+    }
+    // A refused read is a sample without readings, and the note has the number.
+    let mut t_s = 0.0;
+    for code in [2, 11] {
+        let noted = std::cell::Cell::new(false);
+        stand.misbehave(READS_REFUSED + code);
+        until(&mut rig, &mut t_s, |batch| {
+            let number = format!("exception {code}");
+            noted.set(noted.get() || batch.events.iter().any(|event| event.message.contains(&number)));
+            reads_nothing(batch) && noted.get()
+        });
+        stand.misbehave(HONEST);
+        until(&mut rig, &mut t_s, reads);
     }
     stand.misbehave(BUSY_ONCE);
     rig.set(&SETPOINTS).unwrap();

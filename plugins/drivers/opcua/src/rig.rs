@@ -216,11 +216,21 @@ impl Controller for Nodes {
         let reading =
             |((channel, _, scale), value): (&(Channel, NodeId, crate::settings::Scale), DataValue)| {
                 let mut quality = quality(&value);
+                let mut why =
+                    value.status.map(words).filter(|_| quality != Quality::Good).unwrap_or_default();
                 // A node may change its type at run time: a Boolean is not a reading.
                 let there = value.value.as_ref().filter(|there| is_number(there));
                 let inside = there.map_or(f64::NAN, |there| scale.inside(number(there)));
-                if inside.is_nan() || self.is_from_the_future(&value, &answer.sent) {
+                let from_the_future = self.is_from_the_future(&value, &answer.sent);
+                if inside.is_nan() || from_the_future {
                     quality = Quality::Bad;
+                }
+                if why.is_empty() && from_the_future {
+                    why = "its source timestamp is later than the server's clock".to_owned();
+                } else if let Some(there) =
+                    value.value.as_ref().filter(|there| why.is_empty() && !is_number(there))
+                {
+                    why = format!("no number: {}", kind(there));
                 }
                 (
                     *channel,
@@ -228,6 +238,7 @@ impl Controller for Nodes {
                         value: inside,
                         source_t_s: self.source_t_s(&value, &answer.sent, t_s),
                         quality,
+                        why,
                     },
                 )
             };

@@ -68,16 +68,30 @@ fn code(status: StatusCode) -> u32 {
     status.bits() & 0xFFFF_0000
 }
 
-/// Quality of a value, from its status: an absent status means good. A value entered by hand or clipped at a limit is a number,
-/// but not the sensor's (Part 8, 6.3).
+/// Codes whose quality differs from that of their severity (Part 4, 7.39; Part 8, 6.3). A value that the sensor does not measure now,
+/// because it was entered by hand, simulated, or kept from before, would blind the guards: it is no reading.
+const STATUSES: [(StatusCode, Quality); 10] = [
+    (StatusCode::Good, Quality::Good),
+    // Sampling has slowed down.
+    (StatusCode::GoodOverload, Quality::Good),
+    (StatusCode::GoodCommunicationEvent, Quality::Good),
+    (StatusCode::GoodLocalOverride, Quality::Bad),
+    (StatusCode::GoodEdited, Quality::Bad),
+    (StatusCode::UncertainInitialValue, Quality::Bad),
+    (StatusCode::UncertainLastUsableValue, Quality::Bad),
+    (StatusCode::UncertainNoCommunicationLastUsableValue, Quality::Bad),
+    (StatusCode::UncertainSimulatedValue, Quality::Bad),
+    (StatusCode::UncertainSubstituteValue, Quality::Bad),
+];
+
+/// Quality of a value, from its status: an absent status means good. Any other code of severity Good, such as `GoodClamped`, limits
+/// what the number means.
 pub(crate) fn quality(value: &DataValue) -> Quality {
-    let by_hand = [StatusCode::GoodLocalOverride, StatusCode::GoodClamped].map(code);
-    match value.status {
-        None => Quality::Good,
-        Some(status) if by_hand.contains(&code(status)) => Quality::Uncertain,
-        Some(status) if status.is_good() => Quality::Good,
-        Some(status) if status.is_uncertain() => Quality::Uncertain,
-        Some(_) => Quality::Bad,
+    let Some(status) = value.status else { return Quality::Good };
+    match STATUSES.iter().find(|(listed, _)| code(*listed) == code(status)) {
+        Some((_, quality)) => *quality,
+        None if status.is_good() || status.is_uncertain() => Quality::Uncertain,
+        None => Quality::Bad,
     }
 }
 
@@ -130,9 +144,16 @@ mod tests {
         let with = |status| quality(&DataValue { status, ..DataValue::null() });
         assert_eq!(with(None), Quality::Good);
         assert_eq!(with(Some(StatusCode::GoodClamped)), Quality::Uncertain);
-        assert_eq!(with(Some(StatusCode::GoodLocalOverride)), Quality::Uncertain);
+        assert_eq!(with(Some(StatusCode::GoodNoData)), Quality::Uncertain);
         assert_eq!(with(Some(StatusCode::GoodOverload)), Quality::Good);
-        assert_eq!(with(Some(StatusCode::UncertainLastUsableValue)), Quality::Uncertain);
+        assert_eq!(with(Some(StatusCode::UncertainSensorNotAccurate)), Quality::Uncertain);
+        // Nothing measures them.
+        for status in [StatusCode::GoodLocalOverride, StatusCode::UncertainLastUsableValue] {
+            assert_eq!(with(Some(status)), Quality::Bad, "{status}");
+        }
+        // Additional bits change nothing.
+        let clipped = StatusCode::from(StatusCode::UncertainSubstituteValue.bits() | 0x0500);
+        assert_eq!(with(Some(clipped)), Quality::Bad);
         assert_eq!(with(Some(StatusCode::BadSensorFailure)), Quality::Bad);
         assert!(is_written(StatusCode::Good));
         let others = [

@@ -435,21 +435,27 @@ fn a_write_that_is_not_simply_good_is_lost() {
     }
 }
 
-/// Changes of a node at run time: a Boolean and readings from the future are missing; uncertain ones are readings, marked as uncertain.
+/// Changes of a node at run time: a Boolean, readings from the future, and values that nobody measures are missing; uncertain ones are
+/// readings, marked as uncertain. The status is noted.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
-    for misdeed in ["boolean", "future", "uncertain"] {
+    for (misdeed, expected, noted_as) in [
+        ("boolean", Quality::Bad, "Boolean"),
+        ("future", Quality::Bad, "later than the server's clock"),
+        ("UncertainSensorNotAccurate", Quality::Uncertain, "UncertainSensorNotAccurate"),
+        ("GoodLocalOverride", Quality::Bad, "GoodLocalOverride"),
+    ] {
         let stand = Stand::with(&["--misdeed", misdeed]);
         stand.trust();
-        let expected = if misdeed == "uncertain" { Quality::Uncertain } else { Quality::Bad };
         let (noted, marked) = (std::cell::Cell::new(false), std::cell::Cell::new(false));
         let seen = |batch: &SampleBatch| {
             // 1 is what a Boolean would be as a number.
             assert_ne!(batch.last(Channel::T2), Some(1.0));
             let of_t2 = batch.provenance.iter().find(|one| one.channel == Channel::T2);
             marked.set(marked.get() || of_t2.is_some_and(|of_t2| of_t2.quality.last() == Some(&expected)));
-            noted.set(noted.get() || !batch.events.is_empty());
+            let notes = batch.events.iter().any(|event| event.message.contains(noted_as));
+            noted.set(noted.get() || notes);
             noted.get() && marked.get()
         };
         assert!(

@@ -55,18 +55,22 @@ impl Diagnose {
         let map = channel_map(self.channels.as_deref())?;
         let registry = registry::registry();
         let effects = registry.effects_with(&self.effects)?;
-        let recordings: Vec<&PathBuf> = self.recordings.iter().chain(&self.named).collect();
-        if (self.html.is_some() || self.laws.is_some()) && recordings.len() > 1 {
-            let message = "--html and --laws are for one recording; give one with them";
-            return Err(Failure::new(Code::BadInput, message));
-        }
         let read = |file: &PathBuf| Recorded::read(&registry, file, &map, Some(&campaign));
         let healthy = self.healthy.as_ref().map(read).transpose()?;
+        let progress = output_options::progress();
+        progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
+        let read_run = |file: &PathBuf| Recorded::read_run(&registry, file, &map, Some(&campaign));
+        // Each part of a resumed run is a recording of its own.
+        let recordings = self.recordings.iter().chain(&self.named).map(read_run);
+        let recordings: Vec<Recorded> =
+            recordings.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+        if (self.html.is_some() || self.laws.is_some()) && recordings.len() > 1 {
+            let message =
+                "--html and --laws are for one recording; give one with them (a resumed run has several)";
+            return Err(Failure::new(Code::BadInput, message));
+        }
         let mut gaps = Vec::with_capacity(recordings.len());
-        for recording in recordings {
-            let progress = output_options::progress();
-            progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
-            let recorded = read(recording)?;
+        for recorded in recordings {
             let on_event = |event: &_| progress.show(event);
             let session = Session { on_event: &on_event, ..Session::new(&registry) };
             let gap = session.diagnose_gap(&recorded, &campaign, &map, effects.clone(), healthy.as_ref())?;

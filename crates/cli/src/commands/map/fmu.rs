@@ -44,7 +44,7 @@ impl Fmu {
         } else {
             let given = given_campaign(self.campaign.as_deref())?;
             let map = channel_map(self.channels.as_deref())?;
-            let recorded = Recorded::read(&registry, &self.machine, &map, given.as_ref())?;
+            let recorded = Recorded::read_run(&registry, &self.machine, &map, given.as_ref())?;
             session.identified_fmu(recorded, &map, self.compile, &self.out, existing)?
         };
         if self.json {

@@ -32,7 +32,7 @@ impl Rig {
         let given = given_campaign(self.campaign.as_deref())?;
         let map = channel_map(self.channels.as_deref())?;
         let registry = registry::registry();
-        let recorded = Recorded::read(&registry, &self.recording, &map, given.as_ref())?;
+        let recorded = Recorded::read_run(&registry, &self.recording, &map, given.as_ref())?;
         let written = Session::new(&registry).rig_files(recorded, &map, &self.out)?;
         if self.json {
             return standard_output::print_json(&written);

@@ -36,6 +36,10 @@ const ROW_LIMIT: usize = crate::table::rows_to_lines::POINT_LIMIT;
 /// Maximum number of cells of a row: Excel's own limit.
 const CELL_LIMIT: usize = 16_384;
 
+/// Maximum length of a line, bytes, 16 for a cell, and number of lines that show the separator. They bound the time for any text.
+const LINE_LIMIT: usize = 16 * CELL_LIMIT;
+const SHOWS_SEPARATOR: usize = 10_000;
+
 /// Text in UTF-8, in UTF-16 with a byte order mark, or in Latin 1.
 ///
 /// # Errors
@@ -67,9 +71,14 @@ impl Grid {
     /// # Errors
     /// [`ImportError::TooMany`] if it has more rows than any map.
     pub(crate) fn of_text(text: &str) -> Result<Grid, ImportError> {
-        let lines = || text.lines().enumerate().map(|(index, line)| (index + 1, line));
+        let cut = |line: &'_ str| line.floor_char_boundary(LINE_LIMIT);
+        let lines = || text.lines().enumerate().map(|(index, line)| (index + 1, &line[..cut(line)]));
+        if lines().nth(4 * ROW_LIMIT).is_some() {
+            return Err(ImportError::TooMany { line: 4 * ROW_LIMIT, limit: ROW_LIMIT });
+        }
         let count = |separator: char| {
             lines()
+                .take(SHOWS_SEPARATOR)
                 .filter(|(_, line)| numbers(&split(uncommented(line).0, separator), separator != ',') >= 3)
                 .count()
         };
@@ -85,7 +94,7 @@ impl Grid {
                 separator != ' '
                     && some_numbers(&split(uncommented(line).0, separator), separator != ',') >= 3
             };
-            lines().filter(|(_, line)| is_point(line)).count()
+            lines().take(SHOWS_SEPARATOR).filter(|(_, line)| is_point(line)).count()
         };
         let separator = best(&count).or_else(|| best(&with_text)).map_or(' ', |(_, separator)| separator);
         let mut rows = Vec::new();

@@ -22,6 +22,7 @@
 
 mod contours;
 mod drawing;
+pub mod efficiency_mesh;
 mod figure_layout;
 mod items;
 mod markers;

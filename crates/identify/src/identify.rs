@@ -2,8 +2,8 @@
 
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::found_fault::{FoundFault, Suspect};
+use crate::faults::nominal_rig::NominalRig;
 use crate::needs::missing;
-use crate::nominal_rig::NominalRig;
 use crate::objections::objection::Objection;
 use crate::objections::objections;
 use crate::single_step::dynamic::Estimate;

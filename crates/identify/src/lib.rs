@@ -12,7 +12,6 @@ mod identify;
 mod isothermal_zero;
 mod joint;
 mod needs;
-mod nominal_rig;
 mod objections;
 mod one_fit;
 mod reduce;
@@ -23,6 +22,7 @@ mod step_outcome;
 pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, Thresholds};
 pub use faults::balance_rows::Machine;
 pub use faults::found_fault::{FoundFault, Suspect};
+pub use faults::nominal_rig::NominalRig;
 pub use identify::{Identified, identify, identify_beside, identify_each, identify_recording};
 pub use isothermal_zero::zero::{
     IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, isothermal_zero_with_a_fault,
@@ -36,7 +36,6 @@ pub use mapper_core::{
     Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings, SettleBands, WindowRule,
 };
 pub use needs::{method_for, needs};
-pub use nominal_rig::NominalRig;
 #[doc(hidden)]
 pub use one_fit::{OneFit, one_fit};
 pub use reduce::{KnownHeat, method_of_table, reduce};

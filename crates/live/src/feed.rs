@@ -59,7 +59,7 @@ impl Feed {
         let units = display.units();
         let mut speeds_rpm: Vec<f64> = run.plan.steps.iter().map(|step| step.to.speed_rpm).collect();
         speeds_rpm.sort_by(f64::total_cmp);
-        let mut lines: Vec<String> = speeds_rpm.iter().map(|rpm| display.speed(*rpm)).collect();
+        let mut lines: Vec<String> = speeds_rpm.iter().map(|rpm| display.line_name(*rpm)).collect();
         lines.dedup();
         let state = State {
             machine: run.campaign.machine.name.clone(),

@@ -15,7 +15,6 @@ mod grouping;
 mod heat_correction;
 mod line_ends;
 mod map_fit;
-pub mod mesh;
 mod repeated_jumps;
 mod repeats;
 pub mod table;

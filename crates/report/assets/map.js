@@ -50,7 +50,7 @@ function mapMarks() {
       for (const piece of runs(line.nodes, false)) path(piece, { stroke: line.measured ? ink : soft, strokeWidth: 1.2 });
       if (layer("extrapolated")) for (const piece of runs(line.nodes, true)) path(piece, { stroke: soft, strokeDasharray: "4 3", strokeWidth: 1 });
       const end = line.nodes.find(node => !node.out);
-      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => short(line.speed), dx: 5, dy: 7, textAnchor: "start", fill: ink, stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "pr", text: () => line.speed, dx: 5, dy: 7, textAnchor: "start", fill: ink, stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
     }
     path(page.map.surge, { stroke: style("--bad"), strokeDasharray: "6 3", strokeWidth: 1.6 });
     path(page.map.choke, { stroke: style("--doubt"), strokeDasharray: "2 3", strokeWidth: 1.6 });
@@ -136,7 +136,7 @@ function drawEta() {
       marks.push(Plot.line(nodes, { x: "flow", y: "eta", stroke: lineColour(name), clip: true }));
       // Its speed is written where the line ends towards choke, or where it leaves what is drawn.
       const end = d3.greatest(nodes, n => n.flow);
-      if (end) marks.push(Plot.text([end], { x: "flow", y: "eta", text: () => short(line.speed), dy: 14, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
+      if (end) marks.push(Plot.text([end], { x: "flow", y: "eta", text: () => line.speed, dy: 14, textAnchor: "middle", fill: style("--ink"), stroke: style("--ground"), strokeWidth: 3, fontSize: 10 }));
     }
   if (layer("intervals")) marks.push(Plot.ruleX(data.filter(p => p.eta_low != null), { x: "flow", y1: "eta_low", y2: "eta_high", stroke: p => lineColour(p.line) }));
   if (layer("dynamic")) {

@@ -17,7 +17,7 @@ function stepWords(step, p) {
       (p.dynamic ? `; by the two-parameter method ${shown(p.dynamic[0], 2)} %` : ""),
     `corrected flow ${shown(p.flow, 2)} ± ${shown(p.flow_half, 2)} ${page.units.flow}, pressure ratio ${shown(p.pr, 4)} ± ${shown(p.pr_half, 4)}` +
       (p.h == null ? "" : `, h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`),
-    p.raw.length ? `read at the end: ${p.raw.join(", ")}` : null,
+    p.raw.length ? `readings at the end: ${p.raw.join(", ")}` : null,
     model ? `T2 residual ${shown(model.rms_k, 3)} K rms, after a shift of the mean by ${shown(model.shift_k, 3)} K` : null,
     ...p.said.map(sentence),
   ].filter(Boolean);
@@ -28,7 +28,7 @@ function drawStep() {
   const box = byId("step-plots");
   byId("step-choice").value = String(chosen);
   document.querySelectorAll("tr[data-step]").forEach(row => row.classList.toggle("chosen", Number(row.dataset.step) === chosen));
-  if (!step || !point) { box.replaceChildren(); byId("step-words").textContent = "Nothing was read in this step."; return; }
+  if (!step || !point) { box.replaceChildren(); byId("step-words").textContent = "This step has no readings."; return; }
   const model = step.model;
   const list = document.createElement("ul");
   list.append(...stepWords(step, point).map(words => { const item = document.createElement("li"); item.textContent = words; return item; }));
@@ -44,11 +44,11 @@ function drawStep() {
     figures.push([holder, channels, extra, title]);
   };
   box.replaceChildren();
-  add(["T2"], "T2 as read (dots) and by the point's numbers (line); the window is shaded", "model");
-  if (model) add(["T2"], "T2 residual, K", "left");
+  add(["T2"], "T2 measured (dots) and computed from the result (line); the shaded window was evaluated", "model");
+  if (model) add(["T2"], "T2 residual: measured minus computed, K", "left");
   add(["Tc"], "Housing temperature Tc");
   add(["N"], "Shaft speed N");
-  add(["m"], "Compressor flow, as read");
+  add(["m"], "Compressor flow, measured");
   add(["P2", "P3"], "Pressures P2 and P3");
   for (const [holder, channels, extra, title] of figures) {
     const rows = channels.flatMap(c => c.values.map((v, i) => ({ t: step.t[i], v, name: c.name }))).filter(r => r.v != null);

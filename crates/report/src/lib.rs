@@ -14,22 +14,21 @@ mod maps;
 pub mod page;
 mod plan;
 mod point_results;
-mod reduced_text;
 mod reference_pages;
 mod test_report;
 
 pub use diagnosis::corrected_points::corrected_csv;
 pub use diagnosis::correction_text::correction_text;
 pub use diagnosis::drift_text::drift_text;
-pub use diagnosis::gap_page::{gap_page, gap_part};
-pub use diagnosis::gap_text::{gap_text, headline};
+pub use diagnosis::gap_text::{NOTHING, OUTSIDE, gap_text, headline, named};
 pub use diagnosis::prediction_check_text::held_text;
 pub use diagnosis::recordings_text::recordings_text;
+pub use diagnosis::stand_actions::{next_measurement, stand_actions};
 pub use formatting::display::Display;
 pub use formatting::duration::duration;
-pub use formatting::number::{number, percent};
+pub use formatting::number::{four_figures, number, percent};
 pub use formatting::paint::{Paint, paint_verdict};
-pub use formatting::table::with_heads;
+pub use formatting::table::{TextTable, with_heads};
 pub use formatting::wrapped::wrapped;
 pub use heat_transfer::heat_correction_text::heat_correction_text;
 pub use heat_transfer::result_pictures::{ErrorAtGradient, error_figure, heat_transfer_figure};
@@ -51,6 +50,7 @@ pub use maps::imported_map_text::{import_remark_text, imported_map_text};
 pub use maps::map_comparison_picture::{distinct_names, map_comparison_figure};
 pub use maps::map_comparison_text::map_comparison_text;
 pub use maps::map_fit_text::map_fit_text;
+pub use maps::reduced_text::reduced_text;
 pub use maps::turbine_file::{TurbinePoint, turbine_points, turbine_text};
 pub use maps::turbine_map_text::{imported_turbine_text, turbine_comparison_text, turbine_fit_text};
 pub use plan::comparison_text::{comparison_json, comparison_text};
@@ -67,7 +67,6 @@ pub use point_results::point_table::{PointCell, PointGroup, point_cells, point_g
 pub use point_results::point_warnings::{Doubt, doubts};
 pub use point_results::points::{opening, points_text, score_text, step_name, truth_text, verdict_word};
 pub use point_results::shared_errors::shared_errors_text;
-pub use reduced_text::reduced_text;
 pub use reference_pages::campaign_page::campaign_page;
 pub use reference_pages::sequence_page::sequence_page;
 pub use test_report::assumed_text::{assumed_sentence, assumed_text, first_campaign_text};
@@ -77,7 +76,7 @@ pub use test_report::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, instrumen
 pub use test_report::key_figures::key_figures;
 pub use test_report::repeated_jumps::repeated_jumps_text;
 pub use test_report::run_report::{
-    ReportSource, RunReport, SurgeReport, condition_facts, instant, provenance_facts, run_report,
+    ReportSource, RunReport, SurgeReport, condition_facts, cover_facts, instant, provenance_facts, run_report,
 };
 pub use test_report::sensors_text::{declared_sensors_text, sensors_text};
 pub use test_report::surge_text::{surge_columns_text, surge_heads, surge_remarks, surge_rows, surge_text};

@@ -1,11 +1,11 @@
 //! The fitted surface in the picture: lines, contours, surge and choke, and grey for extrapolation.
 
 use crate::labels::{percent, speed};
+use mapper_chart::efficiency_mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
 use mapper_chart::{Contours, Dash, Line, LineEnd, Panel, Polygon, palette};
 use mapper_core::{
     CompressorMap, FittedLine, FittedMap, FittedNode, MapUnits, SpeedLine, confidence_interval_95,
 };
-use mapper_maps::mesh::{SUBDIVISIONS, across, contour_levels, fitted_surface};
 
 const SURGE: palette::Colour = palette::VERMILLION;
 const CHOKE: palette::Colour = palette::PURPLE;

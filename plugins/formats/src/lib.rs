@@ -12,7 +12,7 @@ mod simulation_table;
 mod turbine;
 
 pub use map_picture::map_figure;
-pub use mapper_maps::mesh::efficiency_surface;
+pub use mapper_chart::efficiency_mesh::efficiency_surface;
 pub use mapper_maps::table::{POINT_LIMIT, parse_reference};
 
 use mapper_core::MapFormats;

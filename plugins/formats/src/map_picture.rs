@@ -7,9 +7,9 @@
 use crate::fitted_items;
 use crate::heading::efficiency_name;
 use crate::labels::{percent, speed};
+use mapper_chart::efficiency_mesh::{contour_levels, efficiency_surface, ordered, speed_curve};
 use mapper_chart::{Axis, Contours, Figure, Line, LineEnd, Marker, Panel, Scatter, ScatterPoint, palette};
 use mapper_core::{CompressorMap, MapPoint, MapUnits, Method, SurgeMark, Verdict, confidence_interval_95};
-use mapper_maps::mesh::{contour_levels, efficiency_surface, ordered, speed_curve};
 
 /// The map as a figure of two panels in these units, efficiency in %.
 pub fn map_figure(map: &CompressorMap, units: &MapUnits) -> Figure {

@@ -47,16 +47,18 @@ def unit_of(name: str) -> str | None:
 def table(rows: Sequence[Mapping[str, Any]], index: str | None = None, first: Sequence[str] = ()) -> pd.DataFrame:
     """Return a table with one row per object, these columns first; nested objects become columns with joined names."""
     objects = _objects(rows)
-    frame = pd.DataFrame([_flat(row, objects) for row in rows])
-    front = [name for name in first if name in frame]
-    frame = frame[[*front, *(name for name in frame.columns if name not in front)]]
-    if index is not None and index in frame:
-        frame = frame.set_index(index)
-    # A column without any value has no type of its own: unknown numbers are NaN, and an object that is absent in all rows has no column.
-    empty = [str(name) for name in frame.columns[frame.isna().all()]]
-    unknown = [name for name in empty if unit_of(name) is not None]
-    frame = frame.drop(columns=[name for name in empty if name not in unknown])
-    frame[unknown] = float("nan")
+    flat = [_flat(row, objects) for row in rows]
+    names = dict.fromkeys(name for row in flat for name in row)
+    columns: dict[str, list[Any]] = {}
+    for name in [*(name for name in first if name in names), *(name for name in names if name not in first)]:
+        values = [row.get(name) for row in flat]
+        # A column without any value has no type of its own: unknown numbers are NaN, and an object that is absent in all rows has no column.
+        if any(value is not None for value in values):
+            columns[name] = values
+        elif unit_of(name) is not None:
+            columns[name] = [float("nan")] * len(flat)
+    rows_of = None if index is None or index not in columns else pd.Index(columns.pop(index), name=index)
+    frame = pd.DataFrame(columns, index=rows_of)
     units = {str(name): unit_of(str(name)) for name, kind in frame.dtypes.items() if is_numeric_dtype(kind)}
     frame.attrs["units"] = {name: unit for name, unit in units.items() if unit is not None}
     return frame
@@ -67,7 +69,7 @@ def _objects(rows: Iterable[Mapping[str, Any]], before: str = "") -> set[str]:
     found: set[str] = set()
     for row in rows:
         for key, value in row.items():
-            if isinstance(value, Mapping):
+            if isinstance(value, dict):
                 found |= {before + key} | _objects([value], f"{before}{key}_")
     return found
 
@@ -76,7 +78,7 @@ def _flat(row: Mapping[str, Any], objects: set[str], before: str = "") -> Json:
     flat: Json = {}
     for key, value in row.items():
         name = before + key
-        if isinstance(value, Mapping):
+        if isinstance(value, dict):
             flat.update(_flat(value, objects, f"{name}_"))
         elif name.endswith("_changes") or name.endswith("_changes_w_m2k"):
             # Lists, one value for each shared parameter: they stay in the JSON.

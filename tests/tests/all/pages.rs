@@ -77,15 +77,12 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
     let text = std::fs::read_to_string(whole).unwrap();
     let section = text.split("id=\"gap\"").nth(1).unwrap();
     assert!(section.contains("(stem_conduction) explains the gap") && section.matches("<svg").count() == 2);
-    for heading in [
-        "Which",
-        "Where",
-        "Residuals without the cause",
-        "Residuals with the first cause",
-        "Before and after",
-    ] {
+    for heading in
+        ["Causes", "Place in the machine", "Difference between measured and computed readings", "What to do"]
+    {
         assert!(dom.contains(&format!("<h2>{heading}")), "{heading}");
     }
+    assert!(dom.contains("<ol><li>"), "a cause that is named leads to actions");
     // It needs nothing but itself.
     assert!(!dom.contains("src=\"http") && !dom.contains("href=\"http"));
 }
@@ -238,6 +235,35 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
     for size in ["1400_light", "1400_dark", "390_light", "390_dark"] {
         assert_eq!(seen[format!("overflow_{size}")], 0, "{size}: the page is wider than the screen");
     }
+}
+
+#[test]
+fn a_machine_without_a_browser_keeps_the_page_and_names_the_remedy() {
+    let (run, folder) = (run_of_nine_points(), scratch());
+    let out = folder.path().join("page.html");
+    let mut report = mapper_command(["report", "--pdf", "-o"]);
+    let ended = report.arg(&out).arg(&run).env("PATH", "").output().unwrap();
+    assert_eq!(ended.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&ended.stderr).contains("install `chromium`"));
+    assert!(out.exists() && !out.with_extension("pdf").exists());
+}
+
+#[test]
+#[cfg_attr(not(with_chromium), ignore = "needs Chromium: run `cargo xtask test`")]
+fn a_page_is_printed_by_the_browser_on_the_path() {
+    let (run, folder) = (run_of_nine_points(), scratch());
+    let out = folder.path().join("page.html");
+    let made = [
+        "report".as_ref(),
+        run.as_os_str(),
+        "--pdf".as_ref(),
+        "--json".as_ref(),
+        "-o".as_ref(),
+        out.as_os_str(),
+    ];
+    let files = mapper(made).exits(0).json();
+    let pdf = std::fs::read(files["pdf"].as_str().unwrap()).unwrap();
+    assert!(pdf.starts_with(b"%PDF") && pdf.len() > 50_000, "{} bytes", pdf.len());
 }
 
 #[test]

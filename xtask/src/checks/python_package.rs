@@ -55,7 +55,7 @@ fn execute_notebooks(of: &dyn Fn(&[&str]) -> Command) -> Result<(), Error> {
     Ok(())
 }
 
-/// Builds the wheel, adds the command to it, installs it into an empty environment and runs its tests there, with that command.
+/// Builds the wheel with the command in it, installs it into an empty environment and runs its tests there, with that command.
 pub fn wheel() -> Result<(), Error> {
     let python = python_env::prepare()?;
     let (wheels, empty) = (workspace::target_dir().join("wheels"), workspace::target_dir().join("wheel-env"));
@@ -65,10 +65,8 @@ pub fn wheel() -> Result<(), Error> {
         }
     }
     let folder = wheels.to_string_lossy();
-    let mut build = command(&python, &["-m", "maturin", "build", "--release", "--out", &folder]);
-    build.current_dir(workspace::root().join("python"));
-    run(build)?;
-    add_command(&python, &wheels)?;
+    let pip = ["-m", "pip", "wheel", "--quiet", "--no-build-isolation", "--no-deps", "--wheel-dir", &folder];
+    run(command(&python, &[&pip[..], &["./python"]].concat()))?;
     run(command("python3", &["-m", "venv", &empty.to_string_lossy()]))?;
     let mut install: Command = command(empty.join("bin/python"), &["-m", "pip", "install", "--quiet"]);
     for wheel in files(&wheels)? {
@@ -80,29 +78,6 @@ pub fn wheel() -> Result<(), Error> {
     tests.env("MAPPER_TEST_PROGRAM", empty.join("bin/mapper")).env("MPLBACKEND", "agg");
     run(tests)?;
     say(&format!("the wheel is in {folder}\n"));
-    Ok(())
-}
-
-/// Adds the command to the wheel in a directory, so that users without Rust have both.
-fn add_command(python: &Path, wheels: &Path) -> Result<(), Error> {
-    run(command(workspace::cargo(), &["build", "--release", "--package", "mapper-cli", "--bin", "mapper"]))?;
-    let unpacked = workspace::target_dir().join("wheel-unpacked");
-    if unpacked.exists() {
-        fs::remove_dir_all(&unpacked).map_err(|source| Error::File { path: unpacked.clone(), source })?;
-    }
-    let (into, out) = (unpacked.to_string_lossy(), wheels.to_string_lossy());
-    for wheel in files(wheels)? {
-        run(command(python, &["-m", "wheel", "unpack", &wheel.to_string_lossy(), "--dest", &into]))?;
-        fs::remove_file(&wheel).map_err(|source| Error::File { path: wheel.clone(), source })?;
-    }
-    let failed = |source| Error::File { path: unpacked.clone(), source };
-    for package in fs::read_dir(&unpacked).map_err(failed)?.flatten().map(|entry| entry.path()) {
-        let name = package.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let scripts = package.join(format!("{name}.data/scripts"));
-        fs::create_dir_all(&scripts).map_err(|source| Error::File { path: scripts.clone(), source })?;
-        copy(&workspace::target_dir().join("release/mapper"), &scripts.join("mapper"))?;
-        run(command(python, &["-m", "wheel", "pack", &package.to_string_lossy(), "--dest-dir", &out]))?;
-    }
     Ok(())
 }
 

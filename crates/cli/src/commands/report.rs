@@ -1,13 +1,14 @@
 //! `mapper report`: the page of a run, with other runs for comparison.
 
+use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::standard_output::Replace;
 use crate::{output::{output_options, standard_output}, registry};
 use clap::Args;
 use mapper_recording::ChannelMap;
-use mapper_session::{Gap, Recorded, Registry, Session, SessionError};
-use serde_json::json;
+use mapper_session::{Gap, Recorded, Registry, Session, SessionError, page_as_pdf};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Make the page of a run: map, points, transients, plan and provenance in one HTML file
@@ -28,6 +29,9 @@ pub struct Report {
     /// Also diagnose the gap between the first run and the nominal model of this campaign, which takes up to a minute
     #[arg(long, value_name = "CAMPAIGN")]
     pub gap: Option<PathBuf>,
+    /// Also print the page to a PDF next to it; needs Chromium on the path
+    #[arg(long)]
+    pub pdf: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -54,11 +58,23 @@ impl Report {
         });
         // The page of a run directory is made from its recording: it may be made again.
         let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
-        Replace { force: self.replace.force || is_own }.write(&out, page.as_bytes())?;
-        match self.json {
-            true => standard_output::print_json(&json!({ "page": out })),
-            false => standard_output::print(&format!("page       {}\n", out.display())),
+        let replace = Replace { force: self.replace.force || is_own };
+        replace.write(&out, page.as_bytes())?;
+        let mut files = vec![("page", out.clone())];
+        if self.pdf {
+            let progress = output_options::progress();
+            progress.begin("printing");
+            let directory = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+            let pdf = page_as_pdf(&page, directory.unwrap_or(Path::new(".")))
+                .map_err(|error| Failure::new(Code::Failure, error))?;
+            files.push(("pdf", out.with_extension("pdf")));
+            replace.write(&files[1].1, &pdf)?;
         }
+        if self.json {
+            return standard_output::print_json(&files.into_iter().collect::<BTreeMap<_, _>>());
+        }
+        let line = |(what, path): &(&str, PathBuf)| format!("{what:<11}{}\n", path.display());
+        standard_output::print(&files.iter().map(line).collect::<String>())
     }
 }
 

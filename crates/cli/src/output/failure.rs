@@ -126,7 +126,7 @@ impl Failure {
         match self.manner {
             Manner::ClosedPipe => return None,
             Manner::Printed => {}
-            Manner::Rendered => standard_error::say(&self.message),
+            Manner::Rendered => standard_error::say_rendered(&self.message),
             Manner::Sentence => {
                 let sentence = format!("mapper: {}\n", shortened(&self.message));
                 standard_error::say(&on_terminal(&sentence, terminal_size_of(std::io::stderr())));

@@ -270,21 +270,25 @@ fn event_line(t_s: f64, message: &str) -> String {
 fn say_lines(event: &SessionEvent, state: &mut State) {
     let line = match event {
         SessionEvent::RunStarted { steps, duration_s, .. } => {
-            state.steps = *steps;
+            (state.steps, state.duration_s) = (*steps, *duration_s);
             format!("{steps} steps in {} of rig time", short(*duration_s))
         }
         SessionEvent::StepStarted(marker) => format!(
-            "{:8.1} s  {}, {}, for {}",
+            "{:8.1} s  {}, {}, for {}, {} of rig time left",
             marker.start_s,
             marker.number().map_or_else(
                 || "a step once more".to_owned(),
                 |number| format!("step {number} of {}", state.steps.max(number))
             ),
             place(marker),
-            short(marker.end_s - marker.start_s)
+            short(marker.end_s - marker.start_s),
+            short(state.duration_s - marker.start_s)
         ),
         SessionEvent::Reported(event) => event_line(event.t_s, &event.message),
-        SessionEvent::Progress { what, .. } if *what != state.last_line => what.clone(),
+        SessionEvent::Progress { what, done_ratio } if *what != state.last_line => {
+            let began = *state.began.get_or_insert_with(Instant::now);
+            progress_line(what, *done_ratio, began.elapsed().as_secs_f64())
+        }
         SessionEvent::PiecesDone { done, of } => {
             let began = *state.began.get_or_insert_with(Instant::now);
             if !is_printed(*done, *of) {
@@ -306,6 +310,15 @@ const PIECES_LINES: usize = 200;
 /// Whether this number of finished pieces is printed.
 fn is_printed(done: usize, of: usize) -> bool {
     done == of || done.is_multiple_of(of.div_ceil(PIECES_LINES).max(1))
+}
+
+/// The current work, its share of the whole and the estimated time remaining, once they are known.
+fn progress_line(what: &str, done_ratio: f64, elapsed_s: f64) -> String {
+    if !(done_ratio > 0.0 && done_ratio < 1.0) {
+        return what.to_owned();
+    }
+    let left_s = elapsed_s * (1.0 - done_ratio) / done_ratio;
+    format!("{:3.0} %  {what}, {} left", 100.0 * done_ratio, short(left_s))
 }
 
 /// Number of finished pieces, elapsed time, and the estimated time remaining.
@@ -343,11 +356,13 @@ fn say(line: &str) {
 
 #[cfg(test)]
 mod tests {
-    use super::{PIECES_LINES, is_printed, pieces_line};
+    use super::{PIECES_LINES, is_printed, pieces_line, progress_line};
 
     #[test]
     fn a_pipe_gets_the_remaining_time_and_never_a_thousand_lines() {
         assert_eq!(pieces_line(0, 14, 0.0), "0 of 14 done");
+        assert_eq!(progress_line("single effects", 0.25, 2.0), " 25 %  single effects, 6.0 s left");
+        assert_eq!(progress_line("reading", 0.0, 2.0), "reading");
         // A third done in 20 s: the other two thirds take 40 s.
         assert_eq!(pieces_line(5, 15, 20.0), "5 of 15 done in 20 s, 40 s left");
         assert_eq!(pieces_line(15, 15, 62.0), "15 of 15 done in 62 s");

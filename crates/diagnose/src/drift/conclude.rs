@@ -9,7 +9,7 @@ use crate::drift::likelihood::fit::Fit;
 use crate::drift::likelihood::refine::Refined;
 use crate::drift::report::{DriftReport, DriftVerdict, FoundDrift, RateOrStep};
 use crate::drift::runs::request::DriftRequest;
-use mapper_core::{IdentifiedPoint, Recording};
+use mapper_core::{IdentifiedPoint, Recording, probability_text};
 
 pub(crate) fn conclude(
     request: &DriftRequest<'_>,
@@ -77,7 +77,10 @@ fn reason(decision: &Decision, drifts: &[FoundDrift], verdict: DriftVerdict) -> 
     if verdict == DriftVerdict::None {
         let probability =
             decision.alone.iter().find(|one| one.cause.is_none()).map_or(1.0, |none| none.probability);
-        return format!("Nothing drifted, with a probability of {}.{left_out}", percent(probability));
+        return format!(
+            "Nothing drifted, with a probability of {}.{left_out}",
+            probability_text(probability)
+        );
     }
     let what: Vec<String> = drifts.iter().map(described).collect();
     let corrected: Vec<String> = drifts.iter().map(|drift| correction(drift.cause)).collect();
@@ -99,7 +102,7 @@ fn described(drift: &FoundDrift) -> String {
         "{} {size} {:.0} s on, with a probability of {}",
         drift.cause,
         drift.onset_s,
-        percent(drift.probability)
+        probability_text(drift.probability)
     )
 }
 
@@ -117,9 +120,4 @@ fn correction(cause: Cause) -> String {
                 .to_owned()
         }
     }
-}
-
-/// A probability is limited by the certainty of the assumptions.
-fn percent(probability: f64) -> String {
-    if probability > 0.995 { "more than 99.5 %".to_owned() } else { format!("{:.0} %", 100.0 * probability) }
 }

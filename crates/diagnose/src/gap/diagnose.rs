@@ -274,7 +274,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
     };
     let without_cause = without_cause(&study, &linearised, fits.first().filter(|_| named))
         .unwrap_or_else(|| (null.prediction.clone(), null.residual.clone()));
-    let with_cause = fits.first().map(|best| ("the first cause", best.clone()));
+    let with_cause = fits.first().map(|best| ("the most probable cause", best.clone()));
     Ok(Diagnosed { diagnosis, study, null, without_cause, with_cause, fits, adequacy: left, linearised })
 }
 

@@ -1,7 +1,7 @@
 //! Drift as text.
 
 use crate::formatting::{number, table};
-use mapper_core::half_width_95;
+use mapper_core::{half_width_95, probability_text};
 use mapper_diagnose::drift::{Alternative, Cause, DriftReport, RateOrStep, RepeatGroup};
 use std::fmt::Write;
 
@@ -25,6 +25,9 @@ pub fn drift_text(report: &DriftReport) -> String {
         && let Some(others) = likely(&report.alone)
     {
         let _ = writeln!(text, "Not excluded: {others}.");
+    }
+    if !report.groups.is_empty() {
+        text.push_str("\nd: change since the first visit, corrected for the boundary conditions.\n");
     }
     for group in &report.groups {
         let _ = write!(text, "\nFrom {} to {}\n{}\n", group.from, group.to, group_table(group));
@@ -51,7 +54,7 @@ pub fn drift_text(report: &DriftReport) -> String {
 fn likely(alternatives: &[Alternative]) -> Option<String> {
     let named = |other: &Alternative| {
         let cause = other.cause.map_or_else(|| "no drift".to_owned(), Cause::name);
-        format!("{cause} {:.0} %", 100.0 * other.probability)
+        format!("{cause} {}", probability_text(other.probability))
     };
     // Half a per cent would be rounded to zero.
     let likely_alternatives = alternatives.iter().filter(|other| (5e-3..0.5).contains(&other.probability));
@@ -59,15 +62,22 @@ fn likely(alternatives: &[Alternative]) -> Option<String> {
     (!words.is_empty()).then(|| words.join(", "))
 }
 
-fn group_table(group: &RepeatGroup) -> comfy_table::Table {
+/// Unit, factor and decimals of a channel's changes.
+fn shown_in(symbol: &str) -> (&'static str, f64, usize) {
+    match symbol.as_bytes() {
+        [b'm', ..] => ("g/s", 1e3, 3),
+        [b'P', ..] => ("Pa", 1.0, 0),
+        [b'N', ..] => ("rpm", 1.0, 0),
+        _ => ("K", 1.0, 2),
+    }
+}
+
+fn group_table(group: &RepeatGroup) -> table::TextTable {
     let symbols: Vec<&str> =
         group.visits.first().map(|visit| visit.channels.keys().copied().collect()).unwrap_or_default();
     let mut heads: Vec<String> =
         ["t s", "eta %", "+/- points", "h W/(m2 K)", "+/- W/(m2 K)"].map(str::to_owned).to_vec();
-    heads.extend(symbols.iter().map(|symbol| match symbol.starts_with("m_") {
-        true => format!("d {symbol} g/s"),
-        false => format!("d {symbol}"),
-    }));
+    heads.extend(symbols.iter().map(|symbol| format!("d {symbol} {}", shown_in(symbol).0)));
     let mut table = table::with_heads(&heads);
     for visit in &group.visits {
         let mut row = vec![
@@ -78,15 +88,13 @@ fn group_table(group: &RepeatGroup) -> comfy_table::Table {
             number::number(visit.sigma_h_w_m2k.map(half_width_95), 0),
         ];
         row.extend(symbols.iter().map(|symbol| {
-            // Relative to the first visit, corrected for boundary conditions.
             let first = group.visits.first().and_then(|first| first.channels.get(symbol));
             let change = visit
                 .channels
                 .get(symbol)
                 .zip(first)
                 .map(|(now, first)| now.end_less_model - first.end_less_model);
-            // Flows in g/s.
-            let (scale, decimals) = if symbol.starts_with("m_") { (1e3, 3) } else { (1.0, 2) };
+            let (_, scale, decimals) = shown_in(symbol);
             number::number(change.map(|change| scale * change), decimals)
         }));
         table.add_row(row);

@@ -1,5 +1,6 @@
 //! Recommended next steps, as text.
 
+use mapper_core::probability_text;
 use mapper_diagnose::gap::findings::report::{Diagnosis, Kind, Next, Suggestion};
 
 /// 0 degC, K.
@@ -13,10 +14,10 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
         (Next::Sensor { sensor, reason }, _) => text += &format!("  {sensor}: {reason}\n"),
         (Next::Jump { .. } | Next::Soak { .. }, Some(first)) => {
             text += &format!(
-                "  {}: {:.1} min, after which the true cause should reach {:.0} %\n",
+                "  {}: {:.1} min, after which the true cause should reach {}\n",
                 named(first),
                 first.minutes,
-                100.0 * first.expected_probability
+                probability_text(first.expected_probability)
             );
             text += &how(first);
         }
@@ -24,15 +25,15 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
     }
     let Some(first) = diagnosis.experiments.first() else { return text };
     text += &format!(
-        "  of {:.2} bit that are open: answered a minute, in total, chance that the true cause then has 95 %\n",
+        "  of {:.2} bit still open: bit per minute, in total, chance that the true cause then has 95 %\n",
         first.entropy_bit
     );
     for experiment in &diagnosis.experiments {
         text += &format!(
-            "  {:>6.3} bit/min {:>5.2} bit {:>4.0} %  {}, {:.1} min\n",
+            "  {:>6.3} bit/min {:>5.2} bit {:>7}  {}, {:.1} min\n",
             experiment.entropy_drop_bit / experiment.minutes,
             experiment.entropy_drop_bit,
-            100.0 * experiment.probability_settled,
+            probability_text(experiment.probability_settled),
             named(experiment),
             experiment.minutes,
         );
@@ -41,7 +42,7 @@ pub(crate) fn next_text(diagnosis: &Diagnosis) -> String {
 }
 
 /// The action, in words.
-fn named(experiment: &Suggestion) -> String {
+pub(crate) fn named(experiment: &Suggestion) -> String {
     let Suggestion { from, to, .. } = experiment;
     let at = format!("at {:.0} krpm and opening {}", to.speed_rpm / 1e3, to.valve);
     let celsius = |change: Option<[f64; 2]>| {

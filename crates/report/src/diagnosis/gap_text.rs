@@ -1,8 +1,11 @@
 //! A diagnosis as a page for a terminal.
 
 use crate::diagnosis::gap_next::next_text;
+use crate::diagnosis::stand_actions::stand_actions;
 use crate::formatting::number::four_figures;
-use mapper_core::{step_number, with_unit};
+use crate::formatting::table::COLUMNS;
+use crate::formatting::wrapped::wrapped;
+use mapper_core::{probability_text, step_number, with_unit};
 use mapper_diagnose::gap::findings::report::{
     Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
 };
@@ -13,6 +16,11 @@ use std::collections::BTreeMap;
 const CAUSES: usize = 5;
 /// Maximum number of places shown.
 const PLACES: usize = 5;
+
+/// The answer that nothing is wrong.
+pub const NOTHING: &str = "nothing beyond tolerance";
+/// The answer that the cause is not in the library.
+pub const OUTSIDE: &str = "a cause outside the catalogue";
 
 /// The page.
 pub fn gap_text(diagnosis: &Diagnosis) -> String {
@@ -31,8 +39,8 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     if !diagnosis.r#where.is_empty() {
         text += "\nwhere\n";
         for place in diagnosis.r#where.iter().take(PLACES) {
-            text += &format!(
-                "  {:20} {:>3.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}\n",
+            let place = format!(
+                "  {}: {:.0} % of the gap, {:.0} sigma; largest in {}, {} after the jump, {}: {} {}",
                 place.submodel,
                 100.0 * place.share,
                 place.sigma,
@@ -42,6 +50,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
                 four_figures(place.size),
                 place.unit,
             );
+            text += &wrapped(&place, COLUMNS, 6);
         }
     }
     if !diagnosis.smallest_seen.is_empty() {
@@ -49,15 +58,23 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     }
     text += "\nwhich\n";
     for candidate in diagnosis.candidates.iter().take(CAUSES) {
-        text += &format!("  {:>5.1} %  {}\n", 100.0 * candidate.probability, cause(candidate));
+        text += &format!("  {:>7}  {}\n", probability_text(candidate.probability), cause(candidate));
         for set in &candidate.equivalent {
-            text += &format!("           is indistinguishable from {}\n", set.join(" + "));
+            text += &format!("           indistinguishable from {}\n", set.join(" + "));
         }
     }
-    text += &format!("  {:>5.1} %  nothing beyond tolerance\n", 100.0 * diagnosis.probability_none);
-    text += &format!("  {:>5.1} %  a cause outside the catalogue\n", 100.0 * diagnosis.probability_outside);
+    for (probability, what) in
+        [(diagnosis.probability_none, NOTHING), (diagnosis.probability_outside, OUTSIDE)]
+    {
+        text += &format!("  {:>7}  {what}\n", probability_text(probability));
+    }
     text += &laws(diagnosis);
     text += &how_far(diagnosis);
+    let actions = stand_actions(diagnosis);
+    if !actions.is_empty() {
+        text += "\ncheck at the stand\n";
+        text += &actions.iter().map(|action| format!("  {action}\n")).collect::<String>();
+    }
     text += &next_text(diagnosis);
     if !diagnosis.assumed.is_empty() {
         text += "\nassumed\n";
@@ -96,9 +113,9 @@ fn laws(diagnosis: &Diagnosis) -> String {
     }
     for law in &diagnosis.laws {
         text += &format!(
-            "\nlaw\n  {}\n  {:.0} %; {} on held-out steps\n",
+            "\nlaw\n  {}\n  {}; {} on held-out steps\n",
             law.sentence,
-            100.0 * law.probability,
+            probability_text(law.probability),
             removed(law)
         );
         if law.probability < NOT_THE_TRUTH {
@@ -133,9 +150,9 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
             diagnosis.off_at_rest.join(", ")
         ),
         (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
-            "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({:.0} %)",
+            "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({})",
             named(first),
-            100.0 * first.probability
+            probability_text(first.probability)
         ),
         (Verdict::WithinTolerance, _) => format!("nothing beyond the declared tolerances {seen}"),
         (Verdict::Explained, Some(first)) => {
@@ -147,8 +164,8 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
         _ => {
             let of = since.map_or_else(String::new, |since| format!(" of what changed since {since}"));
             let outside = format!(
-                "a cause outside the catalogue is the most probable{of} ({:.1} %)",
-                100.0 * diagnosis.probability_outside
+                "{OUTSIDE} is the most probable{of} ({})",
+                probability_text(diagnosis.probability_outside)
             );
             law_found(diagnosis).map_or_else(|| outside.clone(), |law| format!("{outside}: {}", law.sentence))
         }

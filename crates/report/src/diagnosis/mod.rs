@@ -4,7 +4,7 @@ pub(crate) mod corrected_points;
 pub(crate) mod correction_text;
 pub(crate) mod drift_text;
 pub(crate) mod gap_next;
-pub(crate) mod gap_page;
 pub(crate) mod gap_text;
 pub(crate) mod prediction_check_text;
 pub(crate) mod recordings_text;
+pub(crate) mod stand_actions;

@@ -94,6 +94,16 @@ impl Display {
         Self::shown(Kind::Speed, &self.units.speed, speed_rpm, if self.units.speed == "krpm" { 2 } else { 0 })
     }
 
+    /// The name of a speed line: its corrected speed in three figures.
+    pub fn line_name(&self, speed_corrected_rpm: f64) -> String {
+        let speed = Self::in_unit(Kind::Speed, &self.units.speed, speed_corrected_rpm);
+        let exponent = if speed == 0.0 { 0 } else { speed.abs().log10().floor() as i32 };
+        let last = 10f64.powi(exponent - 2);
+        let text = format!("{:.*}", (2 - exponent).max(0) as usize, (speed / last).round() * last);
+        // Without zeros at the end.
+        text.parse::<f64>().map_or(text, |speed| speed.to_string())
+    }
+
     /// An operating point in words: speed with its unit, opening.
     pub fn place_in_words(&self, point: OperatingPoint) -> String {
         format!("{} {}, opening {}", self.speed(point.speed_rpm), self.units.speed, point.shown().1)

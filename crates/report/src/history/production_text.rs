@@ -30,7 +30,7 @@ fn one(production: &Production) -> String {
         "nights %",
         "rest %",
     ];
-    let mut table = table::with_heads(&heads.map(str::to_owned));
+    let mut table = table::with_heads(&heads);
     for place in &production.places {
         table.add_row(row(place));
     }

@@ -1,6 +1,7 @@
 //! The cause of a deviation on one side of a machine, for a terminal and a report.
 
 use crate::formatting::table;
+use mapper_core::probability_text;
 use mapper_diagnose::driven::cause_search::{Beyond, Cause, Diagnosis, HeldOut, Which, Word};
 use std::fmt::Write;
 
@@ -67,7 +68,7 @@ fn headline(found: &Diagnosis) -> String {
         Word::Named => format!(
             "{} explains it ({}).",
             open.first().map_or_else(String::new, |cause| begun(&cause.names.join(" and "))),
-            open.first().map_or_else(String::new, |cause| percent(cause.probability))
+            open.first().map_or_else(String::new, |cause| probability_text(cause.probability))
         ),
         Word::NotDistinguished => format!(
             "{} explain it equally well and are indistinguishable.",
@@ -79,11 +80,11 @@ fn headline(found: &Diagnosis) -> String {
         ),
         Word::WithinTolerance => format!(
             "Nothing is seen beyond the usual uncertainty of such a machine (no cause: {}).",
-            percent(found.probability_none)
+            probability_text(found.probability_none)
         ),
         Word::Outside => format!(
             "Nothing of the catalogue explains it: something outside it acts here ({}). The residual of the nearest cause is below.",
-            percent(found.probability_outside)
+            probability_text(found.probability_outside)
         ),
     }
 }
@@ -100,8 +101,8 @@ fn causes(text: &mut String, found: &Diagnosis) {
             || *place == 0
             || (*place < found.open + FURTHER_ROWS && cause.probability > NOT_WORTH)
     };
-    let heads = ["cause", "probability", "size", "95 % interval", "left, K"].map(str::to_owned);
-    let mut rows = table::with_heads(&heads);
+    let heads = ["cause", "probability", "size", "95 % interval", "left, K"];
+    let mut rows = table::with_heads(&heads).with_texts(2..4);
     for (_, cause) in found.causes.iter().enumerate().filter(shown) {
         let each = |of: &dyn Fn(&mapper_diagnose::gap::findings::report::Estimate) -> String| {
             cause.parameters.values().map(of).collect::<Vec<_>>().join("; ")
@@ -122,7 +123,7 @@ fn causes(text: &mut String, found: &Diagnosis) {
         let end = if cause.at_the_end.is_empty() { "" } else { " (end of its range)" };
         rows.add_row([
             cause.effects.join(" + "),
-            percent(cause.probability),
+            probability_text(cause.probability),
             each(&|e| e.size.clone()) + end,
             interval,
             cause.left_k.first().map_or_else(String::new, |k| format!("{k:.2}")),
@@ -133,15 +134,6 @@ fn causes(text: &mut String, found: &Diagnosis) {
         text.push_str(
             "A size at the end of its range is more than such an effect can be: rather something that the catalogue has not.\n\n",
         );
-    }
-}
-
-/// No log makes a cause certain.
-fn percent(probability: f64) -> String {
-    match 100.0 * probability {
-        p if p > 99.0 => "over 99 %".to_owned(),
-        p if p < 1.0 => "below 1 %".to_owned(),
-        p => format!("{p:.0} %"),
     }
 }
 
@@ -219,11 +211,8 @@ fn verdict(beyond: &Beyond, word: Word) -> &'static str {
 }
 
 fn unknowns(text: &mut String, found: &Diagnosis) {
-    let heads = ["unknown", "value", "95 % interval", "unit", "known from", "what it is"].map(str::to_owned);
-    let mut rows = table::with_heads(&heads);
-    for column in rows.column_iter_mut().skip(3) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Left);
-    }
+    let heads = ["unknown", "value", "95 % interval", "unit", "known from", "what it is"];
+    let mut rows = table::with_heads(&heads).with_texts(3..6);
     for unknown in &found.unknowns {
         rows.add_row([
             unknown.name.to_owned(),

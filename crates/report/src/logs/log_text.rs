@@ -1,7 +1,6 @@
 //! The content of a log as a table, and a suggested channel map.
 
-use crate::formatting::table;
-use comfy_table::CellAlignment;
+use crate::formatting::table::{TextTable, with_heads};
 use mapper_recording::logs::proposal::{Ambient, Certainty, Proposal};
 use mapper_recording::logs::{Layout, Survey, sparkline};
 use std::fmt::Write;
@@ -49,18 +48,15 @@ pub fn log_text(format: &str, layout: &Layout, survey: &Survey, proposal: &Propo
     text
 }
 
-fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> comfy_table::Table {
+fn columns(layout: &Layout, survey: &Survey, proposal: &Proposal) -> TextTable {
     let several = layout.groups.len() > 1;
-    let mut head = vec!["column", "unit", "least", "largest", "empty", "trace", "channel"];
+    let mut head = vec!["column", "unit", "min", "max", "empty", "trace", "channel"];
     if several {
         head.insert(0, "group");
     }
-    let mut table = table::with_heads(&head.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
-    for (column, name) in table.column_iter_mut().zip(&head) {
-        if ["unit", "trace", "channel", "column"].contains(name) {
-            column.set_cell_alignment(CellAlignment::Left);
-        }
-    }
+    let texts =
+        (0..head.len()).filter(|place| ["unit", "trace", "channel", "column"].contains(&head[*place]));
+    let mut table = with_heads(&head).with_texts(texts);
     for (index, (column, data)) in layout.columns.iter().zip(&survey.columns).enumerate() {
         let is_ambient =
             matches!(&proposal.ambient, Some(Ambient::Column { column, .. }) if *column == index);

@@ -35,12 +35,8 @@ pub fn transient_text(outcome: &DrivenOutcome) -> String {
         );
     }
     text.push('\n');
-    let heads =
-        ["parameter", "value", "95 % interval", "unit", "known from", "what it is"].map(str::to_owned);
-    let mut rows = table::with_heads(&heads);
-    for column in rows.column_iter_mut().skip(3) {
-        column.set_cell_alignment(comfy_table::CellAlignment::Left);
-    }
+    let heads = ["parameter", "value", "95 % interval", "unit", "known from", "what it is"];
+    let mut rows = table::with_heads(&heads).with_texts(3..6);
     for found in &outcome.parameters {
         let parameter = &found.parameter;
         rows.add_row([

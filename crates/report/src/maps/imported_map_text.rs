@@ -10,7 +10,7 @@ pub fn imported_map_text(found: &ImportedMap) -> String {
     let mut text = String::new();
     text.push_str(&columns_text(&found.columns, "rpm, kg/s, Pa, K and as fractions"));
     let heads = ["corrected rpm", "points", "flow kg/s", "pressure ratio", "efficiency %"];
-    let mut lines = table::with_heads(&heads.map(str::to_owned));
+    let mut lines = table::with_heads(&heads);
     for line in &map.lines {
         let range = |value: fn(&MapPoint) -> Option<f64>, factor: f64, digits: usize| {
             let values = line.points.iter().filter_map(value);
@@ -46,7 +46,7 @@ pub(crate) fn columns_text(columns: &[ImportedColumn], units: &str) -> String {
     if columns.is_empty() {
         return String::new();
     }
-    let mut rows = table::with_heads(&["heading", "quantity", "unit", "from", "to"].map(str::to_owned));
+    let mut rows = table::with_heads(&["heading", "quantity", "unit", "from", "to"]);
     for column in columns {
         rows.add_row(vec![
             column.heading.clone(),

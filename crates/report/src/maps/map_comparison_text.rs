@@ -20,7 +20,7 @@ pub fn map_comparison_text(comparison: &MapComparison) -> String {
         "line differs %",
         "eta differs %",
     ];
-    let mut table = table::with_heads(&heads.map(str::to_owned));
+    let mut table = table::with_heads(&heads);
     for line in &comparison.lines {
         let mean = |value: fn(&ComparedPlace) -> f64| mean(line, value);
         let share = |differs: fn(&ComparedPlace) -> bool| {

@@ -18,7 +18,7 @@ pub fn map_fit_text(map: &CompressorMap, fitted: &FittedMap) -> String {
         "eta points",
         "",
     ];
-    let mut table = table::with_heads(&heads.map(str::to_owned));
+    let mut table = table::with_heads(&heads);
     for line in &fitted.lines {
         let left_out = fitted.left_out.iter().find(|l| l.speed_corrected_rpm == line.speed_corrected_rpm);
         // If the line is supported at all, its best efficiency is supported too.

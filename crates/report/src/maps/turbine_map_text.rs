@@ -12,7 +12,7 @@ pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
     let mut text =
         columns_text(&found.columns, "rpm or rpm/K^0.5, kg/s or kg K^0.5/(s kPa), and as fractions");
     let heads = ["vanes", "rpm/K^0.5", "points", "flow kg K^0.5/(s kPa)", "expansion ratio", "efficiency %"];
-    let mut lines = table::with_heads(&heads.map(str::to_owned));
+    let mut lines = table::with_heads(&heads);
     for line in found.map.lines() {
         let range = |value: fn(&TurbineMapPoint) -> Option<f64>, factor: f64, digits: usize| {
             let values = line.iter().filter_map(value);
@@ -43,7 +43,7 @@ pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
 /// A row for each line and the error at lines that the fit does not know.
 pub fn turbine_fit_text(map: &TurbineMap, fitted: &FittedTurbine) -> String {
     let heads = ["vanes", "rpm/K^0.5", "expansion ratio", "flow", "+/- %", "best efficiency %", "+/- points"];
-    let mut rows = table::with_heads(&heads.map(str::to_owned));
+    let mut rows = table::with_heads(&heads);
     for line in &fitted.lines {
         let measured = || line.nodes.iter().filter(|node| !node.extrapolated);
         let Some((first, last)) = measured().next().zip(measured().next_back()) else { continue };
@@ -78,7 +78,7 @@ pub fn turbine_fit_text(map: &TurbineMap, fitted: &FittedTurbine) -> String {
 /// Sentences on the differences between two maps.
 pub fn turbine_comparison_text(comparison: &TurbineComparison) -> String {
     let percent = |value: Option<f64>| number(value.map(|value| 100.0 * value), 2);
-    let mut rows = table::with_heads(&["", "mean", "rms", "differs at % of points"].map(str::to_owned));
+    let mut rows = table::with_heads(&["", "mean", "rms", "differs at % of points"]);
     for (name, mean, rms, share) in [
         (
             "flow %",

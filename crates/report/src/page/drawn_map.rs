@@ -2,9 +2,9 @@
 
 use crate::Display;
 use mapper_campaign::units::Kind;
+use mapper_chart::efficiency_mesh::{contour_levels, efficiency_surface, fitted_surface, speed_curve};
 use mapper_chart::{StructuredGrid, contour_lines};
 use mapper_core::{CompressorMap, FittedNode, half_width_95};
-use mapper_maps::mesh::{contour_levels, efficiency_surface, fitted_surface, speed_curve};
 use serde::Serialize;
 
 /// The map without its points.
@@ -74,7 +74,7 @@ pub(crate) fn drawn_map(map: &CompressorMap, display: &Display) -> DrawnMap {
                 .lines
                 .iter()
                 .map(|line| DrawnLine {
-                    speed: display.speed(line.speed_corrected_rpm),
+                    speed: display.line_name(line.speed_corrected_rpm),
                     measured: line.measured,
                     nodes: line.nodes.iter().map(node).collect(),
                 })
@@ -89,7 +89,7 @@ pub(crate) fn drawn_map(map: &CompressorMap, display: &Display) -> DrawnMap {
                 .lines
                 .iter()
                 .map(|line| DrawnLine {
-                    speed: display.speed(line.speed_corrected_rpm),
+                    speed: display.line_name(line.speed_corrected_rpm),
                     measured: true,
                     nodes: speed_curve(map, line)
                         .into_iter()

@@ -65,7 +65,7 @@ pub(crate) fn drawn_points(page: &RunPage<'_>, display: &Display) -> Vec<DrawnPo
         .map(|point| {
             let rounded = line_of(point.step).unwrap_or(point.speed_corrected_rpm);
             let two = page.report.two_parameter.iter().find(|two| two.step == point.step);
-            let drawn = drawn_point(point, display.speed(rounded), two, display);
+            let drawn = drawn_point(point, display.line_name(rounded), two, display);
             DrawnPoint { raw: raw(page, point.step, display), ..drawn }
         })
         .collect()

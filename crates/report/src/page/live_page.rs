@@ -64,7 +64,7 @@ pub fn live_page() -> Result<String, serde_json::Error> {
 /// A single identified point, on the line of its target.
 pub fn live_point(point: &IdentifiedPoint, display: &Display) -> LivePoint {
     let speed_rpm = point.target.map_or(point.speed_rpm, |target| target.speed_rpm);
-    LivePoint(drawn_point(point, display.speed(speed_rpm), None, display))
+    LivePoint(drawn_point(point, display.line_name(speed_rpm), None, display))
 }
 
 /// The map of the points so far: contours between lines that have two points each, by the mesh of the finished map. Empty

@@ -18,6 +18,8 @@ const LIVE: &str = include_str!("../../assets/live.js");
 pub(crate) enum Purpose {
     /// To keep: it works from disk and makes no requests.
     Kept,
+    /// To keep, without a script: its pictures are in it.
+    Still,
     /// To watch a run: it makes requests only to the program that served it.
     Live,
 }
@@ -26,22 +28,25 @@ impl Purpose {
     /// Parts of the page's own script, in order.
     fn scripts(self) -> &'static [&'static str] {
         match self {
-            Purpose::Kept => &[COMMON, MAP, STEPS, TABLES],
-            Purpose::Live => &[COMMON, MAP, LIVE],
+            Purpose::Kept => &[D3, PLOT, COMMON, MAP, STEPS, TABLES],
+            Purpose::Still => &[],
+            Purpose::Live => &[D3, PLOT, COMMON, MAP, LIVE],
         }
     }
 
     fn policy(self) -> String {
         match self {
-            Purpose::Kept => POLICY.to_owned(),
-            Purpose::Live => format!("{POLICY}; connect-src 'self'"),
+            Purpose::Still => format!("{POLICY}; script-src 'none'"),
+            Purpose::Kept => format!("{POLICY}; {OWN_SCRIPT}"),
+            Purpose::Live => format!("{POLICY}; {OWN_SCRIPT}; connect-src 'self'"),
         }
     }
 }
 
 /// No requests in or out.
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; \
-                      base-uri 'none'; form-action 'none'";
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+const OWN_SCRIPT: &str = "script-src 'unsafe-inline'";
 
 /// The complete page; `footer` is printed on each sheet, `data` is the input of its script.
 pub(crate) fn shell(
@@ -64,10 +69,10 @@ pub(crate) fn shell(
             }
             body {
                 (body)
-                script type="application/json" id="data" { (PreEscaped(json_in_html(data)?)) }
-                @for script in [D3, PLOT].iter().chain(purpose.scripts()) {
-                    script { (PreEscaped(script)) }
+                @if purpose != Purpose::Still {
+                    script type="application/json" id="data" { (PreEscaped(json_in_html(data)?)) }
                 }
+                @for script in purpose.scripts() { script { (PreEscaped(script)) } }
             }
         }
     };

@@ -32,25 +32,29 @@ pub(crate) struct Row {
     pub(crate) cells: Vec<Cell>,
 }
 
+/// A table that may be wider than the screen: it scrolls separately, by keyboard too.
+pub(crate) fn scrolling(name: &str, table: &Markup) -> Markup {
+    html! { div.scroll tabindex="0" role="region" aria-label=(name) { (table) } }
+}
+
 /// A table of data with a caption. The page's script makes it sortable and adds a copy button.
 pub(crate) fn data_table(caption: &str, heads: &[String], rows: &[Row]) -> Markup {
-    html! {
-        div.scroll tabindex="0" role="region" aria-label=(caption) {
-            table.data {
-                caption { (caption) }
-                thead { tr { @for head in heads { th scope="col" { (head) } } } }
-                tbody {
-                    @for row in rows {
-                        tr data-step=[row.step.map(mapper_core::step_number)] {
-                            @for cell in &row.cells {
-                                td data-sort=[cell.sorted_by] class=[cell.class] { (cell.text) }
-                            }
+    let table = html! {
+        table.data {
+            caption { (caption) }
+            thead { tr { @for head in heads { th scope="col" { (head) } } } }
+            tbody {
+                @for row in rows {
+                    tr data-step=[row.step.map(mapper_core::step_number)] {
+                        @for cell in &row.cells {
+                            td data-sort=[cell.sorted_by] class=[cell.class] { (cell.text) }
                         }
                     }
                 }
             }
         }
-    }
+    };
+    scrolling(caption, &table)
 }
 
 /// A table whose first two columns are text; sortable like the others.
@@ -59,15 +63,14 @@ pub(crate) fn words_table<const COLUMNS: usize>(
     heads: &[&str; COLUMNS],
     rows: &[[String; COLUMNS]],
 ) -> Markup {
-    html! {
-        div.scroll tabindex="0" role="region" aria-label=(caption) {
-            table.data.words {
-                caption { (caption) }
-                thead { tr { @for head in heads { th scope="col" { (head) } } } }
-                tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
-            }
+    let table = html! {
+        table.data.words {
+            caption { (caption) }
+            thead { tr { @for head in heads { th scope="col" { (head) } } } }
+            tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
         }
-    }
+    };
+    scrolling(caption, &table)
 }
 
 /// A table of names and values, one row each.

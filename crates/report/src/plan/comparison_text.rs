@@ -31,7 +31,7 @@ pub fn comparison_json(plan: &Plan, others: &[Plan]) -> Value {
 /// For people, in 80 columns.
 pub fn comparison_text(plan: &Plan, others: &[Plan]) -> String {
     let mut rows = table::with_heads(
-        &["order", "steps min", "total K", "least K", "rms pts", "worst pts", "undeclared pts"]
+        &["order", "steps min", "total K", "min K", "rms pts", "worst pts", "undeclared pts"]
             .map(str::to_owned),
     );
     for plan in std::iter::once(plan).chain(others) {
@@ -47,7 +47,7 @@ pub fn comparison_text(plan: &Plan, others: &[Plan]) -> String {
         ]);
     }
     let legend = format!(
-        "total, least: sum and minimum of the thermal gradients. rms, worst: expected error of the efficiency over the points, one sigma, if the machine is as \
+        "total, min: sum and minimum of the thermal gradients. rms, worst: expected error of the efficiency over the points, one sigma, if the machine is as \
          declared; undeclared: rms if alpha_A, probe and heating/cooling ratio have to be found. \
          conventional: each point until T2 and housing drift by less than {STABLE_DRIFT_K_MIN} K/min; its error is heat transfer."
     );

@@ -27,9 +27,6 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
         "settles s".to_owned(),
         "ends".to_owned(),
     ]);
-    for column in steps.column_iter_mut() {
-        column.set_padding((0, 1));
-    }
     // The machine soaks before the plan begins.
     let soak_s = campaign.zero.map_or(0.0, |zero| zero.duration_s);
     for step in &plan.steps {
@@ -52,7 +49,7 @@ pub fn plan_text(campaign: &Campaign, plan: &Plan) -> String {
 }
 
 /// The mark of a step that is not a point of the grid.
-fn mark(kind: StepKind) -> &'static str {
+pub(crate) fn mark(kind: StepKind) -> &'static str {
     match kind {
         StepKind::Point => "",
         StepKind::Repeat => "r",
@@ -61,18 +58,20 @@ fn mark(kind: StepKind) -> &'static str {
     }
 }
 
-fn legend(plan: &Plan) -> String {
+/// The meaning of the marks of these steps; empty without any.
+pub(crate) fn marks_legend(kinds: &[StepKind]) -> String {
     let marks = [
         (StepKind::Repeat, "r repeats a jump to show drift"),
         (StepKind::Return, "a visits the first point again"),
         (StepKind::Approach, "s approaches surge"),
     ];
-    let marked: Vec<&str> = marks
-        .into_iter()
-        .filter(|(kind, _)| plan.steps.iter().any(|step| step.kind == *kind))
-        .map(|(_, text)| text)
-        .collect();
-    let marked = if marked.is_empty() { String::new() } else { format!("step: {}. ", marked.join(", ")) };
+    let marked: Vec<&str> =
+        marks.into_iter().filter(|(kind, _)| kinds.contains(kind)).map(|(_, text)| text).collect();
+    if marked.is_empty() { String::new() } else { format!("step: {}. ", marked.join(", ")) }
+}
+
+fn legend(plan: &Plan) -> String {
+    let marked = marks_legend(&plan.steps.iter().map(|step| step.kind).collect::<Vec<_>>());
     let text = format!(
         "{marked}valve: opening of the back-pressure valve. P3: turbine inlet pressure. m_c, PR, T2: at the end of the step. dTc: change of the compressor \
          housing's temperature in the window, the thermal gradient. +/-: expected error of the efficiency, points, one sigma. settles: after the jump. ends: after \
@@ -101,7 +100,7 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> String {
         ("plan", format!("{}, {} by {}", plan.campaign, steps(&plan.steps), plan.objective)),
         ("rig time", format!("{} ({})", duration(soak_s + plan.duration_s()), parts.join(", "))),
         ("total gradient", total_gradient(plan)),
-        ("least gradient", format!("{} K{}", number(figures.min_gradient_k, 1), least_bound(plan))),
+        ("min gradient", format!("{} K{}", number(figures.min_gradient_k, 1), least_bound(plan))),
     ];
     let declared = figures.rms_error_eta.map(|error| {
         format!(

@@ -3,7 +3,7 @@
 use crate::formatting::display::Display;
 use crate::formatting::number::{number, percent};
 use crate::formatting::paint::{Paint, paint_verdict};
-use crate::formatting::table::with_heads;
+use crate::formatting::table::{COLUMNS, with_heads};
 use crate::formatting::wrapped::wrapped;
 use crate::point_results::point_warnings::{Doubt, doubts};
 use crate::point_results::points::opening;
@@ -12,9 +12,6 @@ use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{CompressorMap, IdentifiedPoint, SpeedLine, Verdict, step_number};
 use mapper_numerics::statistics::mean;
 use mapper_recording::score::ScoredPoint;
-
-/// Default width of a terminal, columns.
-const COLUMNS: usize = 80;
 
 /// The points of the map by speed line from surge to choke, followed by the points outside it; without repeats, which serve only
 /// for comparison. With their true efficiency if `truth` is set and it is known.
@@ -58,7 +55,7 @@ pub fn points_by_line_text(
             points.iter().filter(|scored| steps.contains(&scored.point.step)).collect();
         own.sort_by(|a, b| a.point.flow_corrected_kg_s.total_cmp(&b.point.flow_corrected_kg_s));
         for (index, scored) in own.into_iter().enumerate() {
-            let name = if index == 0 { display.speed(speed_rpm) } else { String::new() };
+            let name = if index == 0 { display.line_name(speed_rpm) } else { String::new() };
             add(name, scored);
             on_a_line.push(scored.point.step);
         }
@@ -86,7 +83,6 @@ pub fn points_by_line_text(
         display.units().flow
     );
     for (index, line) in rendered.lines().enumerate() {
-        let line = line.strip_prefix(' ').unwrap_or(line).trim_end();
         text.push_str(line);
         // A good point needs no remark.
         match index.checked_sub(1).and_then(|row| verdicts.get(row)) {

@@ -49,7 +49,7 @@ pub fn point_groups<'a>(
             let mut points: Vec<&IdentifiedPoint> =
                 line.points.iter().map(|point| &point.identified).collect();
             points.sort_by(|a, b| a.flow_corrected_kg_s.total_cmp(&b.flow_corrected_kg_s));
-            let speed = display.speed(line.speed_corrected_rpm);
+            let speed = display.line_name(line.speed_corrected_rpm);
             PointGroup { caption: format!("{speed} {} corrected", display.units().speed), points }
         })
         .collect();

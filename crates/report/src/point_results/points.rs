@@ -2,7 +2,9 @@
 
 use crate::formatting::display::Display;
 use crate::formatting::number::{number, percent};
-use crate::formatting::table;
+use crate::formatting::table::{self, COLUMNS};
+use crate::formatting::wrapped::wrapped;
+use crate::plan::plan_text::{mark, marks_legend};
 use crate::point_results::point_warnings::doubts;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{IdentifiedPoint, StepKind, Verdict, step_number};
@@ -12,7 +14,13 @@ use std::fmt::Write;
 /// Identified points as a table with their warnings below; deviations from the truth if it is known.
 /// `truth`: whether to show the latter.
 pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> String {
-    let mut text = format!("{}\n\n", points_table(points, units, truth));
+    let kinds: Vec<StepKind> = points.iter().map(|scored| scored.point.kind).collect();
+    let legend = wrapped(
+        &format!("{}+/-: half a 95 % interval. dT2: change of T2 in the window.", marks_legend(&kinds)),
+        COLUMNS,
+        0,
+    );
+    let mut text = format!("{}\n\n{legend}\n", points_table(points, units, truth));
     let doubted = points.iter().map(|scored| &scored.point).filter(|point| point.verdict != Verdict::Good);
     for doubt in doubts(doubted) {
         let _ = writeln!(text, "{}: {}", doubt.steps(), doubt.message);
@@ -69,7 +77,7 @@ pub fn opening(ratio: f64) -> String {
     if ratio.is_finite() { ((1e3 * ratio).round() / 1e3).to_string() } else { "-".to_owned() }
 }
 
-fn points_table(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> comfy_table::Table {
+fn points_table(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> table::TextTable {
     let display = Display::new(units);
     let with_truth = truth && points.iter().any(|scored| scored.truth.is_some());
     let mut heads = vec![
@@ -93,7 +101,7 @@ fn points_table(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) -> co
     for ScoredPoint { point, truth } in points {
         let half = |low: Option<f64>, high: Option<f64>| Some(0.5 * (high? - low?));
         let mut row = vec![
-            step_name(point),
+            format!("{}{}", step_number(point.step), mark(point.kind)),
             display.speed(point.speed_rpm),
             opening(point.valve_opening_ratio),
             display.flow(point.flow_corrected_kg_s),

@@ -7,7 +7,7 @@ use mapper_core::{Channel, Recording};
 use mapper_numerics::statistics::mean;
 
 /// Columns of [`condition_rows`].
-pub const CONDITION_HEADS: [&str; 6] = ["condition", "declared", "mean", "lowest", "highest", "unit"];
+pub const CONDITION_HEADS: [&str; 6] = ["condition", "declared", "mean", "min", "max", "unit"];
 
 /// A row for each condition with readings: name, declared value, and mean, minimum and maximum of its readings at the ends of the steps.
 pub fn condition_rows(

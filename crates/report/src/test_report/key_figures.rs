@@ -18,30 +18,45 @@ pub fn key_figures(
     let display = crate::Display::new(&units);
     let on_map: usize = map.lines.iter().map(|line| line.points.len()).sum();
     let speeds = || map.lines.iter().map(|line| line.speed_corrected_rpm);
-    let slowest = display.speed(speeds().fold(f64::INFINITY, f64::min));
-    let fastest = display.speed(speeds().fold(f64::NEG_INFINITY, f64::max));
+    let slowest = display.line_name(speeds().fold(f64::INFINITY, f64::min));
+    let fastest = display.line_name(speeds().fold(f64::NEG_INFINITY, f64::max));
+    let measured = map.lines.iter().flat_map(|line| &line.points);
+    let highest = measured.map(|point| point.pressure_ratio).fold(f64::NEG_INFINITY, f64::max);
     let mut words = match map.lines.len() {
         0 => return None,
-        1 => format!("{on_map} points at {fastest} {} (corrected)", units.speed),
+        1 => format!("The map has {on_map} points at {fastest} {} (corrected)", units.speed),
         lines => {
             format!(
-                "{on_map} points on {lines} speed lines from {slowest} to {fastest} {} (corrected)",
+                "The map has {on_map} points on {lines} speed lines from {slowest} to {fastest} {} (corrected)",
                 units.speed
             )
         }
     };
+    words.push_str(&format!(", with pressure ratios up to {highest:.2}."));
     match all.saturating_sub(on_map) {
         0 => {}
-        1 => words.push_str(", one more visit to compare"),
-        more => words.push_str(&format!(", {more} more visits to compare")),
+        1 => words.push_str(" One more point was measured to show drift."),
+        more => words.push_str(&format!(" {more} more points were measured to show drift.")),
     }
-    words.push('.');
+    let usable = |point: &&IdentifiedPoint| point.verdict != Verdict::Unusable;
+    let best = points.iter().map(|scored| &scored.point).filter(usable);
+    if let Some((best, eta)) =
+        best.filter_map(|point| Some((point, point.eta?))).max_by(|a, b| a.1.total_cmp(&b.1))
+    {
+        words.push_str(&format!(
+            " The best efficiency is {:.1} %, at {} {} and a pressure ratio of {:.2}.",
+            100.0 * eta,
+            display.line_name(best.speed_corrected_rpm),
+            units.speed,
+            best.pressure_ratio
+        ));
+    }
     if let Some(sure) = certainty(points.iter().map(|scored| &scored.point)) {
         words.push_str(&sure);
     }
     if let Some(plan) = plan {
         let rest_s = campaign.and_then(|campaign| campaign.zero).map_or(0.0, |zero| zero.duration_s);
-        words.push_str(&format!(" Planned for {}", duration(rest_s + plan.duration_s())));
+        words.push_str(&format!(" The test was planned for {}", duration(rest_s + plan.duration_s())));
         if rest_s > 0.0 {
             words.push_str(&format!(", {} of it at rest", duration(rest_s)));
         }
@@ -58,6 +73,6 @@ fn certainty<'a>(points: impl Iterator<Item = &'a IdentifiedPoint>) -> Option<St
     let middle = median(halves.iter().copied())?;
     let widest = halves.iter().copied().fold(0.0, f64::max);
     Some(format!(
-        " Efficiency is known within +/- {middle:.2} points (95 %) at half of the usable points, within +/- {widest:.2} at all of them."
+        " Its efficiencies are known within +/- {middle:.1} points (95 %) at half of the usable points, within +/- {widest:.1} at all of them."
     ))
 }

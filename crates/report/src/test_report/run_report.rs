@@ -135,7 +135,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
     let units = campaign.map(|campaign| campaign.display.clone()).unwrap_or_default();
     let display = Display::new(&units);
     // Writing to a String cannot fail, here and below.
-    let mut text = format!("# Compressor map of {machine}\n\n");
+    let mut text = format!("# Compressor map of {machine}\n\n{}\n", facts(&cover_facts(report)));
     if let Some(disagreement) = disagreement_text(points, two_parameter, &units) {
         let _ = writeln!(text, "**{}**\n", disagreement.trim_end());
     }
@@ -237,10 +237,35 @@ fn facts(rows: &[(&'static str, String)]) -> String {
     markdown::table(&["", ""], Align::Left, rows)
 }
 
-/// Who tested what, where and when, and the declared conditions of rig and cell: name and value in words.
+/// For whom which machine was tested, where, when and by whom: name and value in words.
+pub fn cover_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
+    let Some(campaign) = report.campaign else {
+        return vec![("machine", report.machine.to_owned()), ("tested", stated(report.tested_at))];
+    };
+    let declared = &campaign.report;
+    let optional = |name, value: &Option<String>| value.clone().map(|value| (name, value));
+    let mut rows: Vec<(&str, String)> = Vec::new();
+    rows.extend(optional("customer", &declared.customer));
+    rows.extend(optional("report number", &declared.number));
+    rows.extend([
+        ("machine", campaign.machine.name.clone()),
+        ("serial number", stated(campaign.machine.serial_number.as_deref())),
+        ("tested", stated(report.tested_at)),
+        ("test cell", stated(declared.test_cell.as_deref())),
+        ("operator", stated(declared.operator.as_deref())),
+    ]);
+    rows.extend(optional("checked by", &declared.checked_by));
+    rows.extend(optional("approved by", &declared.approved_by));
+    rows
+}
+
+fn stated(value: Option<&str>) -> String {
+    value.unwrap_or("not stated").to_owned()
+}
+
+/// The declared conditions of rig and cell: name and value in words.
 pub fn condition_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
-    let mut rows = vec![("tested", report.tested_at.unwrap_or("not stated").to_owned())];
-    rows.extend(report.campaign.map(campaign_rows).unwrap_or_default());
+    let mut rows = report.campaign.map(campaign_rows).unwrap_or_default();
     if report.score.is_some()
         && let Some((_, rig)) = rows.iter_mut().find(|(what, _)| *what == "rig")
     {
@@ -278,12 +303,8 @@ pub fn provenance_facts(report: &RunReport<'_>) -> Vec<(&'static str, String)> {
 
 fn campaign_rows(campaign: &Campaign) -> Vec<(&'static str, String)> {
     let (display, report) = (Display::new(&campaign.display), &campaign.report);
-    let missing = || "not stated".to_owned();
+    let missing = || stated(None);
     let mut rows = vec![
-        ("machine", campaign.machine.name.clone()),
-        ("serial number", campaign.machine.serial_number.clone().unwrap_or_else(missing)),
-        ("operator", report.operator.clone().unwrap_or_else(missing)),
-        ("test cell", report.test_cell.clone().unwrap_or_else(missing)),
         ("rig", campaign.backend.name.clone()),
         (
             "barometer",

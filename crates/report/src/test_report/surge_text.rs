@@ -3,14 +3,11 @@
 use crate::formatting::display::Display;
 use crate::formatting::markdown::{self, Align};
 use crate::formatting::number::{number, percent};
-use crate::formatting::table::with_heads;
+use crate::formatting::table::{COLUMNS, with_heads};
 use crate::formatting::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{SurgeFoundBy, SurgeMark, half_width_95};
 use mapper_recording::score::ScoredMark;
-
-/// Default width of a terminal, columns.
-const COLUMNS: usize = 80;
 
 /// Marks of a search for surge, lines without a mark, and the number of surge events; Markdown.
 pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units: &DisplayUnits) -> String {
@@ -71,14 +68,9 @@ pub fn surge_columns_text(
     for row in surge_rows(marks, &display) {
         table.add_row(row);
     }
-    let lines: String = table
-        .to_string()
-        .lines()
-        .map(|line| format!("{}\n", line.strip_prefix(' ').unwrap_or(line).trim_end()))
-        .collect();
     let words = "Surge-side ends that were sought: corrected speed and flow, half widths of 95 % intervals, how far above it the \
                  nearest point was, openings that were tried.";
-    let mut text = format!("{}\n{lines}\n", wrapped(words, COLUMNS, 0));
+    let mut text = format!("{}\n{table}\n\n", wrapped(words, COLUMNS, 0));
     if with_truth(marks) {
         text.push_str("off: from the simulator's truth.\n");
     }

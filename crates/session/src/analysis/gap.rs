@@ -33,6 +33,7 @@ use mapper_observe::{Declared, FusedChannel};
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
+use mapper_report::page::gap_page;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::slice;
@@ -66,6 +67,14 @@ impl Gap {
             value["sensors"] = json!(self.sensors);
         }
         Ok(value)
+    }
+
+    /// The page of the diagnosis. `recording`: the name of what was diagnosed.
+    ///
+    /// # Errors
+    /// [`SessionError::Json`]: none in practice.
+    pub fn page(&self, machine: &str, recording: &str) -> Result<String, SessionError> {
+        Ok(gap_page(machine, recording, &self.diagnosed)?)
     }
 }
 

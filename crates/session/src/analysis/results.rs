@@ -17,10 +17,8 @@ use mapper_maps::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_observe::FusedChannel;
 use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
-use mapper_report::page::{OtherRun, RunPage, run_page};
-use mapper_report::{
-    Display, PointsOrigin, ReportSource, RunReport, SurgeReport, gap_part, instant, run_report,
-};
+use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
+use mapper_report::{Display, PointsOrigin, ReportSource, RunReport, SurgeReport, instant, run_report};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};

@@ -10,8 +10,9 @@ use std::ops::Range;
 /// Longest source line that is shown, bytes.
 const LINE_LIMIT: usize = 400;
 
-/// Width to which messages are wrapped, characters.
-const WIDTH: usize = 100;
+/// Width to which messages are wrapped, characters: 80 with the margin of their level.
+const WIDTH: usize = 68;
+const MARGIN: usize = 12;
 
 impl Findings {
     /// All findings, each with its place in the file; `colours` only for a terminal.
@@ -19,7 +20,7 @@ impl Findings {
         // ASCII characters in both: the carets are carets, and logs stay legible.
         let renderer = if colours { Renderer::styled() } else { Renderer::plain() }
             .decor_style(DecorStyle::Ascii)
-            .term_width(WIDTH + 10);
+            .term_width(WIDTH + MARGIN);
         let name = harmless(&self.source.origin.display().to_string());
         let mut out = String::new();
         for finding in &self.list {

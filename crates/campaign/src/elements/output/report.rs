@@ -17,6 +17,14 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Report {
+    /// Customer of the test, for the head of the report.
+    pub customer: Option<String>,
+    /// Number of the report.
+    pub number: Option<String>,
+    /// Who checked the report.
+    pub checked_by: Option<String>,
+    /// Who approved the report, with the date if it has one.
+    pub approved_by: Option<String>,
     /// Operator of the test.
     pub operator: Option<String>,
     /// Place of the test.

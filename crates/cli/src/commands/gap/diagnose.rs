@@ -10,7 +10,7 @@ use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::Diagnosed;
 use mapper_diagnose::gap::joint::over_recordings;
 use mapper_diagnose::gap::findings::report::Law;
-use mapper_report::{gap_page, gap_text, headline, recordings_text, sensors_text, zero_text};
+use mapper_report::{gap_text, headline, recordings_text, sensors_text, zero_text};
 use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -80,7 +80,8 @@ impl Diagnose {
         if let [(title, gap)] = &mut gaps[..] {
             self.write_laws(&mut gap.diagnosed.diagnosis.laws)?;
             if let Some(file) = &self.html {
-                self.replace.write(file, gap_page(title, &gap.diagnosed).as_bytes())?;
+                let page = gap.page(&campaign.machine.name, title)?;
+                self.replace.write(file, page.as_bytes())?;
             }
         }
         if let [(_, gap)] = &gaps[..] {

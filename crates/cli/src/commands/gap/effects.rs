@@ -37,7 +37,7 @@ impl Effects {
             return standard_output::print_json(&json!({ "effects": list }));
         }
         let heads = ["effect", "where", "parameter", "unit", "neutral", "range"];
-        let mut table = with_heads(&heads.map(str::to_owned));
+        let mut table = with_heads(&heads);
         let mut legend = String::new();
         for effect in &effects {
             let info = effect.info();

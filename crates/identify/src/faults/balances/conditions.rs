@@ -3,7 +3,7 @@
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, Readings};
-use crate::nominal_rig::NominalRig;
+use crate::faults::nominal_rig::NominalRig;
 use crate::objections::ends::LAST_S;
 use mapper_core::{Channel, ModelTolerances, Recording, StepMarker};
 use mapper_numerics::statistics::median;

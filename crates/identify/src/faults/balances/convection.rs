@@ -8,7 +8,7 @@ use crate::IdentifyConfig;
 use crate::faults::balance_rows::{Machine, Rows, common, own};
 use crate::faults::balances::efficiency::{FittedEfficiencies, compressed};
 use crate::faults::end_readings::{CHANNELS, Readings, TC};
-use crate::nominal_rig::NominalRig;
+use crate::faults::nominal_rig::NominalRig;
 use mapper_core::Channel;
 use mapper_physics::laws::nusselt;
 use mapper_physics::rig::sensor_fault::FaultKind;

@@ -6,9 +6,9 @@
 
 use crate::faults::balance_rows::{Machine, Rows, common, own};
 use crate::faults::end_readings::{PerChannel, Readings};
+use crate::faults::nominal_rig::NominalRig;
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
-use crate::nominal_rig::NominalRig;
 use mapper_core::{Channel, ReferenceState};
 use mapper_physics::laws::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
 use mapper_physics::rig::sensor_fault::FaultKind;

@@ -5,9 +5,9 @@
 
 use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
 use crate::faults::end_readings::{PerChannel, Readings};
+use crate::faults::nominal_rig::NominalRig;
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
-use crate::nominal_rig::NominalRig;
 use mapper_core::ReferenceState;
 use nalgebra::DVector;
 

@@ -5,7 +5,7 @@
 
 use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
 use crate::faults::end_readings::{PerChannel, Readings};
-use crate::nominal_rig::NominalRig;
+use crate::faults::nominal_rig::NominalRig;
 use mapper_physics::laws::orifice;
 use nalgebra::DMatrix;
 

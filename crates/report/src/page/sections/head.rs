@@ -3,19 +3,17 @@
 use crate::page::advice::{first_things, is_clean};
 use crate::page::prose::sentence;
 use crate::page::run_page::RunPage;
-use crate::{key_figures, verdict_sentence};
+use crate::{cover_facts, key_figures, verdict_sentence};
 use maud::{Markup, html};
 
 pub(crate) fn head(page: &RunPage<'_>) -> Markup {
     let report = page.report;
     let (clean, things) = (is_clean(page), first_things(report));
-    let serial = report.campaign.and_then(|campaign| campaign.machine.serial_number.clone());
     html! {
         header {
             h1 { "Compressor map of " (report.machine) }
+            dl.cover { @for (what, value) in cover_facts(report) { div { dt { (what) } dd { (value) } } } }
             p.under {
-                @if let Some(serial) = serial { "Serial number " (serial) ". " }
-                @if let Some(when) = report.tested_at { "Tested " (when) ". " }
                 @if report.score.is_some() { strong { "Simulated rig: nothing was measured on a real machine." } " " }
                 "Efficiency is isentropic, total to total (" (report.efficiency.description()) "); corrected to " (report.reference) "; method " (report.method) "."
             }
@@ -26,12 +24,12 @@ pub(crate) fn head(page: &RunPage<'_>) -> Markup {
                     p { "Nothing needs attention before the map is used." }
                 }
                 @if !things.is_empty() {
-                    p { "First:" }
+                    p { "Before the map is used:" }
                     ul { @for thing in &things { li { (sentence(thing)) } } }
                 }
             }
             nav aria-label="Sections" {
-                @for (to, name) in [("map", "Map"), ("step", "A point's transient"), ("conditions", "Conditions and instruments"), ("points", "Points"), ("plan", "Executed plan"),
+                @for (to, name) in [("map", "Map"), ("step", "Transient of a point"), ("conditions", "Conditions and instruments"), ("points", "Points"), ("plan", "Executed plan"),
                     ("gap", "Gap"), ("notes", "Notes"), ("provenance", "Provenance")] {
                     @if to != "gap" || page.gap.is_some() { a href=(format!("#{to}")) { (name) } }
                 }

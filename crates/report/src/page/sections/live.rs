@@ -41,8 +41,8 @@ pub(crate) fn live() -> Markup {
             }
             section aria-labelledby="map-head" {
                 h2 #map-head { "Map so far" }
-                p { "Rings are where points are expected; contours stand between lines that have two points each. Each point is identified by itself as soon as its step has ended, before the zero is \
-                     subtracted; at the end all are identified together, and the intervals shrink." }
+                p { "Rings: expected points. Each point is preliminary: it is identified by itself at the end of its step, before the zero is subtracted. At the end of the \
+                     run all points are identified together, with narrower intervals." }
                 fieldset.layers.screen {
                     legend { "Show" }
                     @for (name, words) in [("lines", "speed lines"), ("contours", "efficiency contours"), ("intervals", "95 % intervals"), ("repeats", "repeats")] {
@@ -63,7 +63,7 @@ pub(crate) fn live() -> Markup {
                 h2 #readings-head { "Readings and their limits" }
                 div.scroll tabindex="0" role="region" aria-label="Readings and their limits" {
                     table.data.words {
-                        thead { tr { @for head in ["channel", "reads", "unit", "state", "lowest", "highest", "what it is"] { th scope="col" { (head) } } } }
+                        thead { tr { @for head in ["channel", "reads", "unit", "state", "min", "max", "description"] { th scope="col" { (head) } } } }
                         tbody #readings {}
                     }
                 }

@@ -32,10 +32,10 @@ pub(crate) fn map(page: &RunPage<'_>) -> Markup {
             }
             (legend(page))
             div.plots {
-                figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Numbers: at lines corrected speed, " (units.speed) "; on contours efficiency, %." span.screen { " Ctrl and the wheel zoom, dragging moves; a click on a point shows its transient." } } }
-                figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals; numbers at lines: corrected speed, " (units.speed) "." } }
+                figure { div #map-plot {} figcaption { "Pressure ratio over corrected flow. Numbers at lines: corrected speed in " (units.speed) "; numbers on contours: efficiency in %." span.screen { " Zoom with Ctrl and the wheel, move by dragging; click a point to see its transient." } } }
+                figure { div #eta-plot {} figcaption { "Efficiency over corrected flow, with 95 % intervals. Numbers at lines: corrected speed in " (units.speed) "." } }
             }
-            noscript { p { "The drawings need the page's own script; the same map is next to this file as map.svg." } }
+            noscript { p { "The drawings need JavaScript; the same map is next to this file as map.svg." } }
         }
     }
 }
@@ -53,15 +53,15 @@ fn legend(page: &RunPage<'_>) -> Markup {
             @if has(Verdict::Unusable) {
                 li { svg aria-hidden="true" viewBox="0 0 12 12" { path.hollow d="M6 1 10 6 6 11 2 6Z" {} } "no usable efficiency" }
             }
-            @if is_sought { li { svg.bad aria-hidden="true" viewBox="0 0 12 12" { rect x="2" y="2" width="8" height="8" {} } "surge, sought, with its 95 % interval" } }
+            @if is_sought { li { svg.bad aria-hidden="true" viewBox="0 0 12 12" { rect x="2" y="2" width="8" height="8" {} } "measured surge, with its 95 % interval" } }
             @if is_fitted {
                 li {
                     svg.bad aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="6 3" {} }
-                    @if is_sought { "surge line" } @else { "end of the lines towards surge; surge itself was not sought" }
+                    @if is_sought { "surge line" } @else { "last points towards surge; surge itself was not measured" }
                 }
                 li { svg.doubt aria-hidden="true" viewBox="0 0 28 12" { path d="M0 6H28" stroke-dasharray="2 3" {} } "choke, fitted" }
             }
-            li.screen { svg.ring aria-hidden="true" viewBox="0 0 12 12" { circle cx="6" cy="6" r="4.5" {} } "the point whose transient is shown below" }
+            li.screen { svg.ring aria-hidden="true" viewBox="0 0 12 12" { circle cx="6" cy="6" r="4.5" {} } "point whose transient is shown below" }
         }
     }
 }

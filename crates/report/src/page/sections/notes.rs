@@ -22,7 +22,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             p { (prose(&report.origin.sentence())) }
             @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (prose(remark)) } } } }
             @if let Some(score) = report.score {
-                h3 { "Against the simulator's truth" }
+                h3 { "Comparison with the simulator's truth" }
                 (sentences(&score_text(score)))
             }
             @if let Some(words) = zero_words(report.zero) {
@@ -32,7 +32,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             }
             @if !report.repeats.is_empty() {
                 h3 { "Drift" }
-                p { "Repeats are kept out of the map. Fixed offsets cancel in what changes between them." }
+                p { "Repeats are not on the map. Fixed offsets of the sensors cancel in the change from one to the next." }
                 (sentences(&repeated_jumps_text(report.repeats, &display)))
             }
             @if let Some(surge) = report.surge {
@@ -40,10 +40,10 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
                 (surge_part(&surge, &display))
             }
             @if !report.sensors.is_empty() {
-                h3 { "Several sensors" }
+                h3 { "Channels with several sensors" }
                 ul { @for fused in report.sensors { li { (fused) } } }
             }
-            h3 { "Doubts and remarks" }
+            h3 { "Warnings and remarks" }
             @if warnings.is_empty() { p { "None." } }
             @else { ul { @for doubt in &warnings { li { (doubt.steps()) " (" (doubt.code) "): " (sentence(&doubt.message)) } } } }
             h3 { "Events" }
@@ -57,7 +57,7 @@ fn surge_part(surge: &SurgeReport<'_>, display: &Display) -> Markup {
     let cells = |row: Vec<String>| Row { step: None, cells: row.into_iter().map(Cell::text).collect() };
     let rows: Vec<Row> = surge_rows(surge.marks, display).into_iter().map(cells).collect();
     html! {
-        (data_table("Surge-side ends that were sought", &surge_heads(surge.marks, display), &rows))
+        (data_table("Measured surge", &surge_heads(surge.marks, display), &rows))
         @for remark in surge_remarks(surge.remarks, surge.surges) { p { (remark) } }
     }
 }

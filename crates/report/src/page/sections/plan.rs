@@ -11,7 +11,7 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
         return html! {
             section #plan aria-labelledby="plan-head" {
                 h2 #plan-head { "Executed plan" }
-                p { "Nobody planned this here: the steps are those that were found in the recording." }
+                p { "There is no plan: the steps were found in the recording." }
             }
         };
     };
@@ -24,25 +24,25 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
         "planned s".to_owned(),
         "dTc K".to_owned(),
         "sigma of eta expected, points".to_owned(),
-        "found, points".to_owned(),
+        "sigma of eta achieved, points".to_owned(),
     ];
     let rows: Vec<Row> = plan.steps.iter().map(|step| row(page, display, step)).collect();
-    let missing = plan.steps.iter().filter(|step| !flown(page, step)).count();
+    let missing = plan.steps.iter().filter(|step| !was_run(page, step)).count();
     html! {
         section #plan aria-labelledby="plan-head" {
             h2 #plan-head { "Executed plan" }
             p {
                 "Order " code { (plan.objective) } ", " (duration(plan.duration_s())) " planned"
-                @if missing > 0 { "; " (missing) " of " (plan.steps.len()) " steps were not flown" } "."
+                @if missing > 0 { "; " (missing) " of " (plan.steps.len()) " steps were not run" } "."
                 " The thermal gradient of a step, dTc, is the change of the housing temperature within the window that was used; sigma is one standard error."
             }
-            figure { div #plan-plot {} figcaption { "Jumps in their order; the first stand out most. Numbers are those of the steps; one that would stand on another is left out, the table has all." } }
+            figure { div #plan-plot {} figcaption { "The jumps in their order, the first ones darkest. The numbers are steps; the table has those without space here." } }
             (data_table("Steps", &heads, &rows))
         }
     }
 }
 
-fn flown(page: &RunPage<'_>, step: &PlanStep) -> bool {
+fn was_run(page: &RunPage<'_>, step: &PlanStep) -> bool {
     page.report.recording.steps.iter().any(|marker| marker.index == step.index)
 }
 

@@ -10,7 +10,7 @@ pub(crate) fn step(page: &RunPage<'_>) -> Markup {
         Display::new(&page.report.campaign.map(|campaign| campaign.display.clone()).unwrap_or_default());
     html! {
         section #step aria-labelledby="step-head" {
-            h2 #step-head { "A point's transient" }
+            h2 #step-head { "Transient of a point" }
             p.screen {
                 label for="step-choice" { "Step " }
                 select #step-choice {

@@ -11,8 +11,8 @@
 //! than two places on the map take no part. Points closer than 1 % of the map's diagonal (repeats) count as one, their
 //! mean.
 
-use crate::mesh::monotone::Monotone;
-use mapper_chart::StructuredGrid;
+use super::monotone::Monotone;
+use crate::StructuredGrid;
 use mapper_core::{CompressorMap, MapPoint, SpeedLine};
 
 /// Nodes along a line.

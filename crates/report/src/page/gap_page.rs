@@ -1,68 +1,36 @@
 //! A diagnosis as a page with pictures: one self-contained HTML file.
 
-use crate::diagnosis::gap_text::{gap_text, headline, named};
-use crate::formatting::number::four_figures;
+use crate::page::prose::sentence;
+use crate::page::shell::{Purpose, shell};
+use crate::page::table::scrolling;
+use crate::{NOTHING, OUTSIDE, four_figures, gap_text, headline, named, next_measurement, stand_actions};
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
-use mapper_core::Channel;
+use mapper_core::{Channel, probability_text, step_number};
 use mapper_diagnose::gap::diagnose::Diagnosed;
+use mapper_diagnose::gap::findings::report::Verdict;
 use mapper_diagnose::gap::residuals::nuisance::OUTPUTS;
 use mapper_diagnose::gap::residuals::study::Study;
 use mapper_numerics::statistics::mean;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
-const STYLE: &str = "\
-:root{--ink:#1b1f24;--soft:#545d68;--line:#d0d7de;--ground:#fff;--card:#f6f8fa;--bar:#4477aa}\
-@media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#a9b4c0;--line:#3d444d;--ground:#0d1117;--card:#161b22;--bar:#79b8ff}\
-svg{background:#fff;border-radius:.4rem}}\
-*{box-sizing:border-box}\
-body{font:16px/1.5 system-ui,sans-serif;max-width:72rem;margin:0 auto;padding:1rem;color:var(--ink);background:var(--ground)}\
-h1{font-size:1.5rem;line-height:1.3}h2{font-size:1.2rem;margin:2rem 0 .5rem}\
-h1,p{overflow-wrap:anywhere;max-width:65rem}p{color:var(--soft)}\
-.scroll{overflow-x:auto;margin:0 0 1rem}\
-:focus-visible{outline:3px solid var(--bar)}\
-table{border-collapse:collapse;font-size:.88rem;font-variant-numeric:tabular-nums}\
-td,th{padding:.2em .6em;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line)}\
-th{color:var(--soft)}\
-td:first-child,th:first-child,td.left{text-align:left}\
-td:first-child,th:first-child{position:sticky;left:0;background:var(--ground)}\
-.bar{background:var(--bar);height:1em;display:inline-block}\
-svg{max-width:100%;height:auto}\
-pre{background:var(--card);padding:1em;overflow:auto;white-space:pre-wrap}\
-@media print{:root{--ink:#000;--soft:#333;--line:#999;--ground:#fff;--card:#fff}.scroll{overflow:visible}table{font-size:7pt}}";
-
-/// No requests in or out.
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
-
-/// A table that may be wider than the screen: it scrolls separately, by keyboard too.
-fn wide(name: &str, table: &Markup) -> Markup {
-    html! { div.scroll tabindex="0" role="region" aria-label=(name) { (table) } }
-}
-
-/// The page.
-pub fn gap_page(title: &str, done: &Diagnosed) -> String {
-    let diagnosis = &done.diagnosis;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { "Gap diagnosis of " (title) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                main {
-                    h1 { (headline(diagnosis)) }
-                    p { (title) }
-                    (sections(done, &|title| html! { h2 { (title) } }))
-                }
+/// The page. `machine` and `recording`: what was diagnosed.
+///
+/// # Errors
+/// None in practice: JSON of numbers and strings can always be written.
+pub fn gap_page(machine: &str, recording: &str, done: &Diagnosed) -> Result<String, serde_json::Error> {
+    let title = format!("Gap between {machine} and its nominal model");
+    let body = html! {
+        header {
+            h1 { (title) }
+            p.under { "Recording: " (recording) }
+            section.verdict.clean[done.diagnosis.verdict == Verdict::WithinTolerance] aria-labelledby="verdict" {
+                h2 #verdict { (sentence(&headline(&done.diagnosis))) }
             }
         }
+        main #gap { (sections(done, &|title| html! { h2 { (title) } })) }
     };
-    page.into_string()
+    shell(&title, &title, Purpose::Still, &(), &body)
 }
 
 /// The diagnosis as a section of another page, below a heading of its own: its headline and the full content of its page.
@@ -73,38 +41,50 @@ pub fn gap_part(done: &Diagnosed) -> Markup {
     }
 }
 
-/// The findings and their evidence, each below a heading.
+/// The findings and their evidence, each below a heading; at last what to do.
 fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
     let diagnosis = &done.diagnosis;
+    let (actions, measurement) = (stand_actions(diagnosis), next_measurement(diagnosis));
+    // The nearest cause of a rig without a gap explains nothing.
+    let with_cause = done.with_cause.as_ref().filter(|_| diagnosis.verdict != Verdict::WithinTolerance);
     html! {
         // The closure term in the headline is not repeated.
         @for law in diagnosis.laws.iter().filter(|law| !headline(diagnosis).contains(&law.sentence)) {
             p { "A law for what is missing in " (law.submodel) ": " b { (law.sentence) } }
         }
-        (heading("Which"))
+        (heading("Causes"))
         (causes(done))
-        (heading("Where"))
+        (heading("Place in the machine"))
         @if diagnosis.r#where.is_empty() { p { "No part departs from the model by more than noise." } }
         @else { (places(done)) }
-        (PreEscaped(map_of_where(done)))
+        figure { (PreEscaped(map_of_where(done))) figcaption { "Ends of the steps, coloured by the difference between measured and computed readings." } }
         @if !diagnosis.forces.is_empty() {
-            (heading("Missing forces, each as if it were the only one"))
+            (heading("Missing heat, power or flow of each balance, if it alone has one"))
             (forces(done))
         }
-        (heading("Residuals without the cause, step by channel, in sigma"))
+        (heading("Difference between measured and computed readings"))
         p {
-            "Each number is the root mean square of a step and channel in units of what is declared: 1 is noise. \
-             Tolerances are those fitted together with the cause or law."
+            "Root mean square for each step and channel, in units of the declared uncertainty: 1 is noise. \
+             Tolerances are fitted."
         }
-        (heat_map(done, &done.without_cause.1))
-        @if let Some((what, fit)) = &done.with_cause {
-            (heading(&format!("Residuals with {what}")))
-            (heat_map(done, &fit.residual))
-            (heading("Before and after"))
-            (PreEscaped(traces(done)))
+        div.plots {
+            (heat_map(done, "without a cause", &done.without_cause.1))
+            @if let Some((what, fit)) = with_cause { (heat_map(done, &format!("with {what}"), &fit.residual)) }
         }
-        (heading("In words"))
-        pre tabindex="0" role="region" aria-label="the diagnosis in words" { (gap_text(diagnosis)) }
+        @if with_cause.is_some() { figure { (PreEscaped(traces(done))) } }
+        (heading("What to do"))
+        @if actions.is_empty() && measurement.is_none() { p { "Nothing: the rig is as declared." } }
+        @else {
+            ol {
+                @for action in &actions { li { (sentence(action)) } }
+                @if let Some(measurement) = measurement { li { (sentence(&measurement)) } }
+                li { "Then record again, and repeat the diagnosis." }
+            }
+        }
+        details {
+            summary { "All results as text" }
+            pre tabindex="0" role="region" aria-label="the diagnosis as text" { (gap_text(diagnosis)) }
+        }
     }
 }
 
@@ -113,8 +93,8 @@ fn causes(done: &Diagnosed) -> Markup {
     let diagnosis = &done.diagnosis;
     let candidates = diagnosis.candidates.iter().take(8);
     let rows = candidates.map(|candidate| (named(candidate), candidate.probability)).chain([
-        ("nothing beyond tolerance".to_owned(), diagnosis.probability_none),
-        ("a cause outside the catalogue".to_owned(), diagnosis.probability_outside),
+        (NOTHING.to_owned(), diagnosis.probability_none),
+        (OUTSIDE.to_owned(), diagnosis.probability_outside),
     ]);
     let mut rows: Vec<(String, f64)> = rows.collect();
     rows.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -124,38 +104,37 @@ fn causes(done: &Diagnosed) -> Markup {
             @for (name, probability) in rows {
                 tr {
                     td { (name) }
-                    td { (format!("{:.1} %", 100.0 * probability)) }
+                    td { (probability_text(probability)) }
                     td.left {
-                        span.bar style=(format!("width:{:.0}px", 300.0 * probability.clamp(0.0, 1.0))) {}
+                        span.bar style=(format!("width:{:.1}em", 15.0 * probability.clamp(0.0, 1.0))) {}
                     }
                 }
             }
         }
     };
-    wide("causes and their probabilities", &table)
+    scrolling("causes and their probabilities", &table)
 }
 
 /// The residual source term of each balance at the end of each step, if that balance alone has one.
 fn forces(done: &Diagnosed) -> Markup {
+    let forces = &done.diagnosis.forces;
     let table = html! {
         table {
             tr {
-                th { "balance" }
-                th { "unit" }
-                @for step in 1..=done.study.steps.len() { th { (step) } }
+                th { "step" }
+                @for force in forces { th { (force.force) ", " (force.unit) } }
             }
-            @for force in &done.diagnosis.forces {
+            @for step in 0..done.study.steps.len() {
                 tr {
-                    td { (force.force) }
-                    td { (force.unit) }
-                    @for [value, low, high] in &force.steps {
+                    td { (step_number(step)) }
+                    @for [value, low, high] in forces.iter().filter_map(|force| force.steps.get(step)) {
                         td title=(format!("{low:.3e} .. {high:.3e}")) { (four_figures(*value)) }
                     }
                 }
             }
         }
     };
-    wide("missing forces by balance and step", &table)
+    scrolling("missing heat, power or flow by step and balance", &table)
 }
 
 /// The parts of the machine in order of their share of the gap.
@@ -175,7 +154,7 @@ fn places(done: &Diagnosed) -> Markup {
             }
         }
     };
-    wide("where the gap lies", &table)
+    scrolling("where the gap lies", &table)
 }
 
 /// Classes of residuals in the map: upper bound in sigma, colour and name.
@@ -233,23 +212,22 @@ fn place_on_map(study: &Study, step: usize) -> Option<(f64, f64)> {
 }
 
 /// Root mean square of the whitened residual of each step and channel, as a table of colours with its numbers.
-fn heat_map(done: &Diagnosed, residual: &[f64]) -> Markup {
-    let steps = done.study.steps.len();
+fn heat_map(done: &Diagnosed, caption: &str, residual: &[f64]) -> Markup {
     let table = html! {
         table {
-            tr {
-                th { "channel" }
-                @for step in 1..=steps { th { (step) } }
-            }
-            @for (output, channel) in OUTPUTS.iter().enumerate() {
-                tr {
-                    td { (channel) }
-                    @for step in 0..steps { (heat_cell(done, residual, step, output)) }
+            caption { (caption) }
+            thead { tr { th { "step" } @for channel in OUTPUTS { th { (channel) } } } }
+            tbody {
+                @for step in 0..done.study.steps.len() {
+                    tr {
+                        td { (step_number(step)) }
+                        @for output in 0..OUTPUTS.len() { (heat_cell(done, residual, step, output)) }
+                    }
                 }
             }
         }
     };
-    wide("residuals by channel and step", &table)
+    scrolling(caption, &table)
 }
 
 fn heat_cell(done: &Diagnosed, residual: &[f64], step: usize, output: usize) -> Markup {

@@ -1,7 +1,7 @@
 //! The mesh of a fitted map.
 
-use crate::mesh::surface::across;
-use mapper_chart::StructuredGrid;
+use super::surface::across;
+use crate::StructuredGrid;
 use mapper_core::{FittedMap, FittedNode};
 
 /// Efficiency (fraction) over corrected flow (x, kg/s) and pressure ratio (y) on the supported part of a fitted map, finer in

@@ -1,0 +1,186 @@
+//! Checks at the stand that confirm or exclude a cause.
+
+use crate::formatting::number::number;
+use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict};
+
+/// Causes less probable than this are not worth a visit to the stand while another one is open.
+const WORTH_A_CHECK: f64 = 0.1;
+
+/// What to check for an effect of the library; one without a row gets the check of its part.
+const EFFECTS: [(&str, &str); 28] = [
+    (
+        "actuator_lag",
+        "time a step of the turbine inlet valve: command, position, pressure before the turbine",
+    ),
+    (
+        "area_split",
+        "check the drawing for the metal area before the wheel, and whether T1 is measured close to the housing",
+    ),
+    (
+        "bearing_friction",
+        "check oil pressure, temperature and grade, and the run-down time of the shaft from a fixed speed",
+    ),
+    (
+        "directional_htc",
+        "check the insulation of the compressor housing, and compare a heating with a cooling jump at one point",
+    ),
+    ("efficiency_scale", "check wheel and diffuser for dirt and damage, and the clearance of the wheel"),
+    (
+        "flow_map_scale",
+        "check for leaks between flow meter and compressor, and that the machine is the one of the nominal map",
+    ),
+    (
+        "flowmeter_gain",
+        "compare the flow meter with a second one or with its calibration, and look for leaks behind it",
+    ),
+    (
+        "flowmeter_lag",
+        "check the filter setting of the flow meter, and the volume between it and the compressor",
+    ),
+    (
+        "htc_scale",
+        "check the internal area of the compressor housing that the campaign declares, and oil or dirt on its wall",
+    ),
+    ("humidity", "measure the humidity of the inlet air, and write it as `report.humidity`"),
+    ("inlet_htc", "check the diameter of the inlet, and whether its pipe is insulated"),
+    (
+        "inlet_preheat",
+        "insulate the pipe between the T1 probe and the wheel, or move the probe closer to the wheel",
+    ),
+    (
+        "inner_node",
+        "check the depth of the Tc probe in the wall; a probe close to the gas side shows the temperature that counts",
+    ),
+    ("oil_scale", "check flow, temperature and grade of the oil"),
+    ("p2_offset", "compare the P2 transducer with the barometer while the machine is at rest"),
+    ("recirculation", "check shroud bleed, recirculation valve and seals behind the wheel for leaks"),
+    (
+        "recovery",
+        "check type and direction of the T2 probe; a shielded probe recovers the kinetic energy of the gas",
+    ),
+    (
+        "sheathed_probe",
+        "check sheath diameter and installation of the T2 probe; a bare thin probe follows faster",
+    ),
+    (
+        "stem_conduction",
+        "check immersion depth of the T2 probe and the insulation of its stem and of the pipe there",
+    ),
+    ("t1_offset", "compare the T1 probe with the others after a soak, and check its connector"),
+    ("t2_offset", "compare the T2 probe with the others after a soak, and check its connector"),
+    (
+        "tc_offset",
+        "compare the Tc probe with the others after a soak, and check its contact with the housing",
+    ),
+    ("tip_diameter", "check the diameter of the T2 probe, and deposits on it"),
+    ("turbine_efficiency", "check turbine wheel and vanes for damage, and the clearance of the wheel"),
+    ("turbine_radiation", "put a heat shield between turbine and compressor housing, and repeat one jump"),
+    (
+        "valve_area",
+        "check the zero of the back-pressure valve, its position feedback and leaks behind the compressor",
+    ),
+    ("ventilation", "check fans, cell ventilation and the insulation of the housings"),
+    (
+        "turbine_flow_gain",
+        "compare the turbine flow meter with a second one, and look for leaks before the turbine",
+    ),
+];
+
+/// What to check where a cause acts that is not in the library.
+const PLACES: [(&str, &str); 13] = [
+    ("actuator", "check the turbine inlet valve and its controller: set-point, position, pressure"),
+    ("turbine_flow", "check for leaks before the turbine, its vanes and the turbine flow meter"),
+    ("shaft", "check the oil supply, the bearings, and whether another power is taken from the shaft"),
+    (
+        "compressor_flow",
+        "check for leaks, recirculation and dirt in the compressor, and that the nominal map is of this machine",
+    ),
+    ("flow_meter", "check range, filter setting and calibration of the flow meter"),
+    ("outlet", "check the back-pressure valve and the volume and leaks behind the compressor"),
+    (
+        "compressor_gas",
+        "check whether gas is heated or cooled between the T1 and the T2 probe: cooler, injection, recirculation",
+    ),
+    ("t1_probe", "check the T1 probe: calibration, connector, place"),
+    ("t2_probe", "check the T2 probe: calibration, immersion depth, insulation, deposits"),
+    ("tc_probe", "check the Tc probe: calibration, depth, contact with the housing"),
+    ("p2_sensor", "check the P2 transducer: calibration, range, pulse line"),
+    (
+        "compressor_housing",
+        "check whether coolant or oil runs through the compressor housing, and its insulation",
+    ),
+    (
+        "turbine_housing",
+        "check whether coolant runs through the bearing or turbine housing, the oil, and the insulation",
+    ),
+];
+
+fn of(table: &[(&str, &'static str)], name: &str) -> Option<&'static str> {
+    table.iter().find(|(known, _)| *known == name).map(|(_, action)| *action)
+}
+
+/// Checks in order of the probability of their causes, each once; empty if the rig is as declared.
+pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut actions: Vec<&str> = Vec::new();
+    let named = matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
+    let open = diagnosis
+        .candidates
+        .iter()
+        .enumerate()
+        .filter(|(place, candidate)| candidate.probability >= WORTH_A_CHECK || (*place == 0 && named));
+    if diagnosis.verdict == Verdict::WithinTolerance && diagnosis.off_at_rest.is_empty() {
+        actions.extend(open.flat_map(|(_, candidate)| &candidate.effects).filter_map(|id| of(&EFFECTS, id)));
+    } else {
+        if diagnosis.verdict != Verdict::WithinTolerance {
+            let sets = open
+                .flat_map(|(_, candidate)| std::iter::once(&candidate.effects).chain(&candidate.equivalent));
+            actions.extend(sets.flatten().filter_map(|id| of(&EFFECTS, id)));
+        }
+        if diagnosis.verdict != Verdict::Explained || actions.is_empty() {
+            actions.extend(diagnosis.r#where.iter().take(2).filter_map(|place| of(&PLACES, &place.submodel)));
+        }
+    }
+    let mut once: Vec<String> =
+        diagnosis.off_at_rest.iter().map(|sensor| format!("calibrate this sensor: {sensor}")).collect();
+    for action in actions {
+        if !once.iter().any(|known| known == action) {
+            once.push(action.to_owned());
+        }
+    }
+    once
+}
+
+/// The measurement that decides between the causes that are left, in a sentence.
+pub fn next_measurement(diagnosis: &Diagnosis) -> Option<String> {
+    let first = diagnosis.experiments.first();
+    Some(match diagnosis.next.as_ref()? {
+        Next::Sensor { sensor, reason } => format!("mount {sensor}: {reason}"),
+        Next::Jump { .. } | Next::Soak { .. } => {
+            format!(
+                "measure: {}, {} min",
+                crate::diagnosis::gap_next::named(first?),
+                number(Some(first?.minutes), 1)
+            )
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{EFFECTS, PLACES, of};
+    use mapper_physics::rig::effect::Submodel;
+
+    #[test]
+    fn checks_are_for_effects_that_exist_and_for_every_part() {
+        let known: Vec<String> = mapper_effects::catalogue()
+            .into_iter()
+            .chain(mapper_physics::rig::sensor_fault::effects())
+            .chain([true, false].into_iter().flat_map(mapper_physics::rig::sensor_fault::log_effects))
+            .map(|effect| effect.info().id.to_string())
+            .collect();
+        let unknown: Vec<&str> =
+            EFFECTS.iter().map(|(id, _)| *id).filter(|id| !known.iter().any(|known| known == id)).collect();
+        assert!(unknown.is_empty(), "no such effects: {unknown:?}");
+        assert!(Submodel::ALL.iter().all(|part| of(&PLACES, part.name()).is_some()));
+    }
+}

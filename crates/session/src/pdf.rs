@@ -1,0 +1,115 @@
+//! A page as a PDF, printed by a browser that is installed on this machine.
+
+use std::fs::File;
+use std::io;
+use std::path::Path;
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// Names under which a Chromium is on the path.
+const BROWSERS: [&str; 7] = [
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "msedge",
+    "microsoft-edge",
+];
+/// Longest wait for the browser: a page of 60 points takes it 3 s.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Interval between two looks at whether it has ended.
+const INTERVAL: Duration = Duration::from_millis(50);
+
+/// Why a page could not be printed.
+#[derive(Debug, thiserror::Error)]
+pub enum PrintError {
+    /// No browser.
+    #[error("printing needs Chromium or a browser made from it, and none is on the path (looked for {}); install `chromium`, or open the page and print it there", BROWSERS.join(", "))]
+    NoBrowser,
+    /// The browser could not be used.
+    #[error("{browser} could not be used: {source}")]
+    System {
+        /// Its name.
+        browser: &'static str,
+        /// The system's error.
+        source: io::Error,
+    },
+    /// The browser made no PDF.
+    #[error("{browser} made no PDF ({reason}); open the page and print it there")]
+    NoPdf {
+        /// Its name.
+        browser: &'static str,
+        /// How it ended, and its last words.
+        reason: String,
+    },
+}
+
+/// The PDF of a page. `directory`: where the browser may read and write for a moment; one that is packed as a snap sees no others than those of
+/// the user.
+///
+/// # Errors
+/// [`PrintError`].
+pub fn page_as_pdf(page: &str, directory: &Path) -> Result<Vec<u8>, PrintError> {
+    let browser = BROWSERS.into_iter().find(|name| is_on_path(name)).ok_or(PrintError::NoBrowser)?;
+    let failed = |source| PrintError::System { browser, source };
+    let folder = tempfile::Builder::new().prefix("mapper-print-").tempdir_in(directory).map_err(failed)?;
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("page.html"), page).map_err(failed)?;
+    let mut command = Command::new(browser);
+    command.args([
+        "--headless",
+        "--disable-gpu",
+        "--no-pdf-header-footer",
+        "--print-to-pdf=page.pdf",
+        "--user-data-dir=profile",
+    ]);
+    if is_of_root(folder.path()) {
+        // Chromium refuses to run as root with its sandbox; the page makes no requests and has no content of others.
+        command.arg("--no-sandbox");
+    }
+    command.arg("page.html").current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::null());
+    command.stderr(File::create(at("log")).map_err(failed)?);
+    let ended = ended_within_patience(&mut command).map_err(failed)?;
+    match (std::fs::read(at("page.pdf")), ended) {
+        (Ok(pdf), Some(status)) if status.success() && pdf.starts_with(b"%PDF") => Ok(pdf),
+        (_, None) => {
+            Err(PrintError::NoPdf { browser, reason: format!("not ready after {} s", PATIENCE.as_secs()) })
+        }
+        (_, Some(status)) => {
+            let log = std::fs::read(at("log")).unwrap_or_default();
+            let log = String::from_utf8_lossy(&log);
+            let last = log.lines().last().unwrap_or_default();
+            Err(PrintError::NoPdf { browser, reason: mapper_core::one_line(&format!("{status}: {last}")) })
+        }
+    }
+}
+
+/// Waits for the end of a command; `None` if it had to be ended.
+fn ended_within_patience(command: &mut Command) -> io::Result<Option<ExitStatus>> {
+    let (mut child, began) = (command.spawn()?, Instant::now());
+    while began.elapsed() < PATIENCE {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        std::thread::sleep(INTERVAL);
+    }
+    child.kill()?;
+    child.wait().map(|_| None)
+}
+
+fn is_on_path(name: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path)
+        .any(|folder| folder.join(name).is_file() || folder.join(format!("{name}.exe")).is_file())
+}
+
+#[cfg(unix)]
+fn is_of_root(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|about| std::os::unix::fs::MetadataExt::uid(&about) == 0)
+}
+
+#[cfg(not(unix))]
+fn is_of_root(_: &Path) -> bool {
+    false
+}

@@ -89,7 +89,7 @@ fn the_labs_steady_states_give_the_labs_map() {
     // Every point's interval covers the truth and has its sources.
     let budgets = work.json["budgets"].as_array().unwrap();
     let sources = budgets[0]["eta"]["rows"].as_array().unwrap();
-    let named = |name: &str| sources.iter().any(|row| row["source"] == Value::from(name));
+    let named = |name: &str| sources.iter().any(|row| row["source"].as_str() == Some(name));
     assert!(["offset of T2", "gain of m_c", "offset of Tc", "convection law"].iter().all(|name| named(name)));
 }
 

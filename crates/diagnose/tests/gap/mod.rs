@@ -1,4 +1,4 @@
-//! All integration tests of `mapper-diagnose`: one program, since each further one would be compiled and linked by itself.
+//! Integration tests of the module `gap`.
 
 mod catalogue;
 pub(crate) mod common;

@@ -5,19 +5,19 @@
 //! number.
 
 mod advice;
+mod document;
 mod drawn_map;
 mod drawn_points;
 mod drawn_steps;
 mod gap_page;
 mod live_page;
-mod page;
 mod prose;
 mod run_page;
 mod sections;
 mod shell;
 mod table;
 
+pub use document::run_page;
 pub use gap_page::{gap_page, gap_part};
 pub use live_page::{LiveMap, LivePoint, Planned, live_map, live_page, live_point, planned};
-pub use page::run_page;
 pub use run_page::{OtherRun, RunPage};

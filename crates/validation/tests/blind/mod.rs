@@ -1,4 +1,4 @@
-//! All integration tests of `mapper-validation`: one program, since each further one would be compiled and linked by itself.
+//! Integration tests of the module `blind`.
 
-mod blind;
+mod cases;
 mod healthy;

@@ -1,3 +1,3 @@
 //! Integration tests of the module `reproduction`.
 
-mod reproduction;
+mod figures;

@@ -1,9 +1,7 @@
 //! Queue of samples that have arrived but have not been polled.
 
 use crate::protocol::Unusable;
-use mapper_core::{
-    Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality, SampleBatch, TruthColumn,
-};
+use mapper_core::{Channel, ChannelColumn, Event, EventKind, SampleBatch};
 use std::collections::VecDeque;
 
 /// Maximum number of queued values over all columns, at 8 bytes each, including names and texts: three hours of 19 channels at 10 Hz, 32 MB.
@@ -94,16 +92,17 @@ impl Pending {
                 self.taken_s = batch.t_s.get(due - 1).copied();
             }
             self.values = self.values.saturating_sub(due * width(&batch));
-            let later = split(&mut batch, due);
+            let later = batch.split_off(due);
             if later.t_s.is_empty() {
                 self.values = self.values.saturating_sub(names(&batch));
             }
-            append(&mut whole, batch);
+            whole.append(batch);
             if !later.t_s.is_empty() {
                 self.batches.push_front(later);
                 break;
             }
         }
+        whole.columns.retain(|column| channels.contains(&column.channel));
         self.next += whole.t_s.len() as u64;
         let (now, later) =
             std::mem::take(&mut self.events).into_iter().partition(|e: &Event| e.t_s <= until_s);
@@ -121,103 +120,10 @@ fn names(batch: &SampleBatch) -> usize {
     batch.truth.iter().map(|column| column.name.len() + column.unit.len()).sum::<usize>() / 8
 }
 
-/// Splits off the samples after the first `at`. All columns have equal length, because the reader ensures it.
-fn split(batch: &mut SampleBatch, at: usize) -> SampleBatch {
-    fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
-        values.split_off(at.min(values.len()))
-    }
-    SampleBatch {
-        first_sequence: batch.first_sequence + at as u64,
-        t_s: cut(&mut batch.t_s, at),
-        columns: batch
-            .columns
-            .iter_mut()
-            .map(|one| ChannelColumn { channel: one.channel, values: cut(&mut one.values, at) })
-            .collect(),
-        elements: batch
-            .elements
-            .iter_mut()
-            .map(|one| ElementColumn { element: one.element, values: cut(&mut one.values, at) })
-            .collect(),
-        provenance: batch
-            .provenance
-            .iter_mut()
-            .map(|one| Provenance {
-                channel: one.channel,
-                source_t_s: cut(&mut one.source_t_s, at),
-                quality: cut(&mut one.quality, at),
-            })
-            .collect(),
-        truth: batch
-            .truth
-            .iter_mut()
-            .map(|one| TruthColumn {
-                name: one.name.clone(),
-                unit: one.unit.clone(),
-                values: cut(&mut one.values, at),
-            })
-            .collect(),
-        events: Vec::new(),
-    }
-}
-
-fn append(whole: &mut SampleBatch, part: SampleBatch) {
-    let (before, after) = (whole.t_s.len(), whole.t_s.len() + part.t_s.len());
-    for column in part.columns {
-        if let Some(there) = whole.columns.iter_mut().find(|there| there.channel == column.channel) {
-            there.values.extend(column.values);
-        }
-    }
-    for column in part.elements {
-        match whole.elements.iter_mut().find(|there| there.element == column.element) {
-            Some(there) => there.values.extend(column.values),
-            None => {
-                let mut values = vec![f64::NAN; before];
-                values.extend(column.values);
-                whole.elements.push(ElementColumn { element: column.element, values });
-            }
-        }
-    }
-    for column in part.truth {
-        match whole.truth.iter_mut().find(|there| there.name == column.name) {
-            Some(there) => there.values.extend(column.values),
-            None => {
-                let mut values = vec![f64::NAN; before];
-                values.extend(column.values);
-                whole.truth.push(TruthColumn { values, ..column });
-            }
-        }
-    }
-    for from in part.provenance {
-        match whole.provenance.iter_mut().find(|there| there.channel == from.channel) {
-            Some(there) => {
-                there.source_t_s.extend(from.source_t_s);
-                there.quality.extend(from.quality);
-            }
-            None => {
-                let mut source_t_s = whole.t_s.clone();
-                let mut quality = vec![Quality::Good; before];
-                source_t_s.extend(from.source_t_s);
-                quality.extend(from.quality);
-                whole.provenance.push(Provenance { channel: from.channel, source_t_s, quality });
-            }
-        }
-    }
-    whole.t_s.extend(&part.t_s);
-    // A column that is missing in this part.
-    whole.columns.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
-    whole.elements.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
-    whole.truth.iter_mut().for_each(|one| one.values.resize(after, f64::NAN));
-    for from in &mut whole.provenance {
-        let known = from.source_t_s.len().min(after);
-        from.source_t_s.extend(&whole.t_s[known..]);
-        from.quality.resize(after, Quality::Good);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mapper_core::{Provenance, Quality};
 
     fn batch(first_sequence: u64, t_s: &[f64], channels: &[Channel]) -> SampleBatch {
         let column = |channel: &Channel| ChannelColumn { channel: *channel, values: t_s.to_vec() };

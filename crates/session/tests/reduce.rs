@@ -7,7 +7,6 @@ use mapper_physics::gas::pressure_tap::total_to_static_pa;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::steady::{SteadyState, hold_speed};
 use mapper_session::{MapWork, Registry, nominal_model};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -5,6 +5,7 @@ pub(crate) mod declared_uncertainty;
 pub(crate) mod event;
 pub(crate) mod held_point;
 pub(crate) mod joined_recordings;
+mod joined_samples;
 pub(crate) mod plausible;
 pub(crate) mod recording;
 pub(crate) mod redundant;

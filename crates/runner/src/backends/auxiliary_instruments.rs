@@ -4,7 +4,6 @@
 //! A reading that arrives after later rig samples is appended behind them, and keeps its own time as its source time.
 
 use crate::backends::reader_link::{Answer, ReaderLink};
-use crate::run_control::merged_batches::append;
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality,
     RigDescription, SampleBatch, Setpoints, TruthColumn,
@@ -103,7 +102,7 @@ impl RigWithInstruments {
         let mut parts: Vec<SampleBatch> = Vec::new();
         for source in &mut self.sources {
             let due = last_s.map_or(0, |last_s| source.waiting.t_s.partition_point(|t_s| *t_s <= last_s));
-            let later = split(&mut source.waiting, due);
+            let later = source.waiting.split_off(due);
             let mut part = std::mem::replace(&mut source.waiting, later);
             move_behind(&mut part, self.last_s);
             parts.push(part);
@@ -160,11 +159,11 @@ impl Source {
                 }
                 // Readings from before the start of the run are dropped.
                 let early = batch.t_s.partition_point(|t_s| *t_s < 0.0);
-                let batch = split(&mut batch, early);
+                let batch = batch.split_off(early);
                 if is_whole(&batch, self.waiting.t_s.last().copied())
                     && self.waiting.t_s.len() + batch.t_s.len() <= MAX_WAITING
                 {
-                    append(&mut self.waiting, batch);
+                    self.waiting.append(batch);
                     return;
                 }
                 self.lost = true;
@@ -261,33 +260,6 @@ fn is_whole(batch: &SampleBatch, last_s: Option<f64>) -> bool {
         && batch.t_s.is_sorted_by(|a, b| a < b)
         && batch.t_s.first().zip(last_s).is_none_or(|(first_s, last_s)| *first_s > last_s)
         && lengths.chain(from).all(|length| length == samples)
-}
-
-/// Cuts a batch after its first `at` samples; returns the later ones.
-fn split(batch: &mut SampleBatch, at: usize) -> SampleBatch {
-    fn cut<T>(values: &mut Vec<T>, at: usize) -> Vec<T> {
-        values.split_off(at.min(values.len()))
-    }
-    let columns = batch.columns.iter_mut();
-    let elements = batch.elements.iter_mut();
-    let provenance = batch.provenance.iter_mut();
-    SampleBatch {
-        t_s: cut(&mut batch.t_s, at),
-        columns: columns
-            .map(|one| ChannelColumn { channel: one.channel, values: cut(&mut one.values, at) })
-            .collect(),
-        elements: elements
-            .map(|one| ElementColumn { element: one.element, values: cut(&mut one.values, at) })
-            .collect(),
-        provenance: provenance
-            .map(|one| Provenance {
-                channel: one.channel,
-                source_t_s: cut(&mut one.source_t_s, at),
-                quality: cut(&mut one.quality, at),
-            })
-            .collect(),
-        ..SampleBatch::default()
-    }
 }
 
 /// Moves late readings behind `last_s`; they keep their source time.

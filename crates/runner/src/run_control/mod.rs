@@ -1,6 +1,5 @@
 //! Control of a run from soak to cool-down: steps, speed control, operator requests, protection, and safe shutdown.
 
-pub(crate) mod merged_batches;
 pub(crate) mod observer;
 pub(crate) mod operator;
 pub(crate) mod protection;

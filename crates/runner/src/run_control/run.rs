@@ -3,7 +3,6 @@
 use crate::guards::guard::{Bench, Commanded, Guard, Trip};
 use crate::guards::plausibility_watch::PlausibilityWatch;
 use crate::guards::speed_reached::Reached;
-use crate::run_control::merged_batches::append;
 use crate::run_control::observer::{ObserverError, RunObserver};
 use crate::run_control::operator::Operator;
 use crate::run_control::protection::Protection;
@@ -456,7 +455,7 @@ impl Run<'_, '_> {
             trips.extend(judged);
             match &mut whole {
                 None => whole = Some(batch),
-                Some(whole) => append(whole, batch),
+                Some(whole) => whole.append(batch),
             }
             // Rounding: accumulated sample times fall slightly short of the full second.
             if !trips.is_empty() || end_s - self.now_s < 1e-9 * end_s.abs() {

@@ -72,7 +72,7 @@ pub fn identify_recording(
     recording: &Recording,
     config: &IdentifyConfig,
 ) -> Result<Identified, IdentifyError> {
-    identify_beside(recording, config, None)
+    identify_with_rig(recording, config, None)
 }
 
 /// Like [`identify_recording`], compared with a declared rig: points are doubtful if flow, speed or efficiencies differ from it by more than
@@ -80,7 +80,7 @@ pub fn identify_recording(
 ///
 /// # Errors
 /// As [`identify`].
-pub fn identify_beside(
+pub fn identify_with_rig(
     recording: &Recording,
     config: &IdentifyConfig,
     nominal: Option<NominalRig<'_>>,

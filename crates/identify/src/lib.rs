@@ -23,7 +23,7 @@ pub use config::{DeclaredUncertainty, IdentifyConfig, NoiseColour, PressureTap, 
 pub use faults::balance_rows::Machine;
 pub use faults::found_fault::{FoundFault, Suspect};
 pub use faults::nominal_rig::NominalRig;
-pub use identify::{Identified, identify, identify_beside, identify_each, identify_recording};
+pub use identify::{Identified, identify, identify_each, identify_recording, identify_with_rig};
 pub use isothermal_zero::zero::{
     IsothermalZero, NoZero, ZeroSettings, expected_after_zero, isothermal_zero, isothermal_zero_with_a_fault,
     zeroed,

@@ -65,7 +65,7 @@ impl AwaitedTruths<'_> {
 }
 
 /// Does `work` while the truths of the recordings at `paths` are read, in that order.
-pub fn beside_truths<T>(paths: &[PathBuf], work: impl FnOnce(AwaitedTruths<'_>) -> T) -> T {
+pub fn with_truths<T>(paths: &[PathBuf], work: impl FnOnce(AwaitedTruths<'_>) -> T) -> T {
     std::thread::scope(|scope| {
         work(AwaitedTruths(scope.spawn(|| paths.iter().map(|path| read_truth(path)).collect())))
     })

@@ -227,6 +227,9 @@ fn all_mistakes_of_a_channel_map_for_a_log_come_at_once_with_their_places() {
         mapper(["identify".as_ref(), log.as_os_str(), "--channels".as_ref(), channels.as_os_str()])
             .exits(3)
             .stderr
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ")
     };
     let names =
         identify("channels:\n  N: {field: n_TK}\n  T2: {field: T9}\n  m_c: {field: m_L, topic: Daten}\n");

@@ -13,7 +13,7 @@ use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::report::{Diagnosis, Verdict};
 use crate::gap::gap_reduction::folds::Folds;
 use crate::gap::gap_reduction::how_far::{Compared, how_far};
-use crate::gap::next_experiment::best_experiment::{Suggested, look_beside, next};
+use crate::gap::next_experiment::best_experiment::{Suggested, next, sensor_near};
 pub use crate::gap::preconditions::gap_error::GapError;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 use crate::gap::preconditions::problem::Problem;
@@ -243,7 +243,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
             .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))
             .unwrap_or_default(),
         Verdict::Unexplained | Verdict::PartlyExplained => {
-            Suggested { next: Some(look_beside(&r#where)), experiments: Vec::new() }
+            Suggested { next: Some(sensor_near(&r#where)), experiments: Vec::new() }
         }
         Verdict::Explained => rivals(&posterior, &fits)
             .map(|rivals| next(&study, rivals, &experiments, calibration.temperature))

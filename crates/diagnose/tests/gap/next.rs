@@ -7,7 +7,7 @@ use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_diagnose::gap::best_fit::fit::Fit;
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, Question, diagnose};
-use mapper_diagnose::gap::findings::experiment::{AllowedJump, AtRest, Beside, Experiment};
+use mapper_diagnose::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use mapper_diagnose::gap::findings::report::{Kind, Next};
 use mapper_diagnose::gap::next_experiment::best_experiment::{Rivals, Suggested, next};
 use mapper_diagnose::gap::next_experiment::outlook::apart;
@@ -71,7 +71,7 @@ fn oil_step(speed_rpm: f64, by_k: f64) -> Experiment {
     let mut experiment = jump(speed_rpm, speed_rpm, 300.0);
     experiment.jump.to_p3_pa =
         held_pa(speed_rpm, &BoundaryConditions { oil_temperature_k: to_k, ..boundary() });
-    Experiment { beside: Beside::Oil { from_k, to_k }, ..experiment }
+    Experiment { also: AlsoChanged::Oil { from_k, to_k }, ..experiment }
 }
 
 fn fit_of<'a>(diagnosed: &'a Diagnosed, id: &str) -> &'a Fit {
@@ -110,7 +110,7 @@ fn an_oil_step_tells_an_oil_side_pair_apart_and_a_lag_from_nothing() {
 fn a_more_uniform_soak_gives_more_information() {
     let soak = |left_k: f64| {
         let soak = AtRest { duration_s: 1800.0, left_sigma_k: [left_k; AtRest::CHANNELS.len()] };
-        Experiment { beside: Beside::Soak(soak), ..jump(70e3, 70e3, 300.0) }
+        Experiment { also: AlsoChanged::Soak(soak), ..jump(70e3, 70e3, 300.0) }
     };
     let diagnosed = ask(("t2_offset", 2.0), &["t1_offset", "t2_offset"]);
     let pair = [fit_of(&diagnosed, "t2_offset"), fit_of(&diagnosed, "t1_offset")];
@@ -168,10 +168,10 @@ fn the_smoother_follows_a_step_of_t3_and_oil() {
         .collect();
     // Of 100 K of T3 and 40 K of oil, at most this much is lost around the corner.
     for (change, most_k) in [
-        (Beside::T3 { from_k: t3_k, to_k: t3_k - 100.0 }, 4.0),
-        (Beside::Oil { from_k: oil_k, to_k: oil_k + 40.0 }, 1.5),
+        (AlsoChanged::T3 { from_k: t3_k, to_k: t3_k - 100.0 }, 4.0),
+        (AlsoChanged::Oil { from_k: oil_k, to_k: oil_k + 40.0 }, 1.5),
     ] {
-        let (channel, series) = Experiment { beside: change, ..hold }.driven(&t_s, 300.0).unwrap();
+        let (channel, series) = Experiment { also: change, ..hold }.driven(&t_s, 300.0).unwrap();
         for noise_k in [0.0, declared().noise_sigma(channel)] {
             let mut random = Pcg64::seed_from_u64(5);
             let mut noisy = series.clone();

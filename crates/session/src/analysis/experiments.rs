@@ -5,7 +5,7 @@ use crate::recording::identification_config::identification_with;
 use crate::{Registry, SessionError};
 use mapper_campaign::Campaign;
 use mapper_core::{OperatingPoint, RigMode, SetpointRanges, Setpoints};
-use mapper_diagnose::gap::findings::experiment::{AllowedJump, AtRest, Beside, Experiment};
+use mapper_diagnose::gap::findings::experiment::{AllowedJump, AlsoChanged, AtRest, Experiment};
 use mapper_identify::{ZeroSettings, expected_after_zero};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::reach::reach;
@@ -62,7 +62,7 @@ fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
     let rest =
         OperatingPoint { speed_rpm: 0.0, valve_opening_ratio: campaign.points.first()?.valve_opening_ratio };
     let jump = AllowedJump { from: rest, to: rest, from_p3_pa: 0.0, to_p3_pa: 0.0, dwell_s: SOAK_S };
-    Some(Experiment { jump, beside: Beside::Soak(soak) })
+    Some(Experiment { jump, also: AlsoChanged::Soak(soak) })
 }
 
 /// Jumps between the campaign's points that the planner allows. Empty for grids too large to simulate and for campaigns without a grid.
@@ -117,20 +117,20 @@ fn temperature_steps(
         accepts.check(&setpoints).is_ok().then_some(p3_pa)
     };
     let Some(from_p3_pa) = held(&now) else { return Vec::new() };
-    let step = |to_p3_pa: f64, beside: Beside| Experiment {
+    let step = |to_p3_pa: f64, also: AlsoChanged| Experiment {
         jump: AllowedJump { from: point, to: point, from_p3_pa, to_p3_pa, dwell_s: DWELL_S },
-        beside,
+        also,
     };
     let (t3_k, oil_k) = (now.t3_k, now.oil_temperature_k);
     let t3_follows = campaign.follow_outlet.turbine_inlet;
     let to_k = T3_STEPS_K.iter().filter(|_| !t3_follows).map(|by_k| t3_k + by_k).filter(room);
     let t3_steps = to_k.filter_map(|to_k| {
-        Some(step(held(&BoundaryConditions { t3_k: to_k, ..now })?, Beside::T3 { from_k: t3_k, to_k }))
+        Some(step(held(&BoundaryConditions { t3_k: to_k, ..now })?, AlsoChanged::T3 { from_k: t3_k, to_k }))
     });
     let oil_steps = OIL_STEPS_K.iter().filter(|_| !campaign.follow_outlet.oil).filter_map(|by_k| {
         let to_k = oil_k + by_k;
         let held_pa = held(&BoundaryConditions { oil_temperature_k: to_k, ..now })?;
-        Some(step(held_pa, Beside::Oil { from_k: oil_k, to_k }))
+        Some(step(held_pa, AlsoChanged::Oil { from_k: oil_k, to_k }))
     });
     t3_steps.chain(oil_steps).collect()
 }

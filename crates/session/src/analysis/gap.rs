@@ -16,7 +16,7 @@ use mapper_diagnose::gap::best_fit::selection::Selection;
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict, law_found};
-use mapper_diagnose::gap::next_experiment::best_experiment::look_beside;
+use mapper_diagnose::gap::next_experiment::best_experiment::sensor_near;
 use mapper_diagnose::gap::next_experiment::outlook::Alike;
 use mapper_diagnose::gap::preconditions::problem::Problem;
 use mapper_diagnose::gap::preconditions::usable::usable;
@@ -136,7 +136,7 @@ impl Session<'_> {
             diagnosis.r#where = places;
             // The best extra sensor is one next to the location that was just found.
             if matches!(diagnosis.next, Some(Next::Sensor { .. })) {
-                diagnosis.next = Some(look_beside(&diagnosis.r#where));
+                diagnosis.next = Some(sensor_near(&diagnosis.r#where));
             }
         }
         let with_a_law = law_found(diagnosis).is_some();
@@ -371,6 +371,6 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
         diagnosis.experiments.clear();
-        diagnosis.next.get_or_insert_with(|| look_beside(&diagnosis.r#where));
+        diagnosis.next.get_or_insert_with(|| sensor_near(&diagnosis.r#where));
     }
 }

@@ -10,13 +10,13 @@ use mapper_core::{
     Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, ThermalModel, joined,
 };
 use mapper_identify::{
-    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_beside,
+    FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_with_rig,
     isothermal_zero, method_for,
 };
 use mapper_maps::{RepeatedJump, repeated_jumps};
 use mapper_observe::FusedChannel;
 use mapper_recording::score::{
-    AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, beside_truths, score, score_marks,
+    AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
 use serde::Serialize;
@@ -132,7 +132,7 @@ impl Session<'_> {
         method: Option<Method>,
     ) -> Result<Identified, SessionError> {
         let paths: Vec<PathBuf> = recorded.iter().map(|one| one.path.clone()).collect();
-        beside_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
+        with_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
     }
 
     /// Same as [`identify`](Session::identify), and compares with the truths in the recordings.
@@ -188,7 +188,7 @@ impl Session<'_> {
             tolerances: &campaign.tolerances,
             conditions: &conditions,
         });
-        let found = identify_beside(&recording, &config, nominal)?;
+        let found = identify_with_rig(&recording, &config, nominal)?;
         let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
         for point in &points {
             self.send(SessionEvent::PointIdentified(Box::new(point.clone())));

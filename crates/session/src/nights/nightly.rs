@@ -72,8 +72,8 @@ impl PreparedNight {
             return Ok(rows);
         }
         let missing = self.runs.iter().find(|run| !rows.iter().any(|row| row.key == run.key));
-        let missing = missing
-            .map_or_else(|| "it has other runs besides".to_owned(), |run| format!("it has no {}", run.key));
+        let missing =
+            missing.map_or_else(|| "it has other runs".to_owned(), |run| format!("it has no {}", run.key));
         Err(SessionError::OtherNight { lacks: missing })
     }
 

@@ -144,12 +144,12 @@ pub(crate) fn all_differ(recorded: &[Recorded]) -> Result<(), SessionError> {
 pub(crate) fn attached_campaign(read: &ReadReport, file: &Path) -> Result<Option<Campaign>, SessionError> {
     let Some(text) = &read.campaign_text else { return Ok(None) };
     let origin = file.with_file_name(run_directory::CAMPAIGN);
-    let checked = mapper_campaign::check(text, &origin, &read_beside);
+    let checked = mapper_campaign::check(text, &origin, &read_next_to);
     Ok(Some(checked.map_err(|findings| CampaignError::Mistakes(Box::new(findings)))?))
 }
 
 /// Reads a file named by the campaign of a recording. A missing sequence script is not an error, because it is not needed here.
-fn read_beside(path: &Path) -> std::io::Result<String> {
+fn read_next_to(path: &Path) -> std::io::Result<String> {
     let text = mapper_campaign::read_text(path);
     if path.extension().is_some_and(|extension| extension == "rhai") {
         Ok(text.unwrap_or_default())

@@ -64,7 +64,7 @@ pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, Sess
 
 /// Stores a file named by the campaign under the same relative path in the run directory. A file outside the campaign's directory stays in
 /// place, or is given later with `--campaign`.
-pub(crate) fn keep_beside(directory: &Path, named: &str, text: &str) -> Result<(), SessionError> {
+pub(crate) fn keep_copy(directory: &Path, named: &str, text: &str) -> Result<(), SessionError> {
     let named = Path::new(named);
     if !named.components().all(|part| matches!(part, Component::Normal(_))) {
         return Ok(());

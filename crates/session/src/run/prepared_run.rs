@@ -305,16 +305,16 @@ impl PreparedRun<'_> {
         write_new(&directory.join(run_directory::CAMPAIGN), self.request.campaign_text.as_bytes())?;
         write_new(&directory.join(run_directory::PLAN), json_text(&self.plan)?.as_bytes())?;
         if let MapSource::Table { named, text, description, .. } = &campaign.machine.map {
-            run_directory::keep_beside(&directory, named, text)?;
+            run_directory::keep_copy(&directory, named, text)?;
             if let Some(description) = description {
-                run_directory::keep_beside(&directory, &description.named, &description.text)?;
+                run_directory::keep_copy(&directory, &description.named, &description.text)?;
             }
         }
         if let Some(source) = &campaign.sequence {
             write_new(&directory.join(run_directory::SEQUENCE), source.text.as_bytes())?;
             // A resumed run finds the script under the name in its campaign.
             if Path::new(&source.named) != Path::new(run_directory::SEQUENCE) {
-                run_directory::keep_beside(&directory, &source.named, &source.text)?;
+                run_directory::keep_copy(&directory, &source.named, &source.text)?;
             }
         }
         Ok(directory)

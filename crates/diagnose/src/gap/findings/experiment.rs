@@ -23,12 +23,12 @@ pub struct Experiment {
     /// Start, target and dwell; equal points if only a temperature changes. P3 is the value that holds the target. Unused for a soak.
     pub jump: AllowedJump,
     /// What changes in addition to the jump.
-    pub beside: Beside,
+    pub also: AlsoChanged,
 }
 
 /// What changes in addition to P3 and the valve.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Beside {
+pub enum AlsoChanged {
     /// Nothing.
     Nothing,
     /// Turbine inlet total temperature changes with the step; K.
@@ -74,31 +74,31 @@ const MOUNTING_MIN: f64 = 30.0;
 impl Experiment {
     /// A jump without any other change.
     pub fn jump(jump: AllowedJump) -> Experiment {
-        Experiment { jump, beside: Beside::Nothing }
+        Experiment { jump, also: AlsoChanged::Nothing }
     }
 
     /// Duration, min. Excludes the approach to the start; includes half an hour for mounting a sensor.
     pub fn minutes(&self) -> f64 {
-        let mounting = if matches!(self.beside, Beside::Sensor(_)) { MOUNTING_MIN } else { 0.0 };
+        let mounting = if matches!(self.also, AlsoChanged::Sensor(_)) { MOUNTING_MIN } else { 0.0 };
         let at_work_s =
-            if let Beside::Soak(soak) = self.beside { soak.duration_s } else { self.jump.dwell_s };
+            if let AlsoChanged::Soak(soak) = self.also { soak.duration_s } else { self.jump.dwell_s };
         (at_work_s / 60.0).max(0.1) + mounting
     }
 
     /// Whether only the valve moves, at one speed.
     pub fn is_valve_step(&self) -> bool {
         let AllowedJump { from, to, .. } = self.jump;
-        self.beside == Beside::Nothing
+        self.also == AlsoChanged::Nothing
             && (from.speed_rpm - to.speed_rpm).abs() < 1e-3 * from.speed_rpm.abs()
             && from.valve_opening_ratio != to.valve_opening_ratio
     }
 
     /// The input that the step changes, as it would be recorded at `t_s` (rising) if the step began at `start_s`.
     pub fn driven(&self, t_s: &[f64], start_s: f64) -> Option<(Channel, Series)> {
-        let (channel, from_k, to_k, lag_s) = match self.beside {
-            Beside::Nothing | Beside::Sensor(_) | Beside::Soak(_) => return None,
-            Beside::T3 { from_k, to_k } => (Channel::T3, from_k, to_k, T3_LAG_S),
-            Beside::Oil { from_k, to_k } => (Channel::TOil, from_k, to_k, OIL_LAG_S),
+        let (channel, from_k, to_k, lag_s) = match self.also {
+            AlsoChanged::Nothing | AlsoChanged::Sensor(_) | AlsoChanged::Soak(_) => return None,
+            AlsoChanged::T3 { from_k, to_k } => (Channel::T3, from_k, to_k, T3_LAG_S),
+            AlsoChanged::Oil { from_k, to_k } => (Channel::TOil, from_k, to_k, OIL_LAG_S),
         };
         let at = |t: &f64| to_k + (from_k - to_k) * (-(t - start_s).max(0.0) / lag_s).exp();
         Some((channel, Series { t_s: t_s.to_vec(), values: t_s.iter().map(at).collect() }))

@@ -1,6 +1,6 @@
 //! Diagnosis report, machine-readable.
 
-use crate::gap::findings::experiment::{Beside, Experiment};
+use crate::gap::findings::experiment::{AlsoChanged, Experiment};
 use crate::gap::reference::baseline_assumptions::Since;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -353,13 +353,13 @@ impl Kind {
 
     /// Kind of an experiment.
     pub fn of(experiment: &Experiment) -> Kind {
-        match experiment.beside {
-            Beside::T3 { .. } => Kind::T3Step,
-            Beside::Oil { .. } => Kind::OilStep,
-            Beside::Sensor(_) => Kind::Sensor,
-            Beside::Soak(_) => Kind::Soak,
-            Beside::Nothing if experiment.is_valve_step() => Kind::ValveStep,
-            Beside::Nothing => Kind::Jump,
+        match experiment.also {
+            AlsoChanged::T3 { .. } => Kind::T3Step,
+            AlsoChanged::Oil { .. } => Kind::OilStep,
+            AlsoChanged::Sensor(_) => Kind::Sensor,
+            AlsoChanged::Soak(_) => Kind::Soak,
+            AlsoChanged::Nothing if experiment.is_valve_step() => Kind::ValveStep,
+            AlsoChanged::Nothing => Kind::Jump,
         }
     }
 }

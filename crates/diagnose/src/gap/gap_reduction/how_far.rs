@@ -196,7 +196,7 @@ fn by_channel(
 fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
     let tolerances = Hypothesis { nuisances: after.nuisances.clone(), effects: Vec::new() };
     let nothing = study.nothing();
-    let Ok(points) = study.points_beside(after, &[&nothing, &tolerances]) else { return Vec::new() };
+    let Ok(points) = study.points_with_others(after, &[&nothing, &tolerances]) else { return Vec::new() };
     study
         .steps
         .iter()

@@ -1,7 +1,7 @@
 //! Next step: the experiments that best distinguish the remaining candidates, or the sensor that would.
 
 use crate::gap::best_fit::fit::Fit;
-use crate::gap::findings::experiment::{AllowedJump, Beside, Experiment};
+use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
 use crate::gap::findings::report::{JumpPoint, Kind, Next, Place, Suggestion};
 use crate::gap::next_experiment::odds::{Odds, entropy_bit, odds};
 use crate::gap::next_experiment::outlook::{apart, apart_at_first_sight, recorded_jumps, recorded_points};
@@ -77,10 +77,11 @@ pub fn next(study: &Study, mut rivals: Rivals<'_>, allowed: &[Experiment], tempe
         let of_kind = looks.iter().map(|(_, experiment)| *experiment).filter(|e| Kind::of(e) == kind);
         close.extend(of_kind.take(most));
     }
-    if let Some(jump) = close.first().filter(|experiment| experiment.beside == Beside::Nothing) {
+    if let Some(jump) = close.first().filter(|experiment| experiment.also == AlsoChanged::Nothing) {
         let missing = OUTPUTS.into_iter().filter(|c| *c != Channel::P3 && study.table.column(*c).is_none());
-        let added: Vec<Experiment> =
-            missing.map(|channel| Experiment { jump: jump.jump, beside: Beside::Sensor(channel) }).collect();
+        let added: Vec<Experiment> = missing
+            .map(|channel| Experiment { jump: jump.jump, also: AlsoChanged::Sensor(channel) })
+            .collect();
         close.extend(added);
     }
     let looked = parallel::map(&close, |experiment| {
@@ -125,13 +126,17 @@ fn suggestion(kind: Kind, experiment: &Experiment, odds: &Odds, open_bit: f64) -
         kind,
         from: point(from),
         to: point(to),
-        t3_k: if let Beside::T3 { from_k, to_k } = experiment.beside { Some([from_k, to_k]) } else { None },
-        oil_temperature_k: if let Beside::Oil { from_k, to_k } = experiment.beside {
+        t3_k: if let AlsoChanged::T3 { from_k, to_k } = experiment.also {
             Some([from_k, to_k])
         } else {
             None
         },
-        sensor: if let Beside::Sensor(channel) = experiment.beside {
+        oil_temperature_k: if let AlsoChanged::Oil { from_k, to_k } = experiment.also {
+            Some([from_k, to_k])
+        } else {
+            None
+        },
+        sensor: if let AlsoChanged::Sensor(channel) = experiment.also {
             Some(channel.symbol().to_owned())
         } else {
             None
@@ -152,11 +157,13 @@ fn script(experiment: &Experiment) -> Vec<String> {
     };
     let celsius = |k: f64| round(k - 273.15);
     let AllowedJump { from, to, dwell_s, .. } = experiment.jump;
-    let change = match experiment.beside {
-        Beside::Nothing | Beside::Sensor(_) => None,
-        Beside::Soak(soak) => return vec![format!("zero: {{soak: {} min}}", round(soak.duration_s / 60.0))],
-        Beside::T3 { to_k, .. } => Some(format!("t3(\"{} degC\");", celsius(to_k))),
-        Beside::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
+    let change = match experiment.also {
+        AlsoChanged::Nothing | AlsoChanged::Sensor(_) => None,
+        AlsoChanged::Soak(soak) => {
+            return vec![format!("zero: {{soak: {} min}}", round(soak.duration_s / 60.0))];
+        }
+        AlsoChanged::T3 { to_k, .. } => Some(format!("t3(\"{} degC\");", celsius(to_k))),
+        AlsoChanged::Oil { to_k, .. } => Some(format!("oil(\"{} degC\");", celsius(to_k))),
     };
     let go = [format!("jump({}, \"{} s\");", place(to), round(dwell_s))];
     let start = [format!("jump({}, \"{START_S} s\");", place(from))];
@@ -169,7 +176,7 @@ fn round(value: f64) -> f64 {
 }
 
 /// Suggestion for a gap outside the effect library: a suspected effect, or a sensor for the part with most of the gap.
-pub fn look_beside(places: &[Place]) -> Next {
+pub fn sensor_near(places: &[Place]) -> Next {
     let place = places.first();
     let part = place.and_then(|place| Submodel::ALL.into_iter().find(|part| part.name() == place.submodel));
     let (sensor, lies) = match part {

@@ -4,7 +4,7 @@ use crate::gap::best_fit::coordinate::coordinates;
 use crate::gap::best_fit::first_step::is_start;
 use crate::gap::best_fit::fit::{Fit, effect_changes};
 use crate::gap::best_fit::misfit::misfit;
-use crate::gap::findings::experiment::{AllowedJump, Beside, Experiment};
+use crate::gap::findings::experiment::{AllowedJump, AlsoChanged, Experiment};
 use crate::gap::next_experiment::at_rest::apart_at_rest;
 use crate::gap::residuals::actuators::Actuators;
 use crate::gap::residuals::nuisance::OUTPUTS;
@@ -98,7 +98,7 @@ fn imagined(recorded: &Study, experiment: &Experiment, interval_s: f64) -> Optio
         marker(0, 0.0, HOLD_S, jump.from_p3_pa, jump.from),
         marker(1, HOLD_S, HOLD_S + dwell_s, jump.to_p3_pa, jump.to),
     ];
-    let added = if let Beside::Sensor(channel) = experiment.beside { Some(channel) } else { None };
+    let added = if let AlsoChanged::Sensor(channel) = experiment.also { Some(channel) } else { None };
     let like = Alike {
         declared: recorded.declared.clone(),
         model: recorded.nominal.model.clone(),
@@ -132,7 +132,7 @@ pub fn apart_at_first_sight(
     experiment: &Experiment,
     fits: &[&Fit],
 ) -> Option<Vec<Vec<f64>>> {
-    if let Beside::Soak(soak) = experiment.beside {
+    if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
     let study = imagined(recorded, experiment, COARSE_S)?;
@@ -155,7 +155,7 @@ pub fn apart_at_first_sight(
 /// `D` is the difference of the predictions and `J` the derivatives of `j`'s prediction with respect to its nuisances and parameters. `L`
 /// is their precision from the recording. Result: `D'D - D'J (L + J'J)^-1 J'D`, all whitened.
 pub fn apart(recorded: &Study, experiment: &Experiment, fits: &[&Fit]) -> Option<Vec<Vec<f64>>> {
-    if let Beside::Soak(soak) = experiment.beside {
+    if let AlsoChanged::Soak(soak) = experiment.also {
         return apart_at_rest(recorded, &soak, fits);
     }
     let study = imagined(recorded, experiment, FINE_S)?;

@@ -110,7 +110,7 @@ impl Study {
             }
             noise
         });
-        study.noise_besides = noise.collect();
+        study.other_noise = noise.collect();
         let since = Since { recording: name, lacking: by_channel(&before, &model_error, &shares) };
         Ok(Changed { study, since, warnings })
     }

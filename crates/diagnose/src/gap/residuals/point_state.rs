@@ -50,7 +50,7 @@ impl Study {
     /// # Errors
     /// [`PredictError`].
     pub fn points(&self, hypothesis: &Hypothesis) -> Result<Vec<PointState>, PredictError> {
-        Ok(self.points_beside(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
+        Ok(self.points_with_others(hypothesis, &[])?.into_iter().map(|(point, _)| point).collect())
     }
 
     /// Model state at the end of each step, and the efficiency and h of other hypotheses' models at the same speed, pressures and metal
@@ -58,7 +58,7 @@ impl Study {
     ///
     /// # Errors
     /// [`PredictError`].
-    pub fn points_beside(
+    pub fn points_with_others(
         &self,
         hypothesis: &Hypothesis,
         others: &[&Hypothesis],

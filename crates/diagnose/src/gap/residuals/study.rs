@@ -109,7 +109,7 @@ pub struct Study {
     /// Row of each output in each step's blocks.
     pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
     /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
-    pub(crate) noise_besides: Vec<DMatrix<f64>>,
+    pub(crate) other_noise: Vec<DMatrix<f64>>,
 }
 
 /// The first step counts from this time before the first jump, s. The rig's earlier history is unknown, and the metal's start is fitted
@@ -247,7 +247,7 @@ impl Study {
             times_s,
             places,
             rows,
-            noise_besides: Vec::new(),
+            other_noise: Vec::new(),
         }
     }
 

@@ -266,7 +266,7 @@ fn covariances(
             for (i, _) in blocks.iter().enumerate().filter(|(_, block)| block.since_jump_s < lost_s) {
                 covariance[(i, i)] += (UNINFORMATIVE * sigma).powi(2);
             }
-            if let Some(more) = study.noise_besides.get(place) {
+            if let Some(more) = study.other_noise.get(place) {
                 covariance += more;
             }
             covariance

@@ -9,8 +9,8 @@ pub(crate) const COLUMNS: usize = 80;
 /// Widths of a head that is broken into lines, if its words allow it.
 const NARROW: usize = 8;
 const NARROWEST: usize = 5;
-/// Minimum width of a column of text that is broken into lines.
-const TEXT: usize = 16;
+/// Minimum width of a column of text that is broken into lines: some three words.
+const TEXT: u16 = 24;
 
 /// A table that fits 80 columns. If it is too wide, its heads are broken into lines, then its texts; a table that is still too wide
 /// continues below itself, with its first column repeated.
@@ -60,16 +60,22 @@ impl TextTable {
         table
     }
 
-    /// Breaks the texts of a table into lines.
-    fn with_broken_texts(&self, mut table: Table) -> Table {
+    /// The same columns with the widest of their texts, but not the first column, broken into lines.
+    fn with_a_broken_text(&self, columns: &[usize]) -> Table {
+        let mut table = self.laid_out(columns, NARROW);
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(COLUMNS as u16);
-        for place in 0..self.heads.len() {
-            let constraint = match self.texts.contains(&place) {
-                true => ColumnConstraint::LowerBoundary(Width::Fixed(TEXT as u16)),
+        let width = |column: &usize| {
+            self.rows.iter().filter_map(|row| row.get(*column)).map(|cell| cell.chars().count()).max()
+        };
+        let texts = columns.iter().skip(1).filter(|column| self.texts.contains(*column));
+        let widest = texts.max_by_key(|column| width(column)).copied();
+        for (place, column) in columns.iter().enumerate() {
+            let constraint = match Some(*column) == widest {
+                true => ColumnConstraint::LowerBoundary(Width::Fixed(TEXT)),
                 false => ColumnConstraint::ContentWidth,
             };
-            if let Some(column) = table.column_mut(place).filter(|_| place > 0) {
-                column.set_constraint(constraint);
+            if let Some(laid_out) = table.column_mut(place) {
+                laid_out.set_constraint(constraint);
             }
         }
         table
@@ -77,17 +83,21 @@ impl TextTable {
 
     /// As many columns as fit, below each other.
     fn in_parts(&self) -> Vec<String> {
+        let part = |columns: &[usize]| {
+            let text = lines(&self.laid_out(columns, NARROW));
+            if fits(&text) { text } else { lines(&self.with_a_broken_text(columns)) }
+        };
         let mut parts = Vec::new();
         let mut columns = vec![0];
         for column in 1..self.heads.len() {
             columns.push(column);
             if columns.len() > 2 && !fits(&lines(&self.laid_out(&columns, NARROW))) {
                 columns.pop();
-                parts.push(lines(&self.laid_out(&columns, NARROW)));
+                parts.push(part(&columns));
                 columns = vec![0, column];
             }
         }
-        parts.push(lines(&self.laid_out(&columns, NARROW)));
+        parts.push(part(&columns));
         parts
     }
 }
@@ -106,10 +116,7 @@ impl fmt::Display for TextTable {
         let has_texts = self.texts.iter().any(|column| *column > 0);
         let widths = [COLUMNS, NARROW, NARROWEST].into_iter();
         let text = widths.map(|width| lines(&self.laid_out(&all, width))).find(|text| fits(text));
-        let broken = || {
-            Some(lines(&self.with_broken_texts(self.laid_out(&all, NARROW))))
-                .filter(|text| has_texts && fits(text))
-        };
+        let broken = || Some(lines(&self.with_a_broken_text(&all))).filter(|text| has_texts && fits(text));
         f.write_str(&text.or_else(broken).unwrap_or_else(|| self.in_parts().join("\n\n")))
     }
 }

@@ -19,6 +19,8 @@ use std::collections::BTreeMap;
 /// What causes add to the readings of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changes {
+    /// Start of the first step, s: at rest before it, a zero has been taken from the readings as they are.
+    start_s: f64,
     /// For each channel its change along the recording, in the channel's unit.
     channels: BTreeMap<Channel, Series>,
 }
@@ -60,17 +62,18 @@ impl Changes {
             channels.insert(channel, series(values));
         }
         channels.retain(|_, change| change.values.iter().any(|value| *value != 0.0));
-        Ok(Changes { channels })
+        let start_s = study.steps.first().map_or(start_s, |first| first.marker.start_s);
+        Ok(Changes { start_s, channels })
     }
 
-    /// The recording without these changes. Readings before the first step that counts stay; after the last the changes are those of its end.
+    /// The recording without these changes. Readings before the first step stay; where the model does not follow, at the start of the first
+    /// step and the end of the last, the changes are the nearest.
     pub fn subtracted_from(&self, mut recording: Recording) -> Recording {
         for (channel, change) in &self.channels {
-            let Some(start_s) = change.t_s.first() else { continue };
             let own = recording.series.get_mut(channel).into_iter();
             let elements = recording.elements.iter_mut().filter(|(element, _)| element.channel == *channel);
             for series in own.chain(elements.map(|(_, series)| series)) {
-                for index in series.range(*start_s, f64::INFINITY) {
+                for index in series.range(self.start_s, f64::INFINITY) {
                     series.values[index] -= change.interpolate(series.t_s[index]).unwrap_or(0.0);
                 }
             }

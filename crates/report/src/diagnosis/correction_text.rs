@@ -2,12 +2,21 @@
 
 use crate::diagnosis::gap_next::next_text;
 use crate::diagnosis::gap_text::{cause, headline};
-use crate::formatting::table::with_heads;
+use crate::formatting::table::{COLUMNS, with_heads};
+use crate::formatting::wrapped::wrapped;
 use mapper_diagnose::gap::correction::{CorrectedMap, NEEDED_PROBABILITY, NotCorrected, PointCorrection};
 use mapper_diagnose::gap::findings::report::{Diagnosis, law_found};
 
-/// The text.
+/// The text, in lines of a terminal.
 pub fn correction_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
+    let line = |line: &str| match line.chars().count() > COLUMNS {
+        true => wrapped(line, COLUMNS, 2),
+        false => format!("{line}\n"),
+    };
+    unwrapped(map, diagnosis).lines().map(line).collect()
+}
+
+fn unwrapped(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
     let mut text = format!("{}\n\n", headline(diagnosis));
     if let Some(refused) = &map.refused {
         text += &format!("Nothing was corrected: {}.\n", refusal(refused));
@@ -40,7 +49,7 @@ pub fn correction_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
     }
     text += &format!("{table}\n");
     text += &consequence(&map.points);
-    text += "The corrected map rests on this cause: if the machine differs in another way, the efficiencies as recorded\nare as likely.\n";
+    text += "The corrected map rests on this cause: if the machine differs in another way, the efficiencies as recorded are as likely.\n";
     text
 }
 

@@ -101,6 +101,11 @@ impl Finished {
         self
     }
 
+    /// Whether these words are on standard error, however its lines are broken.
+    pub fn mentions(&self, words: &str) -> bool {
+        self.stderr.split_whitespace().collect::<Vec<_>>().join(" ").contains(words)
+    }
+
     /// Standard output as the one JSON object that it must be.
     #[track_caller]
     pub fn json(&self) -> Value {

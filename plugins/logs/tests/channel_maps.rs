@@ -69,6 +69,7 @@ fn units_that_contradict_the_log_are_reported_and_gauge_units_need_the_word() {
         .collect();
     assert_eq!(channels, [Channel::T2]);
     let error = read(&log(10), "channels:\n  P1: {field: p1}\n").unwrap_err().to_string();
+    let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(error.contains("over the ambient pressure") && error.contains("gauge: true"), "{error}");
 }
 

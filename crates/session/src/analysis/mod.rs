@@ -9,5 +9,6 @@ pub(crate) mod further_results;
 pub(crate) mod gap;
 pub(crate) mod gap_correction;
 pub(crate) mod identification;
+pub(crate) mod pdf;
 pub(crate) mod results;
 pub(crate) mod transient;

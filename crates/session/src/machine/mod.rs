@@ -7,3 +7,4 @@ pub(crate) mod fmu_binary;
 pub(crate) mod fmu_file;
 pub(crate) mod map_file;
 pub(crate) mod map_work;
+pub(crate) mod reduce;

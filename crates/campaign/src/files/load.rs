@@ -125,7 +125,7 @@ pub fn backend_mistake(
     if hidden {
         tree.hide(&steps);
     }
-    let remedy = "the settings of each backend are listed in docs/tutorials/first_map.md";
+    let remedy = "docs/reference/virtual_lab.md lists the settings of the virtual lab, docs/how-to/rig.md those of drivers";
     notes.push(tree.finding(FindingKind::WrongValue, &steps, message, remedy));
     tree.findings(notes)
 }

@@ -99,7 +99,7 @@ pub fn actual_rise_k(t1_k: f64, t2_k: f64, air: Air) -> f64 {
 /// Efficiency of a compressor without heat transfer between total temperatures T1 and T2, fraction.
 ///
 /// ```
-/// use mapper_physics::{air::Air, compression::apparent_efficiency};
+/// use mapper_physics::{gas::air::Air, laws::compression::apparent_efficiency};
 /// // From 300 K to 480.6 K at a pressure ratio of 4 (Moran and Shapiro, table A-22): 0.8.
 /// assert!((apparent_efficiency(4.0, 300.0, 480.6, Air::DRY) - 0.8).abs() < 2e-3);
 /// ```
@@ -112,7 +112,7 @@ pub fn apparent_efficiency(pressure_ratio: f64, t1_k: f64, t2_k: f64, air: Air) 
 ///
 /// ```
 /// use mapper_core::EfficiencyDefinition;
-/// use mapper_physics::{air::Air, compression::efficiency_by};
+/// use mapper_physics::{gas::air::Air, laws::compression::efficiency_by};
 /// let by_enthalpy = efficiency_by(EfficiencyDefinition::Enthalpy, 0.72, 4.0, 298.0, Air::PAPER);
 /// // The paper's definition reads 0.7 points higher at this pressure ratio.
 /// assert!((0.005..0.009).contains(&(0.72 - by_enthalpy)));

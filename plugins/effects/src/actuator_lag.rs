@@ -1,9 +1,9 @@
 //! P3 follows its command more slowly.
 
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::rig::instruments::NOMINAL_P3_LAG_S;
 
 effect_parameters! {

@@ -1,9 +1,9 @@
 //! Part of the heat enters the gas before the wheel.
 
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 
 effect_parameters! {
     /// Part of the heat enters the gas before the wheel.

@@ -1,9 +1,9 @@
 //! All convection of the compressor housing is stronger or weaker.
 
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 
 effect_parameters! {
     /// All convection of the compressor housing is stronger or weaker.

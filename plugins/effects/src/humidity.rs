@@ -1,9 +1,9 @@
 //! The compressor takes in moist air.
 
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 
 effect_parameters! {
     /// The compressor takes in moist air.

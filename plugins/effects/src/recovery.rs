@@ -1,9 +1,9 @@
 //! The T2 probe does not recover the whole total temperature.
 
-use mapper_physics::rig::effect::{Rig, Submodel};
-use mapper_physics::rig::effect_kind::{About, EffectKind};
 use mapper_physics::effect_parameters;
 use mapper_physics::machine::hooks::TooManyExtraStates;
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
 
 effect_parameters! {
     /// The T2 probe does not recover the whole total temperature.

@@ -1,10 +1,10 @@
 //! CSV and similar: cells with a separator between them.
 
-use crate::notation::table_row::Rows;
 use crate::notation::encoding;
+use crate::notation::separator::{SEPARATORS, decimal, score};
+use crate::notation::table_row::Rows;
 use crate::tables::long_table::{LongForm, LongRows};
 use crate::tables::row_stream::{Dialect, RowStream};
-use crate::notation::separator::{SEPARATORS, decimal, score};
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink};
 use std::io::Cursor;

@@ -3,9 +3,9 @@
 //! Format: MathWorks, MAT-File Format (2005-2024), chapter 1. Matrices become one column for each of theirs; texts, cells, objects and complex or
 //! sparse numbers are left out.
 
+use crate::columns::table_head::COLUMN_LIMIT;
 use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
 use crate::tables::several_tables::{Part, side_by_side};
-use crate::columns::table_head::COLUMN_LIMIT;
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::limits::UNPACKED_BYTES;
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};

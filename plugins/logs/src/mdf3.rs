@@ -2,7 +2,9 @@
 
 use crate::mdf_source::MdfSource;
 use falcon_mdf::mdf3::Mdf3File;
-use mapper_recording::logs::{Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+use mapper_recording::logs::{
+    Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink,
+};
 use std::collections::BTreeMap;
 
 /// The format.

@@ -3,7 +3,9 @@
 use crate::mdf_source::MdfSource;
 use falcon_mdf::{Channel, ChannelGroup, Conversion, Mf4File, OpenOptions, Signal};
 use mapper_recording::logs::limits::{BLOCK_BYTES, unpacked_max};
-use mapper_recording::logs::{Column, Group, Kind, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+use mapper_recording::logs::{
+    Column, Group, Kind, Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink,
+};
 use std::collections::BTreeSet;
 
 /// The format.

@@ -1,9 +1,9 @@
 //! TDMS: the files of LabVIEW and of National Instruments' loggers. Each group is a table; waveform channels have their own rate.
 
-use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
-use crate::notation::instant::Instant;
-use crate::tables::several_tables::{Part, side_by_side};
 use crate::columns::table_head::COLUMN_LIMIT;
+use crate::notation::instant::Instant;
+use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
+use crate::tables::several_tables::{Part, side_by_side};
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
 use std::io::{Seek as _, SeekFrom};

@@ -2,16 +2,18 @@
 
 mod check;
 
-use crate::notation::table_row::{Cells, Rows};
+use crate::columns::table_head::COLUMN_LIMIT;
 use crate::notation::instant::{Instant, NS_PER_DAY};
 use crate::notation::number::number_in;
-use crate::tables::several_tables::{Part, side_by_side};
 use crate::notation::separator::decimal;
-use crate::columns::table_head::COLUMN_LIMIT;
-use crate::tables::table_log::{Origin, Table};
+use crate::notation::table_row::{Cells, Rows};
 use crate::notation::typed_cell::Value;
+use crate::tables::several_tables::{Part, side_by_side};
+use crate::tables::table_log::{Origin, Table};
 use calamine::{Cell, DataRef, DataType, Reader, SheetVisible, Xlsx, XlsxCellReader};
-use mapper_recording::logs::{DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink};
+use mapper_recording::logs::{
+    DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink,
+};
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };

@@ -2,7 +2,11 @@
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::{interrupt, output::{output_options, standard_output}, registry};
+use crate::{
+    interrupt,
+    output::{output_options, standard_output},
+    registry,
+};
 use clap::Args;
 use mapper_campaign::CampaignError;
 use mapper_report::{assumed_text, declared_sensors_text, duration, lines_text, verdict_forecast_text};

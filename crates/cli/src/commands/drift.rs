@@ -1,8 +1,8 @@
 //! `mapper drift`: whether the rig stayed the same while a map was made.
 
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `mapper fleet`.
 
-use crate::output::failure::Failure;
 use crate::command_line::subcommands::subcommands;
+use crate::output::failure::Failure;
 use clap::Args;
 
 /// Work in many pieces on many cores or machines: maps, diagnoses, calibrations, studies

@@ -1,7 +1,7 @@
 //! `mapper gap`.
 
-use crate::output::failure::Failure;
 use crate::command_line::subcommands::subcommands;
+use crate::output::failure::Failure;
 use clap::Args;
 
 /// Diagnose the gap between nominal model and rig, and check that diagnosis on withheld data

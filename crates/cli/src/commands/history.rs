@@ -1,9 +1,9 @@
 //! `mapper history`: what the nights gave.
 
+use crate::command_line::subcommands::subcommands;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use crate::output::standard_output::Replace;
-use crate::command_line::subcommands::subcommands;
 use clap::Args;
 use mapper_history::{Filter, Metric};
 use mapper_report::{groups_text, history_svg, runs_text};
@@ -111,6 +111,10 @@ impl History {
             let runs: Vec<serde_json::Value> = runs.iter().map(mapper_report::listed_run_json).collect();
             return standard_output::print_json(&json!({"history": self.chosen.db, "runs": runs}));
         }
-        standard_output::print(&if self.runs { runs_text(&runs, &figures) } else { groups_text(&runs, &figures) })
+        standard_output::print(&if self.runs {
+            runs_text(&runs, &figures)
+        } else {
+            groups_text(&runs, &figures)
+        })
     }
 }

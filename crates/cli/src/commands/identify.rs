@@ -1,13 +1,13 @@
 //! `mapper identify`: from recordings to points and a map, without a rig.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::detail_options::ShownArguments;
+use crate::output::failure::Failure;
+use crate::terminal::{identified_text, results_text};
 use crate::{output::standard_output, registry};
 use clap::{Args, ValueEnum};
 use mapper_core::Method;
 use mapper_session::{Recorded, Session};
-use crate::terminal::{identified_text, results_text};
 use std::path::PathBuf;
 
 /// Identify efficiency and heat transfer from run directories, MCAP recordings or logs of other programs
@@ -65,7 +65,13 @@ impl Identify {
         found.has_points(&warnings)?;
         match self.json {
             true => standard_output::print_json(&found.json(path.as_deref(), &warnings)),
-            false => standard_output::print(&identified_text(&display, &found, MORE, &warnings, self.shown.shown())),
+            false => standard_output::print(&identified_text(
+                &display,
+                &found,
+                MORE,
+                &warnings,
+                self.shown.shown(),
+            )),
         }
     }
 }

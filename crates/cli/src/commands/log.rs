@@ -1,7 +1,7 @@
 //! `mapper log`.
 
-use crate::output::failure::Failure;
 use crate::command_line::subcommands::subcommands;
+use crate::output::failure::Failure;
 use clap::Args;
 
 /// Look into the log of a test stand

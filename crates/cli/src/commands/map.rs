@@ -1,7 +1,7 @@
 //! `mapper map`.
 
-use crate::output::failure::Failure;
 use crate::command_line::subcommands::subcommands;
+use crate::output::failure::Failure;
 use clap::Args;
 
 /// Fit, convert and compare compressor maps

@@ -2,7 +2,11 @@
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::{interrupt, output::{output_options, standard_output}, registry};
+use crate::{
+    interrupt,
+    output::{output_options, standard_output},
+    registry,
+};
 use clap::Args;
 use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};

@@ -1,10 +1,13 @@
 //! `mapper report`: the page of a run, with other runs for comparison.
 
+use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::standard_output::Replace;
-use crate::{output::{output_options, standard_output}, registry};
+use crate::{
+    output::{output_options, standard_output},
+    registry,
+};
 use clap::Args;
 use mapper_recording::ChannelMap;
 use mapper_session::{Gap, Recorded, Registry, Session, SessionError, page_as_pdf};

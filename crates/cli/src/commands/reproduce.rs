@@ -37,7 +37,8 @@ impl Reproduce {
         let page = self.out.join("reproduction.md");
         write(&page, mapper_validation::reproduction::reproduction_page(&results).as_bytes())?;
         if self.json {
-            let figures: Vec<serde_json::Value> = results.iter().map(mapper_validation::reproduction::figure_json).collect();
+            let figures: Vec<serde_json::Value> =
+                results.iter().map(mapper_validation::reproduction::figure_json).collect();
             return standard_output::print_json(&json!({"page": page, "figures": figures}));
         }
         let mut text = String::new();

@@ -1,17 +1,24 @@
 //! `mapper run`: the whole way from a campaign to a map.
 
+use crate::output::detail_options::ShownArguments;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::output::detail_options::ShownArguments;
+use crate::terminal::results_text;
 use crate::wall_clock::SystemWall;
-use crate::{interrupt, output::{output_options, standard_output}, registry, rig_states};
+use crate::{
+    interrupt,
+    output::{output_options, standard_output},
+    registry, rig_states,
+};
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
 use mapper_live::{Asked, LiveError, LiveRun, Observers, TlsFiles};
 use mapper_report::plan_text;
-use mapper_session::{BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError, SessionEvent, recording::run_directory, soak_s, start_time_ns};
-use crate::terminal::results_text;
+use mapper_session::{
+    BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
+    SessionEvent, recording::run_directory, soak_s, start_time_ns,
+};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -181,7 +188,12 @@ impl Run {
             (Err(error), None) => return Err(error.into()),
             (Ok(results), _) if !self.json => {
                 let more = format!("`mapper identify {} --full`", results.run.display());
-                standard_output::print(&results_text(&campaign.display, &results, &more, self.shown.shown()))?;
+                standard_output::print(&results_text(
+                    &campaign.display,
+                    &results,
+                    &more,
+                    self.shown.shown(),
+                ))?;
             }
             // Stopped before there was anything to identify: why it was stopped is what counts.
             (Err(_), Some(_)) if !self.json => {}

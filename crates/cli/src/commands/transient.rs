@@ -1,7 +1,7 @@
 //! `mapper transient`: a log in which nothing rests.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;

@@ -3,8 +3,8 @@
 use super::motion::Motion;
 use super::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, RunningMachine, SecondOrder, Structure, StructureError};
-use mapper_physics::simulation::model::{Model, State};
 use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::model::{Model, State};
 use mapper_physics::simulation::simulate::Watch;
 use mapper_physics::simulation::steady;
 use std::sync::Arc;

@@ -7,9 +7,12 @@ use super::passage::{
     AREA_SHARES, BACK_NODE, CAPACITY_SHARES, EXTERNAL_SHARES, FLANGE_NODE, NODES, PROBE_NODE, along, h_ratios,
 };
 use super::structure::OtherStructure;
-use mapper_physics::simulation::model::{Model, Outputs, State};
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::{gas::air, laws::{compression, housing, orifice}};
+use mapper_physics::simulation::model::{Model, Outputs, State};
+use mapper_physics::{
+    gas::air,
+    laws::{compression, housing, orifice},
+};
 
 /// Shaft, two pressures, duct flow, turbine housing, probe tip, gas of the first volume, separation, nodes, their inner
 /// walls, hidden temperatures of hooks.

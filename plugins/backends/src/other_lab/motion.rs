@@ -3,11 +3,13 @@
 use super::machine::{SIZES, STATES, evaluate, seen, start};
 use super::structure::OtherStructure;
 use crate::virtual_lab::{LabInputs, RunningMachine, StructureError};
+use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, State};
-use mapper_physics::machine::params::{BoundaryConditions, Params};
 use mapper_physics::simulation::rosenbrock::{Integrator, OdeSystem, Tolerances};
-use mapper_physics::simulation::simulate::{Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch};
+use mapper_physics::simulation::simulate::{
+    Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
+};
 
 /// Time to a steady state: many time constants of the turbine housing, s.
 const LONG_S: f64 = 40_000.0;

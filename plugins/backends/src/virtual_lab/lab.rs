@@ -1,25 +1,25 @@
 //! The virtual gas stand: the lumped model behind actuators and sensors, in simulated time.
 
+use super::samples::{Instant, Readers, SampleCollector};
+use super::settings::{LabSettings, Start};
+use crate::setpoint_limits;
 use crate::virtual_lab::rig::actuator::Actuator;
 use crate::virtual_lab::rig::drift::{self, LabDrift};
-use crate::virtual_lab::sensors::elements::ElementBank;
 use crate::virtual_lab::rig::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
 use crate::virtual_lab::rig::precursor::Resonator;
 use crate::virtual_lab::rig::running::RunningMachine;
-use super::samples::{Instant, Readers, SampleCollector};
+use crate::virtual_lab::sensors::elements::ElementBank;
 use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
 use crate::virtual_lab::sensors::sensor::Sensor;
-use super::settings::{LabSettings, Start};
-use crate::setpoint_limits;
 use mapper_core::{
     Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, RigDescription, RigMode,
     SafeTrajectory, SampleBatch, Setpoints,
 };
-use mapper_physics::simulation::inputs::Inputs;
+use mapper_physics::laws::standstill::{self, StandstillState};
 use mapper_physics::rig::instruments::ChannelFollower;
+use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{State, rad_s_of_rpm};
 use mapper_physics::simulation::simulate::{Crossing, ModelEvent, SimulationError, Watch};
-use mapper_physics::laws::standstill::{self, StandstillState};
 
 /// Shaft speed at which a starting machine enters the running model and a stopping one leaves it, rpm.
 const CRANKING_SPEED_RPM: f64 = 5_000.0;

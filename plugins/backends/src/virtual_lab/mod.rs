@@ -1,29 +1,29 @@
 //! A simulated gas stand: the lumped model, actuators, sensors, standstill, surge, overspeed.
 
 mod campaign_keys;
-mod rig;
-mod sensors;
 mod lab;
 mod name;
+mod rig;
 mod samples;
+mod sensors;
 mod settings;
 mod truth;
 
+pub use campaign_keys::setting_problem::{SettingProblem, within};
+pub use campaign_keys::settings_file::read_settings;
+pub use lab::VirtualLab;
+pub use name::NAME;
 pub use rig::actuator::ActuatorDynamics;
 pub use rig::boundary_wander::Weather;
 pub use rig::drift::{Drifting, LabDrift};
-pub use sensors::elements::{LabElement, LabElements};
 pub use rig::inputs::LabInputs;
-pub use lab::VirtualLab;
-pub use name::NAME;
 pub use rig::precursor::SurgePrecursor;
 pub use rig::running::{RunningMachine, Structure, StructureError};
+pub use rig::tolerances::draw_tolerances;
+pub use sensors::elements::{LabElement, LabElements};
 pub use sensors::second_order::SecondOrder;
 pub use sensors::sensor::SensorErrors;
-pub use campaign_keys::setting_problem::{SettingProblem, within};
 pub use settings::{LabSettings, Start};
-pub use campaign_keys::settings_file::read_settings;
-pub use rig::tolerances::draw_tolerances;
 
 use mapper_core::{Backend, BackendError};
 use mapper_physics::rig::backend_plugin::BackendPlugin;

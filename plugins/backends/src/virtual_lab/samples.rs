@@ -1,17 +1,17 @@
 //! Readings of the lab's sensors: the model's values through taps, lags and errors, collected into a batch.
 
-use crate::virtual_lab::rig::drift;
-use crate::virtual_lab::sensors::elements::ElementBank;
-use crate::virtual_lab::rig::precursor::{P2_SHARE, Resonator, Swing};
-use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
-use crate::virtual_lab::sensors::sensor::Sensor;
 use super::settings::LabSettings;
 use super::truth::TruthRecorder;
+use crate::virtual_lab::rig::drift;
+use crate::virtual_lab::rig::precursor::{P2_SHARE, Resonator, Swing};
+use crate::virtual_lab::sensors::elements::ElementBank;
+use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
+use crate::virtual_lab::sensors::sensor::Sensor;
 use mapper_core::{CHANNELS, Channel, ChannelColumn, ElementColumn, Event, SampleBatch, Setpoints};
+use mapper_physics::gas::pressure_tap;
+use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{self, ChannelFollower};
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
-use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::gas::pressure_tap;
 
 /// Frequency of the surge cycle, Hz: the order of a small compressor with a short outlet duct.
 const SURGE_FREQUENCY_HZ: f64 = 7.3;

@@ -3,16 +3,16 @@
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
 use crate::virtual_lab::rig::boundary_wander::Weather;
 use crate::virtual_lab::rig::drift::LabDrift;
-use crate::virtual_lab::sensors::elements::LabElements;
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
 use crate::virtual_lab::rig::running::{Lumped, Structure};
+use crate::virtual_lab::sensors::elements::LabElements;
 use crate::virtual_lab::sensors::second_order::SecondOrder;
 use crate::virtual_lab::sensors::sensor::SensorErrors;
 use mapper_core::Channel;
+use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::instruments::Instruments;
 use mapper_physics::simulation::model::Model;
-use mapper_physics::machine::params::BoundaryConditions;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! `mapper fleet estimate`: what a study costs, before it is run.
 
-use crate::output::failure::Failure;
 use crate::fleet_place::in_fleet;
+use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_report::cost_text;
@@ -26,6 +26,10 @@ impl Estimate {
         let tried = in_fleet(&self.directory, None, |fleet, kind, engine, machine| {
             fleet.tried(kind, self.tries.into(), engine, machine)
         })?;
-        if self.json { standard_output::print_json(&tried.cost) } else { standard_output::print(&cost_text(&tried.cost)) }
+        if self.json {
+            standard_output::print_json(&tried.cost)
+        } else {
+            standard_output::print(&cost_text(&tried.cost))
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! `mapper fleet make`: a study becomes items.
 
-use crate::output::failure::Failure;
 use crate::fleet_place::on_this_machine;
+use crate::output::failure::Failure;
 use crate::output::{output_options, standard_output};
 use clap::Args;
 use mapper_fleet::{Made, kind_of, open_study};

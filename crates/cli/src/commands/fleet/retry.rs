@@ -1,7 +1,7 @@
 //! `mapper fleet retry`: what is missing, once more.
 
-use crate::output::failure::Failure;
 use crate::fleet_place::in_fleet;
+use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_report::submission_text;
@@ -21,6 +21,10 @@ impl Retry {
     /// Submits.
     pub fn run(&self) -> Result<(), Failure> {
         let submission = in_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
-        if self.json { standard_output::print_json(&submission) } else { standard_output::print(&submission_text(&submission)) }
+        if self.json {
+            standard_output::print_json(&submission)
+        } else {
+            standard_output::print(&submission_text(&submission))
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! `mapper fleet run`: all of a study on this machine.
 
+use crate::fleet_place::in_fleet;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::fleet_place::in_fleet;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::Which;

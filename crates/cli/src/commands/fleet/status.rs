@@ -1,7 +1,7 @@
 //! `mapper fleet status`: how far a study is.
 
-use crate::output::failure::Failure;
 use crate::fleet_place::on_this_machine;
+use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::{Fleet, Template, running};

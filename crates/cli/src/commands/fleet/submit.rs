@@ -1,8 +1,8 @@
 //! `mapper fleet submit`: a study on a cluster.
 
+use crate::fleet_place::in_fleet;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::fleet_place::in_fleet;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::{Limits, SubmitOptions, Template};
@@ -72,7 +72,11 @@ impl Submit {
             let cost = fleet.tried(kind, TRIES, engine, machine)?.cost;
             fleet.submit(&options, &cost, machine)
         })?;
-        if self.json { standard_output::print_json(&submission) } else { standard_output::print(&submission_text(&submission)) }
+        if self.json {
+            standard_output::print_json(&submission)
+        } else {
+            standard_output::print(&submission_text(&submission))
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! `mapper fleet work`: a share of the items.
 
+use crate::fleet_place::in_fleet;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::fleet_place::in_fleet;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_fleet::{Hash, Shard, Which};

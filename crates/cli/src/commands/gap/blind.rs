@@ -1,7 +1,7 @@
 //! `mapper gap blind`: the check of the diagnosis on withheld data.
 
-use crate::output::failure::Failure;
 use crate::command_line::subcommands::subcommands;
+use crate::output::failure::Failure;
 use clap::Args;
 
 /// Check the diagnosis on data whose causes are withheld

@@ -1,15 +1,18 @@
 //! `mapper gap diagnose`: where a recording leaves the nominal model, why, how far that closes the gap, what is next.
 
+use crate::command_line::shared_arguments::channel_map;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::command_line::shared_arguments::channel_map;
 use crate::output::standard_output::Replace;
-use crate::{output::{output_options, standard_output}, registry};
+use crate::{
+    output::{output_options, standard_output},
+    registry,
+};
 use clap::Args;
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::Diagnosed;
-use mapper_diagnose::gap::joint::over_recordings;
 use mapper_diagnose::gap::findings::report::Law;
+use mapper_diagnose::gap::joint::over_recordings;
 use mapper_report::{gap_text, headline, recordings_text, sensors_text, zero_text};
 use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent};
 use serde_json::{Value, json};
@@ -85,7 +88,11 @@ impl Diagnose {
             }
         }
         if let [(_, gap)] = &gaps[..] {
-            return if self.json { standard_output::print_json(&gap.json()?) } else { standard_output::print(&text(gap)) };
+            return if self.json {
+                standard_output::print_json(&gap.json()?)
+            } else {
+                standard_output::print(&text(gap))
+            };
         }
         let diagnosed: Vec<&Diagnosed> = gaps.iter().map(|(_, gap)| &gap.diagnosed).collect();
         let over = over_recordings(&diagnosed, &Calibration::shipped().map_err(SessionError::Calibration)?);

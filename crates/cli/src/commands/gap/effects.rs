@@ -3,10 +3,10 @@
 use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
-use mapper_validation::blind::study_without_causes;
 use mapper_diagnose::missing_terms::imitations::signatures;
 use mapper_physics::rig::effect::Effect;
 use mapper_report::with_heads;
+use mapper_validation::blind::study_without_causes;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

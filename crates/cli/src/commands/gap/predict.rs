@@ -1,7 +1,7 @@
 //! `mapper gap predict`: forecasts the next recording under seal, and says afterwards how that came out.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::channel_map;
+use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_report::held_text;

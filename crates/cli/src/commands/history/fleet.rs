@@ -26,7 +26,9 @@ impl Fleet {
             opened(&self.chosen)?.points(&self.chosen.filter()).map_err(SessionError::from)?;
         let productions = productions(&nights, &points);
         if self.json {
-            return standard_output::print_json(&json!({"history": self.chosen.db, "productions": productions}));
+            return standard_output::print_json(
+                &json!({"history": self.chosen.db, "productions": productions}),
+            );
         }
         standard_output::print(&production_text(&productions))
     }

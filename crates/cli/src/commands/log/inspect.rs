@@ -1,7 +1,7 @@
 //! `mapper log inspect`: what a log holds, and the channel map that it suggests.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::key_and_value;
+use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;

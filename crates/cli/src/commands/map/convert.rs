@@ -1,7 +1,7 @@
 //! `mapper map convert`: a map in another format, at another reference state.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::{MapReading, reference};
+use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `mapper map correct`: a hot map without the heat that it shows.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::MapReading;
+use crate::output::failure::Failure;
 use crate::output::standard_output::MapTarget;
 use crate::{output::standard_output, registry};
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `mapper map fmu`: the machine as an FMU.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;

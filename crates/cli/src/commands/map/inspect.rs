@@ -1,7 +1,7 @@
 //! `mapper map inspect`: how a map file is understood.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::MapReading;
+use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
 use crate::{output::standard_output, registry};
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `mapper map reduce`: a table of steady points becomes a map.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::MapReading;
+use crate::output::failure::Failure;
 use crate::output::standard_output::MapTarget;
 use crate::{output::standard_output, registry};
 use clap::Args;

@@ -1,7 +1,7 @@
 //! `mapper map rig`: results of a run in addition to the compressor's map.
 
-use crate::output::failure::Failure;
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
+use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
 use mapper_session::{Recorded, Session};

@@ -1,7 +1,7 @@
 //! `drift:` below `virtual_lab`: drifts during the campaign.
 
-use crate::virtual_lab::rig::drift::{Drifting, LabDrift};
 use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
+use crate::virtual_lab::rig::drift::{Drifting, LabDrift};
 use mapper_core::{BackendError, Channel};
 use mapper_yaml::units::{Kind, Quantity};
 use serde::Deserialize;

@@ -1,9 +1,9 @@
 //! The lab's redundant sensors as declared, and `faults:` below `virtual_lab`: offset, slow or stuck sensors.
 
+use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
 use crate::virtual_lab::sensors::draws::{Draws, offset_kind};
 use crate::virtual_lab::sensors::elements::{LabElement, LabElements, stream};
 use crate::virtual_lab::sensors::sensor::SensorErrors;
-use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
 use mapper_core::{BackendError, Channel, DeclaredElement, Element};
 use mapper_physics::rig::nominal_rig::NominalRig;
 use mapper_yaml::units::{Duration, Length, Quantity};

@@ -1,23 +1,23 @@
 //! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
 
-use crate::virtual_lab::rig::actuator::ActuatorDynamics;
-use crate::virtual_lab::rig::boundary_wander::Weather;
-use crate::virtual_lab::sensors::draws::{Draws, draw, offset_kind};
 use crate::virtual_lab::campaign_keys::drift_file::{self, DriftFile};
 use crate::virtual_lab::campaign_keys::effects_file::{EffectValues, put_in};
 use crate::virtual_lab::campaign_keys::elements_file::{self, FaultFile};
+use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
+use crate::virtual_lab::rig::actuator::ActuatorDynamics;
+use crate::virtual_lab::rig::boundary_wander::Weather;
 use crate::virtual_lab::rig::precursor::SurgePrecursor;
 use crate::virtual_lab::rig::running::Lumped;
-use crate::virtual_lab::sensors::sensor::SensorErrors;
-use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
-use crate::virtual_lab::settings::{LabSettings, Start};
 use crate::virtual_lab::rig::tolerances::draw_tolerances;
+use crate::virtual_lab::sensors::draws::{Draws, draw, offset_kind};
+use crate::virtual_lab::sensors::sensor::SensorErrors;
+use crate::virtual_lab::settings::{LabSettings, Start};
 use mapper_core::{BackendError, Channel};
+use mapper_physics::machine::params::Params;
 use mapper_physics::rig::effect::Rig;
 use mapper_physics::rig::instruments::Instruments;
-use mapper_physics::simulation::model::Model;
 use mapper_physics::rig::nominal_rig::NominalRig;
-use mapper_physics::machine::params::Params;
+use mapper_physics::simulation::model::Model;
 use mapper_yaml::units::{
     Conductance, Dimension, Duration, Fraction, Frequency, Length, PressureRate, Quantity, RatioRate, Speed,
     TemperatureRate,

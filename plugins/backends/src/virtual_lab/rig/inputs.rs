@@ -2,8 +2,8 @@
 
 use crate::virtual_lab::rig::actuator::{Actuator, ActuatorDynamics};
 use crate::virtual_lab::rig::boundary_wander::Weather;
-use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::inputs::Inputs;
 
 /// Minimum ratio of air supply to P4 while the model runs: the model divides by the turbine's flow.
 pub const LOWEST_EXPANSION_RATIO: f64 = 1.0005;

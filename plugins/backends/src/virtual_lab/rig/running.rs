@@ -1,10 +1,12 @@
 //! The running machine: the lumped model, or other equations in the same rig.
 
-use crate::virtual_lab::rig::inputs::LabInputs;
 use crate::virtual_lab::name::NAME;
-use mapper_physics::simulation::model::{Model, Outputs, State};
+use crate::virtual_lab::rig::inputs::LabInputs;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
-use mapper_physics::simulation::simulate::{DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch};
+use mapper_physics::simulation::model::{Model, Outputs, State};
+use mapper_physics::simulation::simulate::{
+    DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Simulator, Watch,
+};
 use mapper_physics::simulation::steady;
 
 /// Why a machine cannot be settled.

@@ -2,9 +2,9 @@
 
 use crate::virtual_lab::sensors::sensor::{Sensor, SensorErrors};
 use mapper_core::{Channel, Element, ElementColumn, RedundantSensors};
+use mapper_physics::laws::thermocouple;
 use mapper_physics::rig::instruments::{ChannelFollower, ChannelPath};
 use mapper_physics::simulation::model::Outputs;
-use mapper_physics::laws::thermocouple;
 
 /// True properties of one of several sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]

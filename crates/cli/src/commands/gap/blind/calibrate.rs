@@ -3,12 +3,16 @@
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_output::Replace;
-use crate::{interrupt, output::{output_options, standard_output}, registry};
+use crate::{
+    interrupt,
+    output::{output_options, standard_output},
+    registry,
+};
 use clap::Args;
-use mapper_validation::blind::calibration::calibrate::{Plan, calibrate};
-use mapper_validation::blind::scoring::reliability::{calibrated_text, reliabilities};
 use mapper_fleet::Engine;
 use mapper_session::json_text;
+use mapper_validation::blind::calibration::calibrate::{Plan, calibrate};
+use mapper_validation::blind::scoring::reliability::{calibrated_text, reliabilities};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -62,9 +66,9 @@ impl Calibrate {
         }
         let (found, made) = (reliabilities(&observed)?, observed.len());
         match self.json {
-            true => {
-                standard_output::print_json(&json!({"calibration": self.out, "diagnoses": made, "reliability": found}))
-            }
+            true => standard_output::print_json(
+                &json!({"calibration": self.out, "diagnoses": made, "reliability": found}),
+            ),
             false => standard_output::print(&calibrated_text(made, &self.out, &found)),
         }
     }

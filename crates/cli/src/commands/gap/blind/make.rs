@@ -1,7 +1,10 @@
 //! `mapper gap blind make`.
 
 use crate::output::failure::Failure;
-use crate::{output::{output_options, standard_output}, registry};
+use crate::{
+    output::{output_options, standard_output},
+    registry,
+};
 use clap::Args;
 use mapper_validation::blind::{CaseKind, Draw, Laboratory, OutsideUse};
 use serde_json::json;
@@ -60,7 +63,8 @@ impl Make {
         let progress = output_options::progress();
         progress.pieces(0, self.cases);
         let done = |done| progress.pieces(done, self.cases);
-        let made = mapper_validation::blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);
+        let made =
+            mapper_validation::blind::make(&campaign, &registry::registry().effects, &draw, &self.out, &done);
         progress.clear();
         let made = made?;
         if self.json {

@@ -2,11 +2,14 @@
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
-use crate::{interrupt, output::{output_options, standard_output}};
+use crate::{
+    interrupt,
+    output::{output_options, standard_output},
+};
 use clap::Args;
-use mapper_validation::blind::{MANIFEST_NAME, Manifest};
 use mapper_fleet::{Engine, cores};
 use mapper_session::write_new;
+use mapper_validation::blind::{MANIFEST_NAME, Manifest};
 use serde_json::json;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -48,7 +51,9 @@ impl Run {
         let failed: Vec<String> = diagnosed.into_iter().filter_map(Result::err).collect();
         if failed.is_empty() {
             if self.json {
-                return standard_output::print_json(&json!({ "cases": manifest.cases, "directory": self.directory }));
+                return standard_output::print_json(
+                    &json!({ "cases": manifest.cases, "directory": self.directory }),
+                );
             }
             let (cases, directory) = (manifest.cases.len(), self.directory.display());
             return standard_output::print(&format!("{cases} diagnoses in {directory}\n"));

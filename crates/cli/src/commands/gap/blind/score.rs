@@ -3,9 +3,9 @@
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
+use mapper_report::with_heads;
 use mapper_validation::blind::scoring::score::{open_answers, score};
 use mapper_validation::blind::{MANIFEST_NAME, Manifest};
-use mapper_report::with_heads;
 use std::path::{Path, PathBuf};
 
 /// Open the seal and print how often the diagnoses are right

@@ -10,7 +10,7 @@ const MEDIAN_LINES: usize = 120;
 /// No file has more, unless its first comment says why.
 const LONGEST_LINES: usize = 500;
 /// All of the program's own crate, tests included: what decides anything lies below it.
-const CLI_LINES: usize = 4_900;
+const CLI_LINES: usize = 5_000;
 /// Files that are longer without saying why: to be emptied.
 const KNOWN: &[&str] = &[];
 

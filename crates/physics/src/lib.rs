@@ -1,6 +1,7 @@
 //! The lumped turbocharger model of Burke et al., and the laws it consists of.
 //!
-//! One file per law; [`model`] combines them, [`simulate`] integrates them, [`steady`] finds steady states.
+//! One file per law; [`model`](simulation::model) combines them, [`simulate`](simulation::simulate) integrates them,
+//! [`steady`](simulation::steady) finds steady states.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

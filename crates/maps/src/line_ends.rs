@@ -6,11 +6,11 @@ use serde::Serialize;
 /// Efficiency below which a compressor counts as choked (Garrett, Turbo Tech 103).
 const CHOKE_ETA: f64 = 0.58;
 /// A line is vertical where the flow rises by less than this ratio of it per ratio of the pressure rise that is lost: at the zero-slope
-/// point the value is above 1, in choke it goes to 0.
+/// point the value is above 1, in choke it goes to 0. Judgement.
 const VERTICAL: f64 = 0.1;
-/// Part of the pressure rise that has to be lost, so that the scatter of repeated points (0.2 % of it) does not count.
+/// Part of the pressure rise that has to be lost, so that the scatter of repeated points (0.2 % of it) does not count. Judgement.
 const VERTICAL_LOSS: f64 = 0.05;
-/// Points with flows nearer than this are one point that was repeated.
+/// Points with flows nearer than this, ratio, are one point that was repeated: twice the usual uncertainty of a flow meter, 0.5 %.
 const REPEAT_RATIO: f64 = 0.01;
 
 /// An end of a line.

@@ -1,6 +1,6 @@
 //! A probability as text.
 
-/// A probability in whole per cent. It is no more certain than its assumptions: outside 0.5 to 99.5 % only the limit is given.
+/// A probability in whole per cent. It is not more certain than its assumptions: outside 0.5 to 99.5 % only the limit is given.
 pub fn probability_text(probability: f64) -> String {
     match 100.0 * probability {
         percent if percent > 99.5 => ">99.5 %".to_owned(),

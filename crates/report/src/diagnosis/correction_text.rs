@@ -83,6 +83,7 @@ fn refusal(refused: &NotCorrected) -> String {
                 100.0 * probability
             )
         }
+        NotCorrected::Undetermined => "the recording does not determine how large the causes are".to_owned(),
         NotCorrected::Ambiguous { step, difference, half_interval } => format!(
             "the recording does not distinguish these causes, and at step {step} their corrections differ by {:.2} points where the interval is \
              +/- {:.2}",

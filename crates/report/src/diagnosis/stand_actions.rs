@@ -3,7 +3,7 @@
 use crate::formatting::number::number;
 use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict};
 
-/// Causes less probable than this are not worth a visit to the stand while another one is open.
+/// Probability below which a cause is not listed for a check while another one is open. Judgement: one visit in ten would find it.
 const WORTH_A_CHECK: f64 = 0.1;
 
 /// What to check for an effect of the library; one without a row gets the check of its part.

@@ -336,7 +336,7 @@ const DRIFT_SHARE: f64 = 0.15;
 const CATALOGUE_END: f64 = 0.7;
 
 /// The recording for the diagnosis, with sensor drift subtracted.
-fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
+pub(crate) fn taken_off(recording: Recording, drift: Option<&DriftReport>) -> Recording {
     drift.and_then(|drift| without_drift(&recording, drift)).unwrap_or(recording)
 }
 

@@ -1,15 +1,16 @@
 //! A map corrected for the causes that a gap diagnosis names: identification of the readings without them.
 
-use crate::analysis::gap::Gap;
+use crate::analysis::gap::{Gap, taken_off};
 use crate::analysis::identification::Identified;
 use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::{BudgetRow, IdentifiedPoint, Method, UncertaintyBudget, half_width_95};
+use mapper_core::{BudgetRow, IdentifiedPoint, Method, UncertaintyBudget, half_width_95, probability_text};
 use mapper_diagnose::gap::correction::{
     Changes, CorrectedMap, NotCorrected, PointCorrection, one_sigma_away,
 };
 use mapper_diagnose::gap::diagnose::GapError;
+use mapper_diagnose::gap::findings::report::Candidate;
 use mapper_diagnose::gap::residuals::study::Hypothesis;
 use mapper_physics::rig::effect::Effect;
 use mapper_recording::ChannelMap;
@@ -46,90 +47,87 @@ impl Session<'_> {
         let quiet = Session::new(self.registry);
         let identify = |recorded| quiet.identify(vec![recorded], map, method);
         let before = identify(recorded.clone())?;
+        let refused = |gap, causes, why, before: Identified| {
+            let points = before.points_alone().map(|point| correction_of(Some(point), None, 0.0)).collect();
+            let map = CorrectedMap { causes, refused: Some(why), points };
+            Ok(GapCorrection { gap, map, identified: before })
+        };
+        // As in the diagnosis, the drift of a sensor is subtracted first.
+        let undrifted = taken_off(recorded.read.recording.clone(), gap.drift.as_ref());
         let without = |hypothesis: &Hypothesis| -> Result<Identified, SessionError> {
             let changes = Changes::of(&gap.diagnosed.study, hypothesis).map_err(GapError::from)?;
             let mut recorded = recorded.clone();
-            recorded.read.recording = changes.subtracted_from(recorded.read.recording);
+            recorded.read.recording = changes.subtracted_from(undrifted.clone());
             identify(recorded)
         };
         let causes = match gap.diagnosed.causes_to_correct() {
             Ok(causes) => causes,
-            Err(refused) => {
-                let map = CorrectedMap {
-                    causes: Vec::new(),
-                    refused: Some(refused),
-                    points: before
-                        .points_alone()
-                        .map(|point| correction_of(Some(point), None, 0.0))
-                        .collect(),
-                };
-                return Ok(GapCorrection { gap, map, identified: before });
-            }
+            Err(why) => return refused(gap, Vec::new(), why, before),
         };
+        let named: Vec<Candidate> = causes.iter().map(|(candidate, _)| (*candidate).clone()).collect();
         let mut after = Vec::with_capacity(causes.len());
         for (_, fit) in &causes {
             after.push(without(&fit.hypothesis)?);
         }
-        let mut moved = Vec::new();
-        for hypothesis in one_sigma_away(&gap.diagnosed.study, causes[0].1) {
-            moved.push(without(&hypothesis)?);
+        let Some(hypotheses) = one_sigma_away(&gap.diagnosed.study, causes[0].1) else {
+            return refused(gap, named, NotCorrected::Undetermined, before);
+        };
+        let mut moved = Vec::with_capacity(hypotheses.len());
+        for hypothesis in &hypotheses {
+            moved.push(without(hypothesis)?);
         }
-        let others = after.split_off(1);
-        let Some(mut identified) = after.pop() else { return Err(SessionError::NoRecording) };
-        let refused = ambiguous(&identified, &others);
-        let named: Vec<_> = causes.iter().map(|(candidate, _)| (*candidate).clone()).collect();
-        let mut points = Vec::new();
-        for (place, scored) in identified.points.iter_mut().enumerate() {
-            let step = scored.point.step;
-            let at = |other: &Identified| other.points_alone().find(|point| point.step == step).cloned();
-            let of = |read: fn(&IdentifiedPoint) -> Option<f64>| {
-                let here = read(&scored.point)?;
-                let differences = |others: &[Identified]| {
-                    others.iter().filter_map(&at).filter_map(|p| Some(read(&p)? - here)).collect::<Vec<_>>()
-                };
-                let parameters = differences(&moved).iter().map(|d| d * d).sum::<f64>();
-                let equivalents = differences(&others).iter().map(|d| d * d).fold(0.0, f64::max);
-                Some((parameters + equivalents).sqrt())
-            };
-            let (eta_sigma, h_sigma) = (of(|point| point.eta), of(|point| point.h_w_m2k));
-            let as_recorded = at(&before);
-            if refused.is_none() {
-                widen(&mut scored.point, eta_sigma.unwrap_or(0.0), h_sigma.unwrap_or(0.0));
-                if let Some(budgets) =
-                    identified.budgets.get_mut(place).filter(|budgets| budgets.step == step)
-                {
-                    add_row(&mut budgets.eta, eta_sigma.unwrap_or(0.0), "");
-                    add_row(&mut budgets.h_w_m2k, h_sigma.unwrap_or(0.0), "W/(m2 K)");
-                }
-            }
-            let corrected = refused.is_none().then_some(&scored.point);
-            points.push(correction_of(
-                as_recorded.as_ref().or(Some(&scored.point)),
-                corrected,
-                eta_sigma.unwrap_or(0.0),
-            ));
+        // There is at least one cause.
+        let mut identified = after.remove(0);
+        if let Some(why) = ambiguous(&identified, &after) {
+            return refused(gap, named, why, before);
         }
-        let map = CorrectedMap { causes: named, refused, points };
-        if map.refused.is_some() {
-            return Ok(GapCorrection { gap, map, identified: before });
-        }
-        identified.remarks.extend(map.causes.iter().map(|cause| {
+        let points = widened(&mut identified, &before, &moved, &after);
+        identified.remarks.extend(named.iter().map(|cause| {
             format!(
-                "corrected for {}, which the diagnosis of this recording names with {:.0} %: without its correction the efficiencies are \
-                 others",
+                "corrected for {}, which the diagnosis of this recording names with {}: without its correction the efficiencies are others",
                 cause.names.join(" + "),
-                100.0 * cause.probability
+                probability_text(cause.probability)
             )
         }));
-        let Some(directory) = directory else { return Ok(GapCorrection { gap, map, identified }) };
-        let mut kept = None;
-        self.identified_into(vec![recorded.clone()], directory, |_| {
-            kept = Some(identified.clone());
-            Ok(identified)
-        })?;
-        let identified = kept.ok_or(SessionError::NoRecording)?;
-        Ok(GapCorrection { gap, map, identified })
+        identified.remarks.extend(
+            gap.drift.as_ref().map(|drift| format!("the drift of a sensor was subtracted: {}", drift.reason)),
+        );
+        if let Some(directory) = directory {
+            let identified = identified.clone();
+            self.identified_into(vec![recorded.clone()], directory, |_| Ok(identified))?;
+        }
+        Ok(GapCorrection { gap, map: CorrectedMap { causes: named, refused: None, points }, identified })
     }
+}
+
+/// Adds the uncertainty of the correction to every point: `moved` are the results one standard deviation away in each direction, `others`
+/// those of causes that the recording does not distinguish.
+fn widened(
+    identified: &mut Identified,
+    before: &Identified,
+    moved: &[Identified],
+    others: &[Identified],
+) -> Vec<PointCorrection> {
+    let mut points = Vec::new();
+    for scored in &mut identified.points {
+        let step = scored.point.step;
+        let at = |other: &Identified| other.points_alone().find(|point| point.step == step).cloned();
+        let sigma = |read: fn(&IdentifiedPoint) -> Option<f64>| {
+            let here = read(&scored.point)?;
+            let square = |other: &Identified| Some((read(&at(other)?)? - here).powi(2));
+            let by_size: f64 = moved.iter().filter_map(square).sum();
+            Some((by_size + others.iter().filter_map(square).fold(0.0, f64::max)).sqrt())
+        };
+        let eta_sigma = sigma(|point| point.eta).unwrap_or(0.0);
+        let h_sigma_w_m2k = sigma(|point| point.h_w_m2k).unwrap_or(0.0);
+        widen(&mut scored.point, eta_sigma, h_sigma_w_m2k);
+        for budgets in identified.budgets.iter_mut().filter(|budgets| budgets.step == step) {
+            add_row(&mut budgets.eta, eta_sigma, "");
+            add_row(&mut budgets.h_w_m2k, h_sigma_w_m2k, "W/(m2 K)");
+        }
+        points.push(correction_of(at(before).as_ref(), Some(&scored.point), eta_sigma));
+    }
+    points
 }
 
 /// Whether the causes that a recording does not distinguish differ at any good point by more than its interval.

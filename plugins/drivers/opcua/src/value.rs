@@ -69,7 +69,7 @@ fn code(status: StatusCode) -> u32 {
 }
 
 /// Codes whose quality differs from that of their severity (Part 4, 7.39; Part 8, 6.3). A value that the sensor does not measure now,
-/// because it was entered by hand, simulated, or kept from before, would blind the guards: it is no reading.
+/// because it was entered by hand, simulated, or kept from before, would blind the guards, so it is not a reading.
 const STATUSES: [(StatusCode, Quality); 10] = [
     (StatusCode::Good, Quality::Good),
     // Sampling has slowed down.

@@ -435,7 +435,7 @@ fn a_write_that_is_not_simply_good_is_lost() {
     }
 }
 
-/// Changes of a node at run time: a Boolean, readings from the future, and values that nobody measures are missing; uncertain ones are
+/// Changes of a node at run time: a Boolean, readings from the future, and values that are not measurements are missing; uncertain ones are
 /// readings, marked as uncertain. The status is noted.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]

@@ -11,7 +11,7 @@ pub(crate) fn plan(page: &RunPage<'_>, display: &Display) -> Markup {
         return html! {
             section #plan aria-labelledby="plan-head" {
                 h2 #plan-head { "Executed plan" }
-                p { "There is no plan: the steps were found in the recording." }
+                p { "The run has no plan; its steps were found in the recording." }
             }
         };
     };

@@ -257,10 +257,12 @@ impl Shown {
     }
 }
 
-/// Target of a step: 110 krpm, opening 0.7.
+/// Target of a step, to a tenth of a krpm and a thousandth of the opening: 110 krpm, opening 0.7.
 fn place(marker: &StepMarker) -> String {
-    let shown = marker.to.map(|point| point.shown());
-    shown.map_or_else(String::new, |(krpm, opening)| format!("{krpm} krpm, opening {opening}"))
+    let shown = |(krpm, opening): (f64, f64)| {
+        format!("{} krpm, opening {}", (krpm * 1e1).round() / 1e1, (opening * 1e3).round() / 1e3)
+    };
+    marker.to.map_or_else(String::new, |point| shown(point.shown()))
 }
 
 fn event_line(t_s: f64, message: &str) -> String {
@@ -274,7 +276,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             format!("{steps} steps in {} of rig time", short(*duration_s))
         }
         SessionEvent::StepStarted(marker) => format!(
-            "{:8.1} s  {}, {}, for {}, {} of rig time left",
+            "{:8.1} s  {}, {}, for {}, {} left",
             marker.start_s,
             marker.number().map_or_else(
                 || "a step once more".to_owned(),

@@ -10,7 +10,7 @@ use mapper_diagnose::gap::findings::report::{Diagnosis, law_found};
 /// The text, in lines of a terminal.
 pub fn correction_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
     let line = |line: &str| match line.chars().count() > COLUMNS {
-        true => wrapped(line, COLUMNS, 2),
+        true => wrapped(line, COLUMNS, 0),
         false => format!("{line}\n"),
     };
     unwrapped(map, diagnosis).lines().map(line).collect()

@@ -40,6 +40,9 @@ impl Recorded {
             return Err(SessionError::Resumed(path.to_owned()));
         }
         let file = run_directory::recording_of(path);
+        if path.is_dir() && !file.exists() {
+            return Err(SessionError::file("read", path)(run_directory::no_recording_in(path)));
+        }
         let options = ReadOptions { logs: registry.logs, ..ReadOptions::default() };
         let read = read_recording(&file, map, &options)?;
         let campaign = match given {

@@ -97,9 +97,31 @@ pub fn recording_of(path: &Path) -> PathBuf {
     if path.is_dir() { path.join(RECORDING) } else { path.to_owned() }
 }
 
+/// Why a directory is no run, and a run that it holds, if any.
+pub(crate) fn no_recording_in(directory: &Path) -> std::io::Error {
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let runs = entries.map(|entry| entry.path()).filter(|path| path.join(RECORDING).exists());
+    let why = match runs.max() {
+        Some(run) => format!("it holds no recording, but runs; give one of them, e.g. {}", run.display()),
+        None => format!("it holds no {RECORDING}; give the directory of a run, or a file"),
+    };
+    std::io::Error::new(ErrorKind::NotFound, why)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_directory_of_runs_names_its_last_run() {
+        let parent = tempfile::tempdir().unwrap();
+        assert!(!no_recording_in(parent.path()).to_string().contains("e.g."));
+        for day in [24, 25] {
+            let run = create(parent.path(), "a", &format!("202611{day}T110618Z")).unwrap();
+            std::fs::write(run.join(RECORDING), "").unwrap();
+        }
+        assert!(no_recording_in(parent.path()).to_string().contains("a-20261125T110618Z"));
+    }
 
     #[test]
     fn a_run_that_was_made_knows_when_from_its_directory() {

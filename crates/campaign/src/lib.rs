@@ -27,7 +27,7 @@ pub use files::load::{
 };
 pub use files::nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use files::schema::json_schema;
-pub use machine_sizes::{AssumedSize, similar_machine, similar_sizes};
+pub use machine_sizes::{AssumedSize, internal_area_sigma_ratio, similar_machine, similar_sizes};
 pub use mapper_yaml::{Finding, FindingKind, Findings, units};
 pub use nominal_table::{NominalTableError, nominal_table};
 pub use resolved::{ResolvedLine, ResolvedPoint, resolved_lines};

@@ -23,6 +23,8 @@ pub struct IdentifyConfig {
     pub alpha_area_sigma_ratio: f64,
     /// Internal area of the compressor housing A_c, m2, > 0.
     pub internal_area_m2: f64,
+    /// Relative uncertainty of that area, one standard deviation: part of the intervals of h, since a recording determines h times the area.
+    pub internal_area_sigma_ratio: f64,
     /// Declared law of h before the wheel.
     pub inlet_convection: InletConvection,
     /// Diameter of the inlet pipe, m, > 0: characteristic length of the convection law before the wheel.
@@ -63,6 +65,7 @@ impl Default for IdentifyConfig {
             alpha_area_ratio: 0.0,
             alpha_area_sigma_ratio: 0.0,
             internal_area_m2: 29e-3,
+            internal_area_sigma_ratio: 0.0,
             inlet_convection: InletConvection::Shared,
             inlet_diameter_m: 40e-3,
             outlet_diameter_m: 35e-3,

@@ -254,6 +254,7 @@ pub(crate) fn check(config: &IdentifyConfig) -> Result<(), IdentifyError> {
     let mut checks = vec![
         share("alpha_area_ratio", config.alpha_area_ratio),
         share("alpha_area_sigma_ratio", config.alpha_area_sigma_ratio),
+        share("internal_area_sigma_ratio", config.internal_area_sigma_ratio),
         positive("internal_area_m2", config.internal_area_m2, "a positive area, m2"),
         positive("time_constant_s", colour.time_constant_s, "a positive time, s"),
         share("first_order_share_ratio", colour.first_order_share_ratio),

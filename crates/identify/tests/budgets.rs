@@ -77,6 +77,38 @@ fn rows_combine_to_the_stated_uncertainty() {
     }
 }
 
+/// The same recording identified with an area that is off by its standard uncertainty has other h by the contribution, and equal efficiencies.
+#[test]
+fn an_uncertain_area_is_in_h_alone() {
+    let (recording, declared) = recorded();
+    let with = |internal_area_m2: f64, internal_area_sigma_ratio: f64| {
+        let usual = IdentifyConfig::default();
+        let config = IdentifyConfig {
+            method: Method::Joint,
+            declared: declared.clone(),
+            joint: fixed(),
+            internal_area_m2: usual.internal_area_m2 * internal_area_m2,
+            internal_area_sigma_ratio,
+            ..usual
+        };
+        identify_recording(&recording, &config).unwrap()
+    };
+    let sigma_ratio = 0.01;
+    let (known, uncertain, off) = (with(1.0, 0.0), with(1.0, sigma_ratio), with(1.0 + sigma_ratio, 0.0));
+    let points = |found: &Identified| found.points.iter().flatten().cloned().collect::<Vec<_>>();
+    for (((known, uncertain), off), budgets) in
+        points(&known).iter().zip(points(&uncertain)).zip(points(&off)).zip(&uncertain.budgets)
+    {
+        let moved = off.h_w_m2k.unwrap() - known.h_w_m2k.unwrap();
+        let stated = contribution(budgets.h_w_m2k.as_ref().unwrap(), "internal area");
+        // 1 / 1.01 is not quite 0.99.
+        assert!((moved / stated - 1.0).abs() < 0.02, "step {}: {moved} {stated}", known.step);
+        assert!((off.eta.unwrap() - known.eta.unwrap()).abs() < 1e-6);
+        assert_eq!((uncertain.eta_low, uncertain.eta_high), (known.eta_low, known.eta_high));
+        assert!(uncertain.h_high_w_m2k > known.h_high_w_m2k);
+    }
+}
+
 /// A reading that is off by its standard uncertainty moves the efficiencies by the contribution: the whole identification is made again.
 #[test]
 fn sensitivities_are_those_of_another_identification() {

@@ -5,8 +5,8 @@ use crate::joint::fit::refinements::Refinements;
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::judge;
 use crate::joint::step_model::parameters::{
-    ALPHA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS, PROBE_MM2,
-    SURFACE, symbol,
+    ALPHA, EXPONENT, LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSET_CHANNELS, OFFSETS,
+    PROBE_MM2, SURFACE, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::profile;
@@ -110,12 +110,15 @@ fn value(
     let known = refinements.and_then(|refinements| refinements.free(index)).map_or(sigma, |(_, error)| error);
     let uninformed = known > IDENTIFIED_RATIO * beforehand;
     let is_offset = is_offset(index);
+    // The coefficient is that of the declared area, as h is.
+    let area =
+        if index == LN_COEFFICIENT && problem.active[LN_AREA] { problem.priors[LN_AREA].sigma } else { 0.0 };
     SharedValue {
         // An offset has its declared spread even if the recording adds nothing.
         value: (!uninformed || is_offset).then_some(reported),
         uncertainty: EstimateUncertainty {
             noise_standard_error: slope.abs() * (variance - bias.min(variance)).max(0.0).sqrt(),
-            bias_standard_error: slope.abs() * bias.min(variance).sqrt(),
+            bias_standard_error: slope.abs() * bias.min(variance).sqrt().hypot(area),
         },
         origin: if uninformed { Origin::NotIdentifiable } else { Origin::Fitted },
     }

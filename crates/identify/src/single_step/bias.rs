@@ -18,7 +18,7 @@ const ENTERING: [Channel; 6] =
 pub(crate) struct DeclaredEffect {
     /// Standard errors of eta and h from fixed offsets and gains.
     pub(crate) bias_standard_errors: [f64; 2],
-    /// Signed effect of one standard deviation of each offset, each gain and the assumed alpha_A, which all points share. The order depends on
+    /// Signed effect of one standard deviation of each offset, each gain, the internal area and the assumed alpha_A, which all points share. The order depends on
     /// the declaration alone.
     pub(crate) common: [Vec<f64>; 2],
     /// Effect of the assumed alpha_A on eta and h, one standard deviation.
@@ -60,6 +60,12 @@ pub(crate) fn declared_effect(
         }
         let mean_square = sensitivity.iter().map(|s| s * s).sum::<f64>() / samples.len().max(1) as f64;
         effect.noise_k2 += mean_square * declared.noise_sigma * declared.noise_sigma;
+    }
+    if config.internal_area_sigma_ratio > 0.0 {
+        // h times the area is what the recording determines.
+        let by_area = -config.internal_area_sigma_ratio * fit.h_w_m2k;
+        squares[1] += by_area * by_area;
+        effect.push([0.0, by_area]);
     }
     effect.bias_standard_errors = squares.map(f64::sqrt);
     if config.alpha_area_sigma_ratio > 0.0 {

@@ -1,7 +1,7 @@
 //! Sizes of the machine that a campaign assumes, and the files of a first campaign.
 
 use crate::formatting::wrapped::wrapped;
-use mapper_campaign::{AssumedSize, Campaign};
+use mapper_campaign::{AssumedSize, Campaign, internal_area_sigma_ratio};
 use std::path::Path;
 
 /// Width of the text, columns.
@@ -15,8 +15,17 @@ pub fn assumed_sentence(campaign: &Campaign) -> Option<String> {
     }
     let named: Vec<String> = sizes.iter().map(named).collect();
     let wheel_mm = 1e3 * campaign.machine.params.compressor.wheel_diameter_m;
+    let sigma_ratio = internal_area_sigma_ratio(sizes);
+    let widened = if sigma_ratio > 0.0 {
+        format!(
+            "; the intervals of h contain {:.0} % for the internal area of the compressor",
+            100.0 * sigma_ratio
+        )
+    } else {
+        String::new()
+    };
     Some(format!(
-        "assumed, from the machine of Burke et al. scaled to a wheel of {} mm: {}",
+        "assumed, from the machine of Burke et al. scaled to a wheel of {} mm: {}{widened}",
         significant(wheel_mm),
         named.join(", ")
     ))

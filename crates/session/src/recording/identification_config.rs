@@ -1,6 +1,6 @@
 //! Converts a campaign's declarations into the configuration of identification and diagnosis.
 
-use mapper_campaign::Campaign;
+use mapper_campaign::{Campaign, internal_area_sigma_ratio};
 use mapper_core::{
     ALPHA_AREA_SIGMA_RATIO, Channel, DeclaredUncertainty, Dimension, Method, ModelTolerances, ReferenceState,
     WindowRule,
@@ -33,6 +33,7 @@ pub fn identification(campaign: &Campaign) -> IdentifyConfig {
         probe_diameter_m: campaign.machine.params.t2_probe_diameter_m,
         joint: chosen.joint,
         internal_area_m2: campaign.machine.params.compressor.internal_area_m2,
+        internal_area_sigma_ratio: internal_area_sigma_ratio(&campaign.machine.assumed),
         air: campaign.machine.params.compressor.air(),
         humidity_sigma_kg_kg: campaign.report.humidity_sigma_kg_kg(&campaign.boundary),
         reference: campaign.reference,

@@ -6,7 +6,7 @@ use crate::joint::fit::solve::{Member, NO_SURFACE_SIGMA, Problem};
 use crate::joint::step_model::model::{Course, Setting};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
-    LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior,
+    LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, LOCAL, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, Prior,
     REFINEMENTS, SHARED, SLOPE, SURFACE,
 };
 use crate::joint::step_model::rows::{StepRows, condensed};
@@ -163,6 +163,8 @@ pub(crate) fn problem<'a>(
     lowest[PROBE_MM2] = 0.0;
     active[LN_DIRECTION] = choice.direction == Choice::Fitted;
     shared[INLET] = inlet::power_of(config.inlet_convection);
+    priors[LN_AREA] = Prior { mean: 0.0, sigma: config.internal_area_sigma_ratio };
+    active[LN_AREA] = config.internal_area_sigma_ratio > 0.0;
     if choice.offsets == Choice::Fitted {
         for (i, channel) in OFFSET_CHANNELS.iter().enumerate() {
             let sigma = config.declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);

@@ -34,8 +34,10 @@ pub(crate) const HUMIDITY: Place = BAROMETER + 1;
 /// Degree to which h before the wheel follows the inlet's own law: 0 is h after the wheel, 1 is that law, with a power law
 /// between. Never fitted: a recording carries almost no information about it next to alpha_A.
 pub(crate) const INLET: Place = HUMIDITY + 1;
+/// ln of the internal area over its value. A recording determines h times the area, so an error of the area is one of h alone.
+pub(crate) const LN_AREA: Place = INLET + 1;
 /// First coefficient of the efficiency surface.
-pub(crate) const SURFACE: Place = INLET + 1;
+pub(crate) const SURFACE: Place = LN_AREA + 1;
 /// First bend of the efficiencies that an offset causes, in the order of [`OFFSET_CHANNELS`] and in units of that offset. The fit
 /// takes the readings as exact, so an offset bends the fitted efficiencies. Without these terms the surface would resist that bend and bias
 /// alpha_A, the probe and the heating/cooling ratio.
@@ -95,6 +97,7 @@ pub(crate) fn symbol(index: usize) -> String {
         BAROMETER => "barometer".to_owned(),
         HUMIDITY => "humidity".to_owned(),
         INLET => "h before the wheel".to_owned(),
+        LN_AREA => "internal area".to_owned(),
         GAINS..BAROMETER => format!("gain of {}", GAIN_CHANNELS[index - GAINS]),
         _ => match OFFSET_CHANNELS.get(index.wrapping_sub(OFFSETS)) {
             Some(channel) => format!("offset of {channel}"),

@@ -8,7 +8,8 @@
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::Covariance;
 use crate::joint::step_model::parameters::{
-    BAROMETER, FLOW_GAIN, GAINS, HUMIDITY, INLET, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, SURFACE, symbol,
+    BAROMETER, FLOW_GAIN, GAINS, HUMIDITY, INLET, LN_AREA, OFFSET_CHANNELS, OFFSETS, PROBE_MM2, SURFACE,
+    symbol,
 };
 use crate::joint::uncertainty::quantity::Quantity;
 use mapper_core::BudgetRow;
@@ -140,7 +141,7 @@ fn unit(index: usize) -> &'static str {
     match index {
         BAROMETER => "Pa",
         HUMIDITY => "kg/kg",
-        FLOW_GAIN | GAINS..BAROMETER | INLET => "1",
+        FLOW_GAIN | GAINS..BAROMETER | INLET | LN_AREA => "1",
         _ => OFFSET_CHANNELS
             .get(index.wrapping_sub(OFFSETS))
             .map_or("1", |channel| channel.info().dimension.unit()),

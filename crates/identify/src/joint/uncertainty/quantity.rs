@@ -2,7 +2,7 @@
 
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{
-    ETA, EXPONENT, HUMIDITY, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SharedVector,
+    ETA, EXPONENT, HUMIDITY, LN_AREA, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SharedVector,
 };
 use crate::joint::step_model::rows::StepRows;
 use nalgebra::DVector;
@@ -104,6 +104,7 @@ pub(crate) fn quantities(
         .map(|i| {
             let (own, mixed) = &covariance.own[i];
             let mut weights = [0.0; SHARED];
+            weights[LN_AREA] = -1.0;
             if problem.setting.with_law {
                 let at = |shared: &SharedVector| {
                     problem.setting.h_at_end(&steps[i].end, shared, &problem.members[i].local)

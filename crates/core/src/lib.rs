@@ -19,8 +19,8 @@ mod text;
 
 pub use identification::common_errors::CommonErrors;
 pub use identification::identified::{
-    EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
-    half_width_95, standard_error_of,
+    EstimateUncertainty, IdentifiedPoint, Method, Verdict, Window, confidence_interval_95, half_width_95,
+    standard_error_of,
 };
 pub use identification::inlet_convection::InletConvection;
 pub use identification::joint_settings::{
@@ -32,6 +32,10 @@ pub use identification::thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };
 pub use identification::uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
+pub use identification::warning::{
+    Bound, EndEvidence, EtaSignal, FitFailure, HeatCorrected, LeftOut, MapRegion, ModelDoubt, ModelEvidence,
+    NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault, Swapped, TooFew, Warning, WideInterval,
+};
 pub use identification::window_rule::WindowRule;
 pub use maps::efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
 pub use maps::fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};

@@ -67,6 +67,7 @@ pub use point_results::point_table::{PointCell, PointGroup, point_cells, point_g
 pub use point_results::point_warnings::{Doubt, doubts};
 pub use point_results::points::{opening, points_text, score_text, step_name, truth_text, verdict_word};
 pub use point_results::shared_errors::shared_errors_text;
+pub use point_results::warning_text::{warning_text, with_messages};
 pub use reference_pages::campaign_page::campaign_page;
 pub use reference_pages::sequence_page::sequence_page;
 pub use test_report::assumed_text::{assumed_sentence, assumed_text, first_campaign_text};

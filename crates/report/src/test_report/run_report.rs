@@ -366,7 +366,7 @@ fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_
     text.push_str("## Doubts and remarks\n\n");
     let doubts = doubts(points());
     for doubt in &doubts {
-        let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message);
+        let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message());
     }
     if doubts.is_empty() {
         text.push_str("None.\n");

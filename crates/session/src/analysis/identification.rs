@@ -19,6 +19,7 @@ use mapper_recording::score::{
     AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
+use mapper_report::with_messages;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -93,7 +94,7 @@ impl Identified {
         if let Some(surge) = &self.surge {
             value["surge"] = json!(surge);
         }
-        value
+        with_messages(value)
     }
 
     /// The points without their truth.

@@ -9,6 +9,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod coded_enum;
 mod identification;
 mod maps;
 mod measurement;
@@ -73,10 +74,11 @@ pub use rig::on_drift::OnDrift;
 pub use rig::run_ending::RunEnding;
 pub use rig::soak::Soak;
 pub use rig::speed_response::{SpeedControlSettings, SpeedResponse};
-pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
+pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSeek};
 pub use test_plan::jump::{Jump, Repeats};
 pub use test_plan::operating_point::OperatingPoint;
 pub use test_plan::plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
+pub use test_plan::plan_remark::{NoBound, PlanRemark};
 pub use test_plan::step_number::step_number;
 pub use test_plan::timing::{Dwell, Timing};
 pub use test_plan::verdict_forecast::{Advice, CampaignChange, VerdictForecast};

@@ -56,6 +56,7 @@ pub use maps::turbine_map_text::{imported_turbine_text, turbine_comparison_text,
 pub use plan::comparison_text::{comparison_json, comparison_text};
 pub use plan::jump_text::{jump_json, jump_text};
 pub use plan::plan_picture::plan_svg;
+pub use plan::plan_remark_text::plan_remark_text;
 pub use plan::plan_text::plan_text;
 pub use plan::speed_lines_text::lines_text;
 pub use plan::verdict_forecast_text::verdict_forecast_text;

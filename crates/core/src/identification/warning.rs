@@ -1,39 +1,12 @@
 //! Every warning and remark about a point, with its values. `mapper-report` turns them into sentences; nothing reads a sentence.
 
 use crate::Channel;
+use crate::coded_enum::coded_enum;
 use serde::{Deserialize, Serialize};
 
-/// Declares the warnings with their stable codes.
-macro_rules! warnings {
-    ($($(#[doc = $doc:literal])* $code:literal $name:ident $({ $($field:ident: $type:ty),* })? $(($inner:ty))?,)*) => {
-        /// A warning or remark about a point, by its stable code. Values are in the unit of their names, readings in that of their channel.
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-        #[serde(tag = "code")]
-        #[allow(missing_docs, reason = "the fields' names are their quantities and units")]
-        #[non_exhaustive]
-        pub enum Warning {
-            $($(#[doc = $doc])* #[serde(rename = $code)] $name $({ $($field: $type),* })? $(($inner))?,)*
-            /// Of a file that has no values, or a code of another version.
-            #[serde(untagged)]
-            Other { code: String, #[serde(default)] message: String },
-        }
-
-        impl Warning {
-            /// All codes, in the order of the reference.
-            pub const CODES: &[&str] = &[$($code),*];
-
-            /// The stable code, for machines.
-            pub fn code(&self) -> &str {
-                match self {
-                    $(Warning::$name { .. } => $code,)*
-                    Warning::Other { code, .. } => code,
-                }
-            }
-        }
-    };
-}
-
-warnings! {
+coded_enum! {
+/// A warning or remark about a point, by its stable code. Values are in the unit of their names, readings in that of their channel.
+Warning {
     /// The median of a step is outside the range of a running machine.
     "dead_channel" DeadChannel { channel: Channel, reading: f64 },
     /// One value for seconds.
@@ -113,6 +86,7 @@ warnings! {
     "off_the_law" OffTheLaw { h_deviation_ratio: f64 },
     /// The joint model does not describe the recording as a whole.
     "model_doubted" ModelDoubted(ModelDoubt),
+}
 }
 
 /// Declares the kinds of warnings with one code.

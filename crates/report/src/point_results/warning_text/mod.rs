@@ -5,6 +5,7 @@ mod of_readings;
 mod of_step;
 pub(crate) mod sentence;
 
+use crate::plan::plan_remark_text::plan_remark_text;
 use crate::point_results::warning_text::sentence::Sentence;
 use mapper_core::{ModelDoubt, Warning};
 use serde::de::DeserializeOwned;
@@ -30,7 +31,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Sentence {
     })
 }
 
-/// A JSON value in which each warning and each doubt has its sentence as `message`, for people.
+/// A JSON value in which each warning, each doubt and each remark of a plan has its sentence as `message`, for people.
 pub fn with_messages(mut value: Value) -> Value {
     add_messages(&mut value);
     value
@@ -44,6 +45,9 @@ fn add_messages(value: &mut Value) {
                 match (key.as_str(), entry) {
                     ("warnings", Value::Array(all)) => {
                         all.iter_mut().for_each(|one| add_message(one, warning_text))
+                    }
+                    ("remarks", Value::Array(all)) => {
+                        all.iter_mut().for_each(|one| add_message(one, plan_remark_text))
                     }
                     ("doubts", Value::Array(all)) => {
                         all.iter_mut().for_each(|one| add_message(one, model_doubt_text))

@@ -1,5 +1,6 @@
 //! Warnings about the readings themselves.
 
+use crate::formatting::number::four_figures;
 use crate::point_results::warning_text::sentence::{Sentence, number, sentence, signed};
 use mapper_core::{Scaled, StepConflict, SuspectedFault, Swapped, Warning, with_unit};
 use mapper_observe::plausible::Implausible;
@@ -27,8 +28,8 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             "{} scatters by {} from sample to sample (one standard deviation), and {} is declared: repair the channel, or declare the \
                  noise that it has",
             *channel,
-            with_unit(format!("{noise:.3e}"), channel.unit()),
-            with_unit(format!("{declared_noise:.3e}"), channel.unit())
+            with_unit(four_figures(*noise), channel.unit()),
+            with_unit(four_figures(*declared_noise), channel.unit())
         ),
         Warning::ScaledChannel(evidence) => scaled(evidence),
         Warning::SwappedChannels(evidence) => swapped(evidence),

@@ -1,7 +1,7 @@
 //! Work in a thread of its own while the calling thread watches for Ctrl-C.
 
 use crate::error::{Fault, MapperError};
-use mapper_session::SessionEvent;
+use mapper_session::{SessionEvent, with_messages};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,10 +38,10 @@ impl Events {
             self.shared.holds_rig.store(false, Ordering::SeqCst);
         }
         if let Some(sender) = &self.sender
-            && let Ok(text) = serde_json::to_string(event)
+            && let Ok(event) = serde_json::to_value(event)
         {
             // A full queue loses a movement of the bar.
-            let _ = sender.try_send(text);
+            let _ = sender.try_send(with_messages(event).to_string());
         }
     }
 }

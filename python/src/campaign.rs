@@ -9,7 +9,7 @@ use mapper_core::{BackendError, NAMED_REFERENCES};
 use mapper_physics::simulation::model::Model;
 use mapper_session::{
     FirstCampaignRequest, FirstRig, PlanInputs, Rehearsal, Session, SessionError, first_campaign,
-    nominal_model, plan_of, rehearse,
+    nominal_model, plan_of, rehearse, with_messages,
 };
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -152,7 +152,7 @@ fn plan_json(inner: &Inner, effort: Option<f64>) -> Result<Value, SessionError> 
     if let Some(zero) = campaign.zero {
         value["soak_s"] = zero.duration_s.into();
     }
-    Ok(value)
+    Ok(with_messages(value))
 }
 
 /// Writes the first campaign of a machine and its nominal map, as `mapper init` does. Returns the JSON of that command.

@@ -5,7 +5,7 @@ use crate::campaign::{Campaign, Inner};
 use crate::error::Fault;
 use crate::map::Map;
 use crate::registry::{registry, registry_with_rig};
-use mapper_session::{Ended, RunOutcome, RunRequest, Session, SessionError, SessionEvent};
+use mapper_session::{Ended, RunOutcome, RunRequest, Session, SessionError, SessionEvent, with_messages};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -122,8 +122,8 @@ fn run(
     };
     let (json, map) = match results {
         Ok(results) => {
-            let json = serde_json::to_string(&results).map_err(SessionError::from)?;
-            (Some(json), results.compressor_map)
+            let json = serde_json::to_value(&results).map_err(SessionError::from)?;
+            (Some(with_messages(json).to_string()), results.compressor_map)
         }
         // Stopped before there was anything to identify.
         Err(_) if end != "completed" => (None, None),

@@ -9,6 +9,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod coded_enum;
 mod identification;
 mod maps;
 mod measurement;
@@ -19,8 +20,8 @@ mod text;
 
 pub use identification::common_errors::CommonErrors;
 pub use identification::identified::{
-    EstimateUncertainty, IdentifiedPoint, Method, Verdict, Warning, Window, confidence_interval_95,
-    half_width_95, standard_error_of,
+    EstimateUncertainty, IdentifiedPoint, Method, Verdict, Window, confidence_interval_95, half_width_95,
+    standard_error_of,
 };
 pub use identification::inlet_convection::InletConvection;
 pub use identification::joint_settings::{
@@ -32,6 +33,10 @@ pub use identification::thermal_model::{
     ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };
 pub use identification::uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
+pub use identification::warning::{
+    Bound, EndEvidence, EtaSignal, FitFailure, HeatCorrected, LeftOut, MapRegion, ModelDoubt, ModelEvidence,
+    NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault, Swapped, TooFew, Warning, WideInterval,
+};
 pub use identification::window_rule::WindowRule;
 pub use maps::efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
 pub use maps::fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
@@ -69,10 +74,11 @@ pub use rig::on_drift::OnDrift;
 pub use rig::run_ending::RunEnding;
 pub use rig::soak::Soak;
 pub use rig::speed_response::{SpeedControlSettings, SpeedResponse};
-pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeSeek};
+pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSeek};
 pub use test_plan::jump::{Jump, Repeats};
 pub use test_plan::operating_point::OperatingPoint;
 pub use test_plan::plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
+pub use test_plan::plan_remark::{NoBound, PlanRemark};
 pub use test_plan::step_number::step_number;
 pub use test_plan::timing::{Dwell, Timing};
 pub use test_plan::verdict_forecast::{Advice, CampaignChange, VerdictForecast};

@@ -8,15 +8,15 @@ use crate::objections::objection::Objection;
 use crate::objections::objections;
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::{EndState, end_state};
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{
     IdentifyConfig, IdentifyError, PressureTap, StepError, faults, joint,
     single_step::{budgets, dynamic, steady},
 };
 use mapper_core::{
-    Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, Method, PointBudgets,
-    Recording, StepMarker, ThermalModel, WindowRule, confidence_interval_95,
+    Channel, CommonErrors, EstimateUncertainty, Event, EventKind, IdentifiedPoint, LeftOut, Method,
+    PointBudgets, Recording, StepMarker, ThermalModel, Warning, WindowRule, confidence_interval_95,
 };
 use mapper_inference::hypotheses::{Likelihood, Priors};
 
@@ -167,12 +167,12 @@ pub fn identify_with_rig(
     }
     objections.extend(faults::objection(&faults, ends.len()));
     if let Some(remark) = faults::remark(&faults) {
-        findings.iter_mut().for_each(|findings| findings.remark(code::OFF_THE_NOMINAL_MAP, remark.clone()));
+        findings.iter_mut().for_each(|findings| findings.remark(remark.clone()));
     }
     // Doubts about the readings come first: all other findings depend on them.
     for objection in objections.iter().rev() {
         for position in &objection.steps {
-            findings[*position].doubt_first(objection.code, objection.message.clone());
+            findings[*position].doubt_first(objection.warning.clone());
         }
     }
     let (points, budgets) = points_with_budgets(recording, states, &estimates, findings, config);
@@ -223,10 +223,7 @@ fn without_the_refused(
     let few = refused.iter().any(|refused| !refused);
     for (position, _) in refused.iter().enumerate().filter(|(_, refused)| few && **refused) {
         if known[position].take().is_some() {
-            findings[position].doubt(
-                code::LEFT_OUT,
-                "this step does not count in what the points share, and has no numbers of its own",
-            );
+            findings[position].doubt(Warning::LeftOut(LeftOut::Readings));
         }
     }
     known
@@ -238,12 +235,10 @@ fn speed_not_reached(recording: &Recording, step: &StepMarker, state: &EndState,
         event.kind == EventKind::SpeedNotReached && event.t_s > step.start_s && event.t_s <= step.end_s
     };
     if let (Some(asked), true) = (step.to, recording.events.iter().any(reported)) {
-        let message = format!(
-            "{:.2} krpm were asked for and {:.2} krpm reached",
-            asked.speed_rpm / 1e3,
-            state.speed_rpm / 1e3
-        );
-        findings.remark(code::SPEED_NOT_REACHED, message);
+        findings.remark(Warning::SpeedNotReached {
+            requested_rpm: asked.speed_rpm,
+            reached_rpm: state.speed_rpm,
+        });
     }
 }
 

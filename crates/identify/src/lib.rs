@@ -42,5 +42,4 @@ pub use reduce::{KnownHeat, method_of_table, reduce};
 pub use single_step::expected::{Expected, ExpectedRow, expected, expected_steady};
 pub use single_step::t2_course::{T2Course, t2_course};
 pub use step_outcome::error::{IdentifyError, StepError};
-pub use step_outcome::findings::code;
 pub use step_outcome::two_parameter::TwoParameter;

@@ -7,11 +7,11 @@ use crate::identify::point;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
 use crate::single_step::expected::DECLARED_INTERVAL_S;
 use crate::step_data::end_state::EndState;
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, IdentifyError, single_step::budgets, step_outcome::interval_width};
 use mapper_core::{
-    BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, MeasuredPoint, Method, PointBudgets,
-    ReferenceState, StepKind, StepMarker,
+    BudgetRow, Channel, EstimateUncertainty, EtaSignal, IdentifiedPoint, MeasuredPoint, Method,
+    NoCompression, PointBudgets, ReferenceState, StepKind, StepMarker, Warning,
 };
 use mapper_numerics::root::root_between;
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
@@ -106,19 +106,16 @@ fn estimate(
     let mut estimate = Estimate::default();
     let (Some(t2_k), Some(tc_k)) = (measured.t2_k, measured.tc_k.or(heat.is_none().then_some(f64::NAN)))
     else {
-        findings
-            .refuse(code::NO_COMPRESSION, "the table has no T2 at this point: no efficiency can be derived");
+        findings.refuse(Warning::NoCompression(NoCompression::NoT2));
         return estimate;
     };
     let params = heat.map(|heat| *heat.params);
     let inputs = Inputs { point: *measured, t2_k, tc_k, air: config.air, params };
     let Some(eta) = inputs.efficiency() else {
-        let message = format!(
-            "T2 - T1 is {:.2} K at a pressure ratio of {:.4}: no efficiency can be derived",
-            t2_k - measured.t1_k,
-            measured.p2_pa / measured.p1_pa
-        );
-        findings.refuse(code::NO_COMPRESSION, message);
+        findings.refuse(Warning::NoCompression(NoCompression::NoRise {
+            rise_k: t2_k - measured.t1_k,
+            pressure_ratio: measured.p2_pa / measured.p1_pa,
+        }));
         return estimate;
     };
     let mut uncertainty = EstimateUncertainty::default();
@@ -148,8 +145,8 @@ fn estimate(
         });
     }
     if known_square.sqrt() > config.thresholds.sigma_eta {
-        let (code, message) = interval_width::cause_of_rise(uncertainty, t2_k - measured.t1_k);
-        findings.doubt(code, message);
+        let signal = EtaSignal::Settled { rise_k: t2_k - measured.t1_k };
+        findings.doubt(interval_width::wide(uncertainty, signal));
     }
     match heat {
         Some(heat) => {
@@ -157,11 +154,9 @@ fn estimate(
             let bias_standard_error = heat.convection_ratio * h_w_m2k;
             let error = EstimateUncertainty { noise_standard_error: 0.0, bias_standard_error };
             estimate.h_w_m2k = Some((h_w_m2k, Some(error)));
-            let message = format!("heat removed by eqs. 1-3 with the convection law {}", heat.origin);
-            findings.remark(code::THROUGH_THE_LAW, message);
+            findings.remark(Warning::ThroughTheLaw { convection_origin: Some(heat.origin.to_owned()) });
         }
-        None => findings
-            .remark(code::APPARENT, "apparent efficiency: heat exchanged with the housing counts as work"),
+        None => findings.remark(Warning::Apparent),
     }
     findings.remark_undeclared(config);
     estimate.eta = Some((eta, Some(uncertainty)));

@@ -151,9 +151,9 @@ fn score(case: &Case, change: &Change) -> Score {
     if std::env::var("MAPPER_CONDITIONS_VERBOSE").is_ok() {
         let mut codes: BTreeMap<&str, usize> = BTreeMap::new();
         for warning in found.points.iter().flatten().flat_map(|point| &point.warnings) {
-            *codes.entry(&warning.code).or_default() += 1;
+            *codes.entry(warning.code()).or_default() += 1;
         }
-        let faults: Vec<String> = found.faults.iter().map(ToString::to_string).collect();
+        let faults: Vec<String> = found.faults.iter().map(|fault| fault.suspect.to_string()).collect();
         println!("    {}: {score:?} {codes:?} {}", change.name, faults.join("; "));
     }
     score

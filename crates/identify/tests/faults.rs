@@ -114,7 +114,7 @@ fn another_valve_is_named_and_leaves_the_points_as_they_are() {
     let [fault] = faults.as_slice() else { panic!("{faults:?}") };
     assert_eq!(fault.suspect, Suspect::Machine(Machine::ValveArea));
     // A tolerance of 0.5 % shrinks it towards zero.
-    assert!((fault.value - 0.05).abs() < 3.0 * fault.sigma.hypot(0.005), "{fault}");
+    assert!((fault.value - 0.05).abs() < 3.0 * fault.sigma.hypot(0.005), "{fault:?}");
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn faults_are_found_and_named_and_none_is_invented() {
         (fault_free.faults, outcomes)
     });
     let false_alarms: Vec<String> =
-        results.iter().flat_map(|(faults, _)| faults).map(ToString::to_string).collect();
+        results.iter().flat_map(|(faults, _)| faults).map(|fault| format!("{fault:?}")).collect();
     println!(
         "false alarms: {} faults in {} fault-free recordings {false_alarms:?}",
         false_alarms.len(),

@@ -12,7 +12,7 @@ mod table;
 use crate::lab::{Campaign, Machine, campaign, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, Recording, Verdict, Warning};
 use mapper_identify::{
-    Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds, code,
+    Choice, DeclaredUncertainty, Identified, IdentifyConfig, JointSettings, NominalRig, Thresholds,
     identify_each, identify_with_rig,
 };
 use mapper_physics::simulation::model::Model;
@@ -210,15 +210,15 @@ fn of_draw(seed: u64, clean: &Campaign) -> Vec<String> {
 
 /// Warnings about readings.
 const OBJECTIONS: [&str; 9] = [
-    code::FROZEN_CHANNEL,
-    code::DEAD_CHANNEL,
-    code::SCALED_CHANNEL,
-    code::SWAPPED_CHANNELS,
-    code::CONTRADICTED_CHANNEL,
-    code::LATE_CHANNEL,
-    code::NOISY_CHANNEL,
-    code::STEPS_CONTRADICT,
-    code::OFF_THE_NOMINAL_MAP,
+    "frozen_channel",
+    "dead_channel",
+    "scaled_channel",
+    "swapped_channels",
+    "contradicted_channel",
+    "late_channel",
+    "noisy_channel",
+    "steps_contradict",
+    "off_the_nominal_map",
 ];
 
 /// Draws of noise and offsets, on two machines: as declared, and with an undeclared tenth of its area before the wheel and an undeclared slow
@@ -239,9 +239,7 @@ fn fault_free_recordings_get_no_objections() {
                     IdentifyConfig { method, declared: declared.clone(), ..IdentifyConfig::default() };
                 let found = identify_with_rig(&recording, &config, nominal).unwrap();
                 let warnings = found.points.into_iter().flatten().flat_map(|point| point.warnings);
-                warnings
-                    .filter(|warning| OBJECTIONS.contains(&warning.code.as_str()))
-                    .collect::<Vec<Warning>>()
+                warnings.filter(|warning| OBJECTIONS.contains(&warning.code())).collect::<Vec<Warning>>()
             })
         });
         let objections: Vec<&Warning> = objections.iter().flatten().flatten().collect();

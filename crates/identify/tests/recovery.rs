@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common::{STEP_S, Transient};
-use mapper_core::{Channel, EstimateUncertainty, Event, EventKind, Method, OperatingPoint, Verdict};
+use mapper_core::{Channel, EstimateUncertainty, Event, EventKind, Method, OperatingPoint, Verdict, Warning};
 use mapper_identify::{
-    DeclaredUncertainty, IdentifyConfig, IdentifyError, PressureTap, WindowRule, code, identify,
+    DeclaredUncertainty, IdentifyConfig, IdentifyError, PressureTap, WindowRule, identify,
 };
 use mapper_physics::gas::pressure_tap::total_to_static_pa;
 use proptest::prelude::*;
@@ -59,7 +59,7 @@ fn a_wrong_area_split_costs_points() {
 fn the_first_step_has_no_transient() {
     let points = identify(&Transient::default().recording(), &config(0.0)).unwrap();
     assert_eq!((points[0].verdict, points[0].eta, points[0].eta_low), (Verdict::Unusable, None, None));
-    assert_eq!(points[0].warnings[0].code, code::NO_TRANSIENT);
+    assert_eq!(points[0].warnings[0].code(), "no_transient");
     // Its position on the map is still known.
     assert!((points[0].pressure_ratio - 1.7).abs() < 1e-12);
 }
@@ -74,8 +74,8 @@ fn the_steady_method_is_right_where_no_heat_flows() {
         assert!((point.eta.unwrap() - transient.eta).abs() < 1e-12);
         assert_eq!(point.h_w_m2k, None);
     }
-    assert_eq!(points[1].warnings[0].code, code::NOT_SETTLED);
-    assert_eq!(points[0].warnings[0].code, code::APPARENT);
+    assert_eq!(points[1].warnings[0].code(), "not_settled");
+    assert_eq!(points[0].warnings[0].code(), "apparent");
 }
 
 /// Static taps: a recording of static pressures gives the same result as one of total pressures.
@@ -200,7 +200,7 @@ fn an_operating_point_that_never_rests_is_doubtful() {
     }
     let point = &identify(&recording, &IdentifyConfig::default()).unwrap()[1];
     assert_ne!(point.verdict, Verdict::Good);
-    assert!(point.warnings.iter().any(|warning| warning.code == code::NOT_STABILISED));
+    assert!(point.warnings.iter().any(|warning| warning.code() == "not_stabilised"));
 }
 
 /// The quantity with the last command change settles last: the window starts after it.
@@ -245,10 +245,7 @@ fn a_speed_that_was_not_reached_is_a_remark() {
     recording.events.push(Event { t_s, kind: EventKind::SpeedNotReached, message: String::new() });
     let warned = identify(&recording, &IdentifyConfig::default()).unwrap()[1].clone();
     assert_eq!((warned.verdict, warned.eta), (plain.verdict, plain.eta));
-    let remark = warned.warnings.iter().find(|warning| warning.code == code::SPEED_NOT_REACHED).unwrap();
-    assert!(
-        remark.message.contains("123.00 krpm")
-            && remark.message.contains(&format!("{:.2} krpm", warned.speed_rpm / 1e3))
-    );
-    assert!(plain.warnings.iter().all(|warning| warning.code != code::SPEED_NOT_REACHED));
+    let remark = Warning::SpeedNotReached { requested_rpm: 123e3, reached_rpm: warned.speed_rpm };
+    assert!(warned.warnings.contains(&remark), "{:?}", warned.warnings);
+    assert!(plain.warnings.iter().all(|warning| warning.code() != "speed_not_reached"));
 }

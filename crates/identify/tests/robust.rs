@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common::Transient;
-use mapper_core::{Channel, IdentifiedPoint, Method, Recording, Series, Verdict};
+use mapper_core::{Channel, IdentifiedPoint, Method, Recording, Series, Verdict, Warning};
 use mapper_identify::{
-    DeclaredUncertainty, IdentifyConfig, PressureTap, SettleBands, WindowRule, code, identify, identify_each,
+    DeclaredUncertainty, IdentifyConfig, PressureTap, SettleBands, WindowRule, identify, identify_each,
 };
 use proptest::prelude::*;
 
@@ -152,9 +152,9 @@ fn lost_samples_and_spikes_are_left_out() {
     let config = IdentifyConfig::default();
     let point = &identify(&recording, &config).unwrap()[1];
     assert!((point.eta.unwrap() - transient.eta).abs() < 1e-8);
-    let message = |code: &str| &point.warnings.iter().find(|warning| warning.code == code).unwrap().message;
-    assert!(message(code::LOST_SAMPLES).starts_with("32 of "));
-    assert!(message(code::OUTLIERS).starts_with("1 sample far"));
+    let reported = |expected: &dyn Fn(&Warning) -> bool| point.warnings.iter().any(expected);
+    assert!(reported(&|warning| matches!(warning, Warning::LostSamples { lost: 32, .. })));
+    assert!(reported(&|warning| *warning == Warning::Outliers { count: 1, limit_k: None }));
     assert_eq!(point.verdict, Verdict::Good);
 }
 
@@ -176,7 +176,7 @@ fn a_channel_lost_for_the_window_makes_the_point_unusable() {
     recording.series.get_mut(&Channel::Tc).unwrap().values[300..].fill(f64::NAN);
     let point = &identify(&recording, &IdentifyConfig::default()).unwrap()[1];
     assert_eq!((point.verdict, point.eta), (Verdict::Unusable, None));
-    assert_eq!(point.warnings[0].code, code::TOO_FEW_SAMPLES);
+    assert_eq!(point.warnings[0].code(), "too_few_samples");
 }
 
 #[test]
@@ -186,6 +186,6 @@ fn no_compression_is_reported() {
         let config = IdentifyConfig { method, ..IdentifyConfig::default() };
         let point = &identify(&transient.recording(), &config).unwrap()[1];
         assert_eq!((point.verdict, point.eta), (Verdict::Unusable, None));
-        assert_eq!(point.warnings.last().unwrap().code, code::NO_COMPRESSION);
+        assert_eq!(point.warnings.last().unwrap().code(), "no_compression");
     }
 }

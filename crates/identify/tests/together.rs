@@ -4,7 +4,7 @@
 
 use crate::lab::{Campaign, Machine, campaign, eighteen, measured};
 use mapper_core::{Channel, IdentifiedPoint, Method, ModelTolerances, StepKind, Verdict};
-use mapper_identify::{IdentifyConfig, NominalRig, code, identify, identify_with_rig};
+use mapper_identify::{IdentifyConfig, NominalRig, identify, identify_with_rig};
 use mapper_physics::simulation::model::Model;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
@@ -109,7 +109,7 @@ fn one_bad_region_does_not_condemn_the_rest() {
     }
     let found = found(&clean, 1, Method::Joint);
     for (point, truth) in found.iter().zip(&clean.truth) {
-        let left_out = point.warnings.iter().any(|warning| warning.code == code::LEFT_OUT);
+        let left_out = point.warnings.iter().any(|warning| warning.code() == "left_out");
         assert!(left_out || point.valve_opening_ratio < 2.0, "{point:?}");
         if !left_out {
             let error = point.eta.unwrap() - truth.eta;
@@ -134,8 +134,8 @@ fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
     let doubted = |recording: &Campaign, seed: u64| {
         let points = found_beside(recording, seed, Method::Joint, Some(nominal));
         let named = |point: &IdentifiedPoint| {
-            let codes = [code::OFF_THE_NOMINAL_MAP, code::CONTRADICTED_CHANNEL];
-            point.warnings.iter().any(|warning| codes.contains(&warning.code.as_str()))
+            let codes = ["off_the_nominal_map", "contradicted_channel"];
+            point.warnings.iter().any(|warning| codes.contains(&warning.code()))
         };
         points.iter().filter(|point| named(point) && point.verdict != Verdict::Good).count()
     };
@@ -170,7 +170,7 @@ fn repeats_alone_tell_no_heat_balance() {
     for seed in 0..12 {
         for point in found(&clean, seed, Method::Joint) {
             assert!(
-                point.warnings.iter().all(|warning| warning.code != code::CONTRADICTED_CHANNEL),
+                point.warnings.iter().all(|warning| warning.code() != "contradicted_channel"),
                 "seed {seed}: {point:?}"
             );
         }

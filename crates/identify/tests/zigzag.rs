@@ -4,7 +4,7 @@
 
 use crate::common::{RIG, add_noise};
 use mapper_core::{Channel, IdentifiedPoint, Recording, StepKind, StepMarker};
-use mapper_identify::{DeclaredUncertainty, IdentifyConfig, WindowRule, code, identify};
+use mapper_identify::{DeclaredUncertainty, IdentifyConfig, WindowRule, identify};
 use mapper_numerics::statistics::median;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -150,7 +150,7 @@ fn a_fixed_window_agrees_with_the_independent_implementation() {
     for (row, point) in &points {
         let Some((eta, h_w_m2k)) = row.two_parameter else {
             assert_eq!(point.verdict, mapper_core::Verdict::Unusable);
-            assert_eq!(point.warnings[0].code, code::NO_TRANSIENT);
+            assert_eq!(point.warnings[0].code(), "no_transient");
             assert_eq!((point.eta, point.h_w_m2k), (None, None));
             continue;
         };
@@ -225,9 +225,9 @@ fn noise_and_offsets_are_within_what_the_points_say() {
                     let (low, high) = point.eta_low.zip(point.eta_high).unwrap();
                     held += f64::from(u8::from(low <= row.eta_end && row.eta_end <= high));
                     let warned =
-                        |code: &str| f64::from(u8::from(point.warnings.iter().any(|w| w.code == code)));
-                    poor += warned(code::POOR_FIT);
-                    unstable += warned(code::NOT_STABILISED);
+                        |code: &str| f64::from(u8::from(point.warnings.iter().any(|w| w.code() == code)));
+                    poor += warned("poor_fit");
+                    unstable += warned("not_stabilised");
                     pairs.push((*row, point));
                 }
             }

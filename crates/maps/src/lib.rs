@@ -26,7 +26,7 @@ pub use efficiency_definition::convert_efficiency;
 pub use error::AssembleError;
 pub use grouping::Grouping;
 pub use heat_correction::{CorrectedLine, HeatCorrection, HeatCorrectionError, correct_for_heat};
-pub use line_ends::{EndEvidence, FoundEnd, LineEnds, mark_line_ends};
+pub use line_ends::{FoundEnd, LineEnds, mark_line_ends};
 pub use map_fit::{MapFit, MapFitError, MapFitOptions, NearestPlace, fit_map, leave_out};
 pub use repeated_jumps::{RepeatedJump, repeated_jumps};
 pub use repeats::points_for_map;

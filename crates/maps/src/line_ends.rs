@@ -1,6 +1,6 @@
 //! The ends of the speed lines of a map: where surge and choke were reached.
 
-use mapper_core::{CompressorMap, LineEnd, MapPoint, SpeedLine, Warning};
+use mapper_core::{CompressorMap, EndEvidence, LineEnd, MapPoint, SpeedLine, Warning};
 use serde::Serialize;
 
 /// Efficiency below which a compressor counts as choked (Garrett, Turbo Tech 103).
@@ -22,22 +22,6 @@ pub struct FoundEnd {
     pub pressure_ratio: f64,
     /// Evidence.
     pub by: EndEvidence,
-}
-
-/// Evidence for an end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EndEvidence {
-    /// The row of the point names it.
-    Named,
-    /// The pressure ratio does not rise any more towards smaller flow.
-    ZeroSlope,
-    /// The efficiency falls below 58 %.
-    Efficiency,
-    /// The pressure ratio falls without more flow.
-    Vertical,
-    /// The outermost point: the end lies beyond it.
-    NotReached,
 }
 
 /// Both ends of a line.
@@ -73,8 +57,8 @@ pub fn mark_line_ends(map: &mut CompressorMap, named: impl Fn(usize) -> Option<L
         };
         let Some((surge, choke)) = end(surge_at, surge_by).zip(end(choke_at, choke_by)) else { continue };
         found.push(LineEnds { speed_corrected_rpm: line.speed_corrected_rpm, surge, choke });
-        mark(line.points.get_mut(surge_at), surge_by, "surge_end", "the surge side of its line ends here");
-        mark(line.points.get_mut(choke_at), choke_by, "choke_end", "the line is choked from here on");
+        mark(line.points.get_mut(surge_at), surge_by, |evidence| Warning::SurgeEnd { evidence });
+        mark(line.points.get_mut(choke_at), choke_by, |evidence| Warning::ChokeEnd { evidence });
     }
     found
 }
@@ -107,16 +91,8 @@ fn choke_evidence(line: &SpeedLine) -> Option<(usize, EndEvidence)> {
     line.points.iter().enumerate().find_map(evidence)
 }
 
-fn mark(point: Option<&mut MapPoint>, by: EndEvidence, code: &str, words: &str) {
-    let why = match by {
-        EndEvidence::Named => "its row names it",
-        EndEvidence::ZeroSlope => "the pressure ratio does not rise towards smaller flow",
-        EndEvidence::Efficiency => "the efficiency falls below 58 %",
-        EndEvidence::Vertical => "the pressure ratio falls without more flow",
-        EndEvidence::NotReached => return,
-    };
-    if let Some(point) = point {
-        let message = format!("{words}: {why}");
-        point.identified.warnings.push(Warning { code: code.to_owned(), message });
+fn mark(point: Option<&mut MapPoint>, evidence: EndEvidence, warning: fn(EndEvidence) -> Warning) {
+    if let Some(point) = point.filter(|_| evidence != EndEvidence::NotReached) {
+        point.identified.warnings.push(warning(evidence));
     }
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::support::{Row, map_of};
-use mapper_core::Method;
+use mapper_core::{HeatCorrected, Method, Warning};
 #[allow(dead_code, reason = "shared with other tests, which use more of it")]
 use mapper_maps::{HeatCorrectionError, correct_for_heat};
 use proptest::prelude::*;
@@ -53,7 +53,7 @@ fn a_heat_that_all_points_share_is_found_and_taken_off() {
             assert!((point.eta.unwrap() - eta).abs() < 0.012, "{heat_w} W: {:?} {eta}", point.eta);
             let (low, high) = (point.identified.eta_low.unwrap(), point.identified.eta_high.unwrap());
             assert!(low < eta && eta < high);
-            assert_eq!(point.identified.warnings[0].code, "heat_corrected");
+            assert_eq!(point.identified.warnings[0].code(), "heat_corrected");
             assert_eq!(point.identified.common.eta_changes.len(), 2);
         }
     }
@@ -80,7 +80,8 @@ fn more_heat_than_a_point_took_up_leaves_it_without_efficiency() {
     let (map, correction) = correct_for_heat(map_of(&[[50e3, 0.02, 1.1, 0.65]]), Some(120.0)).unwrap();
     let point = &map.lines[0].points[0];
     assert_eq!((point.eta, point.identified.eta, point.identified.eta_low), (None, None, None));
-    assert!(point.identified.warnings[0].message.contains("above 95 %"));
+    let lost = Warning::HeatCorrected(HeatCorrected::TooMuchHeat { heat_w: 120.0 });
+    assert_eq!(point.identified.warnings, [lost]);
     assert!(correction.lines.is_empty());
 }
 

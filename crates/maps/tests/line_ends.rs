@@ -1,8 +1,9 @@
 //! Where surge and choke were reached on the lines of a map.
 
 use crate::support::map_of;
+use mapper_core::EndEvidence;
 use mapper_core::LineEnd;
-use mapper_maps::{EndEvidence, LineEnds, mark_line_ends};
+use mapper_maps::{LineEnds, mark_line_ends};
 
 /// Speed, flow, pressure ratio, efficiency of a line: an ellipse from its top at 0.05 kg/s to choke at 0.10 kg/s.
 fn line(from: f64, to: f64, points: usize, eta: f64) -> Vec<[f64; 4]> {
@@ -63,7 +64,7 @@ fn a_row_that_names_an_end_has_it() {
         .points
         .iter()
         .flat_map(|point| &point.identified.warnings)
-        .map(|warning| warning.code.as_str())
+        .map(|warning| warning.code())
         .collect();
     assert_eq!(codes, ["surge_end", "choke_end"]);
 }

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{SimpleHousing, grid, request};
-use mapper_core::{Dwell, Jump, OperatingPoint, Repeats, StepKind, VisitOrder};
+use mapper_core::{Dwell, Jump, OperatingPoint, PlanRemark, Repeats, StepKind, VisitOrder};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::thermal_memory::chain::gradients_k;
 use mapper_planner::{
@@ -213,7 +213,11 @@ fn the_first_point_is_visited_again_at_the_end() {
         assert_eq!(plan.figures.sum_gradient_k, gradients_k.iter().sum::<f64>());
         assert_eq!(plan.figures.min_gradient_k, gradients_k.iter().copied().min_by(f64::total_cmp));
         assert!((60.0 * plan.figures.minutes - (last.start_s + last.dwell_s)).abs() < 1e-6);
-        assert!(plan.remarks.iter().any(|remark| remark.contains("visited again")), "{:?}", plan.remarks);
+        assert!(
+            plan.remarks.iter().any(|remark| matches!(remark, PlanRemark::FirstPointAgain { .. })),
+            "{:?}",
+            plan.remarks
+        );
         if let Some(bound) = plan.bound {
             assert!(plan.figures.sum_gradient_k <= bound.sum_gradient_k);
             assert!(plan.figures.min_gradient_k.unwrap() <= bound.min_gradient_k);
@@ -239,7 +243,7 @@ fn a_way_back_that_is_not_allowed_is_left_out_and_reported() {
     limited.limits.housing_gradient_max_k = Some(26.0);
     let plan = make_plan(&limited).unwrap();
     assert!(plan.steps.iter().all(|step| step.kind == StepKind::Point));
-    assert!(plan.remarks.iter().any(|remark| remark.contains("forbids the way back")), "{:?}", plan.remarks);
+    assert!(plan.remarks.contains(&PlanRemark::NoWayBack), "{:?}", plan.remarks);
 }
 
 fn permute(points: &mut [OperatingPoint], from: usize, visit: &mut impl FnMut(&[OperatingPoint])) {

@@ -56,6 +56,7 @@ pub use maps::turbine_map_text::{imported_turbine_text, turbine_comparison_text,
 pub use plan::comparison_text::{comparison_json, comparison_text};
 pub use plan::jump_text::{jump_json, jump_text};
 pub use plan::plan_picture::plan_svg;
+pub use plan::plan_remark_text::plan_remark_text;
 pub use plan::plan_text::plan_text;
 pub use plan::speed_lines_text::lines_text;
 pub use plan::verdict_forecast_text::verdict_forecast_text;
@@ -67,6 +68,7 @@ pub use point_results::point_table::{PointCell, PointGroup, point_cells, point_g
 pub use point_results::point_warnings::{Doubt, doubts};
 pub use point_results::points::{opening, points_text, score_text, step_name, truth_text, verdict_word};
 pub use point_results::shared_errors::shared_errors_text;
+pub use point_results::warning_text::{warning_text, with_messages};
 pub use reference_pages::campaign_page::campaign_page;
 pub use reference_pages::sequence_page::sequence_page;
 pub use test_report::assumed_text::{assumed_sentence, assumed_text, first_campaign_text};

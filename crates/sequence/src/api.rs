@@ -258,7 +258,7 @@ fn points_of(array: Array) -> Result<Vec<OperatingPoint>, Thrown> {
 
 fn warnings(result: &StepResult) -> Array {
     let all = result.identified.iter().flat_map(|point| &point.warnings);
-    all.map(|warning| Dynamic::from(ImmutableString::from(warning.code.as_str()))).collect()
+    all.map(|warning| Dynamic::from(ImmutableString::from(warning.code()))).collect()
 }
 
 fn shown(result: &StepResult) -> String {

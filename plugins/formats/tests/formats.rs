@@ -74,10 +74,7 @@ fn csv_reads_back_to_the_same_numbers() {
         assert_eq!(number("residual_rms_k"), p.residual_rms_k);
         assert_eq!(number("dt2_k"), p.dt2_k);
         assert_eq!(field("verdict") == "unusable", p.verdict == Verdict::Unusable);
-        assert_eq!(
-            field("warnings"),
-            p.warnings.iter().map(|w| w.code.clone()).collect::<Vec<_>>().join(";")
-        );
+        assert_eq!(field("warnings"), p.warnings.iter().map(|w| w.code()).collect::<Vec<_>>().join(";"));
     }
     assert!(text.contains("# reference state of corrected flow and speed: 298 K, 100000 Pa\n"));
     assert!(text.contains("# method: dynamic\n"));

@@ -218,8 +218,8 @@ class Plan:
 
     @property
     def remarks(self) -> list[str]:
-        """Warnings for the operator."""
-        return list(self.json["remarks"])
+        """Remarks for the operator."""
+        return [remark["message"] for remark in self.json["remarks"]]
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the order of the steps over mass flow and pressure ratio."""

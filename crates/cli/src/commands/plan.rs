@@ -11,7 +11,9 @@ use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan, other_orders};
-use mapper_report::{comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text};
+use mapper_report::{
+    comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text, with_messages,
+};
 use mapper_session::{
     PlanInputs, Rehearsal, Session, SessionError, json_text, nominal_model, plan_of, rehearse,
 };
@@ -104,7 +106,7 @@ impl Plan {
             if let Some(zero) = campaign.zero {
                 value["soak_s"] = zero.duration_s.into();
             }
-            return standard_output::print_json(&value);
+            return standard_output::print_json(&with_messages(value));
         }
         let mut text = plan_text(&campaign, &plan);
         if let Some(others) = &others {
@@ -130,7 +132,7 @@ impl Plan {
             if let Some(zero) = campaign.zero {
                 value["soak_s"] = zero.duration_s.into();
             }
-            return standard_output::print_json(&value);
+            return standard_output::print_json(&with_messages(value));
         }
         let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
         standard_output::print(&format!(

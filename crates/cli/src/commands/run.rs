@@ -14,7 +14,7 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
 use mapper_live::{Asked, LiveError, LiveRun, Observers, TlsFiles};
-use mapper_report::plan_text;
+use mapper_report::{plan_text, with_messages};
 use mapper_session::{
     BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
     SessionEvent, recording::run_directory, soak_s, start_time_ns,
@@ -199,7 +199,7 @@ impl Run {
             (Err(_), Some(_)) if !self.json => {}
             (results, failure) => {
                 let mut value = match results {
-                    Ok(results) => serde_json::to_value(&results).map_err(SessionError::from)?,
+                    Ok(results) => with_messages(serde_json::to_value(&results).map_err(SessionError::from)?),
                     Err(_) => json!({"run": directory, "recording": recording, "points": [], "map": {}}),
                 };
                 if let Some(failure) = failure {

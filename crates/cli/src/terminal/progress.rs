@@ -3,7 +3,7 @@
 use crate::terminal::bar_text::{run_words, short};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_core::{StepMarker, terminal_text};
-use mapper_report::wrapped;
+use mapper_report::{with_messages, wrapped};
 use mapper_session::SessionEvent;
 use serde_json::json;
 use std::io::Write;
@@ -347,7 +347,7 @@ fn print_json(event: &SessionEvent, state: &mut State) {
         }
         _ => {}
     }
-    let value = serde_json::to_value(event);
+    let value = serde_json::to_value(event).map(with_messages);
     say(&value.unwrap_or_else(|error| json!({ "event": "error", "message": error.to_string() })).to_string());
 }
 

@@ -1,6 +1,6 @@
 //! Identification result of one point, with its uncertainty.
 
-use crate::{CommonErrors, OperatingPoint, StepKind};
+use crate::{CommonErrors, OperatingPoint, StepKind, Warning};
 use serde::{Deserialize, Serialize};
 
 /// How a point was identified.
@@ -51,15 +51,6 @@ impl Verdict {
             Verdict::Unusable => Verdict::Unusable,
         }
     }
-}
-
-/// A warning about a point.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Warning {
-    /// Stable key for machines, e.g. `small_gradient`.
-    pub code: String,
-    /// One sentence with values and units.
-    pub message: String,
 }
 
 /// The part of a recording that was used.

@@ -8,4 +8,5 @@ pub(crate) mod model_tolerances;
 pub(crate) mod settle_bands;
 pub(crate) mod thermal_model;
 pub(crate) mod uncertainty_budget;
+pub(crate) mod warning;
 pub(crate) mod window_rule;

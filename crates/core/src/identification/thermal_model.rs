@@ -1,7 +1,8 @@
 //! Parameters that all points of a campaign share: heat exchange of gas and compressor housing, and sensor errors.
 
-use crate::{Channel, EstimateUncertainty, InletConvection};
-use serde::{Deserialize, Serialize};
+use crate::{Channel, EstimateUncertainty, InletConvection, ModelDoubt};
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Origin of a parameter of the thermal model.
@@ -124,6 +125,13 @@ pub struct ThermalModel {
     pub offsets: BTreeMap<Channel, SharedValue>,
     /// Parameters that are nearly indistinguishable (correlation beyond 0.95 in size).
     pub entangled: Vec<Entangled>,
-    /// Evidence against the model, one sentence each; empty if there is none.
-    pub doubts: Vec<String>,
+    /// Evidence against the model; empty if there is none.
+    #[serde(deserialize_with = "with_values")]
+    pub doubts: Vec<ModelDoubt>,
+}
+
+/// Doubts of older files are sentences without values, and are left out.
+fn with_values<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<ModelDoubt>, D::Error> {
+    let stored = Vec::<Value>::deserialize(deserializer)?;
+    Ok(stored.into_iter().filter_map(|doubt| serde_json::from_value(doubt).ok()).collect())
 }

@@ -74,6 +74,17 @@ pub struct SurgeMark {
     pub steps: usize,
 }
 
+/// A line on which surge was not found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SurgeNotFound {
+    /// Target shaft speed of the line (physical), rpm.
+    pub target_speed_rpm: f64,
+    /// Openings that were tried.
+    pub openings: usize,
+    /// Whether they were enough to locate surge: the variation of pressures and flow did not grow over them.
+    pub enough: bool,
+}
+
 impl SurgeMark {
     /// Standard error of the flow, the flow meter's gain included, kg/s.
     pub fn flow_total_standard_error_kg_s(&self) -> f64 {

@@ -3,6 +3,7 @@
 pub(crate) mod jump;
 pub(crate) mod operating_point;
 pub(crate) mod plan;
+pub(crate) mod plan_remark;
 pub mod step_number;
 pub(crate) mod timing;
 pub(crate) mod verdict_forecast;

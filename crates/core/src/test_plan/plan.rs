@@ -1,6 +1,7 @@
 //! The plan as data: steps, their order, and the expected results.
 
 use crate::OperatingPoint;
+use crate::test_plan::plan_remark::{NoBound, PlanRemark, no_bound, remarks};
 use serde::{Deserialize, Serialize};
 
 /// Whether a step measures a point for the map or revisits one.
@@ -183,12 +184,12 @@ pub struct Plan {
     /// Bounds on the best possible order; `None` if the order was not searched for.
     #[serde(default)]
     pub bound: Option<PlanBound>,
-    /// The unknown part of the bound, and why; `None` if all is known.
-    #[serde(default)]
-    pub bound_remark: Option<String>,
-    /// Warnings for the operator of the plan.
-    #[serde(default)]
-    pub remarks: Vec<String>,
+    /// Why there is no bound; `None` if there is one, or none was requested.
+    #[serde(default, deserialize_with = "no_bound")]
+    pub bound_remark: Option<NoBound>,
+    /// Remarks for the operator of the plan.
+    #[serde(default, deserialize_with = "remarks")]
+    pub remarks: Vec<PlanRemark>,
 }
 
 fn is_zero(value: &f64) -> bool {

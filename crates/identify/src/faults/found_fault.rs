@@ -1,7 +1,7 @@
 //! A detected fault and its description.
 
 use crate::faults::balance_rows::Machine;
-use mapper_core::Channel;
+use mapper_core::{Channel, SuspectedFault};
 use mapper_physics::rig::sensor_fault::{FaultKind, SensorFault};
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -39,58 +39,39 @@ impl Suspect {
         }
     }
 
-    /// Factor and display unit of its size.
-    fn scale(&self) -> (f64, &'static str) {
-        let Suspect::Sensor(SensorFault { channels, kind, .. }) = self else {
-            return match self {
-                Suspect::Machine(Machine::Condition(Channel::P1)) => (1e-3, "kPa"),
-                Suspect::Machine(Machine::Condition(_)) => (1.0, "K"),
-                _ => (100.0, "%"),
-            };
-        };
-        match (kind, channels) {
-            (FaultKind::Gain | FaultKind::TowardsWall, _)
-            | (FaultKind::Drift, [Channel::CompressorFlow | Channel::ShaftSpeed]) => (100.0, "%"),
-            (_, [Channel::P1 | Channel::P2, ..]) => (1e-3, "kPa"),
-            (_, [Channel::CompressorFlow]) => (1e3, "g/s"),
-            (_, [Channel::ShaftSpeed]) => (1e-3, "krpm"),
-            _ => (1.0, "K"),
+    /// Unit of its size.
+    fn unit(&self) -> &'static str {
+        match self {
+            Suspect::Sensor(SensorFault { kind: FaultKind::Gain | FaultKind::TowardsWall, .. })
+            | Suspect::Sensor(SensorFault {
+                kind: FaultKind::Drift,
+                channels: [Channel::CompressorFlow | Channel::ShaftSpeed],
+                ..
+            }) => "1",
+            Suspect::Sensor(SensorFault { channels, .. }) => channels.first().map_or("1", |c| c.unit()),
+            Suspect::Machine(Machine::Condition(channel)) => channel.unit(),
+            Suspect::Machine(_) => "1",
         }
     }
 }
 
-/// Machine-readable form: the cause, its size in SI units or as a ratio, and the alternatives.
+impl From<&FoundFault> for SuspectedFault {
+    fn from(found: &FoundFault) -> Self {
+        SuspectedFault {
+            fault: found.suspect.to_string(),
+            channels: found.suspect.channels().to_vec(),
+            value: found.value,
+            sigma: found.sigma,
+            unit: found.suspect.unit().to_owned(),
+            alternatives: found.alternatives.iter().map(ToString::to_string).collect(),
+            touches_points: found.touches_points,
+        }
+    }
+}
+
 impl Serialize for FoundFault {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Shown {
-            fault: String,
-            channels: &'static [Channel],
-            value: f64,
-            sigma: f64,
-            unit: &'static str,
-            alternatives: Vec<String>,
-            touches_points: bool,
-        }
-        let unit = match self.suspect.scale().1 {
-            "%" => "1",
-            "kPa" => "Pa",
-            "g/s" => "kg/s",
-            "krpm" => "rpm",
-            other => other,
-        };
-        let alternatives = self.alternatives.iter().map(ToString::to_string).collect();
-        let (fault, channels) = (self.suspect.to_string(), self.suspect.channels());
-        Shown {
-            fault,
-            channels,
-            value: self.value,
-            sigma: self.sigma,
-            unit,
-            alternatives,
-            touches_points: self.touches_points,
-        }
-        .serialize(serializer)
+        SuspectedFault::from(self).serialize(serializer)
     }
 }
 
@@ -100,39 +81,6 @@ impl fmt::Display for Suspect {
         match self {
             Suspect::Sensor(fault) => fault.fmt(f),
             Suspect::Machine(machine) => f.write_str(&machine_name(*machine)),
-        }
-    }
-}
-
-/// With its size, its 95 % interval and the alternatives.
-impl fmt::Display for FoundFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (scale, unit) = self.suspect.scale();
-        let size = format!("{:+.2} +/- {:.2} {unit}", scale * self.value, 1.96 * scale * self.sigma);
-        match self.suspect {
-            Suspect::Sensor(fault) => {
-                let channels = fault.channel_names();
-                let several = fault.channels.len() > 1;
-                let verb = |one, many| if several { many } else { one };
-                match fault.kind {
-                    FaultKind::Offset => write!(f, "{channels} {} {size} too high", verb("reads", "read")),
-                    FaultKind::Gain => write!(f, "{channels} {} a gain error of {size}", verb("has", "have")),
-                    FaultKind::TowardsWall => {
-                        write!(f, "{channels} reads {size} of the way to the housing temperature")
-                    }
-                    _ => write!(f, "{channels} {} by {size} over the run", verb("drifts", "drift")),
-                }?;
-            }
-            Suspect::Machine(machine) => {
-                write!(f, "the {} is {size} off its declaration", machine_name(machine))?
-            }
-        }
-        match self.alternatives.as_slice() {
-            [] => Ok(()),
-            others => {
-                let others: Vec<String> = others.iter().map(ToString::to_string).collect();
-                write!(f, " (or: {})", others.join("; "))
-            }
         }
     }
 }

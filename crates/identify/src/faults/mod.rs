@@ -21,8 +21,7 @@ use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
-use mapper_core::{Channel, Method, Recording};
+use mapper_core::{Channel, Method, Recording, SuspectedFault, Warning};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
 use mapper_physics::rig::sensor_fault::additive;
 
@@ -92,27 +91,18 @@ fn touches_points(suspect: Suspect, method: Method) -> bool {
 pub(crate) fn objection(faults: &[FoundFault], steps: usize) -> Option<Objection> {
     faults.iter().any(|fault| fault.touches_points).then_some(())?;
     let sensors = faults.iter().any(|fault| matches!(fault.suspect, Suspect::Sensor(_)));
-    let code = if sensors { code::CONTRADICTED_CHANNEL } else { code::OFF_THE_NOMINAL_MAP };
-    let message = format!(
-        "{}: compare the channels at standstill (`zero`) and with the barometer, and repair the sensor, declare its uncertainty or correct the \
-         declared conditions (`boundary`)",
-        described(faults)
-    );
-    Some(Objection::new(code, message, (0..steps).collect()))
+    let faults = faults.iter().map(SuspectedFault::from).collect();
+    let warning = match sensors {
+        true => Warning::ContradictedChannel { faults },
+        false => Warning::OffTheNominalMap { faults },
+    };
+    Some(Objection::new(warning, (0..steps).collect()))
 }
 
-/// Remarks on faults that do not affect the points.
-pub(crate) fn remark(faults: &[FoundFault]) -> Option<String> {
+/// A remark on faults that do not affect the points.
+pub(crate) fn remark(faults: &[FoundFault]) -> Option<Warning> {
     let harmless = !faults.is_empty() && !faults.iter().any(|fault| fault.touches_points);
-    harmless.then(|| format!("{}; no point depends on it", described(faults)))
-}
-
-fn described(faults: &[FoundFault]) -> String {
-    let sizes: Vec<String> = faults.iter().map(ToString::to_string).collect();
-    format!(
-        "conditions, valve, head, heat of the housing and efficiencies do not agree unless {}",
-        sizes.join(", and ")
-    )
+    harmless.then(|| Warning::OffTheNominalMap { faults: faults.iter().map(SuspectedFault::from).collect() })
 }
 
 /// Standard error of each suspect's size from the balances, in its unit.

@@ -7,9 +7,9 @@ use crate::joint::step_model::parameters::{
     ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2,
 };
 use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::step_outcome::interval_width;
-use mapper_core::EstimateUncertainty;
+use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
 use mapper_numerics::statistics::{DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, mean, median, rms};
 
 /// Whitened mean square above which a step is doubtful.
@@ -82,46 +82,35 @@ pub(crate) fn judge_step(
     let Some(member) = problem.members.get(index) else { return };
     let eta = member.local[ETA];
     if !(0.05..=1.0).contains(&eta) {
-        let message =
-            format!("the fitted efficiency is {eta:.3}: something outside the model has an influence");
-        findings.refuse(code::POOR_FIT, message);
+        findings.refuse(Warning::PoorFit(PoorFit::Eta { eta }));
     }
     if eta_error.combined_standard_error() > config.thresholds.sigma_eta {
-        interval_width::judge(eta_error, dt2_k.unwrap_or(0.0), " and what is shared", config, findings);
+        interval_width::judge(eta_error, dt2_k.unwrap_or(0.0), true, config, findings);
     }
     let declared = !config.declared.is_empty();
     let square = mean_square(problem, member);
     if declared && square > DOUBT_SQUARE {
-        let message = format!(
-            "the residual of T2 is {:.1} times the declared noise: something disturbed it, or more noise is to be declared",
-            square.sqrt()
-        );
-        findings.doubt(code::POOR_FIT, message);
+        findings.doubt(Warning::PoorFit(PoorFit::NoiseRatio { residual_ratio: square.sqrt() }));
     }
     if !member.shares && !member.barred {
-        findings.doubt(
-            code::LEFT_OUT,
-            "this step fits so much worse than the others that it does not count in what they share",
-        );
+        findings.doubt(Warning::LeftOut(LeftOut::PoorFit));
     }
     let deviation = member.local[LN_DEVIATION];
     if problem.setting.with_law
         && deviation.abs() > LAW_SCATTER_RATIO.max(3.0 * member.priors[LN_DEVIATION].sigma)
     {
-        let message =
-            format!("h lies {:+.1} % off the law that the other points follow", 100.0 * deviation.exp_m1());
-        findings.doubt(code::OFF_THE_LAW, message);
+        findings.doubt(Warning::OffTheLaw { h_deviation_ratio: deviation.exp_m1() });
     }
 }
 
-/// Arguments against the model as a whole, one sentence each.
+/// Arguments against the model as a whole.
 pub(crate) fn doubts(
     problem: &Problem<'_>,
     covariance: &Covariance,
     smoothed: &Smoothed,
     refinements: Option<&Refinements>,
     config: &IdentifyConfig,
-) -> Vec<String> {
+) -> Vec<ModelDoubt> {
     let mut doubts = Vec::new();
     let squares: Vec<f64> = problem
         .members
@@ -138,62 +127,45 @@ pub(crate) fn doubts(
         .collect();
     let slow = mean(&slow).unwrap_or(0.0);
     if !config.declared.is_empty() && overall > MODEL_SQUARE {
-        doubts.push(format!(
-            "the residual over all steps is {:.2} times the declared noise: something outside the model has an influence",
-            overall.sqrt()
-        ));
+        doubts.push(ModelEvidence::Residual { residual_ratio: overall.sqrt() });
     }
     if !config.declared.is_empty() && slow > SLOW_SQUARE {
-        doubts.push(format!(
-            "the residual of T2 over all steps has a shape: its slow part is {:.2} times that of the declared noise",
-            slow.sqrt()
-        ));
+        doubts.push(ModelEvidence::SlowResidual { residual_ratio: slow.sqrt() });
     }
     let error = |index: usize| covariance.error_of(index);
     if let Some(sigma) = error(EXPONENT) {
         let exponent = problem.shared[EXPONENT];
         let outside = (EXPONENT_RANGE.0 - exponent).max(exponent - EXPONENT_RANGE.1);
         if outside > HINT_SIGMAS * sigma {
-            doubts.push(format!(
-                "the convection law's exponent comes out as {exponent:.2} +/- {:.2}, which is impossible for flow in a housing",
-                1.96 * sigma
-            ));
+            doubts.push(ModelEvidence::Exponent { exponent, exponent_sigma: sigma });
         }
     }
     if let Some(sigma) = error(PROBE_MM2) {
         let square = problem.shared[PROBE_MM2];
         if square - HINT_SIGMAS * sigma > LARGEST_PROBE_MM * LARGEST_PROBE_MM {
-            doubts.push(format!(
-                "T2 lags as if behind a probe of {:.1} mm, which no outlet has: something else delays it",
-                square.sqrt()
-            ));
+            doubts.push(ModelEvidence::Probe { diameter_m: 1e-3 * square.sqrt() });
         }
     }
     let scatter = rms(problem.members.iter().map(|member| member.local[LN_DEVIATION])).unwrap_or(0.0);
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {
-        doubts.push(format!("the points scatter by {:.1} % about the convection law", 100.0 * scatter));
+        doubts.push(ModelEvidence::Scatter { scatter_ratio: scatter });
     }
     let above = |judged: &&Judged| {
         judged.value - HINT_SIGMAS * judged.uncertainty.combined_standard_error() > HIGHEST_EFFICIENCY
     };
     let above = smoothed.eta.iter().filter(above).count();
     if above > 0 {
-        doubts.push(format!(
-            "the efficiency comes out above {HIGHEST_EFFICIENCY:.2} at {above} points, which no turbocharger's compressor reaches"
-        ));
+        doubts.push(ModelEvidence::Eta { points: above, max_eta: HIGHEST_EFFICIENCY });
     }
     if smoothed.strain > DOUBT_SIGMAS {
-        doubts.push(format!(
-            "the efficiencies bend towards low speed more than in any map; attributed to offsets, these are {:.1} times the declared ones",
-            smoothed.strain
-        ));
+        doubts.push(ModelEvidence::Bend { offset_ratio: smoothed.strain });
     }
     doubts.extend(split_doubt(problem, refinements));
-    doubts
+    doubts.into_iter().map(|evidence| ModelDoubt { evidence, parameters_held: false }).collect()
 }
 
 /// Fits steps with rising T2 and steps with falling T2 separately: their shared parameters must agree.
-fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Option<String> {
+fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Option<ModelEvidence> {
     let rises = |member: &Member<'_>| match (member.measured_k.first(), member.measured_k.last()) {
         (Some(first), Some(last)) => last > first,
         _ => false,
@@ -216,14 +188,11 @@ fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Opti
     [LN_COEFFICIENT, ALPHA, LN_DIRECTION].into_iter().find_map(|index| {
         let (a, b) = (up_covariance.error_of(index)?, down_covariance.error_of(index)?);
         let (difference, sigma) = (up[index] - down[index], a.hypot(b));
-        (difference.abs() > EXCLUDE_SIGMAS * sigma).then(|| {
-            format!(
-                "steps with rising T2 and steps with falling T2 disagree on the {}: {:.3} and {:.3}, {:.1} standard errors apart",
-                crate::joint::step_model::parameters::symbol(index),
-                up[index],
-                down[index],
-                difference.abs() / sigma
-            )
+        (difference.abs() > EXCLUDE_SIGMAS * sigma).then(|| ModelEvidence::Directions {
+            parameter: crate::joint::step_model::parameters::symbol(index),
+            rising: up[index],
+            falling: down[index],
+            sigmas: difference.abs() / sigma,
         })
     })
 }

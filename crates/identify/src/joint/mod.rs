@@ -19,12 +19,12 @@ use crate::joint::step_model::parameters::{FLOW_GAIN, INLET, OFFSETS, PROBE_MM2,
 use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, step_data::commands};
 use mapper_core::{
-    Choice, EstimateUncertainty, JointSettings, Recording, ThermalModel, Verdict, Window,
-    confidence_interval_95,
+    Choice, EstimateUncertainty, FitFailure, JointSettings, LeftOut, ModelDoubt, ModelEvidence, Recording,
+    ThermalModel, Verdict, Warning, Window, confidence_interval_95,
 };
 use mapper_numerics::statistics::{DOUBT_SIGMAS, rms};
 
@@ -91,10 +91,7 @@ pub(crate) fn estimate(
         // Single-step results are better than none.
         let mut estimates = vec![Estimate::default(); recording.steps.len()];
         for step in &steps {
-            findings[step.position].doubt(
-                code::FIT_FAILED,
-                "least squares over all steps did not converge: this step was identified by itself",
-            );
+            findings[step.position].doubt(Warning::FitFailed(FitFailure::AllSteps));
             estimates[step.position] = alone[step.position].clone();
         }
         return Joint { estimates, thermal: None, two_parameter, fitted: None };
@@ -114,7 +111,7 @@ pub(crate) fn estimate(
         };
         let errors = [eta_error, h_error].map(|error| error.combined_standard_error());
         if ![eta, h_w_m2k, errors[0], errors[1]].iter().all(|number| number.is_finite()) {
-            own.refuse(code::FIT_FAILED, "the fit gives no finite number for this step".to_owned());
+            own.refuse(Warning::FitFailed(FitFailure::NotFinite));
             continue;
         }
         let (first, last) = (step.rows.first(), step.rows.last());
@@ -148,26 +145,18 @@ pub(crate) fn estimate(
         };
         let dt2_k = estimates[step.position].dt2_k;
         judge::judge_step(&problem, i, eta_error, dt2_k, config, own);
-        if let Some(message) = left_out.as_ref().filter(|_| member.barred) {
-            own.doubt(code::LEFT_OUT, message.clone());
+        if let Some(region) = left_out.as_ref().filter(|_| member.barred) {
+            own.doubt(Warning::LeftOut(region.clone()));
         }
         if !commands::begins_with_jump(&recording.steps, step.position) {
-            own.remark(
-                code::THROUGH_THE_LAW,
-                "no jump leads to this step: its efficiency rests on what the points share",
-            );
+            own.remark(Warning::ThroughTheLaw { convection_origin: None });
         }
         own.remark_undeclared(config);
         if resting > MAX_RESTING_ETA {
-            let message = format!(
-                "the recording alone knows the efficiencies to {:.1} points only; the rest is trust in the declared alpha_A, probe and \
-                 direction factor: record longer steps or larger gradients, or hold fixed what is known (`identification.joint`)",
-                100.0 * resting
-            );
-            own.doubt(code::RESTS_ON_DECLARATION, message);
+            own.doubt(Warning::RestsOnDeclaration { eta_error: resting });
         }
         for doubt in &thermal.doubts {
-            own.doubt(code::MODEL_DOUBTED, doubt.clone());
+            own.doubt(Warning::ModelDoubted(doubt.clone()));
         }
     }
     Joint { estimates, thermal: Some(thermal), two_parameter, fitted }
@@ -182,7 +171,7 @@ struct Attempt<'a> {
     /// Error of the efficiencies if parameters shrunk to their declared values are not as declared, fraction.
     resting: f64,
     /// Reason for excluding the barred steps, if any.
-    left_out: Option<String>,
+    left_out: Option<LeftOut>,
 }
 
 impl<'a> Attempt<'a> {
@@ -241,28 +230,18 @@ impl<'a> Attempt<'a> {
                 (undoubted && knows).then_some((region, rest, sigmas))
             });
             let (region, mut rest, sigmas) = rests.max_by(|a, b| a.2.total_cmp(&b.2))?;
-            rest.left_out = Some(format!(
-                "the steps {} disagree with all others on what they share ({sigmas:.0} standard errors; with them, {}): they do not \
-                 count in it",
-                region.name,
-                self.thermal.doubts.join("; "),
-            ));
+            let doubts = self.thermal.doubts.clone();
+            rest.left_out = Some(LeftOut::Region { region: region.region, sigmas, doubts });
             Some(rest)
         })
     }
 
     /// This fit after another one had warnings: the warnings remain.
     fn instead_of(mut self, doubted: Option<Attempt<'_>>) -> Self {
-        let doubts = match doubted {
-            Some(doubted) => doubted.thermal.doubts,
-            None => vec!["least squares over all steps did not converge".to_owned()],
-        };
-        let mut doubts: Vec<String> = doubts
-            .into_iter()
-            .map(|doubt| format!("{doubt}; so all refinements are held as declared"))
-            .collect();
-        doubts.extend(self.thermal.doubts);
-        self.thermal.doubts = doubts;
+        let none = ModelDoubt { evidence: ModelEvidence::NotConverged, parameters_held: false };
+        let doubts = doubted.map_or(vec![none], |doubted| doubted.thermal.doubts).into_iter();
+        let held = doubts.map(|doubt| ModelDoubt { parameters_held: true, ..doubt });
+        self.thermal.doubts.splice(0..0, held);
         self
     }
 }

@@ -9,7 +9,7 @@ use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_DIRECTION, Place};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::SurfaceScale;
-use mapper_core::ReferenceState;
+use mapper_core::{MapRegion, ReferenceState};
 use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 
 /// Shares of the steps in a region; the smallest one that helps is left out.
@@ -22,8 +22,8 @@ const FLOORS: [(Place, f64); 4] =
 
 /// Steps at one end of the map.
 pub(crate) struct Region {
-    /// Display name: "near choke".
-    pub(crate) name: &'static str,
+    /// The end.
+    pub(crate) region: MapRegion,
     /// Indices of the steps.
     pub(crate) steps: Vec<usize>,
 }
@@ -43,16 +43,19 @@ pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<
         order.sort_by(|a, b| of(&coordinates[*a]).total_cmp(&of(&coordinates[*b])));
         order
     };
-    let ends: [(&'static str, Rank); 4] = [
-        ("near choke", |place| -place.1),
-        ("near surge", |place| place.1),
-        ("at the lowest speeds", |place| place.0),
-        ("at the highest speeds", |place| -place.0),
+    let ends: [(MapRegion, Rank); 4] = [
+        (MapRegion::Choke, |place| -place.1),
+        (MapRegion::Surge, |place| place.1),
+        (MapRegion::LowestSpeeds, |place| place.0),
+        (MapRegion::HighestSpeeds, |place| -place.0),
     ];
     let of_size = |share: f64| {
         let count = (share * steps.len() as f64).ceil() as usize;
         ends.iter()
-            .map(|(name, of)| Region { name, steps: sorted(*of).into_iter().take(count).collect() })
+            .map(|(region, of)| Region {
+                region: *region,
+                steps: sorted(*of).into_iter().take(count).collect(),
+            })
             .collect()
     };
     SHARES.into_iter().map(of_size).collect()

@@ -7,7 +7,7 @@
 
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
+use mapper_core::{Scaled, Swapped, Warning};
 use mapper_numerics::statistics::median;
 
 /// Isentropic rise above which heat no longer hides the work, K.
@@ -26,16 +26,14 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let mut found = Vec::new();
     let below = known.iter().filter(|end| end.p2_pa < end.p1_pa).count();
     if known.len() >= MIN && below as f64 > BELOW_SHARE * known.len() as f64 {
-        let middle =
-            |read: fn(&Ends) -> f64| median(known.iter().map(|end| read(end))).unwrap_or(f64::NAN) / 1e3;
-        let message = format!(
-            "P2 lies below P1 at {below} of {} points (medians {:.1} and {:.1} kPa): the channels are exchanged, P2 is a gauge \
-             pressure, or one of them is dead; correct the channel map",
-            known.len(),
-            middle(|end| end.p2_pa),
-            middle(|end| end.p1_pa),
-        );
-        found.push(Objection::new(code::SWAPPED_CHANNELS, message, all()));
+        let middle = |read: fn(&Ends) -> f64| median(known.iter().map(|end| read(end))).unwrap_or(f64::NAN);
+        let swapped = Swapped::P2BelowP1 {
+            points: below,
+            of: known.len(),
+            p1_pa: middle(|end| end.p1_pa),
+            p2_pa: middle(|end| end.p2_pa),
+        };
+        found.push(Objection::new(Warning::SwappedChannels(swapped), all()));
         return found;
     }
     let apparent = |end: &Ends| end.isentropic_rise_k() / (end.t2_k - end.t1_k);
@@ -44,9 +42,7 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let exchanged =
         |end: &&&Ends| end.t3_k.is_some_and(|t3_k| end.t2_k > t3_k) && apparent(end) < *MIDDLE.start();
     if 2 * known.iter().filter(exchanged).count() > known.len() {
-        let message = "T2 is hotter than T3 and than this pressure ratio makes the gas at most points: the channels are exchanged; correct the \
-             channel map";
-        found.push(Objection::new(code::SWAPPED_CHANNELS, message, all()));
+        found.push(Objection::new(Warning::SwappedChannels(Swapped::T2AboveT3), all()));
     }
     let judged: Vec<&&Ends> = known.iter().filter(|end| end.isentropic_rise_k() > MIN_RISE_K).collect();
     // Without a rise of T2 the efficiency is undefined; treat it as too high.
@@ -56,20 +52,16 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
         judged.iter().filter(|end| !ANY.contains(&value(end))).map(|end| end.position).collect();
     if !MIDDLE.contains(&middle) || 2 * impossible.len() > judged.len() {
         let of = |read: fn(&Ends) -> f64| median(judged.iter().map(|end| read(end))).unwrap_or(f64::NAN);
-        let message = format!(
-            "T2 - T1 is {:.1} K where compression from {:.1} K by a pressure ratio of {:.3} takes {:.1} K without losses (medians): an \
-             apparent efficiency of {middle:.2}, and compressors have 0.3 to 0.85. T1, T2, P1 or P2 is scaled, exchanged or in \
-             another unit",
-            of(|end| end.t2_k - end.t1_k),
-            of(|end| end.t1_k),
-            of(|end| end.p2_pa / end.p1_pa),
-            of(Ends::isentropic_rise_k),
-        );
-        found.push(Objection::new(code::SCALED_CHANNEL, message, all()));
+        let scaled = Scaled::ApparentEfficiency {
+            rise_k: of(|end| end.t2_k - end.t1_k),
+            t1_k: of(|end| end.t1_k),
+            pressure_ratio: of(|end| end.p2_pa / end.p1_pa),
+            isentropic_rise_k: of(Ends::isentropic_rise_k),
+            efficiency: middle,
+        };
+        found.push(Objection::new(Warning::ScaledChannel(scaled), all()));
     } else if !impossible.is_empty() {
-        let message = "T2 - T1 is not what any compressor makes of the pressure ratio (apparent efficiency outside 0.2 to 1.6): T1, T2, \
-                       P1 or P2 failed there";
-        found.push(Objection::new(code::SCALED_CHANNEL, message, impossible));
+        found.push(Objection::new(Warning::ScaledChannel(Scaled::SomePoints), impossible));
     }
     found
 }
@@ -107,6 +99,6 @@ mod tests {
             assert!(objections(&ends_with(t3_k, None)).is_empty(), "{t3_k} K before the turbine");
         }
         let exchanged = objections(&ends_with(388.0, Some(773.15)));
-        assert_eq!(exchanged[0].code, code::SWAPPED_CHANNELS, "{exchanged:?}");
+        assert!(matches!(exchanged[0].warning, Warning::SwappedChannels(_)), "{exchanged:?}");
     }
 }

@@ -6,8 +6,7 @@
 
 use crate::objections::objection::Objection;
 use crate::step_data::commands::begins_with_jump;
-use crate::step_outcome::findings::code;
-use mapper_core::{Channel, Recording, Series};
+use mapper_core::{Channel, Recording, Series, Swapped, Warning};
 use mapper_numerics::statistics::{mean, median};
 
 /// Averaging time before and after a moment.
@@ -55,18 +54,11 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let Some(middle_s) = median(lags_s.iter().map(|(_, lag_s)| *lag_s)).filter(|_| lags_s.len() >= 3) else {
         return found;
     };
-    let late = lags_s
-        .iter()
-        .filter(|(_, lag_s)| (lag_s - middle_s).abs() > LATE_S)
-        .map(|(channel, lag_s)| {
-            let message = format!(
-                "{channel} moves {:.1} s {} the other channels at the jumps (all {} together): its clock or filter is another; \
-                 correct its times",
-                (lag_s - middle_s).abs(),
-                if *lag_s > middle_s { "after" } else { "before" },
-                jumps_s.len()
-            );
-            Objection::new(code::LATE_CHANNEL, message, (0..steps.len()).collect())
+    let late =
+        lags_s.iter().filter(|(_, lag_s)| (lag_s - middle_s).abs() > LATE_S).map(|(channel, lag_s)| {
+            let (lag_s, jumps) = (lag_s - middle_s, jumps_s.len());
+            let late = Warning::LateChannel { channel: *channel, lag_s, jumps };
+            Objection::new(late, (0..steps.len()).collect())
         });
     found.extend(late);
     found
@@ -80,11 +72,8 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
     };
     let (t2_k, tc_k) = (jump_k(Channel::T2)?, jump_k(Channel::Tc)?);
     (tc_k > 2.0 * t2_k).then(|| {
-        let message = format!(
-            "Tc moves by {tc_k:.1} K within some seconds of a jump and T2 by {t2_k:.1} K (medians), and no housing is faster than the \
-             gas in it: the channels are exchanged; correct the channel map"
-        );
-        Objection::new(code::SWAPPED_CHANNELS, message, (0..recording.steps.len()).collect())
+        let swapped = Swapped::TcBeforeT2 { tc_jump_k: tc_k, t2_jump_k: t2_k };
+        Objection::new(Warning::SwappedChannels(swapped), (0..recording.steps.len()).collect())
     })
 }
 

@@ -7,8 +7,7 @@ use crate::IdentifyConfig;
 use crate::needs::needs;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
-use mapper_core::{Channel, Recording, Series, with_unit};
+use mapper_core::{Channel, Recording, Series, Warning};
 use mapper_physics::rig::sensor_fault::repeats_s;
 
 /// Minimum number of equal samples.
@@ -86,14 +85,10 @@ fn of_channel(
         of(a).total_cmp(&of(b))
     })?;
     let (from_s, to_s) = (series.t_s[longest.first], series.t_s[longest.last]);
-    let message = format!(
-        "{channel} shows {} and nothing else from {from_s:.0} s to {to_s:.0} s: it is frozen or saturated; the steps in which it \
-         does not change cannot be used, so repair the channel and repeat them",
-        with_unit(format!("{:.6}", series.values[longest.first]), channel.unit())
-    );
+    let frozen = Warning::FrozenChannel { channel, reading: series.values[longest.first], from_s, to_s };
     // Cleaning removes the constant samples of a channel with declared noise; speed needs no other check.
     let samples_left_out = noisy && channel != Channel::ShaftSpeed;
-    let objection = Objection { samples_left_out, ..Objection::new(code::FROZEN_CHANNEL, message, steps) };
+    let objection = Objection { samples_left_out, ..Objection::new(frozen, steps) };
     (!objection.steps.is_empty()).then_some(objection)
 }
 

@@ -6,8 +6,7 @@
 use crate::IdentifyConfig;
 use crate::needs::needs;
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
-use mapper_core::{Recording, with_unit};
+use mapper_core::{Recording, Warning};
 use mapper_numerics::statistics::robust_sigma;
 
 /// Ratio of a sample's standard deviation to the declared one. Noise with a time constant only reduces the difference between samples.
@@ -33,13 +32,8 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
             if !(declared > 0.0 && found > MAX_RATIO * declared) {
                 return None;
             }
-            let message = format!(
-                "{channel} scatters by {} from sample to sample (one standard deviation), and {} is declared: repair the channel, or \
-                 declare the noise that it has",
-                with_unit(format!("{found:.3e}"), channel.unit()),
-                with_unit(format!("{declared:.3e}"), channel.unit()),
-            );
-            Some(Objection::new(code::NOISY_CHANNEL, message, (0..recording.steps.len()).collect()))
+            let noisy = Warning::NoisyChannel { channel, noise: found, declared_noise: declared };
+            Some(Objection::new(noisy, (0..recording.steps.len()).collect()))
         })
         .collect()
 }

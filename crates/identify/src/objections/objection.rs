@@ -1,12 +1,12 @@
 //! A failed check of the readings.
 
+use mapper_core::Warning;
+
 /// A failed check of the readings, and the steps that depend on them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Objection {
-    /// Stable code of the warning.
-    pub(crate) code: &'static str,
-    /// Channel, values with units, what to do.
-    pub(crate) message: String,
+    /// Channel and values.
+    pub(crate) warning: Warning,
     /// Positions of the steps.
     pub(crate) steps: Vec<usize>,
     /// Whether identification omits the samples concerned, so that the rest of the step can be used.
@@ -14,7 +14,7 @@ pub(crate) struct Objection {
 }
 
 impl Objection {
-    pub(crate) fn new(code: &'static str, message: impl Into<String>, steps: Vec<usize>) -> Self {
-        Objection { code, message: message.into(), steps, samples_left_out: false }
+    pub(crate) fn new(warning: Warning, steps: Vec<usize>) -> Self {
+        Objection { warning, steps, samples_left_out: false }
     }
 }

@@ -5,8 +5,7 @@
 use crate::IdentifyConfig;
 use crate::needs::needs;
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
-use mapper_core::Recording;
+use mapper_core::{Recording, Warning};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 
@@ -25,7 +24,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
                 }
             }
             let why = check_running(channel, median(&middles)?).err()?;
-            Some(Objection::new(code::DEAD_CHANNEL, why.to_string(), steps))
+            Some(Objection::new(Warning::DeadChannel { channel, reading: why.value }, steps))
         })
         .collect()
 }

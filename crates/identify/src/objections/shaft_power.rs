@@ -6,8 +6,7 @@
 
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
-use mapper_core::Channel;
+use mapper_core::{Channel, Scaled, Warning};
 use mapper_numerics::statistics::median;
 use mapper_observe::plausible::check_running;
 use mapper_physics::gas::air;
@@ -35,12 +34,11 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
     if POSSIBLE.contains(&middle) || 2 * powers_w.len() < ends.len() {
         return None;
     }
-    let of = |read: fn(&(f64, f64)) -> f64| median(powers_w.iter().map(read)).unwrap_or(f64::NAN) / 1e3;
-    let message = format!(
-        "the compressor takes {:.2} kW and the exhaust gas gives {:.2} kW (medians; {middle:.2} of it, and 0.5 to 1 is usual): m_c, T1 \
-         or T2, or else m_t, T3 or T4, is scaled or in another unit",
-        of(|powers| powers.0),
-        of(|powers| powers.1),
-    );
-    Some(Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect()))
+    let of = |read: fn(&(f64, f64)) -> f64| median(powers_w.iter().map(read)).unwrap_or(f64::NAN);
+    let scaled = Scaled::ShaftPower {
+        compressor_w: of(|powers| powers.0),
+        turbine_w: of(|powers| powers.1),
+        power_ratio: middle,
+    };
+    Some(Objection::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
 }

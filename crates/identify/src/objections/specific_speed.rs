@@ -5,7 +5,7 @@
 
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
+use mapper_core::{Scaled, Warning};
 use mapper_numerics::statistics::median;
 
 /// Limits for the median of a campaign's points, with a wide margin about real machines.
@@ -24,12 +24,11 @@ pub(crate) fn objections(ends: &[Option<Ends>]) -> Option<Objection> {
         return None;
     }
     let of_middle = |read: fn(&Ends) -> f64| median(used.iter().map(|end| read(end))).unwrap_or(f64::NAN);
-    let message = format!(
-        "N, m_c and P2/P1 do not go together: {:.4} krpm, {:.4} g/s and a pressure ratio of {:.3} (medians) make a specific speed of \
-         {middle:.3}, and radial compressors have 0.3 to 2: check the units of N (rpm, not 1/s) and m_c, and that P1 and P2 are absolute",
-        of_middle(|end| end.speed_rpm) / 1e3,
-        of_middle(|end| end.flow_kg_s) * 1e3,
-        of_middle(|end| end.p2_pa / end.p1_pa),
-    );
-    Some(Objection::new(code::SCALED_CHANNEL, message, (0..ends.len()).collect()))
+    let scaled = Scaled::SpecificSpeed {
+        speed_rpm: of_middle(|end| end.speed_rpm),
+        flow_kg_s: of_middle(|end| end.flow_kg_s),
+        pressure_ratio: of_middle(|end| end.p2_pa / end.p1_pa),
+        specific_speed: middle,
+    };
+    Some(Objection::new(Warning::ScaledChannel(scaled), (0..ends.len()).collect()))
 }

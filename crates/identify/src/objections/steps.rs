@@ -1,8 +1,7 @@
 //! Detects impossible steps: a rig is at one operating point at a time, and a number identifies one step.
 
 use crate::objections::objection::Objection;
-use crate::step_outcome::findings::code;
-use mapper_core::{Recording, step_number};
+use mapper_core::{Recording, StepConflict, Warning, step_number};
 
 /// Overlap that rounded times of other loggers explain, s.
 const ROUNDED_S: f64 = 0.5;
@@ -20,17 +19,15 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     for &position in &by_time {
         let step = &steps[position];
         if let Some(before) = furthest.filter(|before| steps[*before].end_s > step.start_s + ROUNDED_S) {
-            let message = format!(
-                "step {} ({:.1} s to {:.1} s) and step {} ({:.1} s to {:.1} s) overlap, and a rig is at one point at a time: correct \
-                 the step marks",
-                step_number(steps[before].index),
-                steps[before].start_s,
-                steps[before].end_s,
-                step_number(step.index),
-                step.start_s,
-                step.end_s
-            );
-            found.push(Objection::new(code::STEPS_CONTRADICT, message, vec![before, position]));
+            let overlap = StepConflict::Overlap {
+                first: step_number(steps[before].index),
+                first_start_s: steps[before].start_s,
+                first_end_s: steps[before].end_s,
+                second: step_number(step.index),
+                second_start_s: step.start_s,
+                second_end_s: step.end_s,
+            };
+            found.push(Objection::new(Warning::StepsContradict(overlap), vec![before, position]));
         }
         if furthest.is_none_or(|before| steps[before].end_s < step.end_s) {
             furthest = Some(position);
@@ -39,20 +36,17 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let mut by_index: Vec<usize> = (0..steps.len()).collect();
     by_index.sort_by_key(|position| steps[*position].index);
     for same in by_index.chunk_by(|a, b| steps[*a].index == steps[*b].index).filter(|same| same.len() > 1) {
-        let message = format!(
-            "{} steps have the number {}, so the results of one cannot be distinguished from those of the others: give each its own",
-            same.len(),
-            step_number(steps[same[0]].index)
-        );
-        found.push(Objection::new(code::STEPS_CONTRADICT, message, same.to_vec()));
+        let shared =
+            StepConflict::SharedNumber { number: step_number(steps[same[0]].index), steps: same.len() };
+        found.push(Objection::new(Warning::StepsContradict(shared), same.to_vec()));
     }
     for (position, step) in steps.iter().enumerate().filter(|(_, step)| step_number(step.index) > MAX_STEPS) {
-        let message = format!(
-            "step {} at {:.1} s has a number beyond {MAX_STEPS}, which no plan has: correct the step marks",
-            step_number(step.index),
-            step.start_s
-        );
-        found.push(Objection::new(code::STEPS_CONTRADICT, message, vec![position]));
+        let large = StepConflict::LargeNumber {
+            number: step_number(step.index),
+            start_s: step.start_s,
+            max_number: MAX_STEPS,
+        };
+        found.push(Objection::new(Warning::StepsContradict(large), vec![position]));
     }
     found
 }

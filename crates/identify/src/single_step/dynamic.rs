@@ -7,9 +7,11 @@ use crate::single_step::flow_drift::{FlowDrift, flow_drift};
 use crate::step_data::cleaning::{SPIKE_SIGMAS, without_spikes};
 use crate::step_data::samples::Samples;
 use crate::step_data::window;
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, step_data::commands, step_outcome::interval_width};
-use mapper_core::{BudgetRow, EstimateUncertainty, Recording, Window};
+use mapper_core::{
+    BudgetRow, EstimateUncertainty, FitFailure, NoCompression, PoorFit, Recording, TooFew, Warning, Window,
+};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 
@@ -24,9 +26,6 @@ const STRUCTURE_BLOCK_S: f64 = 10.0;
 
 /// Maximum share of the noise that remains in block means (first-order part, 2 s): four tenths of 0.6, twice.
 const STRUCTURE_OVER_NOISE_RATIO: f64 = 0.75;
-
-/// Advice if the model does not fit.
-const POOR_FIT_REMEDY: &str = "declare the noise and the probe that T2 really has; `joint` finds probe and alpha_A, `mapper gap` looks for other causes";
 
 /// Result of a method for one step.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -73,17 +72,12 @@ pub(crate) fn estimate(
     let Some(step) = recording.steps.get(position) else { return estimate };
     let limits = &config.thresholds;
     if !commands::begins_with_jump(&recording.steps, position) {
-        findings.refuse(
-            code::NO_TRANSIENT,
-            "no jump leads to this step, so it has no transient; the dynamic method needs one",
-        );
+        findings.refuse(Warning::NoTransient);
         return estimate;
     }
     let Some(window) = window::choose(recording, step, config.window, &config.settle_bands, findings) else {
-        let seconds = step.end_s - step.start_s;
-        let message =
-            format!("the step lasts {seconds:.1} s, which leaves no room for a window after its jump");
-        findings.refuse(code::TOO_FEW_SAMPLES, message);
+        let short = TooFew::ShortStep { step_s: step.end_s - step.start_s };
+        findings.refuse(Warning::TooFewSamples(short));
         return estimate;
     };
     estimate.window = Some(window);
@@ -95,26 +89,17 @@ pub(crate) fn estimate(
     estimate.dtc_k = samples.change(&samples.tc_k, limits.end_mean_s);
     let rise_ratio = mean(&samples.rise_ratio).unwrap_or(0.0);
     if rise_ratio < SMALLEST_RISE_RATIO {
-        findings.refuse(
-            code::NO_COMPRESSION,
-            "the pressure ratio is 1 or less: nothing is compressed, efficiency has no meaning",
-        );
+        findings.refuse(Warning::NoCompression(NoCompression::NoPressureRise));
         return estimate;
     }
     let geometry = Geometry::of(config);
     let Some((samples, fit)) = fit_without_outliers(samples, geometry, findings) else {
-        findings.refuse(
-            code::FIT_FAILED,
-            "least squares for efficiency and heat-transfer coefficient did not converge",
-        );
+        findings.refuse(Warning::FitFailed(FitFailure::Step));
         return estimate;
     };
     estimate.residual_rms_k = Some(fit.residual_rms_k());
-    if let Some(which) = fit.at_bound() {
-        findings.refuse(
-            code::AT_BOUND,
-            format!("the best fit puts {which}, a bound of the search; no number is given"),
-        );
+    if let Some(bound) = fit.at_bound() {
+        findings.refuse(Warning::AtBound(bound));
         return estimate;
     }
     let declared = declared_effect(&fit, &samples, geometry, config);
@@ -135,21 +120,18 @@ pub(crate) fn estimate(
 /// Checks that the window holds enough complete samples, and adds a finding if not.
 pub(crate) fn enough(samples: &Samples, config: &IdentifyConfig, findings: &mut Findings) -> bool {
     let limits = &config.thresholds;
-    let (kept, lost) = (samples.len(), samples.lost);
-    if kept < limits.fewest_samples.max(3) {
-        let message = format!(
-            "{kept} complete samples in the window ({lost} lost); at least {} are needed",
-            limits.fewest_samples.max(3)
-        );
-        findings.refuse(code::TOO_FEW_SAMPLES, message);
+    let (complete, lost, needed) = (samples.len(), samples.lost, limits.fewest_samples.max(3));
+    if complete < needed {
+        findings.refuse(Warning::TooFewSamples(TooFew::Samples { complete, lost, needed }));
         return false;
     }
     if lost > 0 {
-        let message = format!("{lost} of {} samples in the window were lost and are left out", kept + lost);
-        if lost as f64 > limits.lost_samples_ratio * (kept + lost) as f64 {
-            findings.doubt(code::LOST_SAMPLES, message);
+        let samples = complete + lost;
+        let warning = Warning::LostSamples { lost, samples };
+        if lost as f64 > limits.lost_samples_ratio * samples as f64 {
+            findings.doubt(warning);
         } else {
-            findings.remark(code::LOST_SAMPLES, message);
+            findings.remark(warning);
         }
     }
     true
@@ -182,10 +164,7 @@ fn fit_without_outliers(
     }
     let samples = samples.filtered(inlier);
     let second = fit(&samples, geometry)?;
-    let message = format!(
-        "{outliers} samples more than {limit_k:.1} K from the fit and from their neighbours are left out"
-    );
-    findings.remark(code::OUTLIERS, message);
+    findings.remark(Warning::Outliers { count: outliers, limit_k: Some(limit_k) });
     Some((samples, second))
 }
 
@@ -225,7 +204,7 @@ fn judge_width(view: &View<'_>, eta: EstimateUncertainty, dt2_k: Option<f64>, fi
     if sigma_eta <= limits.sigma_eta && dt2_k.abs() >= limits.dt2_k {
         return;
     }
-    interval_width::judge(eta, dt2_k, "", view.config, findings);
+    interval_width::judge(eta, dt2_k, false, view.config, findings);
 }
 
 /// Checks that the assumed alpha_A is known well enough. `off_eta`: its error of eta, one standard deviation.
@@ -233,13 +212,11 @@ pub(crate) fn judge_assumption(off_eta: f64, config: &IdentifyConfig, findings: 
     if off_eta.abs() <= config.thresholds.sigma_eta {
         return;
     }
-    let message = format!(
-        "alpha_A is assumed to be {} within {} (1 sigma), which leaves eta uncertain by {:.1} points; `joint` finds it",
-        config.alpha_area_ratio,
-        config.alpha_area_sigma_ratio,
-        100.0 * off_eta.abs()
-    );
-    findings.doubt(code::ASSUMED_ALPHA, message);
+    findings.doubt(Warning::AssumedAlpha {
+        alpha_area_ratio: config.alpha_area_ratio,
+        alpha_area_sigma_ratio: config.alpha_area_sigma_ratio,
+        eta_sigma: off_eta.abs(),
+    });
 }
 
 /// Checks that the flow was constant enough for a constant h.
@@ -247,13 +224,11 @@ fn judge_flow(drift: Option<FlowDrift>, config: &IdentifyConfig, findings: &mut 
     let Some(drift) = drift.filter(|drift| drift.eta.abs() > config.thresholds.flow_drift_eta) else {
         return;
     };
-    let message = format!(
-        "the flow moved by {:+.1} % in the window and h with it, which the method assumes to be constant: eta is about {:+.1} points off, h about {:+.0} W/(m2 K)",
-        100.0 * drift.flow_ratio,
-        100.0 * drift.eta,
-        drift.h_w_m2k
-    );
-    findings.doubt(code::FLOW_MOVED, message);
+    findings.doubt(Warning::FlowMoved {
+        flow_change_ratio: drift.flow_ratio,
+        eta_error: drift.eta,
+        h_error_w_m2k: drift.h_w_m2k,
+    });
 }
 
 /// Checks that the residual is only noise.
@@ -262,23 +237,14 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
     let limits = &view.config.thresholds;
     let dt2_k = dt2_k.unwrap_or(0.0);
     if fit.eta > 1.0 {
-        let message = format!(
-            "the fitted efficiency is {:.3}, above 1: something outside the method has an influence",
-            fit.eta
-        );
-        findings.refuse(code::POOR_FIT, message);
+        findings.refuse(Warning::PoorFit(PoorFit::Eta { eta: fit.eta }));
     }
     let (rms_k, slow_k) = (fit.residual_rms_k(), slow_rms_k(fit, view.samples));
     if noise_k > 0.0 && rms_k > limits.residual_over_noise_ratio * noise_k {
-        let message = format!(
-            "the residual of T2 is {rms_k:.3} K rms; the declared noise explains {noise_k:.3} K: {POOR_FIT_REMEDY}"
-        );
-        findings.doubt(code::POOR_FIT, message);
+        findings.doubt(Warning::PoorFit(PoorFit::Noise { residual_k: rms_k, noise_k }));
     } else if slow_k > (limits.structure_ratio * dt2_k.abs()).max(STRUCTURE_OVER_NOISE_RATIO * noise_k) {
-        let message = format!(
-            "the residual of T2 has a shape: {slow_k:.3} K rms in {STRUCTURE_BLOCK_S:.0} s means, while T2 moves by {dt2_k:.1} K: {POOR_FIT_REMEDY}"
-        );
-        findings.doubt(code::POOR_FIT, message);
+        let shape = PoorFit::Shape { residual_k: slow_k, block_s: STRUCTURE_BLOCK_S, dt2_k };
+        findings.doubt(Warning::PoorFit(shape));
     }
     findings.remark_undeclared(view.config);
 }

@@ -4,7 +4,7 @@
 use crate::IdentifyConfig;
 use crate::single_step::probe_reading::{Followed, Probe};
 use crate::step_data::samples::Samples;
-use mapper_core::InletConvection;
+use mapper_core::{Bound, InletConvection};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
 use mapper_physics::laws::inlet_convection::InletLaw;
@@ -99,13 +99,13 @@ impl Fit {
     }
 
     /// Name of a parameter on its bound, if any.
-    pub(crate) fn at_bound(&self) -> Option<String> {
+    pub(crate) fn at_bound(&self) -> Option<Bound> {
         let near = |value: f64, bound: f64, size: f64| (value - bound).abs() < 1e-6 * size;
         if near(self.eta, ETA_BOUNDS.0, 1.0) || near(self.eta, ETA_BOUNDS.1, 1.0) {
-            return Some(format!("the efficiency at {:.3}", self.eta));
+            return Some(Bound::Eta { eta: self.eta });
         }
         if near(self.h_w_m2k, H_BOUNDS_W_M2K.0, 1e3) || near(self.h_w_m2k, H_BOUNDS_W_M2K.1, 1e5) {
-            return Some(format!("the heat-transfer coefficient at {:.0} W/(m2 K)", self.h_w_m2k));
+            return Some(Bound::H { h_w_m2k: self.h_w_m2k });
         }
         None
     }

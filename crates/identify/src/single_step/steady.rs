@@ -7,9 +7,9 @@ use crate::config::coloured;
 use crate::single_step::dynamic::{Estimate, enough};
 use crate::step_data::cleaning::without_spikes;
 use crate::step_data::samples::Samples;
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, step_outcome::interval_width};
-use mapper_core::{Channel, EstimateUncertainty, Recording, Window};
+use mapper_core::{Channel, EstimateUncertainty, EtaSignal, NoCompression, Recording, Warning, Window};
 use mapper_numerics::statistics::{mean, standard_deviation};
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::apparent_efficiency;
@@ -86,33 +86,28 @@ pub(crate) fn estimate(
     };
     let eta = means.apparent_eta();
     if !(eta.is_finite() && eta > 0.0) {
-        let message = format!(
-            "T2 - T1 is {:.2} K at a pressure ratio of {:.4}: no efficiency can be derived",
-            means.t2_k - means.t1_k,
-            means.p2_pa / means.p1_pa
-        );
-        findings.refuse(code::NO_COMPRESSION, message);
+        findings.refuse(Warning::NoCompression(NoCompression::NoRise {
+            rise_k: means.t2_k - means.t1_k,
+            pressure_ratio: means.p2_pa / means.p1_pa,
+        }));
         return estimate;
     }
     let (mut uncertainty, common) = uncertainty(&means, &samples, config);
     // The drift is not linear, so the correction may be wrong by its own size.
     let lag_eta = eta * lag_k / (means.t2_k - means.t1_k);
     uncertainty.bias_standard_error = uncertainty.bias_standard_error.hypot(lag_eta);
-    for (name, column) in [("T2", &trend.t2_k), ("Tc", &trend.tc_k)] {
+    for (channel, column) in [(Channel::T2, &trend.t2_k), (Channel::Tc, &trend.tc_k)] {
         let Some(drift_k_min) = slope_per_s(&trend.t_s, column).map(|slope| 60.0 * slope) else { continue };
         if drift_k_min.abs() > limits.steady_drift_k_min {
-            let message = format!(
-                "{name} still drifts by {drift_k_min:+.2} K/min at the step's end (limit {:.2}): the temperatures have not settled",
-                limits.steady_drift_k_min
-            );
-            findings.doubt(code::NOT_SETTLED, message);
+            let limit_k_min = limits.steady_drift_k_min;
+            findings.doubt(Warning::NotSettled { channel, drift_k_min, limit_k_min });
         }
     }
     if uncertainty.combined_standard_error() > limits.sigma_eta {
-        let (code, message) = interval_width::cause_of_rise(uncertainty, means.t2_k - means.t1_k);
-        findings.doubt(code, message);
+        let signal = EtaSignal::Settled { rise_k: means.t2_k - means.t1_k };
+        findings.doubt(interval_width::wide(uncertainty, signal));
     }
-    findings.remark(code::APPARENT, "apparent efficiency: heat exchanged with the housing counts as work");
+    findings.remark(Warning::Apparent);
     findings.remark_undeclared(config);
     estimate.eta = Some((eta, Some(uncertainty)));
     estimate.common[0] = common;

@@ -2,8 +2,8 @@
 
 use crate::IdentifyConfig;
 use crate::step_data::samples::Samples;
-use crate::step_outcome::findings::{Findings, code};
-use mapper_core::Channel;
+use crate::step_outcome::findings::Findings;
+use mapper_core::{Channel, Warning};
 use mapper_numerics::statistics::{median_of_sorted, robust_sigma};
 use mapper_physics::rig::sensor_fault::repeats_s;
 
@@ -44,15 +44,8 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         }
         let stuck = stuck_of(&samples.t_s, column, repeats_s(channel));
         if let (Some(first), Some(last)) = (stuck.first(), stuck.last()) {
-            let message = format!(
-                "{channel} shows the same value for {:.0} s though noise is declared: these samples are left out",
-                samples
-                    .t_s
-                    .get(*last)
-                    .zip(samples.t_s.get(*first))
-                    .map_or(0.0, |(last_s, first_s)| last_s - first_s)
-            );
-            findings.doubt(code::STUCK, message);
+            let at = |index: usize| samples.t_s.get(index).copied().unwrap_or(f64::NAN);
+            findings.doubt(Warning::Stuck { channel, duration_s: at(*last) - at(*first) });
         }
         for index in stuck {
             if let Some(keep) = kept.get_mut(index) {
@@ -61,11 +54,7 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         }
     }
     if spikes > 0 {
-        let remark = match spikes {
-            1 => "1 sample far from its neighbours is left out".to_owned(),
-            _ => format!("{spikes} samples far from their neighbours are left out"),
-        };
-        findings.remark(code::OUTLIERS, remark);
+        findings.remark(Warning::Outliers { count: spikes, limit_k: None });
     }
     if kept.iter().all(|keep| *keep) {
         return samples;

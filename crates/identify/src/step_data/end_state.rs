@@ -1,9 +1,9 @@
 //! The position on the map at which a step ended: means over its last seconds.
 
 use crate::step_data::cleaning::SPIKE_SIGMAS;
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, StepError, step_data::taps};
-use mapper_core::{Channel, Recording, Series, StepMarker};
+use mapper_core::{Channel, Recording, Series, StepMarker, Warning};
 use mapper_numerics::statistics::{mean, median, robust_sigma};
 use mapper_observe::plausible::is_reading;
 
@@ -31,11 +31,7 @@ pub(crate) fn end_state(
             StepError::NoState { step: step.index, start_s: step.start_s, end_s: step.end_s, channel },
         )?;
         if last_s < step.end_s - 2.0 * seconds {
-            let message = format!(
-                "{channel} was lost {:.1} s before the step's end; its last values are used",
-                step.end_s - last_s
-            );
-            findings.doubt(code::END_STATE, message);
+            findings.doubt(Warning::EndState { channel, lost_before_end_s: step.end_s - last_s });
         }
         Ok(value)
     };

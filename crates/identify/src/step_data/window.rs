@@ -1,8 +1,8 @@
 //! The identification window: fixed, or found from the settling of the operating point.
 
 use crate::step_data::commands;
-use crate::step_outcome::findings::{Findings, code};
-use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Window, WindowRule};
+use crate::step_outcome::findings::Findings;
+use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Warning, Window, WindowRule};
 use mapper_numerics::statistics::median;
 use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
@@ -28,11 +28,8 @@ fn fixed(step: &StepMarker, start_s: f64, end_s: f64, findings: &mut Findings) -
     let window = Window { start_s: step.start_s + start_s, end_s: asked_end_s.min(step.end_s) };
     // A millisecond of tolerance: step times of other loggers are rounded.
     if window.end_s + 1e-3 < asked_end_s {
-        let message = format!(
-            "the window was asked to end {end_s:.1} s after the jump; the step ends after {:.1} s",
-            step.end_s - step.start_s
-        );
-        findings.remark(code::WINDOW_CUT, message);
+        let step_s = step.end_s - step.start_s;
+        findings.remark(Warning::WindowCut { requested_end_s: end_s, step_s });
     }
     (window.start_s < window.end_s).then_some(window)
 }
@@ -50,12 +47,12 @@ fn settled(
         return Some(Window { start_s, end_s });
     }
     let start_s = (end_s - WindowRule::SHORTEST_S).max(earliest_s);
-    let message = format!(
-        "the {slowest} still varies beyond its limit {settled_s:.0} s before the step's end (needed: {:.0} s); the last {:.0} s are used",
-        WindowRule::SHORTEST_S,
-        end_s - start_s
-    );
-    findings.doubt(code::NOT_STABILISED, message);
+    findings.doubt(Warning::NotStabilised {
+        quantity: slowest.to_owned(),
+        settled_s,
+        needed_s: WindowRule::SHORTEST_S,
+        used_s: Some(end_s - start_s),
+    });
     Some(Window { start_s, end_s })
 }
 

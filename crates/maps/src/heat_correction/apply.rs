@@ -4,8 +4,8 @@ use super::error::HeatCorrectionError;
 use super::estimate::estimate;
 use super::work::{air_of, isentropic_work_j_kg, work_points};
 use mapper_core::{
-    CompressorMap, EstimateUncertainty, MapPoint, Method, Verdict, Warning, confidence_interval_95,
-    standard_error_of,
+    CompressorMap, EstimateUncertainty, HeatCorrected, MapPoint, Method, Verdict, Warning,
+    confidence_interval_95, standard_error_of,
 };
 use serde::Serialize;
 
@@ -18,7 +18,6 @@ const PREMISE_ERROR: f64 = 0.01;
 /// Above this a corrected efficiency is none.
 const HIGHEST_EFFICIENCY: f64 = 0.95;
 /// The code of the warning at each corrected point.
-const CODE: &str = "heat_corrected";
 
 /// What the correction did to a line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -155,13 +154,8 @@ fn put(point: &mut MapPoint, apparent: f64, eta: f64, heat_change: f64, shared: 
     identified.eta = Some(eta);
     point.eta = Some(eta);
     identified.verdict = identified.verdict.doubted();
-    identified.warnings.push(Warning {
-        code: CODE.to_owned(),
-        message: format!(
-            "corrected from an apparent {:.2} % by one heat for the whole map; the interval assumes it known to half its size",
-            100.0 * apparent
-        ),
-    });
+    let corrected = HeatCorrected::Corrected { apparent_eta: apparent };
+    identified.warnings.push(Warning::HeatCorrected(corrected));
 }
 
 fn lose(point: &mut MapPoint, heat_w: f64) {
@@ -169,10 +163,5 @@ fn lose(point: &mut MapPoint, heat_w: f64) {
     (identified.eta, identified.eta_low, identified.eta_high, point.eta) = (None, None, None, None);
     identified.eta_uncertainty = None;
     identified.verdict = Verdict::Unusable;
-    identified.warnings.push(Warning {
-        code: CODE.to_owned(),
-        message: format!(
-            "without a heat of {heat_w:.0} W its efficiency would be above 95 %: it did not take up that much"
-        ),
-    });
+    identified.warnings.push(Warning::HeatCorrected(HeatCorrected::TooMuchHeat { heat_w }));
 }

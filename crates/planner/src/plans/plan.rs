@@ -5,7 +5,7 @@ use crate::plans::plan_builder::{Draft, PlanBuilder, max_steps};
 use crate::plans::plan_figures::rms_error_eta;
 use crate::request::{PlanError, PlanRequest};
 use crate::targets::reachable;
-use mapper_core::{Dwell, Jump, Plan, Repeats, WindowRule};
+use mapper_core::{Dwell, Jump, Plan, PlanRemark, Repeats, WindowRule};
 use mapper_physics::simulation::steady::SteadyState;
 
 /// Jumps tried for repeats if the request names none; each takes a whole search.
@@ -32,7 +32,7 @@ pub fn make_plan(request: &PlanRequest<'_>) -> Result<Plan, PlanError> {
     let (true, Err(PlanError::NoAdmissibleOrder(_))) = (request.return_to_first, &made) else { return made };
     // It may be the way back alone that is not allowed: it was not requested by name.
     let mut plan = with_repeats(&PlanRequest { return_to_first: false, ..request.clone() }, &targets)?;
-    plan.remarks.push("a limit forbids the way back to the first point at the end".to_owned());
+    plan.remarks.push(PlanRemark::NoWayBack);
     Ok(plan)
 }
 
@@ -51,7 +51,7 @@ fn with_repeats(request: &PlanRequest<'_>, targets: &[SteadyState]) -> Result<Pl
         }
     }
     let mut plan = with_jump(request, targets, None).map_err(|error| barred.unwrap_or(error))?;
-    plan.remarks.push("no jump between the points can be repeated, so that drift would not show".to_owned());
+    plan.remarks.push(PlanRemark::NoRepeatedJump);
     Ok(plan)
 }
 

@@ -14,7 +14,10 @@ use crate::thermal_memory::forecast::Resting;
 use crate::thermal_memory::housing::Housing;
 use crate::upper_bound::bound::Optimistic;
 use crate::upper_bound::relaxation::Repeated;
-use mapper_core::{Dwell, Jump, OperatingPoint, Plan, PlanBound, PlanStep, Repeats, StepKind, VisitOrder};
+use mapper_core::{
+    Dwell, Jump, NoBound, OperatingPoint, Plan, PlanBound, PlanRemark, PlanStep, Repeats, StepKind,
+    VisitOrder,
+};
 use mapper_physics::simulation::steady::SteadyState;
 
 /// How often jumps that turn out not to be allowed are taken out and the rest is ordered again.
@@ -251,66 +254,48 @@ impl<'a> PlanBuilder<'a> {
     }
 
     /// Why the bound is missing.
-    fn bound_remark(&self, bound: Option<&PlanBound>) -> Option<String> {
+    fn bound_remark(&self, bound: Option<&PlanBound>) -> Option<NoBound> {
         let request = self.request;
-        let text = match () {
-            () if bound.is_some() || !request.bound => return None,
-            () if !request.order.is_searched() => "the order was not searched for",
-            () if request.appended.is_some() => "none: a jump was put behind the points",
-            () => "none: more points than its table takes, or a housing whose states stay within no box",
-        };
-        Some(text.to_owned())
+        match () {
+            () if bound.is_some() || !request.bound => None,
+            () if !request.order.is_searched() => Some(NoBound::OrderNotSearched),
+            () if request.appended.is_some() => Some(NoBound::AppendedJump),
+            () => Some(NoBound::TooLarge),
+        }
     }
 
-    fn remarks(&self, draft: &Draft) -> Vec<String> {
+    fn remarks(&self, draft: &Draft) -> Vec<PlanRemark> {
         let (request, steps) = (self.request, &draft.steps);
         let mut remarks = Vec::new();
         let repeated = self.repeated.map(|jump| self.points[jump.to]);
         let repeats =
             || steps.iter().filter(|step| step.kind == StepKind::Repeat && Some(step.to) == repeated);
         if let Some(PlanStep { from: Some(from), to, .. }) = repeats().next() {
-            let count = repeats().count();
-            remarks.push(format!("the jump from {from} to {to} is made {count} times to show drift"));
+            remarks.push(PlanRemark::RepeatedJump { from: *from, to: *to, times: repeats().count() });
         }
         if let Some(Jump { from, to }) = request.appended {
-            remarks.push(format!(
-                "the jump from {from} to {to} is made after all else, and is not a point of the map"
-            ));
+            remarks.push(PlanRemark::AppendedJump { from, to });
         }
         if let [first, others @ ..] = steps.as_slice() {
             if steps.iter().any(|step| step.kind == StepKind::Return) {
-                remarks.push(format!(
-                    "the first point, {}, is visited again at the end: no jump led to it at the start",
-                    first.to
-                ));
+                remarks.push(PlanRemark::FirstPointAgain { point: first.to });
             } else if others.iter().all(|step| step.to != first.to) {
-                remarks.push(format!(
-                    "no jump leads to the first point, {}: it has no transient to identify",
-                    first.to
-                ));
+                remarks.push(PlanRemark::FirstPointWithoutJump { point: first.to });
             }
         }
         if let Some(Resting { eta, max_eta, .. }) =
             draft.resting.filter(|resting| resting.eta > resting.max_eta)
         {
-            remarks.push(format!(
-                "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps determine the efficiencies \
-                 only to {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the \
-                 dwell, add points, or hold what is known (`identification.joint`)",
-                100.0 * eta,
-                100.0 * max_eta
-            ));
+            remarks.push(PlanRemark::RestsOnDeclaration { eta_error: eta, max_eta_error: max_eta });
         }
         if let (Dwell::RequiredSigmaEta(required), Some(found)) = (request.timing.dwell, rms_error_eta(steps))
             && found > required
         {
-            remarks.push(format!(
-                "steps of {:.0} s, the longest that are chosen, reach an expected error of {:.2} points of efficiency (rms), not the {:.2} that \
-                 are required",
-                draft.dwell_s,
-                100.0 * found,
-                100.0 * required
-            ));
+            remarks.push(PlanRemark::RequiredErrorNotReached {
+                dwell_s: draft.dwell_s,
+                eta_sigma: found,
+                required_eta_sigma: required,
+            });
         }
         remarks
     }

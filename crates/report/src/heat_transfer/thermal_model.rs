@@ -1,5 +1,6 @@
 //! The parameters that the points of a campaign share, as text.
 
+use crate::point_results::warning_text::model_doubt_text;
 use mapper_core::{FoundInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95};
 use std::fmt::Write;
 
@@ -69,7 +70,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
         );
     }
     for doubt in &thermal.doubts {
-        let _ = writeln!(text, "  doubt: {doubt}");
+        let _ = writeln!(text, "  doubt: {}", model_doubt_text(doubt));
     }
     text
 }

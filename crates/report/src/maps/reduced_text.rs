@@ -2,8 +2,9 @@
 
 use crate::formatting::number::number;
 use crate::formatting::table;
+use mapper_core::EndEvidence;
 use mapper_core::{CompressorMap, EstimateUncertainty, MapPoint, PointBudgets, half_width_95};
-use mapper_maps::{EndEvidence, FoundEnd, LineEnds};
+use mapper_maps::{FoundEnd, LineEnds};
 use std::fmt::Write;
 
 /// Lines, ends, sources of uncertainty, and remarks.

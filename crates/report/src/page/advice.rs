@@ -36,7 +36,7 @@ pub(crate) fn first_things(report: &RunReport<'_>) -> Vec<String> {
         // Findings about the most steps come first. Three sentences are enough here; the rest is listed with the points.
         let mut warnings = doubts(of(verdict));
         warnings.sort_by_key(|doubt| std::cmp::Reverse(doubt.count()));
-        things.extend(warnings.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message)));
+        things.extend(warnings.iter().take(3).map(|doubt| format!("{}: {}", doubt.steps(), doubt.message())));
     }
     things
 }

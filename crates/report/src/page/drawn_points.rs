@@ -1,7 +1,7 @@
 //! Points in the form that the script draws, in display units.
 
 use crate::page::run_page::RunPage;
-use crate::{Display, at_end, step_name, verdict_word};
+use crate::{Display, at_end, step_name, verdict_word, warning_text};
 use mapper_campaign::units::Kind;
 use mapper_core::{Channel, IdentifiedPoint, half_width_95, standard_error_of};
 use mapper_identify::TwoParameter;
@@ -104,7 +104,7 @@ pub(crate) fn drawn_point(
         valve: point.valve_opening_ratio.is_finite().then_some(point.valve_opening_ratio),
         verdict: verdict_word(point.verdict),
         repeat: !point.kind.measures(),
-        said: point.warnings.iter().map(|warning| warning.message.clone()).collect(),
+        said: point.warnings.iter().map(warning_text).collect(),
         raw: Vec::new(),
     }
 }

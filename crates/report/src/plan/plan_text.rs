@@ -5,6 +5,7 @@ use crate::formatting::duration::{duration, eta};
 use crate::formatting::number::{number, percent};
 use crate::formatting::table;
 use crate::formatting::wrapped::wrapped;
+use crate::plan::plan_remark_text::{no_bound_text, plan_remark_text};
 use mapper_campaign::Campaign;
 use mapper_core::{Plan, PlanBound, PlanStep, StepKind, VisitOrder, step_number};
 
@@ -119,8 +120,8 @@ fn summary(campaign: &Campaign, plan: &Plan, soak_s: f64) -> String {
     if !errors.is_empty() {
         lines.push(("expected error", errors.join("; ")));
     }
-    lines.extend(plan.bound_remark.iter().map(|remark| ("bound", remark.clone())));
-    lines.extend(plan.remarks.iter().map(|remark| ("note", remark.clone())));
+    lines.extend(plan.bound_remark.iter().map(|reason| ("bound", no_bound_text(*reason).to_owned())));
+    lines.extend(plan.remarks.iter().map(|remark| ("note", plan_remark_text(remark))));
     if !campaign.machine.assumed.is_empty() {
         let count = campaign.machine.assumed.len();
         lines.push((

@@ -146,7 +146,7 @@ pub fn first_doubts_text(points: &[ScoredPoint]) -> String {
             true => "all steps".to_owned(),
             false => doubt.steps(),
         };
-        wrapped(&format!("{steps}: {}", doubt.message), COLUMNS, 2)
+        wrapped(&format!("{steps}: {}", doubt.message()), COLUMNS, 2)
     };
     remarks.iter().map(named).collect()
 }

@@ -8,3 +8,4 @@ pub(crate) mod point_table;
 pub(crate) mod point_warnings;
 pub(crate) mod points;
 pub(crate) mod shared_errors;
+pub(crate) mod warning_text;

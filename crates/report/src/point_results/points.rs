@@ -23,7 +23,7 @@ pub fn points_text(points: &[ScoredPoint], units: &DisplayUnits, truth: bool) ->
     let mut text = format!("{}\n\n{legend}\n", points_table(points, units, truth));
     let doubted = points.iter().map(|scored| &scored.point).filter(|point| point.verdict != Verdict::Good);
     for doubt in doubts(doubted) {
-        let _ = writeln!(text, "{}: {}", doubt.steps(), doubt.message);
+        let _ = writeln!(text, "{}: {}", doubt.steps(), doubt.message());
     }
     let count = |verdict| points.iter().filter(|scored| scored.point.verdict == verdict).count();
     let _ = writeln!(

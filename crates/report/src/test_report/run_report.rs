@@ -22,7 +22,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
     Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, PointBudgets,
-    Recording, ReferenceState, terminal_text,
+    Recording, ReferenceState, SurgeNotFound, terminal_text,
 };
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
@@ -104,7 +104,7 @@ pub struct SurgeReport<'a> {
     /// Marks in order of speed.
     pub marks: &'a [ScoredMark],
     /// Lines on which no mark was found.
-    pub remarks: &'a [String],
+    pub remarks: &'a [SurgeNotFound],
     /// How often the compressor went into surge.
     pub surges: usize,
 }
@@ -366,7 +366,7 @@ fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_
     text.push_str("## Doubts and remarks\n\n");
     let doubts = doubts(points());
     for doubt in &doubts {
-        let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message);
+        let _ = writeln!(text, "- {} ({}): {}", doubt.steps(), doubt.code, doubt.message());
     }
     if doubts.is_empty() {
         text.push_str("None.\n");

@@ -6,11 +6,16 @@ use crate::formatting::number::{number, percent};
 use crate::formatting::table::{COLUMNS, with_heads};
 use crate::formatting::wrapped::wrapped;
 use mapper_campaign::campaign::DisplayUnits;
-use mapper_core::{SurgeFoundBy, SurgeMark, half_width_95};
+use mapper_core::{SurgeFoundBy, SurgeMark, SurgeNotFound, half_width_95};
 use mapper_recording::score::ScoredMark;
 
 /// Marks of a search for surge, lines without a mark, and the number of surge events; Markdown.
-pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units: &DisplayUnits) -> String {
+pub fn surge_text(
+    marks: &[ScoredMark],
+    remarks: &[SurgeNotFound],
+    surges: usize,
+    units: &DisplayUnits,
+) -> String {
     let display = Display::new(units);
     let table = markdown::table(&surge_heads(marks, &display), Align::Right, surge_rows(marks, &display));
     let remarks_text: String =
@@ -19,9 +24,16 @@ pub fn surge_text(marks: &[ScoredMark], remarks: &[String], surges: usize, units
 }
 
 /// The number of surge events, and the lines without a mark, a sentence each.
-pub fn surge_remarks(remarks: &[String], surges: usize) -> Vec<String> {
+pub fn surge_remarks(remarks: &[SurgeNotFound], surges: usize) -> Vec<String> {
     std::iter::once(times(surges))
-        .chain(remarks.iter().map(|remark| format!("Not found at {remark}.")))
+        .chain(remarks.iter().map(|SurgeNotFound { target_speed_rpm, openings, enough }| match enough {
+            true => format!(
+                "Not found at {target_speed_rpm:.0} rpm: the variation of pressures and flow did not grow over {openings} openings."
+            ),
+            false => format!(
+                "Not found at {target_speed_rpm:.0} rpm: {openings} openings are too few to locate surge."
+            ),
+        }))
         .collect()
 }
 
@@ -46,7 +58,7 @@ pub fn surge_heads(marks: &[ScoredMark], display: &Display) -> Vec<String> {
 /// The same for a terminal of 80 columns. `truth`: whether to show the deviations of the marks from it.
 pub fn surge_columns_text(
     marks: &[ScoredMark],
-    remarks: &[String],
+    remarks: &[SurgeNotFound],
     surges: usize,
     units: &DisplayUnits,
     truth: bool,

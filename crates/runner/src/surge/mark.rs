@@ -4,7 +4,7 @@ use crate::surge::estimate::SurgeEstimate;
 use crate::surge::surge_reading::SurgeReading;
 use mapper_core::{
     Channel, DeclaredUncertainty, EventKind, Recording, ReferenceState, StepKind, StepMarker, SurgeFoundBy,
-    SurgeMark,
+    SurgeMark, SurgeNotFound,
 };
 use std::collections::BTreeMap;
 
@@ -36,8 +36,8 @@ impl SurgeErrors {
 pub struct SurgeMarks {
     /// Marks in order of speed.
     pub marks: Vec<SurgeMark>,
-    /// Lines on which surge was not found, in words.
-    pub remarks: Vec<String>,
+    /// Lines on which surge was not found.
+    pub remarks: Vec<SurgeNotFound>,
     /// Number of surge events during the approaches.
     pub surges: usize,
 }
@@ -63,7 +63,7 @@ pub fn surge_marks(recording: &Recording, reference: ReferenceState, errors: Sur
         let target_speed_rpm = approach.first().and_then(|step| step.to).map_or(0.0, |to| to.speed_rpm);
         match mark(&looks, target_speed_rpm, surged.map(|step| step.valve_opening_ratio), errors) {
             Ok(mark) => found.marks.push(mark),
-            Err(reason) => found.remarks.push(format!("{:.0} rpm: {reason}", target_speed_rpm)),
+            Err(not_found) => found.remarks.push(not_found),
         }
     }
     found.marks.sort_by(|a, b| a.speed_corrected_rpm.total_cmp(&b.speed_corrected_rpm));
@@ -98,9 +98,9 @@ fn mark(
     target_speed_rpm: f64,
     surged_at_ratio: Option<f64>,
     errors: SurgeErrors,
-) -> Result<SurgeMark, String> {
-    let too_few = || format!("{} openings are too few to locate surge", looks.len());
-    let last = looks.last().ok_or_else(too_few)?;
+) -> Result<SurgeMark, SurgeNotFound> {
+    let not_found = |enough: bool| SurgeNotFound { target_speed_rpm, openings: looks.len(), enough };
+    let last = looks.last().ok_or(not_found(false))?;
     let (flow_kg_s, standard_error_kg_s, closest_kg_s) = match surged_at_ratio {
         Some(surged_at_ratio) => {
             let high = last.flow_corrected_kg_s;
@@ -109,9 +109,9 @@ fn mark(
             (0.5 * (low + high), (high - low) / 12.0f64.sqrt(), high)
         }
         None => {
-            let estimate = SurgeEstimate::of(looks).ok_or_else(too_few)?;
+            let estimate = SurgeEstimate::of(looks).ok_or(not_found(false))?;
             if !estimate.seen {
-                return Err("the variation of pressures and flow did not grow".to_owned());
+                return Err(not_found(true));
             }
             (estimate.flow_corrected_kg_s, estimate.standard_error_kg_s, estimate.closest_flow_kg_s)
         }

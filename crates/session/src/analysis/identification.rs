@@ -7,7 +7,8 @@ use crate::recording::recording_file::{Recorded, all_differ, same_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
-    Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, ThermalModel, joined,
+    Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, SurgeNotFound,
+    ThermalModel, joined,
 };
 use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_with_rig,
@@ -19,6 +20,7 @@ use mapper_recording::score::{
     AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
+use mapper_report::with_messages;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -64,8 +66,8 @@ pub struct Identified {
 pub struct SoughtSurge {
     /// The marks in order of speed, with the truth if the recording contains it.
     pub marks: Vec<ScoredMark>,
-    /// Remarks on lines without a surge point.
-    pub remarks: Vec<String>,
+    /// Lines without a surge point.
+    pub remarks: Vec<SurgeNotFound>,
     /// Number of surge events of the compressor.
     pub surges: usize,
 }
@@ -93,7 +95,7 @@ impl Identified {
         if let Some(surge) = &self.surge {
             value["surge"] = json!(surge);
         }
-        value
+        with_messages(value)
     }
 
     /// The points without their truth.

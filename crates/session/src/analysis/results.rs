@@ -18,7 +18,9 @@ use mapper_observe::FusedChannel;
 use mapper_recording::score::{ScoreSummary, ScoredPoint};
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
-use mapper_report::{Display, PointsOrigin, ReportSource, RunReport, SurgeReport, instant, run_report};
+use mapper_report::{
+    Display, PointsOrigin, ReportSource, RunReport, SurgeReport, instant, run_report, with_messages,
+};
 use serde::Serialize;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
@@ -291,7 +293,7 @@ impl Session<'_> {
         if let Some(surge) = &identified.surge {
             points_file["surge"] = json!(surge);
         }
-        files.write(run_directory::POINTS, json_text(&points_file)?.as_bytes());
+        files.write(run_directory::POINTS, json_text(&with_messages(points_file))?.as_bytes());
         if !identified.budgets.is_empty() {
             files.write(run_directory::BUDGET, &budget_csv(&identified.budgets)?);
         }

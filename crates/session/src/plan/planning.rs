@@ -33,7 +33,7 @@ pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
 /// As [`plan`].
 pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
     let mut plan = make_plan(request)?;
-    plan.remarks.extend(zero_forecast::sentence(campaign));
+    plan.remarks.extend(zero_forecast::remark(campaign));
     count_surge_search(campaign, request.model, &mut plan);
     Ok(plan)
 }

@@ -2,7 +2,7 @@
 
 use crate::recording::identification_config::declared;
 use mapper_campaign::Campaign;
-use mapper_core::{OperatingPoint, Plan, Predicted, Recording, SurgeSeek};
+use mapper_core::{OperatingPoint, Plan, PlanRemark, Predicted, Recording, SurgeSeek};
 use mapper_identify::IdentifyConfig;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::hold_speed;
@@ -63,16 +63,14 @@ pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option
 }
 
 impl SurgeForecast {
-    /// One sentence for a plan's remarks.
-    pub fn sentence(&self, seek: &SurgeSeek) -> String {
-        format!(
-            "behind these steps surge is sought at the ends of {} speed lines, no nearer than a margin of {:.1} %: about {} steps, \
-             {:.0} min, counted in",
-            self.lines,
-            100.0 * seek.closest_margin_ratio,
-            self.steps,
-            self.duration_s / 60.0
-        )
+    /// The remark of a plan.
+    fn remark(&self, seek: &SurgeSeek) -> PlanRemark {
+        PlanRemark::SurgeSearch {
+            lines: self.lines,
+            closest_margin_ratio: seek.closest_margin_ratio,
+            steps: self.steps,
+            duration_s: self.duration_s,
+        }
     }
 }
 
@@ -81,7 +79,7 @@ pub(crate) fn count_surge_search(campaign: &Campaign, model: &Model, plan: &mut 
     if let Some((seek, forecast)) = campaign.surge_search.zip(surge_forecast(campaign, model, plan)) {
         plan.surge_search_s = forecast.duration_s;
         plan.figures.minutes = plan.duration_s() / 60.0;
-        plan.remarks.push(forecast.sentence(&seek));
+        plan.remarks.push(forecast.remark(&seek));
     }
 }
 

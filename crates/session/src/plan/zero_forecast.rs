@@ -2,8 +2,9 @@
 
 use crate::recording::identification_config::identification;
 use mapper_campaign::Campaign;
-use mapper_core::{Channel, with_unit};
+use mapper_core::{Channel, PlanRemark};
 use mapper_identify::{ZeroSettings, expected_after_zero};
+use std::collections::BTreeMap;
 
 /// Channels whose offsets dominate the error of efficiency.
 const CHANNELS: [Channel; 5] = [Channel::T1, Channel::T2, Channel::Tc, Channel::P1, Channel::P2];
@@ -12,44 +13,24 @@ const LONGER_RATIO: f64 = 2.0;
 /// Minimum relative reduction of an offset by a longer soak that is reported.
 const WORTH_IT_RATIO: f64 = 0.3;
 
-/// One sentence for a plan's remarks; `None` without a zero or without declared offsets.
-pub(crate) fn sentence(campaign: &Campaign) -> Option<String> {
+/// The remark of a plan; `None` without a zero or without declared offsets.
+pub(crate) fn remark(campaign: &Campaign) -> Option<PlanRemark> {
     let soak = campaign.zero?;
-    let left_after = |soak_s: f64| {
-        let left = expected_after_zero(identification(campaign), &ZeroSettings::from(soak), soak_s);
-        CHANNELS.map(|channel| left.declared.get(&channel).map(|declared| declared.offset_sigma))
+    let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
+        let left = expected_after_zero(identification(campaign), &ZeroSettings::from(soak), soak_s).declared;
+        CHANNELS.into_iter().filter_map(|channel| Some((channel, left.get(&channel)?.offset_sigma))).collect()
     };
-    let (left, longer) = (left_after(soak.duration_s), left_after(LONGER_RATIO * soak.duration_s));
-    let named = |(channel, sigma): (Channel, f64)| {
-        let digits = if channel.unit() == "K" { 3 } else { 1 };
-        format!("{channel} {}", with_unit(format!("{sigma:.digits$}"), channel.unit()))
-    };
-    let all: Vec<String> = CHANNELS
-        .into_iter()
-        .zip(left)
-        .filter_map(|(channel, sigma)| Some(named((channel, sigma?))))
-        .collect();
-    let better: Vec<String> = CHANNELS
-        .into_iter()
-        .zip(left.into_iter().zip(longer))
-        .filter_map(|(channel, (left, longer))| {
-            let (left, longer) = (left?, longer?);
-            (longer < (1.0 - WORTH_IT_RATIO) * left).then(|| named((channel, longer)))
-        })
-        .collect();
-    if all.is_empty() {
-        return None;
-    }
-    let mut sentence = format!(
-        "the rest of {:.0} min leaves of the offsets (one standard deviation): {}",
-        soak.duration_s / 60.0,
-        all.join(", ")
-    );
-    if !better.is_empty() {
-        let minutes = LONGER_RATIO * soak.duration_s / 60.0;
-        sentence += &format!("; {minutes:.0} min would leave {}", better.join(", "));
-    }
-    Some(sentence)
+    let longer_soak_s = LONGER_RATIO * soak.duration_s;
+    let (offset_sigmas, mut longer_offset_sigmas) = (left_after(soak.duration_s), left_after(longer_soak_s));
+    longer_offset_sigmas.retain(|channel, longer| {
+        offset_sigmas.get(channel).is_some_and(|left| *longer < (1.0 - WORTH_IT_RATIO) * left)
+    });
+    (!offset_sigmas.is_empty()).then_some(PlanRemark::OffsetsAfterSoak {
+        soak_s: soak.duration_s,
+        offset_sigmas,
+        longer_soak_s,
+        longer_offset_sigmas,
+    })
 }
 
 #[cfg(test)]
@@ -60,15 +41,18 @@ mod tests {
     #[test]
     fn a_longer_rest_is_named_where_it_leaves_clearly_less() {
         let mut campaign = shipped::campaign(&[]);
-        let half_an_hour = sentence(&campaign).unwrap();
-        assert!(half_an_hour.contains("the rest of 30 min leaves"), "{half_an_hour}");
+        let named = |campaign: &_| match remark(campaign) {
+            Some(PlanRemark::OffsetsAfterSoak { soak_s, longer_offset_sigmas, .. }) => {
+                Some((soak_s, longer_offset_sigmas.into_keys().collect::<Vec<_>>()))
+            }
+            _ => None,
+        };
         // Only the housing has not settled; averaging no longer improves the other sensors.
-        assert!(half_an_hour.contains("60 min would leave Tc"), "{half_an_hour}");
+        assert_eq!(named(&campaign), Some((1800.0, vec![Channel::Tc])));
         let soak = campaign.zero.as_mut().unwrap();
         soak.duration_s = 4.0 * 3600.0;
-        let night = sentence(&campaign).unwrap();
-        assert!(!night.contains("would leave"), "{night}");
+        assert_eq!(named(&campaign), Some((4.0 * 3600.0, Vec::new())));
         campaign.zero = None;
-        assert_eq!(sentence(&campaign), None);
+        assert_eq!(named(&campaign), None);
     }
 }

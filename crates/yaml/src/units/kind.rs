@@ -1,48 +1,5 @@
 //! The table of quantities and their units.
 
-/// What a value written with a unit measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
-    /// Absolute temperature, K inside.
-    Temperature,
-    /// Difference of temperatures (noise, offset), K inside.
-    TemperatureDifference,
-    /// Absolute pressure, Pa inside.
-    Pressure,
-    /// Difference of pressures (noise, offset), Pa inside.
-    PressureDifference,
-    /// Shaft speed, rpm inside.
-    Speed,
-    /// Mass flow, kg/s inside.
-    MassFlow,
-    /// Time, s inside.
-    Duration,
-    /// Length, m inside.
-    Length,
-    /// Area, m2 inside.
-    Area,
-    /// Volume, m3 inside.
-    Volume,
-    /// Mass, kg inside.
-    Mass,
-    /// Moment of inertia, kg m2 inside.
-    Inertia,
-    /// Thermal conductance, W/K inside.
-    Conductance,
-    /// Thermal conductivity, W/(m K) inside.
-    Conductivity,
-    /// Share of a whole, a ratio inside.
-    Fraction,
-    /// Frequency, Hz inside.
-    Frequency,
-    /// Rate of a pressure, Pa/s inside.
-    PressureRate,
-    /// Rate of a temperature, K/s inside.
-    TemperatureRate,
-    /// Rate of a ratio such as a valve opening, 1/s inside.
-    RatioRate,
-}
-
 /// One unit: `inside = (value + zero) * numerator / denominator * 10^decade`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
@@ -199,53 +156,102 @@ const PRESSURE_RATE: &[Unit] = &[decimal(&["Pa/s"], 0), decimal(&["kPa/s"], 3), 
 const TEMPERATURE_RATE: &[Unit] = &[decimal(&["K/s"], 0), unit(&["K/min"], 1.0, 60.0)];
 const RATIO_RATE: &[Unit] = &[decimal(&["1/s"], 0), decimal(&["%/s"], -2)];
 
+/// Ties a type to its kind.
+pub trait Dimension {
+    /// The kind.
+    const KIND: Kind;
+}
+
+/// Declares the kinds: for each its type, its key, its name with the article, a value as one would write it, and its units.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $name:ident $key:literal, $named:literal, $example:literal, $units:ident;)*) => {
+        /// What a value written with a unit measures.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Kind {
+            $($(#[$doc])* $name,)*
+        }
+
+        $(
+            $(#[$doc])*
+            #[derive(Debug, Clone, Copy, PartialEq)]
+            pub enum $name {}
+            impl Dimension for $name {
+                const KIND: Kind = Kind::$name;
+            }
+        )*
+
+        impl Kind {
+            /// All kinds.
+            pub const ALL: [Kind; [$($key),*].len()] = [$(Kind::$name),*];
+
+            /// Stable key, as in the schema's `x-quantity`.
+            pub fn key(self) -> &'static str {
+                match self { $(Kind::$name => $key,)* }
+            }
+
+            /// Name with its article, for messages.
+            pub fn name(self) -> &'static str {
+                match self { $(Kind::$name => $named,)* }
+            }
+
+            /// A value as one would write it.
+            pub fn example(self) -> &'static str {
+                match self { $(Kind::$name => $example,)* }
+            }
+
+            /// The units that may be written; the first of them is the unit used inside, but for fractions.
+            pub fn units(self) -> &'static [Unit] {
+                match self { $(Kind::$name => $units,)* }
+            }
+        }
+    };
+}
+
+kinds! {
+    /// Absolute temperature, K inside.
+    Temperature "temperature", "a temperature", "25 degC", TEMPERATURE;
+    /// Difference of temperatures (noise, offset), K inside.
+    TemperatureDifference "temperature_difference", "a temperature difference", "0.25 K", TEMPERATURE_DIFFERENCE;
+    /// Absolute pressure, Pa inside.
+    Pressure "pressure", "an absolute pressure", "100 kPa", PRESSURE;
+    /// Difference of pressures (noise, offset), Pa inside.
+    PressureDifference "pressure_difference", "a pressure difference", "50 Pa", PRESSURE_DIFFERENCE;
+    /// Shaft speed, rpm inside.
+    Speed "speed", "a shaft speed", "110 krpm", SPEED;
+    /// Mass flow, kg/s inside.
+    MassFlow "mass_flow", "a mass flow", "1.5e-4 kg/s", MASS_FLOW;
+    /// Time, s inside.
+    Duration "duration", "a time", "10 s", DURATION;
+    /// Length, m inside.
+    Length "length", "a length", "35 mm", LENGTH;
+    /// Area, m2 inside.
+    Area "area", "an area", "29e-3 m^2", AREA;
+    /// Volume, m3 inside.
+    Volume "volume", "a volume", "0.78e-3 m^3", VOLUME;
+    /// Mass, kg inside.
+    Mass "mass", "a mass", "0.93 kg", MASS;
+    /// Moment of inertia, kg m2 inside.
+    Inertia "inertia", "a moment of inertia", "16e-6 kg m^2", INERTIA;
+    /// Thermal conductance, W/K inside.
+    Conductance "conductance", "a thermal conductance", "8 W/K", CONDUCTANCE;
+    /// Thermal conductivity, W/(m K) inside.
+    Conductivity "conductivity", "a thermal conductivity", "47.5 W/(m K)", CONDUCTIVITY;
+    /// Share of a whole, a ratio inside.
+    Fraction "fraction", "a share", "0.5 %", FRACTION;
+    /// Frequency, Hz inside.
+    Frequency "frequency", "a frequency", "10 Hz", FREQUENCY;
+    /// Rate of a pressure, Pa/s inside.
+    PressureRate "pressure_rate", "a rate of pressure", "100 kPa/s", PRESSURE_RATE;
+    /// Rate of a temperature, K/s inside.
+    TemperatureRate "temperature_rate", "a rate of temperature", "5 K/s", TEMPERATURE_RATE;
+    /// Rate of a ratio such as a valve opening, 1/s inside.
+    RatioRate "ratio_rate", "a rate of opening", "1 1/s", RATIO_RATE;
+}
+
 impl Kind {
-    /// All kinds.
-    pub const ALL: [Kind; 19] = [
-        Kind::Temperature,
-        Kind::TemperatureDifference,
-        Kind::Pressure,
-        Kind::PressureDifference,
-        Kind::Speed,
-        Kind::MassFlow,
-        Kind::Duration,
-        Kind::Length,
-        Kind::Area,
-        Kind::Volume,
-        Kind::Mass,
-        Kind::Inertia,
-        Kind::Conductance,
-        Kind::Conductivity,
-        Kind::Fraction,
-        Kind::Frequency,
-        Kind::PressureRate,
-        Kind::TemperatureRate,
-        Kind::RatioRate,
-    ];
-
-    /// Stable key, as in the schema's `x-quantity`.
-    pub fn key(self) -> &'static str {
-        self.row().0
-    }
-
     /// The kind with that key.
     pub fn from_key(key: &str) -> Option<Kind> {
         Kind::ALL.into_iter().find(|kind| kind.key() == key)
-    }
-
-    /// Name with its article, for messages.
-    pub fn name(self) -> &'static str {
-        self.row().1
-    }
-
-    /// A value as one would write it.
-    pub fn example(self) -> &'static str {
-        self.row().2
-    }
-
-    /// The units that may be written; the first of them is the unit used inside, but for fractions.
-    pub fn units(self) -> &'static [Unit] {
-        self.row().3
     }
 
     /// The unit with that spelling. Runs of blanks count as one.
@@ -257,34 +263,6 @@ impl Kind {
     /// The symbols of all units, for messages.
     pub fn unit_list(self) -> String {
         self.units().iter().map(Unit::symbol).collect::<Vec<_>>().join(", ")
-    }
-
-    fn row(self) -> (&'static str, &'static str, &'static str, &'static [Unit]) {
-        match self {
-            Kind::Temperature => ("temperature", "a temperature", "25 degC", TEMPERATURE),
-            Kind::TemperatureDifference => {
-                ("temperature_difference", "a temperature difference", "0.25 K", TEMPERATURE_DIFFERENCE)
-            }
-            Kind::Pressure => ("pressure", "an absolute pressure", "100 kPa", PRESSURE),
-            Kind::PressureDifference => {
-                ("pressure_difference", "a pressure difference", "50 Pa", PRESSURE_DIFFERENCE)
-            }
-            Kind::Speed => ("speed", "a shaft speed", "110 krpm", SPEED),
-            Kind::MassFlow => ("mass_flow", "a mass flow", "1.5e-4 kg/s", MASS_FLOW),
-            Kind::Duration => ("duration", "a time", "10 s", DURATION),
-            Kind::Length => ("length", "a length", "35 mm", LENGTH),
-            Kind::Area => ("area", "an area", "29e-3 m^2", AREA),
-            Kind::Volume => ("volume", "a volume", "0.78e-3 m^3", VOLUME),
-            Kind::Mass => ("mass", "a mass", "0.93 kg", MASS),
-            Kind::Inertia => ("inertia", "a moment of inertia", "16e-6 kg m^2", INERTIA),
-            Kind::Conductance => ("conductance", "a thermal conductance", "8 W/K", CONDUCTANCE),
-            Kind::Conductivity => ("conductivity", "a thermal conductivity", "47.5 W/(m K)", CONDUCTIVITY),
-            Kind::Fraction => ("fraction", "a share", "0.5 %", FRACTION),
-            Kind::Frequency => ("frequency", "a frequency", "10 Hz", FREQUENCY),
-            Kind::PressureRate => ("pressure_rate", "a rate of pressure", "100 kPa/s", PRESSURE_RATE),
-            Kind::TemperatureRate => ("temperature_rate", "a rate of temperature", "5 K/s", TEMPERATURE_RATE),
-            Kind::RatioRate => ("ratio_rate", "a rate of opening", "1 1/s", RATIO_RATE),
-        }
     }
 }
 

@@ -11,10 +11,10 @@ mod parse;
 mod quantity;
 
 pub use header_unit::{HeaderUnit, Reference, header_unit, split_unit, volume_flow_m3_s};
-pub use kind::{BARE_RATIO, Kind, Unit};
-pub use parse::{UnitError, parse, parse_with};
-pub use quantity::{
-    Area, Conductance, Conductivity, Dimension, Duration, Fraction, Frequency, Inertia, Length, Mass,
-    MassFlow, Pressure, PressureDifference, PressureRate, Quantity, RatioRate, Speed, Temperature,
-    TemperatureDifference, TemperatureRate, Volume,
+pub use kind::{
+    Area, BARE_RATIO, Conductance, Conductivity, Dimension, Duration, Fraction, Frequency, Inertia, Kind,
+    Length, Mass, MassFlow, Pressure, PressureDifference, PressureRate, RatioRate, Speed, Temperature,
+    TemperatureDifference, TemperatureRate, Unit, Volume,
 };
+pub use parse::{UnitError, parse, parse_with};
+pub use quantity::Quantity;

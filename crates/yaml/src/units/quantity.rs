@@ -1,67 +1,9 @@
 //! A value of a known kind, as written in the YAML.
 
-use super::{Kind, parse};
+use super::{Dimension, Kind, parse};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, de};
 use std::{borrow::Cow, marker::PhantomData};
-
-/// Ties a type to its row in the table of units.
-pub trait Dimension {
-    /// The row.
-    const KIND: Kind;
-}
-
-macro_rules! dimensions {
-    ($($(#[$doc:meta])* $name:ident),+ $(,)?) => {$(
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq)]
-        pub enum $name {}
-        impl Dimension for $name {
-            const KIND: Kind = Kind::$name;
-        }
-    )+};
-}
-
-dimensions! {
-    /// Absolute temperature.
-    Temperature,
-    /// Difference of temperatures.
-    TemperatureDifference,
-    /// Absolute pressure.
-    Pressure,
-    /// Difference of pressures.
-    PressureDifference,
-    /// Shaft speed.
-    Speed,
-    /// Mass flow.
-    MassFlow,
-    /// Time.
-    Duration,
-    /// Length.
-    Length,
-    /// Area.
-    Area,
-    /// Volume.
-    Volume,
-    /// Mass.
-    Mass,
-    /// Moment of inertia.
-    Inertia,
-    /// Thermal conductance.
-    Conductance,
-    /// Thermal conductivity.
-    Conductivity,
-    /// Share of a whole.
-    Fraction,
-    /// Frequency.
-    Frequency,
-    /// Rate of a pressure.
-    PressureRate,
-    /// Rate of a temperature.
-    TemperatureRate,
-    /// Rate of a ratio.
-    RatioRate,
-}
 
 /// A value written with its unit, e.g. `110 krpm`.
 ///

@@ -233,7 +233,7 @@ fn own_point(
         .unwrap_or_default()
         .split(';')
         .filter(|code| !code.is_empty())
-        .map(|code| Warning {
+        .map(|code| Warning::Other {
             code: code.to_owned(),
             message: "read from a CSV map, which holds the code alone".to_owned(),
         })

@@ -1,6 +1,6 @@
 //! A map as rows of points.
 
-use mapper_core::{CompressorMap, ExportError, MapPoint, SpeedLine, Verdict, step_number};
+use mapper_core::{CompressorMap, ExportError, MapPoint, SpeedLine, Verdict, Warning, step_number};
 
 /// Column names, in order. A missing number is an empty field; `eta*` are fractions, 95 % intervals.
 const COLUMNS: [&str; 28] = [
@@ -96,7 +96,7 @@ fn row(line: &SpeedLine, point: &MapPoint) -> [String; 28] {
         option(p.dtc_k),
         p.method.to_string(),
         verdict.to_owned(),
-        p.warnings.iter().map(|warning| warning.code.as_str()).collect::<Vec<_>>().join(";"),
+        p.warnings.iter().map(Warning::code).collect::<Vec<_>>().join(";"),
         step_number(p.step).to_string(),
         number(p.flow_corrected_kg_s),
         number(p.pressure_ratio),

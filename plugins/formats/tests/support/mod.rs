@@ -2,7 +2,7 @@
 //! physics crate, which this crate may not depend on.
 
 use mapper_core::{
-    CommonErrors, CompressorMap, EfficiencyDefinition, EstimateUncertainty, IdentifiedPoint, MapPoint,
+    Bound, CommonErrors, CompressorMap, EfficiencyDefinition, EstimateUncertainty, IdentifiedPoint, MapPoint,
     Method, OperatingPoint, ReferenceState, SpeedLine, StepKind, Verdict, Warning, confidence_interval_95,
 };
 
@@ -64,10 +64,13 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
     // Slow lines are less accurate because of small temperature rises; a fixed pattern replaces random numbers.
     let standard_error = 0.0012 * (160_000.0 / speed_rpm).powi(2) * (1.0 + 0.5 * (step % 3) as f64);
     let eta = eta + standard_error * [0.6, -0.9, 0.2, 1.1, -0.4][step % 5];
-    let (verdict, code) = match step {
-        0 => (Verdict::Unusable, Some("no_transient")),
-        27 => (Verdict::Unusable, Some("not_settled")),
-        4 | 5 | 10 | 23 => (Verdict::Doubtful, Some("small_gradient")),
+    let (verdict, warning) = match step {
+        0 => (Verdict::Unusable, Some(Warning::NoTransient)),
+        27 => (Verdict::Unusable, Some(Warning::AtBound(Bound::Eta { eta: 2.0 }))),
+        4 | 5 | 10 | 23 => (
+            Verdict::Doubtful,
+            Some(Warning::SmallGradient { dt2_k: 0.25, needed_dt2_k: 0.5, eta_sigma: 0.0625 }),
+        ),
         _ => (Verdict::Good, None),
     };
     let eta = (verdict != Verdict::Unusable).then_some(eta);
@@ -102,10 +105,7 @@ fn point(step: usize, speed_rpm: f64, x: f64, valve_opening_ratio: f64) -> MapPo
         },
         method: Method::Dynamic,
         verdict,
-        warnings: code
-            .map(|code| Warning { code: code.to_owned(), message: "T2 moved by 1.2 K".to_owned() })
-            .into_iter()
-            .collect(),
+        warnings: warning.into_iter().collect(),
         window: None,
         residual_rms_k: eta.map(|_| 0.05),
         dt2_k: Some(-12.5),

@@ -16,9 +16,11 @@ use crate::step_data::cleaning::cleaned;
 use crate::step_data::end_state::EndState;
 use crate::step_data::samples::Samples;
 use crate::step_data::window;
-use crate::step_outcome::findings::{Findings, code};
+use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, WindowRule, step_data::commands};
-use mapper_core::{Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, Window};
+use mapper_core::{
+    Channel, Choice, ConvectionWithinStep, EfficiencyWithinStep, Recording, TooFew, Warning, Window,
+};
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{DOUBT_SIGMAS, mean, median};
@@ -88,9 +90,8 @@ fn rows_of(
     let start_s = commands::at_rest_s(recording, step).max(step.start_s) + after_s;
     let window = Window { start_s, end_s: step.end_s };
     if start_s.is_nan() || start_s >= step.end_s {
-        let message =
-            format!("the commands changed until {:.1} s before the step's end", step.end_s - start_s);
-        own.refuse(code::TOO_FEW_SAMPLES, message);
+        let late = TooFew::LateCommands { before_end_s: step.end_s - start_s };
+        own.refuse(Warning::TooFewSamples(late));
         return None;
     }
     let samples = cleaned(Samples::of(recording, window, config, true), config, own);
@@ -102,11 +103,12 @@ fn rows_of(
         let rest = window::rest(recording, step, &config.settle_bands);
         let needed_s = WindowRule::rest_at_end_s(step.end_s - step.start_s);
         if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
-            let message = format!(
-                "the {} still varies beyond its limit {:.0} s before the step's end (needed: {needed_s:.0} s)",
-                rest.slowest, rest.settled_s
-            );
-            own.doubt(code::NOT_STABILISED, message);
+            own.doubt(Warning::NotStabilised {
+                quantity: rest.slowest.to_owned(),
+                settled_s: rest.settled_s,
+                needed_s,
+                used_s: None,
+            });
         }
     }
     condensed(recording, position, &samples, end_state, config)

@@ -45,7 +45,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             }
             h3 { "Warnings and remarks" }
             @if warnings.is_empty() { p { "None." } }
-            @else { ul { @for doubt in &warnings { li { (doubt.steps()) " (" (doubt.code) "): " (sentence(&doubt.message)) } } } }
+            @else { ul { @for doubt in &warnings { li { (doubt.steps()) " (" (doubt.code) "): " (sentence(&doubt.message())) } } } }
             h3 { "Events" }
             @if report.events.is_empty() { p { "None." } }
             @else { ul { @for event in report.events { li { (format!("{:.1} s", event.t_s)) ": " (prose(&event.message)) } } } }

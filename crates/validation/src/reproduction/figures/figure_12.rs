@@ -5,8 +5,8 @@ use crate::reproduction::number_text::fixed;
 use crate::reproduction::outcome::{Outcome, RUN_S, assuming, outcome_of, rms};
 use crate::reproduction::{FigureResult, ReproduceError, Statement, Table, Verdict};
 use mapper_chart::{Axis, Figure, Marker, Panel, Rule, RuleAt, Scatter, palette};
-use mapper_core::{Channel, Recording, Verdict as PointVerdict};
-use mapper_identify::{DeclaredUncertainty, IdentifyConfig, code};
+use mapper_core::{Channel, Recording, Verdict as PointVerdict, Warning};
+use mapper_identify::{DeclaredUncertainty, IdentifyConfig};
 use mapper_numerics::coloured_noise::memory;
 use mapper_numerics::statistics::quantile;
 use mapper_physics::simulation::model::Model;
@@ -128,7 +128,8 @@ impl<'a> Bin<'a> {
 pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {
     let found = measured()?;
     let bins: Vec<Bin<'_>> = BINS_K.into_iter().map(|bin| Bin::of(&found, bin)).collect();
-    let moved = |o: &Outcome| o.point.warnings.iter().any(|warning| warning.code == code::FLOW_MOVED);
+    let moved =
+        |o: &Outcome| o.point.warnings.iter().any(|warning| matches!(warning, Warning::FlowMoved { .. }));
     let of = |from_k: f64, to_k: f64, steady: bool| {
         let wanted = |o: &&Outcome| (from_k..to_k).contains(&dt2_k(o)) && !(steady && moved(o));
         rms(found.iter().filter(wanted).map(Outcome::eta_error_points)).unwrap_or(f64::NAN)

@@ -1,0 +1,63 @@
+//! Remarks for the operator of a plan.
+
+use crate::coded_enum::coded_enum;
+use crate::{Channel, OperatingPoint};
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+coded_enum! {
+/// A remark for the operator of a plan, by its stable code.
+PlanRemark {
+    /// A jump is repeated to show drift.
+    "repeated_jump" RepeatedJump { from: OperatingPoint, to: OperatingPoint, times: usize },
+    /// No jump can be repeated, so that drift would not show.
+    "no_repeated_jump" NoRepeatedJump,
+    /// A jump follows all other steps, and is not a point of the map.
+    "appended_jump" AppendedJump { from: OperatingPoint, to: OperatingPoint },
+    /// The first point is visited again at the end.
+    "first_point_again" FirstPointAgain { point: OperatingPoint },
+    /// No jump leads to the first point, so that it has no transient.
+    "first_point_without_jump" FirstPointWithoutJump { point: OperatingPoint },
+    /// A limit forbids the way back to the first point.
+    "no_way_back" NoWayBack,
+    /// The points will have the warning of this code: error without a declaration, and the largest permitted one.
+    "rests_on_declaration" RestsOnDeclaration { eta_error: f64, max_eta_error: f64 },
+    /// The longest dwell does not reach the required error.
+    "required_error_not_reached" RequiredErrorNotReached { dwell_s: f64, eta_sigma: f64, required_eta_sigma: f64 },
+    /// The search for surge behind the steps.
+    "surge_search" SurgeSearch { lines: usize, closest_margin_ratio: f64, steps: usize, duration_s: f64 },
+    /// Offsets that the soak leaves, in the channels' units, and those that a longer one would clearly reduce.
+    "offsets_after_soak" OffsetsAfterSoak {
+        soak_s: f64, offset_sigmas: BTreeMap<Channel, f64>, longer_soak_s: f64, longer_offset_sigmas: BTreeMap<Channel, f64>
+    },
+}
+}
+
+/// Why a plan has no bound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoBound {
+    /// The order was not searched for.
+    OrderNotSearched,
+    /// A jump was put behind the points.
+    AppendedJump,
+    /// More points than its table takes, or a housing whose states stay within no box.
+    TooLarge,
+}
+
+/// Remarks of older plans are sentences.
+pub(crate) fn remarks<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<PlanRemark>, D::Error> {
+    let stored = Vec::<Value>::deserialize(deserializer)?;
+    let read = |remark: Value| match remark {
+        Value::String(message) => Ok(PlanRemark::Other { code: "sentence".to_owned(), message }),
+        typed => serde_json::from_value(typed).map_err(serde::de::Error::custom),
+    };
+    stored.into_iter().map(read).collect()
+}
+
+/// That of older plans is a sentence, and is left out.
+pub(crate) fn no_bound<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<NoBound>, D::Error> {
+    let stored = Option::<Value>::deserialize(deserializer)?;
+    Ok(stored.and_then(|value| serde_json::from_value(value).ok()))
+}

@@ -1,0 +1,83 @@
+//! Sentences of the remarks of plans.
+
+use mapper_core::{Channel, NoBound, PlanRemark, with_unit};
+use std::collections::BTreeMap;
+
+/// The sentence of a remark, with values and units.
+pub fn plan_remark_text(remark: &PlanRemark) -> String {
+    match remark {
+        PlanRemark::RepeatedJump { from, to, times } => {
+            format!("the jump from {from} to {to} is made {times} times to show drift")
+        }
+        PlanRemark::NoRepeatedJump => {
+            "no jump between the points can be repeated, so that drift would not show".to_owned()
+        }
+        PlanRemark::AppendedJump { from, to } => {
+            format!("the jump from {from} to {to} is made after all others, and is not a point of the map")
+        }
+        PlanRemark::FirstPointAgain { point } => {
+            format!("the first point, {point}, is visited again at the end: no jump led to it at the start")
+        }
+        PlanRemark::FirstPointWithoutJump { point } => {
+            format!("no jump leads to the first point, {point}: it has no transient to identify")
+        }
+        PlanRemark::NoWayBack => "a limit forbids the way back to the first point at the end".to_owned(),
+        PlanRemark::RestsOnDeclaration { eta_error, max_eta_error } => format!(
+            "no expected error is stated, and the points will be doubtful (`rests_on_declaration`): these steps determine the efficiencies \
+             only to {:.1} points if alpha_A, probe and heating/cooling ratio have to be found, and {:.2} are needed; lengthen the \
+             dwell, add points, or hold what is known (`identification.joint`)",
+            100.0 * eta_error,
+            100.0 * max_eta_error
+        ),
+        PlanRemark::RequiredErrorNotReached { dwell_s, eta_sigma, required_eta_sigma } => format!(
+            "steps of {dwell_s:.0} s, the longest that are chosen, reach an expected error of {:.2} points of efficiency (rms), not the \
+             required {:.2}",
+            100.0 * eta_sigma,
+            100.0 * required_eta_sigma
+        ),
+        PlanRemark::SurgeSearch { lines, closest_margin_ratio, steps, duration_s } => format!(
+            "a search for surge follows at the ends of {lines} speed lines, no nearer than a margin of {:.1} %: about {steps} steps, \
+             {:.0} min, counted in",
+            100.0 * closest_margin_ratio,
+            duration_s / 60.0
+        ),
+        PlanRemark::OffsetsAfterSoak { soak_s, offset_sigmas, longer_soak_s, longer_offset_sigmas } => {
+            let left = format!(
+                "the soak of {:.0} min leaves of the offsets (one standard deviation): {}",
+                soak_s / 60.0,
+                listed(offset_sigmas)
+            );
+            match longer_offset_sigmas.is_empty() {
+                true => left,
+                false => {
+                    format!(
+                        "{left}; {:.0} min would leave {}",
+                        longer_soak_s / 60.0,
+                        listed(longer_offset_sigmas)
+                    )
+                }
+            }
+        }
+        PlanRemark::Other { message, .. } => message.clone(),
+        other => other.code().to_owned(),
+    }
+}
+
+fn listed(sigmas: &BTreeMap<Channel, f64>) -> String {
+    let named = |(channel, sigma): (&Channel, &f64)| {
+        let digits = if channel.unit() == "K" { 3 } else { 1 };
+        format!("{channel} {}", with_unit(format!("{sigma:.digits$}"), channel.unit()))
+    };
+    sigmas.iter().map(named).collect::<Vec<_>>().join(", ")
+}
+
+/// Why a plan has no bound.
+pub(crate) fn no_bound_text(reason: NoBound) -> &'static str {
+    match reason {
+        NoBound::OrderNotSearched => "the order was not searched for",
+        NoBound::AppendedJump => "none: a jump was put behind the points",
+        NoBound::TooLarge => {
+            "none: more points than its table takes, or a housing whose states stay within no box"
+        }
+    }
+}

@@ -13,7 +13,7 @@ const LONGER_RATIO: f64 = 2.0;
 const WORTH_IT_RATIO: f64 = 0.3;
 
 /// One sentence for a plan's remarks; `None` without a zero or without declared offsets.
-pub(crate) fn sentence(campaign: &Campaign) -> Option<String> {
+pub(crate) fn zero_remark(campaign: &Campaign) -> Option<String> {
     let soak = campaign.zero?;
     let left_after = |soak_s: f64| {
         let left = expected_after_zero(identification(campaign), &ZeroSettings::from(soak), soak_s);
@@ -41,13 +41,13 @@ pub(crate) fn sentence(campaign: &Campaign) -> Option<String> {
         return None;
     }
     let mut sentence = format!(
-        "the rest of {:.0} min leaves of the offsets (one standard deviation): {}",
+        "offset uncertainties after the soak of {:.0} min (one standard deviation): {}",
         soak.duration_s / 60.0,
         all.join(", ")
     );
     if !better.is_empty() {
         let minutes = LONGER_RATIO * soak.duration_s / 60.0;
-        sentence += &format!("; {minutes:.0} min would leave {}", better.join(", "));
+        sentence += &format!("; after {minutes:.0} min: {}", better.join(", "));
     }
     Some(sentence)
 }
@@ -58,17 +58,16 @@ mod tests {
     use crate::shipped;
 
     #[test]
-    fn a_longer_rest_is_named_where_it_leaves_clearly_less() {
+    fn a_longer_soak_is_mentioned_if_it_reduces_an_offset_clearly() {
         let mut campaign = shipped::campaign(&[]);
-        let half_an_hour = sentence(&campaign).unwrap();
-        assert!(half_an_hour.contains("the rest of 30 min leaves"), "{half_an_hour}");
+        let half_an_hour = zero_remark(&campaign).unwrap();
         // Only the housing has not settled; averaging no longer improves the other sensors.
-        assert!(half_an_hour.contains("60 min would leave Tc"), "{half_an_hour}");
+        assert!(half_an_hour.contains("60 min: Tc"), "{half_an_hour}");
         let soak = campaign.zero.as_mut().unwrap();
         soak.duration_s = 4.0 * 3600.0;
-        let night = sentence(&campaign).unwrap();
-        assert!(!night.contains("would leave"), "{night}");
+        let night = zero_remark(&campaign).unwrap();
+        assert!(!night.contains("480 min"), "{night}");
         campaign.zero = None;
-        assert_eq!(sentence(&campaign), None);
+        assert_eq!(zero_remark(&campaign), None);
     }
 }

@@ -89,7 +89,7 @@ fn of_session(error: SessionError) -> PyErr {
         | E::NoPoints { .. }
         | E::OtherMachine(_)
         | E::MachineUnknown { .. }
-        | E::NotTogether { .. }
+        | E::DifferentCampaigns { .. }
         | E::Method { .. }
         | E::Drift(_)
         | E::Driven(_)

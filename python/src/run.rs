@@ -5,7 +5,7 @@ use crate::campaign::{Campaign, Inner};
 use crate::error::Fault;
 use crate::map::Map;
 use crate::registry::{registry, registry_with_rig};
-use mapper_session::{Ended, RunOutcome, RunRequest, Session, SessionError, SessionEvent, with_messages};
+use mapper_session::{RunTermination, RunOutcome, RunRequest, Session, SessionError, SessionEvent, with_messages};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -114,11 +114,11 @@ fn run(
     let sentence = outcome.sentence();
     let RunOutcome { directory, recording, end, results } = outcome;
     let end = match end {
-        Ended::Completed => "completed",
-        Ended::Drifted { .. } => "drifted",
-        Ended::Tripped { .. } => "tripped",
-        Ended::Interrupted { .. } => "interrupted",
-        Ended::Failed(source) => return Err(SessionError::Run { source, recording }.into()),
+        RunTermination::Completed => "completed",
+        RunTermination::Drifted { .. } => "drifted",
+        RunTermination::Tripped { .. } => "tripped",
+        RunTermination::Interrupted { .. } => "interrupted",
+        RunTermination::Failed(source) => return Err(SessionError::Run { source, recording }.into()),
     };
     let (json, map) = match results {
         Ok(results) => {

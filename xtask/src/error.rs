@@ -1,4 +1,4 @@
-//! Why a chore could not be done.
+//! Errors of the developer commands.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Chores of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `python`, `wheel` and `performance`.
+//! Developer commands of the repository: `cargo xtask quick`, `test`, `fleet-test`, `fmt`, `docs`, `python`, `wheel` and `performance`.
 
 mod checks;
 mod commands;

@@ -1,4 +1,4 @@
-//! Programs run under a heading, with the time they took.
+//! Runs programs as named steps and measures their time.
 
 use crate::error::Error;
 use crate::workspace;
@@ -6,13 +6,13 @@ use std::ffi::OsStr;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A step that was run: its name, its time, and whether it ended well.
+/// A finished step: its name, its time, and whether it succeeded.
 type Done = (&'static str, Duration, bool);
 
-/// What a step does.
+/// Work of a step.
 pub type Work<'a> = Box<dyn FnOnce() -> Result<(), Error> + Send + 'a>;
 
-/// Steps that were run, for the summary.
+/// The finished steps, for the summary.
 pub struct Steps {
     begun: Instant,
     done: Vec<Done>,
@@ -24,7 +24,7 @@ impl Default for Steps {
     }
 }
 
-/// Runs one step, and says how it ended.
+/// Runs one step and prints its result.
 fn run_step(name: &'static str, work: impl FnOnce() -> Result<(), Error>) -> Done {
     say(&format!("\n==> {name}\n"));
     let started = Instant::now();
@@ -38,12 +38,12 @@ fn run_step(name: &'static str, work: impl FnOnce() -> Result<(), Error>) -> Don
 }
 
 impl Steps {
-    /// Runs one step. A failure is kept for the end, so that one run shows all that is wrong.
+    /// Runs one step. Failures are reported at the end, so that one run shows all of them.
     pub fn run(&mut self, name: &'static str, work: impl FnOnce() -> Result<(), Error>) {
         self.done.push(run_step(name, work));
     }
 
-    /// Runs one step, and alongside it others, one after the other: for a step that often waits. Their output is mixed.
+    /// Runs one step that often waits, and other steps in sequence at the same time. Their output is mixed.
     pub fn run_with(
         &mut self,
         name: &'static str,
@@ -59,7 +59,7 @@ impl Steps {
         self.done.extend(of_others);
     }
 
-    /// Whether every step so far ended well.
+    /// Whether every step so far succeeded.
     pub fn all_well(&self) -> bool {
         self.done.iter().all(|(.., well)| *well)
     }
@@ -145,7 +145,7 @@ pub fn line(command: &Command) -> String {
     words.join(" ")
 }
 
-/// Standard output, without a panic where its reader went away.
+/// Writes to standard output; a closed pipe causes no panic.
 pub fn say(text: &str) {
     use std::io::Write;
     let mut out = std::io::stdout().lock();

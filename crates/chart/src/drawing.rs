@@ -1,4 +1,4 @@
-//! What a picture consists of before it becomes text or pixels.
+//! Shapes of a picture before they are written as SVG or drawn as pixels.
 
 use crate::Colour;
 use crate::items::{Dash, Note, TextAnchor};
@@ -74,7 +74,7 @@ pub(crate) type Px = (f64, f64);
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
     OpenGroup(String),
-    /// Begins the note on the shapes up to the next [`Shape::CloseNote`].
+    /// Starts the note for the shapes up to the next [`Shape::CloseNote`].
     OpenNote(Note),
     CloseNote(Note),
     CloseGroup,

@@ -1,9 +1,9 @@
-//! What a panel can show. Coordinates are in the axes' units throughout; lengths on paper are in px.
+//! Items that a panel can show. Coordinates are in the axes' units throughout; lengths on paper are in px.
 
 use crate::palette::{GREY, INK};
 use crate::{Colour, Contours};
 
-/// One thing to show. Things are drawn in the order given, texts last.
+/// One item to show. Items are drawn in the given order, texts last.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
     /// A line series.
@@ -162,11 +162,11 @@ pub struct Scatter {
     pub size_px: f64,
     /// Entry in the legend; items with equal text share one entry.
     pub label: Option<String>,
-    /// What a viewer that has a pointer says at each point, in the order of the points; empty: nothing.
+    /// Tooltips of the points in an SVG viewer, in the order of the points; empty for none.
     pub notes: Vec<Note>,
 }
 
-/// What an SVG says at a point under the pointer, and where a click on it leads. A PNG has none of it.
+/// Tooltip of a point in an SVG, and target of a click. A PNG has neither.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Note {
     /// The words.
@@ -347,7 +347,7 @@ impl Annotation {
 /// few lines as possible; one that is away from its point has a leader line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointLabels {
-    /// Text and point of each, the most important first; those that find no place are left out.
+    /// Text and point of each, the most important first; labels without a free position are omitted.
     pub labels: Vec<(String, (f64, f64))>,
     /// Colour.
     pub colour: Colour,

@@ -1,13 +1,13 @@
-//! Pictures as data: describe a [`Figure`] of [`Panel`]s, get one SVG string.
+//! Draws charts and compressor maps for reports and pages. Describe a [`Figure`] of [`Panel`]s and get an SVG document or a PNG picture.
 //!
 //! The same figure gives the same bytes: numbers are written with a fixed format, and nothing depends on time,
 //! locale or hash order. The SVG is self-contained (no fonts, scripts or links) on a white ground.
 //!
-//! Nothing here fails on bad numbers: points that are NaN or infinite are left out and break a line, empty data
-//! give an empty frame, constant data get a widened axis.
+//! Bad numbers cause no errors: points that are NaN or infinite are omitted and break a line, empty data give an empty frame, and the axis
+//! of constant data is widened.
 //!
-//! Contour lines run over a [`StructuredGrid`] with any coordinates ([`contour_lines`]); a cell with a corner that
-//! has no value draws nothing, so a contour ends exactly at the edge of what is known.
+//! Contour lines run over a [`StructuredGrid`] with any coordinates ([`contour_lines`]); cells with an unknown corner are not drawn, so a
+//! contour ends exactly at the edge of the known region.
 //!
 //! ```
 //! use mapper_chart::{Axis, Figure, Line, Panel, Scatter, palette};

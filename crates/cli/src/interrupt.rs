@@ -1,13 +1,13 @@
-//! Ctrl-C and its like: to stop in good order.
+//! Handles Ctrl-C and other signals, so that a run stops safely.
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
-use mapper_session::{RunStop, Signalled};
+use mapper_session::{RunStop, SignalResponse};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag that Ctrl-C raises. The second one ends the process at once: for commands that touch no rig.
+/// A flag that Ctrl-C sets. A second Ctrl-C ends the process at once. For commands that do not use a rig.
 pub fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = flag.clone();
@@ -20,15 +20,15 @@ pub fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Does what a signal asks of a run.
-fn obey(stop: &RunStop, gentle: bool) {
-    match stop.signalled(gentle) {
-        Signalled::Raised => {}
-        Signalled::Answered => standard_output::warn(
-            "The rig is safe and the recording is whole; its results are being written. Ask again to end without them: `mapper \
-             identify` makes them from the run's directory.\n",
+/// Responds to a signal during a run.
+fn handle_signal(stop: &RunStop, gentle: bool) {
+    match stop.handle_signal(gentle) {
+        SignalResponse::StopRequested => {}
+        SignalResponse::Deferred => standard_output::warn(
+            "The rig is safe and the recording is complete; its results are being written. Press Ctrl-C again to end without them; `mapper \
+             identify` makes them later from the run directory.\n",
         ),
-        Signalled::Ends => std::process::exit(Code::Interrupted as i32),
+        SignalResponse::MayExit => std::process::exit(Code::Interrupted as i32),
     }
 }
 
@@ -48,12 +48,12 @@ pub fn run_stop() -> Result<RunStop, Failure> {
     let mut signals = Signals::new(ends.into_iter().chain([SIGTSTP])).map_err(failed)?;
     let watch = move || {
         signals.forever().for_each(|signal| match signal {
-            SIGTSTP if raised.has_the_rig() => standard_output::warn(
-                "A suspended program could not protect the rig: it goes on. Press Ctrl-C to stop the run.\n",
+            SIGTSTP if raised.uses_rig() => standard_output::warn(
+                "The run continues, because a suspended program could not protect the rig. Press Ctrl-C to stop the run.\n",
             ),
-            // If it fails, the process just goes on.
+            // If this fails, the process continues.
             SIGTSTP => drop(signal_hook::low_level::emulate_default_handler(SIGTSTP)),
-            _ => obey(&raised, signal == SIGINT),
+            _ => handle_signal(&raised, signal == SIGINT),
         });
     };
     std::thread::Builder::new().name("signals".to_owned()).spawn(watch).map_err(failed)?;
@@ -65,10 +65,10 @@ pub fn run_stop() -> Result<RunStop, Failure> {
 pub fn run_stop() -> Result<RunStop, Failure> {
     let stop = RunStop::default();
     let raised = stop.clone();
-    ctrlc::set_handler(move || obey(&raised, true)).map_err(failed)?;
+    ctrlc::set_handler(move || handle_signal(&raised, true)).map_err(failed)?;
     Ok(stop)
 }
 
 fn failed(error: impl std::fmt::Display) -> Failure {
-    Failure::new(Code::Failure, format!("failed to watch for Ctrl-C: {error}"))
+    Failure::new(Code::Failure, format!("failed to install a handler for Ctrl-C: {error}"))
 }

@@ -1,12 +1,12 @@
-//! `mapper`: from one campaign file to a compressor map.
+//! The command line program `mapper`: from a campaign file to a compressor map.
 //!
-//! One file per command in `commands`: its options, its call, its words. The work is done in `mapper-session`;
-//! `registry` alone names plug-ins.
+//! `commands` has one file for each command, with its options and its output. `mapper-session` does the work; only `registry` names
+//! plug-ins.
 
 mod command_line;
 mod commands;
 mod drivers;
-mod fleet_place;
+mod fleet_directory;
 mod interrupt;
 mod output;
 mod registry;
@@ -24,20 +24,19 @@ use std::process::ExitCode;
 struct Arguments {
     #[command(flatten)]
     manner: output::output_options::OutputOptions,
-    /// What to do.
     #[command(subcommand)]
     command: commands::Command,
 }
 
 fn main() -> ExitCode {
     let raw: Vec<OsString> = std::env::args_os().collect();
-    let (json, colour) = output::output_options::of_raw(&raw);
+    let (json, colour) = output::output_options::scan_raw_arguments(&raw);
     let read = command_line::tasks::by_task(Arguments::command()).color(colour).try_get_matches_from(raw);
     let read = read.and_then(|matches| Ok((Arguments::from_arg_matches(&matches)?, matches)));
     match read {
         Ok((arguments, matches)) => {
-            output::output_options::keep(&arguments.manner, &matches);
-            output::output_options::keep_commands(Arguments::command);
+            output::output_options::set_options(&arguments.manner, &matches);
+            output::output_options::set_commands(Arguments::command);
             match arguments.command.run() {
                 Ok(()) => ExitCode::SUCCESS,
                 Err(failure) => output::exit_report::failed(&failure),

@@ -1,7 +1,7 @@
-//! The data that flows through `mapper`, and the two interfaces to the outside: [`Backend`] and [`Clock`].
+//! The data types that all crates of `mapper` share, and the two interfaces to the outside: [`Backend`] (a rig) and [`Clock`].
 //!
-//! Campaign -> [`Plan`] -> [`Recording`] -> [`IdentifiedPoint`] -> [`CompressorMap`]: every arrow is a function
-//! from data to data. This crate holds the data, names every measured quantity once ([`Channel`]), and does no IO.
+//! The program is a chain of functions from data to data: campaign -> [`Plan`] -> [`Recording`] -> [`IdentifiedPoint`] ->
+//! [`CompressorMap`]. This crate defines these types and every measured quantity ([`Channel`]). It does no input or output.
 //!
 //! Conventions: SI inside (kelvin, pascal, kg/s) except shaft speed, which is in rpm as on every map; each `f64`
 //! that crosses a boundary carries its unit in its name; pressures and temperatures are total unless a name contains
@@ -30,7 +30,7 @@ pub use identification::joint_settings::{
 pub use identification::model_tolerances::ModelTolerances;
 pub use identification::settle_bands::SettleBands;
 pub use identification::thermal_model::{
-    ConvectionLaw, Entangled, FoundInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
+    ConvectionLaw, CorrelatedPair, IdentifiedInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
 };
 pub use identification::uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
 pub use identification::warning::{
@@ -56,7 +56,7 @@ pub use measurement::channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group,
 pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use measurement::event::{Event, EventKind};
 pub use measurement::held_point::{HeldPoint, JUMPS, VALVE_JUMP_RATIO};
-pub use measurement::joined_recordings::{StepOrigin, joined};
+pub use measurement::joined_recordings::{StepOrigin, join_recordings};
 pub use measurement::plausible::{Plausible, measurable, plausible};
 pub use measurement::recording::{ReadingOrigin, Recording, RecordingError, Series};
 pub use measurement::redundant::{DeclaredElement, Element, MAX_ELEMENTS, RedundantSensors, UnknownElement};
@@ -77,7 +77,7 @@ pub use rig::speed_response::{SpeedControlSettings, SpeedResponse};
 pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSeek};
 pub use test_plan::jump::{Jump, Repeats};
 pub use test_plan::operating_point::OperatingPoint;
-pub use test_plan::plan::{MadeFrom, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
+pub use test_plan::plan::{PlanInputHashes, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
 pub use test_plan::plan_remark::{NoBound, PlanRemark};
 pub use test_plan::step_number::step_number;
 pub use test_plan::timing::{Dwell, Timing};

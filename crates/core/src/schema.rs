@@ -3,9 +3,9 @@
 use schemars::Schema;
 use serde_json::{Value, json};
 
-/// An enum of unit variants as one list of names. With a doc comment on each variant, `schemars` makes a list of
-/// alternatives instead, and messages would have to report them one by one.
-pub(crate) fn names_alone(schema: &mut Schema) {
+/// Turns the schema of an enum of unit variants into one list of names. `schemars` makes a list of alternatives if each variant has a doc comment;
+/// messages could then not list the names together.
+pub(crate) fn flatten_to_names(schema: &mut Schema) {
     let Some(Value::Array(variants)) = schema.get("oneOf") else { return };
     let names: Option<Vec<Value>> = variants
         .iter()

@@ -5,8 +5,8 @@
 #![allow(clippy::print_stdout, missing_docs)]
 
 use mapper_fleet::{
-    At, Draft, Drafts, Engine, FleetError, Kind, Machine, Made, Output, Results, StudyFile, Which, WorkError,
-    open_study,
+    CreatedStudy, Draft, Drafts, Engine, FleetError, ItemSelection, Kind, Machine, Output, Results,
+    StudyFile, WorkContext, WorkError, open_study,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ impl Kind for Nothing {
         Ok(Drafts { items: (0..self.items).map(item).collect(), settings: Value::Null })
     }
 
-    fn work(&self, payload: &Value, _: At<'_>) -> Result<String, WorkError> {
+    fn work(&self, payload: &Value, _: WorkContext<'_>) -> Result<String, WorkError> {
         Ok(format!("{{\"n\":{},\"r\":\"{}\"}}", payload["n"], "x".repeat(self.bytes)))
     }
 
@@ -63,12 +63,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("{name:6} {took_s:8.2} s, {:.3} ms an item", 1e3 * took_s / kind.items as f64);
     };
     let started = Instant::now();
-    let fleet = Made::make(&study, &kind, &directory.join("fleet"), "example", "overhead")?.fleet;
+    let fleet = CreatedStudy::create(&study, &kind, &directory.join("fleet"), "example", "overhead")?.fleet;
     per_item("make", started);
     let stop = AtomicBool::new(false);
     let engine = Engine { jobs: Some(1), stop: &stop, on_progress: &|_, _| {} };
     let started = Instant::now();
-    fleet.work(&kind, Which::All, false, &engine, &machine)?;
+    fleet.work(&kind, ItemSelection::All, false, &engine, &machine)?;
     per_item("parts", started);
     let started = Instant::now();
     fleet.status();

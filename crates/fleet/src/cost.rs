@@ -1,12 +1,12 @@
 //! Cost of a study, extrapolated from the finished items.
 
 use crate::directory::shared_files::Machine;
-use crate::{Engine, Fleet, FleetError, Kind, Status, Which};
+use crate::{Engine, Fleet, FleetError, ItemSelection, Kind, Status};
 use serde::Serialize;
 
 /// Result of the trial that estimates the cost.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tried {
+pub struct CostEstimate {
     /// The estimated cost.
     pub cost: Cost,
     /// Progress of the study.
@@ -37,7 +37,7 @@ pub struct Cost {
 }
 
 /// Allowance for the first line of a part and for the unused rest of a disk block, bytes.
-const PART_BESIDE_BYTES: u64 = 4096;
+const PART_OVERHEAD_BYTES: u64 = 4096;
 
 impl Fleet {
     /// The estimated cost of the study; `None` if no item is done.
@@ -50,11 +50,11 @@ impl Fleet {
             .items
             .first()
             .map_or(0, |item| std::fs::metadata(self.item(&item.hash)).map_or(0, |file| file.len()));
-        let part_bytes = status.disk_bytes / from as u64 + PART_BESIDE_BYTES;
+        let part_bytes = status.disk_bytes / from as u64 + PART_OVERHEAD_BYTES;
         Some(Cost {
             items,
             from: status.done,
-            left: status.lacking(),
+            left: status.unfinished(),
             item_s,
             longest_s: status.longest_s,
             hours: item_s * items as f64 / 3600.0,
@@ -67,20 +67,20 @@ impl Fleet {
     /// Runs items one at a time until a few are done, and estimates the cost of all. Their results are kept.
     ///
     /// # Errors
-    /// As [`Fleet::work`]; [`FleetError::NothingTried`] if none has a result.
-    pub fn tried(
+    /// As [`Fleet::work`]; [`FleetError::UnknownCost`] if none has a result.
+    pub fn estimate_cost(
         &self,
         kind: &dyn Kind,
         count: usize,
         engine: &Engine<'_>,
         machine: &Machine<'_>,
-    ) -> Result<Tried, FleetError> {
+    ) -> Result<CostEstimate, FleetError> {
         let done = self.status().done;
         let mut why = String::new();
         if done < count {
             // One at a time, so that time and memory belong to one item.
             let one = Engine { jobs: Some(1), ..*engine };
-            let worked = self.work(kind, Which::First(count - done), false, &one, machine)?;
+            let worked = self.work(kind, ItemSelection::First(count - done), false, &one, machine)?;
             why = worked
                 .failed
                 .into_iter()
@@ -89,7 +89,7 @@ impl Fleet {
                 .unwrap_or_default();
         }
         let status = self.status();
-        let cost = self.cost(&status).ok_or(FleetError::NothingTried { why })?;
-        Ok(Tried { cost, status })
+        let cost = self.cost(&status).ok_or(FleetError::UnknownCost { why })?;
+        Ok(CostEstimate { cost, status })
     }
 }

@@ -1,4 +1,4 @@
-//! The only work loop: nights, diagnoses, calibrations and fleets all run in it.
+//! The work loop of nights, diagnoses, calibrations and fleets.
 
 use mapper_numerics::parallel;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -11,7 +11,7 @@ pub fn cores() -> usize {
 /// Settings of the work loop.
 #[derive(Clone, Copy)]
 pub struct Engine<'a> {
-    /// Pieces at a time; `None`: the number of cores.
+    /// Maximum number of pieces at a time; `None` for the number of cores.
     pub jobs: Option<usize>,
     /// Set from outside to start no further piece.
     pub stop: &'a AtomicBool,
@@ -20,14 +20,13 @@ pub struct Engine<'a> {
 }
 
 impl Engine<'_> {
-    /// Pieces at a time, limited by their number.
-    pub fn at_a_time(&self, pieces: usize) -> usize {
+    /// Number of pieces at a time, limited by their total.
+    pub fn parallel_jobs(&self, pieces: usize) -> usize {
         self.jobs.unwrap_or_else(cores).clamp(1, pieces.max(1))
     }
 
-    /// Does `work` on every piece; results are in the order of the pieces, whatever the number of jobs. The pieces under way share
-    /// the cores, so that each runs on its own. After an error or a stop no further piece starts. A piece that a stop
-    /// prevented is `None`.
+    /// Does `work` on every piece. Results are in the order of the pieces for any number of jobs. Concurrent pieces share the cores. After
+    /// an error or a stop no further piece starts; pieces that did not start because of a stop are `None`.
     ///
     /// # Errors
     /// That of the first piece whose work fails.
@@ -36,7 +35,7 @@ impl Engine<'_> {
         pieces: &[T],
         work: impl Fn(usize, &T) -> Result<R, E> + Sync,
     ) -> Result<Vec<Option<R>>, E> {
-        let jobs = self.at_a_time(pieces.len());
+        let jobs = self.parallel_jobs(pieces.len());
         let threads = (cores() / jobs).max(1);
         let done = AtomicUsize::new(0);
         (self.on_progress)(0, pieces.len());

@@ -1,4 +1,5 @@
-//! Work in many independent pieces, on the cores of one machine or on many machines that share a directory.
+//! Runs a study of many independent items on the cores of one computer ([`Engine`]) or on many computers that share a directory
+//! ([`Fleet`]).
 //!
 //! A study becomes items, each a small file named by the SHA-256 of its bytes. A worker writes one part file per item.
 //! Parts merge into the result that one machine alone would write. All state is in the directory: no daemon, no
@@ -17,22 +18,22 @@ mod status;
 mod submit;
 mod work;
 
-pub use cost::{Cost, Tried};
+pub use cost::{Cost, CostEstimate};
 pub use directory::error::FleetError;
 pub use directory::fleet::Fleet;
 pub use directory::hash::Hash;
 pub use directory::item::Item;
-pub use directory::kind::{At, Draft, Drafts, Kind, Output, Results, WorkError};
+pub use directory::kind::{Draft, Drafts, Kind, Output, Results, WorkContext, WorkError};
 pub use directory::kinds::kind_of;
 pub use directory::part::{Outcome, Part, PartRefusal};
 pub use directory::shared_files::Machine;
-pub use directory::study::{Listed, Study};
+pub use directory::study::{ItemEntry, Study};
 pub use directory::study_file::{StudyFile, StudyFileError, open_study};
-pub use directory::study_writer::Made;
+pub use directory::study_writer::CreatedStudy;
 pub use engine::{Engine, cores};
-pub use merge::Merged;
-pub use queue::{Template, running};
+pub use merge::MergeOutcome;
+pub use queue::{Template, query_task_states};
 pub use shard::Shard;
-pub use status::{Lacking, Status};
+pub use status::{Status, UnfinishedItem};
 pub use submit::{Limits, Submission, SubmitOptions};
-pub use work::{Which, Worked};
+pub use work::{ItemSelection, WorkOutcome};

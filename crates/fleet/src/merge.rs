@@ -1,14 +1,14 @@
 //! Merges parts into the result, which is the same for any number of machines and any order of work.
 
 use crate::directory::shared_files::{Machine, make_directory};
-use crate::status::{Lacking, Status};
+use crate::status::{Status, UnfinishedItem};
 use crate::{Fleet, FleetError, Kind, Outcome, Output, PartRefusal};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// The outcome.
 #[derive(Debug)]
-pub struct Merged {
+pub struct MergeOutcome {
     /// Progress of the study.
     pub status: Status,
     /// The result's directory and one-line description; `None` if parts are missing and nothing was written.
@@ -21,21 +21,30 @@ impl Fleet {
     ///
     /// # Errors
     /// [`FleetError`] if a file cannot be written, or a part's result is not what the kind makes.
-    pub fn merge(&self, kind: &dyn Kind, partial: bool, machine: &Machine<'_>) -> Result<Merged, FleetError> {
+    pub fn merge(
+        &self,
+        kind: &dyn Kind,
+        partial: bool,
+        machine: &Machine<'_>,
+    ) -> Result<MergeOutcome, FleetError> {
         let mut status = self.status();
-        if status.lacking() > 0 && !partial {
-            return Ok(Merged { status, result: None });
+        if status.unfinished() > 0 && !partial {
+            return Ok(MergeOutcome { status, result: None });
         }
-        let new = self.directory().join(format!(".result.{}.new", safe(machine.name)));
+        let new = self.directory().join(format!(".result.{}.new", file_name_safe(machine.name)));
         let output = Output::new(make_directory(new.clone())?);
-        let spoilt: RefCell<Vec<Lacking>> = RefCell::default();
+        let damaged: RefCell<Vec<UnfinishedItem>> = RefCell::default();
         let mut parts = self.study.items.iter().map(|item| {
-            let result = match self.whole(item) {
+            let result = match self.read_part(item) {
                 Some(Ok((part, body))) if part.outcome == Outcome::Done => Ok(body),
                 Some(Ok((_, why))) => Err(why),
                 Some(Err(refusal)) => {
                     let why = Some(refusal.to_string());
-                    spoilt.borrow_mut().push(Lacking { name: item.name.clone(), hash: item.hash, why });
+                    damaged.borrow_mut().push(UnfinishedItem {
+                        name: item.name.clone(),
+                        hash: item.hash,
+                        why,
+                    });
                     Err(refusal.to_string())
                 }
                 None => Err("missing".to_owned()),
@@ -44,23 +53,23 @@ impl Fleet {
         });
         let description = kind.merge(&self.study.settings, &mut parts, &output);
         drop(parts);
-        // Content that was changed, which the first lines do not show.
-        for changed in spoilt.into_inner() {
-            self.put_aside(&changed);
+        // Parts whose content was changed; their headers are intact.
+        for changed in damaged.into_inner() {
+            self.set_changed_part_aside(&changed);
             if !status.refused.contains(&changed) {
                 status.done -= 1;
                 status.refused.push(changed);
             }
         }
-        let whole = partial || status.lacking() == 0;
+        let whole = partial || status.unfinished() == 0;
         let description = match description {
             Ok(description) if whole => description,
             other => {
                 let _ = std::fs::remove_dir_all(&new);
-                // Report damaged parts first: they may be why the merge failed.
+                // Damaged parts are reported first, because they may have caused the failure.
                 return match other {
                     Err(error) if whole => Err(error),
-                    _ => Ok(Merged { status, result: None }),
+                    _ => Ok(MergeOutcome { status, result: None }),
                 };
             }
         };
@@ -68,13 +77,13 @@ impl Fleet {
         let installed = install(&new, &result);
         let _ = std::fs::remove_dir_all(&new);
         installed?;
-        Ok(Merged { status, result: Some((result, description)) })
+        Ok(MergeOutcome { status, result: Some((result, description)) })
     }
 }
 
 impl Fleet {
-    /// Moves a part with changed content out of the way: its first line is intact, so it would count as done.
-    fn put_aside(&self, changed: &Lacking) {
+    /// Renames a part with changed content, which would otherwise count as done because its header is intact.
+    fn set_changed_part_aside(&self, changed: &UnfinishedItem) {
         let part = self.part(&changed.hash);
         let is_changed = changed.why.as_deref() == Some(PartRefusal::Checksum.to_string().as_str());
         if is_changed {
@@ -104,6 +113,6 @@ fn install(new: &Path, result: &Path) -> Result<(), FleetError> {
     Ok(())
 }
 
-fn safe(name: &str) -> String {
+fn file_name_safe(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
 }

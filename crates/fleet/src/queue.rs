@@ -18,7 +18,7 @@ pub struct Template {
 }
 
 /// Largest template, bytes.
-const LARGEST_BYTES: u64 = 64 << 10;
+const MAX_FILE_BYTES: u64 = 64 << 10;
 
 impl Template {
     /// Slurm.
@@ -31,25 +31,25 @@ impl Template {
     /// # Errors
     /// [`FleetError::File`].
     pub fn read(path: &Path) -> Result<Template, FleetError> {
-        let bytes = read_at_most(path, LARGEST_BYTES)?;
+        let bytes = read_at_most(path, MAX_FILE_BYTES)?;
         let text = String::from_utf8_lossy(&bytes).into_owned();
         Ok(Template { name: path.display().to_string(), text })
     }
 
     /// The line that prints the state of each task of the job `$WORK`.
-    fn question(&self) -> Option<&str> {
+    fn state_query(&self) -> Option<&str> {
         self.text.lines().find_map(|line| line.strip_prefix("#states: "))
     }
 }
 
 /// Text quoted as one word of a shell.
-pub(crate) fn quoted(text: &str) -> String {
+pub(crate) fn shell_quote(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
 /// The queue's answer to a submission.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Submitted {
+pub(crate) struct QueueJobs {
     /// ID of the array job.
     pub work: String,
     /// ID of the merge job; or, if the queue refused it after it had accepted the array, its answer.
@@ -57,7 +57,7 @@ pub(crate) struct Submitted {
 }
 
 /// Runs the submission. It prints `work ID` and `merge ID`; other lines, e.g. the site's greeting, are ignored.
-pub(crate) fn submitted(script: &Path, template: &Template) -> Result<Submitted, FleetError> {
+pub(crate) fn run_submission(script: &Path, template: &Template) -> Result<QueueJobs, FleetError> {
     let failed = |message: String| FleetError::Queue {
         script: PathBuf::from(script),
         answer: message,
@@ -77,37 +77,37 @@ pub(crate) fn submitted(script: &Path, template: &Template) -> Result<Submitted,
         .collect();
     let merge = ids.remove("merge");
     match (ids.remove("work"), output.status.success()) {
-        (Some(work), true) => Ok(Submitted { work, merge: Ok(merge) }),
+        (Some(work), true) => Ok(QueueJobs { work, merge: Ok(merge) }),
         // The tasks are in the queue, and must not be submitted a second time.
-        (Some(work), false) => Ok(Submitted { work, merge: Err(answer) }),
+        (Some(work), false) => Ok(QueueJobs { work, merge: Err(answer) }),
         (None, false) => Err(failed(answer)),
-        (None, true) => Err(failed(format!("it printed no `work ID` but {printed:?}"))),
+        (None, true) => Err(failed(format!("it did not print `work ID`, but {printed:?}"))),
     }
 }
 
 /// Number of tasks of a job in each state, as the queue reports it; `None` if it does not answer within some seconds.
 /// Nothing depends on the answer.
-pub fn running(template: &Template, job: &str) -> Option<BTreeMap<String, usize>> {
-    let question = template.question()?;
+pub fn query_task_states(template: &Template, job: &str) -> Option<BTreeMap<String, usize>> {
+    let query = template.state_query()?;
     let mut child = Command::new("sh")
-        .args(["-c", question])
+        .args(["-c", query])
         .env("WORK", job)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
         .ok()?;
-    for _ in 0..LOOKS {
+    for _ in 0..QUERY_ATTEMPTS {
         if child.try_wait().ok()?.is_some() {
             let mut printed = String::new();
-            child.stdout.take()?.take(LARGEST_BYTES * 16).read_to_string(&mut printed).ok()?;
+            child.stdout.take()?.take(MAX_FILE_BYTES * 16).read_to_string(&mut printed).ok()?;
             let mut states = BTreeMap::new();
             for state in printed.lines().map(str::trim).filter(|line| !line.is_empty()) {
                 *states.entry(state.to_lowercase()).or_insert(0) += 1;
             }
             return Some(states);
         }
-        std::thread::sleep(BETWEEN);
+        std::thread::sleep(QUERY_INTERVAL);
     }
     let _ = child.kill();
     let _ = child.wait();
@@ -115,5 +115,5 @@ pub fn running(template: &Template, job: &str) -> Option<BTreeMap<String, usize>
 }
 
 /// Number and interval of the attempts to reach a queue that does not answer: 5 s.
-const LOOKS: usize = 100;
-const BETWEEN: Duration = Duration::from_millis(50);
+const QUERY_ATTEMPTS: usize = 100;
+const QUERY_INTERVAL: Duration = Duration::from_millis(50);

@@ -2,13 +2,13 @@
 
 use crate::directory::fleet::part_name;
 use crate::directory::part::Outcome;
-use crate::{Fleet, Hash, Listed, Part};
+use crate::{Fleet, Hash, ItemEntry, Part};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// An item without a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Lacking {
+pub struct UnfinishedItem {
     /// Its name.
     pub name: String,
     /// Its hash.
@@ -25,11 +25,11 @@ pub struct Status {
     /// Items with a result.
     pub done: usize,
     /// Items that failed, and why.
-    pub failed: Vec<Lacking>,
+    pub failed: Vec<UnfinishedItem>,
     /// Files in the place of a part that do not belong to this study, and why; left out.
-    pub refused: Vec<Lacking>,
+    pub refused: Vec<UnfinishedItem>,
     /// Items without a part; `why`: the worker that started it.
-    pub missing: Vec<Lacking>,
+    pub missing: Vec<UnfinishedItem>,
     /// Part files that belong to no item; left out.
     pub strangers: Vec<String>,
     /// Total time of the finished items on one core, s.
@@ -44,7 +44,7 @@ pub struct Status {
 
 impl Status {
     /// Items without a result.
-    pub fn lacking(&self) -> usize {
+    pub fn unfinished(&self) -> usize {
         self.items - self.done
     }
 
@@ -55,7 +55,7 @@ impl Status {
 
     /// Remaining work, in seconds of one core; `None` before any item is done.
     pub fn left_s(&self) -> Option<f64> {
-        (self.done > 0).then(|| self.spent_s / self.done as f64 * self.lacking() as f64)
+        (self.done > 0).then(|| self.spent_s / self.done as f64 * self.unfinished() as f64)
     }
 
     fn count(&mut self, part: &Part) {
@@ -71,24 +71,25 @@ impl Status {
 const MAX_STRANGERS: usize = 1000;
 
 impl Fleet {
-    /// The progress. Every part is read whole: a damaged one does not count as done.
+    /// Determines the progress. Every part is read completely, because a damaged one does not count as done.
     pub fn status(&self) -> Status {
         let mut status = Status { items: self.study.items.len(), ..Status::default() };
         for item in &self.study.items {
-            let unfinished = |why| Lacking { name: item.name.clone(), hash: item.hash, why };
-            match self.head(item) {
+            let unfinished = |why| UnfinishedItem { name: item.name.clone(), hash: item.hash, why };
+            match self.read_part_header(item) {
                 Some(Ok(part)) if part.outcome == Outcome::Done => status.count(&part),
-                Some(Ok(_)) => status.failed.push(unfinished(Some(self.why(item)))),
+                Some(Ok(_)) => status.failed.push(unfinished(Some(self.failure_reason(item)))),
                 Some(Err(refusal)) => status.refused.push(unfinished(Some(refusal.to_string()))),
-                None => status.missing.push(unfinished(self.who_began(item))),
+                None => status.missing.push(unfinished(self.worker_of(item))),
             }
         }
         status.strangers = self.strangers();
         status
     }
 
-    fn who_began(&self, item: &Listed) -> Option<String> {
-        let who = crate::directory::shared_files::read_at_most(&self.begun(&item.hash), 256).ok()?;
+    fn worker_of(&self, item: &ItemEntry) -> Option<String> {
+        let who =
+            crate::directory::shared_files::read_at_most(&self.progress_marker(&item.hash), 256).ok()?;
         Some(String::from_utf8_lossy(&who).into_owned())
     }
 

@@ -2,7 +2,7 @@
 
 use crate::directory::fleet::LOGS;
 use crate::directory::shared_files::{Durability, Machine, make_directory, read_at_most, write_whole};
-use crate::queue::{Template, quoted, running, submitted};
+use crate::queue::{Template, query_task_states, run_submission, shell_quote};
 use crate::{Cost, Fleet, FleetError, Shard, Status};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -72,9 +72,9 @@ pub struct Submission {
 }
 
 /// Safety factor on the estimated duration of a task.
-const SLACK: f64 = 1.5;
+const TIME_SAFETY_FACTOR: f64 = 1.5;
 /// Memory in addition to the items, with overheads that only queues count, MB.
-const MEMORY_BESIDE_MB: u64 = 128;
+const MEMORY_OVERHEAD_MB: u64 = 128;
 
 impl Fleet {
     /// Submits the remaining items. The number of tasks is the smallest that keeps each within the target duration.
@@ -88,9 +88,9 @@ impl Fleet {
         machine: &Machine<'_>,
     ) -> Result<Submission, FleetError> {
         if cost.left == 0 {
-            return Err(self.nothing_left());
+            return Err(self.nothing_left_error());
         }
-        self.not_in_the_queue()?;
+        self.check_not_queued()?;
         let status = self.status();
         let limits = &options.limits;
         let refused = |why: String| Err(FleetError::DoesNotFit { why });
@@ -101,7 +101,7 @@ impl Fleet {
             ));
         }
         let items_mb = (cost.memory_bytes >> 20) + 1;
-        let memory_mb = MEMORY_BESIDE_MB + items_mb * options.cpus as u64;
+        let memory_mb = MEMORY_OVERHEAD_MB + items_mb * options.cpus as u64;
         if let Some(most_mb) = limits.memory_mb.filter(|most_mb| memory_mb > *most_mb) {
             return refused(format!(
                 "a task of {} cores needs {memory_mb} MB, the limit is {most_mb}; give it fewer cores",
@@ -112,20 +112,21 @@ impl Fleet {
             let items = self.largest_shard(&status, tasks) as f64;
             (items * cost.item_s / options.cpus as f64).max(cost.longest_s) / 60.0
         };
-        let wanted_min =
-            limits.time_min.map_or(options.task_min, |most| options.task_min.min(most as f64 / SLACK));
+        let wanted_min = limits
+            .time_min
+            .map_or(options.task_min, |most| options.task_min.min(most as f64 / TIME_SAFETY_FACTOR));
         let most_tasks = limits.tasks.min(cost.left as u64).max(1);
         let fair = (cost.left_hours * 60.0 / options.cpus as f64 / wanted_min).ceil() as u64;
         let mut tasks = fair.clamp(1, most_tasks);
-        // Shards are even on average: add a few tasks if the largest is too large.
+        // Shards are equal only on average, so a few tasks are added if the largest is too large.
         while lasts_min(tasks) > 1.25 * wanted_min && tasks < most_tasks {
             tasks = (tasks + tasks.div_ceil(10)).min(most_tasks);
         }
         let longest_min = lasts_min(tasks);
-        if let Some(most) = limits.time_min.filter(|most| SLACK * longest_min > *most as f64) {
+        if let Some(most) = limits.time_min.filter(|most| TIME_SAFETY_FACTOR * longest_min > *most as f64) {
             return refused(format!(
-                "the longest of {tasks} tasks takes some {longest_min:.1} min, and the time limit of {most} min is less than {SLACK} \
-                 times that; allow more tasks, cores or time"
+                "the longest of {tasks} tasks takes about {longest_min:.1} min, but the time limit of {most} min must be at least \
+                 {TIME_SAFETY_FACTOR} times that; allow more tasks, cores or time"
             ));
         }
         let minutes = limits.time_min.unwrap_or((2.0 * longest_min).ceil() as u64 + 5);
@@ -144,7 +145,7 @@ impl Fleet {
             merge: None,
             merge_refused: None,
         };
-        self.hand_over(submission, "", machine)
+        self.write_and_submit(submission, "", machine)
     }
 
     /// Submits again the tasks with missing, failed or damaged items, and the merge that follows them.
@@ -153,7 +154,7 @@ impl Fleet {
     /// [`FleetError::NotSubmitted`], [`FleetError::NothingLeft`], [`FleetError::Queue`].
     pub fn retry(&self, machine: &Machine<'_>) -> Result<Submission, FleetError> {
         let before = self.submission()?;
-        self.not_in_the_queue()?;
+        self.check_not_queued()?;
         let status = self.status();
         let mut numbers: Vec<u64> = status
             .failed
@@ -165,9 +166,9 @@ impl Fleet {
         numbers.sort_unstable();
         numbers.dedup();
         if numbers.is_empty() {
-            return Err(self.nothing_left());
+            return Err(self.nothing_left_error());
         }
-        self.hand_over(Submission { array: ranges(&numbers), ..before }, "--again", machine)
+        self.write_and_submit(Submission { array: ranges(&numbers), ..before }, "--again", machine)
     }
 
     /// The last submission.
@@ -183,15 +184,15 @@ impl Fleet {
         serde_json::from_slice(&bytes).map_err(FleetError::content(&path, "a submission"))
     }
 
-    /// Refuses a submission while the queue still has tasks of the last one: each item would be done twice. A queue that cannot be asked
-    /// counts as empty.
-    fn not_in_the_queue(&self) -> Result<(), FleetError> {
+    /// Refuses a submission while the queue still has tasks of the last one, because each item would be done twice. A queue that does not
+    /// answer counts as empty.
+    fn check_not_queued(&self) -> Result<(), FleetError> {
         let Ok(before) = self.submission() else { return Ok(()) };
         let template = Template { name: before.template, text: before.template_text };
-        let tasks: usize = running(&template, &before.work).unwrap_or_default().into_values().sum();
+        let tasks: usize = query_task_states(&template, &before.work).unwrap_or_default().into_values().sum();
         match tasks {
             0 => Ok(()),
-            tasks => Err(FleetError::InTheQueue {
+            tasks => Err(FleetError::StillQueued {
                 directory: self.directory().to_owned(),
                 job: before.work,
                 tasks,
@@ -199,7 +200,7 @@ impl Fleet {
         }
     }
 
-    fn nothing_left(&self) -> FleetError {
+    fn nothing_left_error(&self) -> FleetError {
         FleetError::NothingLeft { items: self.study.items.len(), directory: self.directory().to_owned() }
     }
 
@@ -214,7 +215,7 @@ impl Fleet {
     }
 
     /// Writes the scripts and runs the submission script.
-    fn hand_over(
+    fn write_and_submit(
         &self,
         mut submission: Submission,
         again: &str,
@@ -223,10 +224,10 @@ impl Fleet {
         let directory = self.directory();
         let directory = directory.canonicalize().map_err(FleetError::file("find", directory))?;
         make_directory(directory.join(LOGS))?;
-        let word = |path: &Path| quoted(&path.to_string_lossy());
+        let word = |path: &Path| shell_quote(&path.to_string_lossy());
         let program = word(&submission.program);
         let (cpus, tasks, here) = (submission.cpus, submission.tasks, word(&directory));
-        // Items keep to their share of the cores; other programs that count cores see only those of the task.
+        // Limits the threads of each item to its share of the cores.
         let task = format!(
             "# One task: shard $1 of {tasks}.\nexport RAYON_NUM_THREADS={cpus}\n\
              exec {program} fleet work {here} --shard \"$1/{tasks}\" --jobs {cpus} {again}\n"
@@ -238,13 +239,13 @@ impl Fleet {
             Ok(path)
         };
         let values = [
-            ("NAME", quoted(&self.study.name)),
-            ("ARRAY", quoted(&submission.array)),
+            ("NAME", shell_quote(&self.study.name)),
+            ("ARRAY", shell_quote(&submission.array)),
             ("AT_ONCE", submission.at_once.map_or_else(String::new, |most| most.to_string())),
             ("MINUTES", submission.minutes.to_string()),
             ("CPUS", cpus.to_string()),
             ("MEMORY_MB", submission.memory_mb.to_string()),
-            ("PARTITION", quoted(&submission.partition)),
+            ("PARTITION", shell_quote(&submission.partition)),
             ("LOGS", word(&directory.join(LOGS))),
             ("TASK", word(&write("task.sh", &task)?)),
             ("MERGE", word(&write("merge.sh", &merge)?)),
@@ -257,7 +258,7 @@ impl Fleet {
         }
         let script = write("submit.sh", &(text + &submission.template_text))?;
         let template = Template { name: submission.template.clone(), text: submission.template_text.clone() };
-        let answer = submitted(&script, &template)?;
+        let answer = run_submission(&script, &template)?;
         submission.work = answer.work;
         (submission.merge, submission.merge_refused) = match answer.merge {
             Ok(merge) => (merge, None),

@@ -1,8 +1,8 @@
-//! Does items: each leaves one part, even if a process is killed.
+//! Does items. Each finished item leaves one complete part, even if a process is killed.
 
 use crate::directory::part::{Outcome, Part};
 use crate::directory::shared_files::Machine;
-use crate::{At, Engine, Fleet, FleetError, Hash, Item, Kind, Listed, Shard, WorkError};
+use crate::{Engine, Fleet, FleetError, Hash, Item, ItemEntry, Kind, Shard, WorkContext, WorkError};
 use mapper_numerics::parallel;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Selection of items.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Which {
+pub enum ItemSelection {
     /// All of them.
     All,
     /// Those of a shard.
@@ -23,7 +23,7 @@ pub enum Which {
 
 /// Result of a call.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Worked {
+pub struct WorkOutcome {
     /// Items done now.
     pub done: usize,
     /// Items that were already done.
@@ -33,7 +33,7 @@ pub struct Worked {
 }
 
 /// Outcome of one item.
-enum One {
+enum ItemOutcome {
     Done,
     There,
     Failed(String),
@@ -49,85 +49,86 @@ impl Fleet {
     pub fn work(
         &self,
         kind: &dyn Kind,
-        which: Which,
+        which: ItemSelection,
         again: bool,
         engine: &Engine<'_>,
         machine: &Machine<'_>,
-    ) -> Result<Worked, FleetError> {
-        let mut worked = Worked::default();
+    ) -> Result<WorkOutcome, FleetError> {
+        let mut worked = WorkOutcome::default();
         let mut items = Vec::new();
-        for item in self.chosen(which)? {
-            match self.head(item) {
+        for item in self.select_items(which)? {
+            match self.read_part_header(item) {
                 Some(Ok(part)) if part.outcome == Outcome::Done => worked.there += 1,
-                Some(Ok(_)) if !again => worked.failed.push((item.name.clone(), self.why(item))),
+                Some(Ok(_)) if !again => worked.failed.push((item.name.clone(), self.failure_reason(item))),
                 // Files that do not belong to this study are replaced.
                 _ => items.push(item),
             }
         }
-        if let Which::First(count) = which {
+        if let ItemSelection::First(count) = which {
             items.truncate(count);
         }
         // An item that was started and has no part may have killed its worker, or is in progress elsewhere: do it last.
-        items.sort_by_cached_key(|item| self.begun(&item.hash).exists());
-        let jobs = engine.at_a_time(items.len());
-        let results =
-            engine.each(&items, |_, item| match self.one(kind, item, again, jobs, engine.stop, machine) {
+        items.sort_by_cached_key(|item| self.progress_marker(&item.hash).exists());
+        let jobs = engine.parallel_jobs(items.len());
+        let results = engine.each(&items, |_, item| {
+            match self.do_item(kind, item, again, jobs, engine.stop, machine) {
                 Ok(one) => Ok(Some(one)),
                 Err(FleetError::Interrupted) => Ok(None),
                 Err(error) => Err(error),
-            })?;
+            }
+        })?;
         let mut interrupted = false;
         for (item, result) in items.iter().zip(results) {
             match result.flatten() {
                 None => interrupted = true,
-                Some(One::Done) => worked.done += 1,
-                Some(One::There) => worked.there += 1,
-                Some(One::Failed(why)) => worked.failed.push((item.name.clone(), why)),
+                Some(ItemOutcome::Done) => worked.done += 1,
+                Some(ItemOutcome::There) => worked.there += 1,
+                Some(ItemOutcome::Failed(why)) => worked.failed.push((item.name.clone(), why)),
             }
         }
         if interrupted { Err(FleetError::Interrupted) } else { Ok(worked) }
     }
 
-    fn chosen(&self, which: Which) -> Result<Vec<&Listed>, FleetError> {
+    fn select_items(&self, which: ItemSelection) -> Result<Vec<&ItemEntry>, FleetError> {
         let items = self.study.items.iter();
-        let mut chosen: Vec<&Listed> = match which {
-            Which::All | Which::First(_) => items.collect(),
-            Which::Shard(shard) => items.filter(|item| shard.holds(&item.hash)).collect(),
-            Which::Item(hash) => {
+        let mut chosen: Vec<&ItemEntry> = match which {
+            ItemSelection::All | ItemSelection::First(_) => items.collect(),
+            ItemSelection::Shard(shard) => items.filter(|item| shard.holds(&item.hash)).collect(),
+            ItemSelection::Item(hash) => {
                 let found = self.study.items.iter().find(|item| item.hash == hash);
                 vec![found.ok_or(FleetError::NoItem { hash })?]
             }
         };
-        if let Which::First(_) = which {
-            // By hash, to get a sample: the first items of the study may be all of one sort.
+        if let ItemSelection::First(_) = which {
+            // Sorted by hash to get a random sample; the first items of a study may be similar.
             chosen.sort_by_key(|item| item.hash);
         }
         Ok(chosen)
     }
 
-    fn one(
+    fn do_item(
         &self,
         kind: &dyn Kind,
-        listed: &Listed,
+        listed: &ItemEntry,
         again: bool,
         jobs: usize,
         stop: &AtomicBool,
         machine: &Machine<'_>,
-    ) -> Result<One, FleetError> {
+    ) -> Result<ItemOutcome, FleetError> {
         // Another worker may have done it in the meantime.
-        if let Some(Ok(part)) = self.head(listed)
+        if let Some(Ok(part)) = self.read_part_header(listed)
             && (part.outcome == Outcome::Done || !again)
         {
-            return Ok(One::There);
+            return Ok(ItemOutcome::There);
         }
         let item = Item::read(&self.item(&listed.hash), &listed.hash)?;
-        let begun = self.begun(&listed.hash);
+        let begun = self.progress_marker(&listed.hash);
         // For information only; work continues if the disk is full.
         let _ = std::fs::write(&begun, machine.name);
-        // Each item on one core, so that the thread's time is the item's cost.
+        // One core for each item, so that the processor time of the thread is the cost of the item.
         let (result, duration_s) = parallel::confined(1, || {
             let started_s = (machine.thread_s)();
-            let result = done(kind, &item, stop);
+            let result = run_item(kind, &item, stop);
             (result, (machine.thread_s)() - started_s)
         });
         let memory_bytes = (machine.peak_memory_bytes)().unwrap_or(0) / jobs as u64;
@@ -137,8 +138,8 @@ impl Fleet {
             Part::write(&self.part(&listed.hash), of, (outcome, body), cost, machine)
         };
         let one = match result {
-            Ok(body) => keep(Outcome::Done, &body).map(|_| One::Done),
-            Err(WorkError::Failed(why)) => keep(Outcome::Failed, &why).map(|_| One::Failed(why)),
+            Ok(body) => keep(Outcome::Done, &body).map(|_| ItemOutcome::Done),
+            Err(WorkError::Failed(why)) => keep(Outcome::Failed, &why).map(|_| ItemOutcome::Failed(why)),
             Err(WorkError::Interrupted) => Err(FleetError::Interrupted),
         };
         let _ = std::fs::remove_file(&begun);
@@ -146,32 +147,32 @@ impl Fleet {
     }
 
     /// Why an item failed, from its part.
-    pub(crate) fn why(&self, item: &Listed) -> String {
-        match self.whole(item) {
-            Some(Ok((_, body))) => body.chars().take(LONGEST_REASON).collect(),
+    pub(crate) fn failure_reason(&self, item: &ItemEntry) -> String {
+        match self.read_part(item) {
+            Some(Ok((_, body))) => body.chars().take(MAX_REASON_CHARS).collect(),
             Some(Err(refusal)) => refusal.to_string(),
-            None => "its part is gone".to_owned(),
+            None => "its part is missing".to_owned(),
         }
     }
 }
 
 /// Longest reason that is recorded, characters.
-const LONGEST_REASON: usize = 400;
+const MAX_REASON_CHARS: usize = 400;
 
 /// Does an item in a directory of its own. A panic fails this item only.
-fn done(kind: &dyn Kind, item: &Item, stop: &AtomicBool) -> Result<String, WorkError> {
+fn run_item(kind: &dyn Kind, item: &Item, stop: &AtomicBool) -> Result<String, WorkError> {
     let room = std::env::temp_dir();
     let scratch = tempfile::Builder::new().prefix("mapper-fleet-").tempdir().map_err(|error| {
         WorkError::Failed(format!("failed to create a directory in {}: {error}", room.display()))
     })?;
-    let work = |path: &Path| kind.work(&item.payload, At { scratch: path, stop });
+    let work = |path: &Path| kind.work(&item.payload, WorkContext { scratch: path, stop });
     let result = catch_unwind(AssertUnwindSafe(|| work(scratch.path()))).unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<String>().map(String::as_str);
         let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-        Err(WorkError::Failed(format!("the program is at fault, it panicked: {message}")))
+        Err(WorkError::Failed(format!("defect of the program, it panicked: {message}")))
     });
     match result {
-        // Whatever it returns after a stop, it counts as stopped.
+        // A failure after a stop counts as interrupted.
         Err(WorkError::Failed(_)) if stop.load(Ordering::Relaxed) => Err(WorkError::Interrupted),
         other => other,
     }

@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_fleet::{
-    At, Draft, Drafts, Engine, Fleet, FleetError, Kind, Limits, Machine, Made, Merged, Output, Results,
-    Shard, StudyFile, SubmitOptions, Template, Which, WorkError, Worked, kind_of, open_study,
+    CreatedStudy, Draft, Drafts, Engine, Fleet, FleetError, ItemSelection, Kind, Limits, Machine,
+    MergeOutcome, Output, Results, Shard, StudyFile, SubmitOptions, Template, WorkContext, WorkError,
+    WorkOutcome, kind_of, open_study,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -48,7 +49,7 @@ impl Kind for Squares {
         Ok(Drafts { items, settings: Value::Null })
     }
 
-    fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError> {
+    fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError> {
         let n = payload.as_u64().unwrap();
         self.worked.fetch_add(1, Ordering::Relaxed);
         assert!(at.scratch.is_dir());
@@ -85,15 +86,21 @@ fn study(folder: &Path, numbers: u64) -> StudyFile {
     open_study(&path).unwrap()
 }
 
-fn made(folder: &Path, numbers: u64, program: &str) -> Result<Made, FleetError> {
-    Made::make(&study(folder, numbers), &Squares::default(), &folder.join("fleet"), program, "maker")
+fn made(folder: &Path, numbers: u64, program: &str) -> Result<CreatedStudy, FleetError> {
+    CreatedStudy::create(
+        &study(folder, numbers),
+        &Squares::default(),
+        &folder.join("fleet"),
+        program,
+        "maker",
+    )
 }
 
-fn work(fleet: &Fleet, kind: &Squares, which: Which, again: bool) -> Result<Worked, FleetError> {
+fn work(fleet: &Fleet, kind: &Squares, which: ItemSelection, again: bool) -> Result<WorkOutcome, FleetError> {
     fleet.work(kind, which, again, &engine(2), &machine("worker"))
 }
 
-fn merge(fleet: &Fleet) -> Merged {
+fn merge(fleet: &Fleet) -> MergeOutcome {
     fleet.merge(&Squares::default(), false, &machine("merger")).unwrap()
 }
 
@@ -115,9 +122,9 @@ fn any_number_of_shards_in_any_order_gives_the_same_bytes() {
         assert!(merge(&fleet).result.is_none());
         for number in (1..=shards).rev() {
             let shard: Shard = format!("{number}/{shards}").parse().unwrap();
-            work(&fleet, &kind, Which::Shard(shard), false).unwrap();
+            work(&fleet, &kind, ItemSelection::Shard(shard), false).unwrap();
             // A second time nothing is left to do.
-            assert_eq!(work(&fleet, &kind, Which::Shard(shard), false).unwrap().done, 0);
+            assert_eq!(work(&fleet, &kind, ItemSelection::Shard(shard), false).unwrap().done, 0);
         }
         assert_eq!(kind.worked.load(Ordering::Relaxed), 100);
         assert!(merge(&fleet).result.is_some());
@@ -132,11 +139,11 @@ fn items_come_and_go_and_parts_stay() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = made(folder.path(), 20, PROGRAM).unwrap().fleet;
     let kind = Squares::default();
-    work(&fleet, &kind, Which::All, false).unwrap();
+    work(&fleet, &kind, ItemSelection::All, false).unwrap();
     let before = std::fs::read(folder.path().join("fleet/study.json")).unwrap();
     let more = made(folder.path(), 30, PROGRAM).unwrap();
     assert_eq!((more.new, more.gone), (10, 0));
-    assert_eq!(work(&more.fleet, &kind, Which::All, false).unwrap().done, 10);
+    assert_eq!(work(&more.fleet, &kind, ItemSelection::All, false).unwrap().done, 10);
     merge(&more.fleet);
     assert_eq!(result(&more.fleet), squares(0..30));
     let fewer = made(folder.path(), 20, PROGRAM).unwrap();
@@ -156,7 +163,7 @@ fn what_fails_is_named_with_its_reason_and_done_again_when_asked() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = made(folder.path(), 30, PROGRAM).unwrap().fleet;
     let kind = Squares { faults: AtomicBool::new(true), ..Squares::default() };
-    let worked = work(&fleet, &kind, Which::All, false).unwrap();
+    let worked = work(&fleet, &kind, ItemSelection::All, false).unwrap();
     assert_eq!((worked.done, worked.failed.len()), (28, 2));
     let merged = merge(&fleet);
     assert!(merged.result.is_none());
@@ -165,12 +172,12 @@ fn what_fails_is_named_with_its_reason_and_done_again_when_asked() {
     assert_eq!(why["number 13"], "thirteen brings bad luck");
     assert!(why["number 17"].contains("panicked") && why["number 17"].contains("seventeen"), "{why:?}");
     // Reported again, not done again.
-    let worked = work(&fleet, &kind, Which::All, false).unwrap();
+    let worked = work(&fleet, &kind, ItemSelection::All, false).unwrap();
     assert_eq!((worked.done, worked.there, worked.failed.len()), (0, 28, 2));
     fleet.merge(&kind, true, &machine("merger")).unwrap().result.expect("what there is");
     assert_eq!(result(&fleet), squares((0..30).filter(|n| ![13, 17].contains(n))));
     kind.faults.store(false, Ordering::Relaxed);
-    assert_eq!(work(&fleet, &kind, Which::All, true).unwrap().done, 2);
+    assert_eq!(work(&fleet, &kind, ItemSelection::All, true).unwrap().done, 2);
     merge(&fleet);
     assert_eq!(result(&fleet), squares(0..30));
 }
@@ -182,12 +189,12 @@ fn a_stop_keeps_what_is_done() {
     let (kind, stop) = (Squares::default(), AtomicBool::new(false));
     let report = |done: usize, _: usize| stop.store(done >= 10, Ordering::Relaxed);
     let stopped = Engine { jobs: Some(1), stop: &stop, on_progress: &report };
-    let error = fleet.work(&kind, Which::All, false, &stopped, &machine("worker")).unwrap_err();
+    let error = fleet.work(&kind, ItemSelection::All, false, &stopped, &machine("worker")).unwrap_err();
     assert!(matches!(error, FleetError::Interrupted), "{error}");
     assert_eq!((fleet.status().done, fleet.status().begun()), (10, 0));
     assert_eq!(
-        work(&fleet, &kind, Which::All, false).unwrap(),
-        Worked { done: 30, there: 10, failed: vec![] }
+        work(&fleet, &kind, ItemSelection::All, false).unwrap(),
+        WorkOutcome { done: 30, there: 10, failed: vec![] }
     );
     assert_eq!(kind.worked.load(Ordering::Relaxed), 40);
 }
@@ -202,7 +209,7 @@ fn hostile_parts_are_named_and_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = made(folder.path(), 12, PROGRAM).unwrap().fleet;
     let kind = Squares::default();
-    work(&fleet, &kind, Which::All, false).unwrap();
+    work(&fleet, &kind, ItemSelection::All, false).unwrap();
     let good = std::fs::read(part(&fleet, 0)).unwrap();
     // Truncated in the first line and in the body, empty, changed, longer, another item's, of another version, huge, no text.
     std::fs::write(part(&fleet, 0), &good[..40]).unwrap();
@@ -237,7 +244,7 @@ fn hostile_parts_are_named_and_left_out() {
         (0, "not a part"),
         (1, "not a part"),
         (2, "bytes of"),
-        (3, "holds the item"),
+        (3, "contains the item"),
         (5, "was made by mapper 1.2.4"),
         (6, "more than"),
         (7, "not a part"),
@@ -250,7 +257,7 @@ fn hostile_parts_are_named_and_left_out() {
     assert_eq!(merged.status.strangers, ["notes.txt"]);
     assert!(merge(&fleet).result.is_none());
     // They are replaced by what belongs there.
-    work(&fleet, &kind, Which::All, false).unwrap();
+    work(&fleet, &kind, ItemSelection::All, false).unwrap();
     assert!(merge(&fleet).result.is_some());
     assert_eq!(result(&fleet), squares(0..12));
 }
@@ -292,14 +299,14 @@ fn a_queue_is_asked_once_and_its_answers_are_understood() {
         limits: Limits { time_min: None, tasks: 10, at_once: None, hours: None, memory_mb: None },
     };
     let machine = machine("login");
-    let cost = fleet.tried(&kind, 3, &engine(1), &machine).unwrap().cost;
+    let cost = fleet.estimate_cost(&kind, 3, &engine(1), &machine).unwrap().cost;
     // A greeting before the ID, and the cluster's name behind it.
     let sent = fleet.submit(&options, &cost, &machine).unwrap();
     assert_eq!((sent.work.as_str(), sent.merge.as_deref()), ("1", Some("2")));
     // While its tasks wait or run, nothing is submitted a second time.
     std::fs::write(place("states"), "PENDING\nRUNNING\n").unwrap();
     for again in [fleet.submit(&options, &cost, &machine), fleet.retry(&machine)] {
-        assert!(matches!(again, Err(FleetError::InTheQueue { tasks: 2, .. })), "{again:?}");
+        assert!(matches!(again, Err(FleetError::StillQueued { tasks: 2, .. })), "{again:?}");
     }
     // An array whose merge the queue refuses is in the queue, and is known.
     std::fs::write(place("states"), "").unwrap();
@@ -325,12 +332,13 @@ fn versions_and_studies_are_never_mixed() {
     let path = folder.path().join("study.yaml");
     std::fs::write(&path, "fleet: others\nstudy: squares\nnumbers: 5\n").unwrap();
     let other = open_study(&path).unwrap();
-    let error = Made::make(&other, &Squares::default(), fleet.directory(), PROGRAM, "maker").unwrap_err();
+    let error =
+        CreatedStudy::create(&other, &Squares::default(), fleet.directory(), PROGRAM, "maker").unwrap_err();
     assert!(matches!(error, FleetError::OtherStudy { .. }), "{error}");
     // An item that was changed is not done.
     let item = fleet.directory().join("items").join(format!("{}.json", fleet.study.items[2].hash));
     std::fs::write(&item, "{}").unwrap();
-    let error = work(&fleet, &Squares::default(), Which::All, false).unwrap_err().to_string();
+    let error = work(&fleet, &Squares::default(), ItemSelection::All, false).unwrap_err().to_string();
     assert!(error.contains("has been changed"), "{error}");
 }
 
@@ -338,7 +346,7 @@ fn versions_and_studies_are_never_mixed() {
 fn two_that_merge_at_once_write_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let fleet = made(folder.path(), 200, PROGRAM).unwrap().fleet;
-    work(&fleet, &Squares::default(), Which::All, false).unwrap();
+    work(&fleet, &Squares::default(), ItemSelection::All, false).unwrap();
     std::thread::scope(|scope| {
         for name in ["one", "two", "three"] {
             let fleet = &fleet;
@@ -369,7 +377,7 @@ fn mistakes_of_a_study_have_their_places() {
     };
     for (text, word) in [
         ("fleet: a\nstudy: cubes\nnumbers: 3\n", "cubes"),
-        ("fleet: a\nnumbers: 3\n", "what kind of study"),
+        ("fleet: a\nnumbers: 3\n", "the kind of study is missing"),
         ("fleet: a\nstudy: squares\nnumbres: 3\n", "numbers"),
         ("fleet: a\nstudy: [squares\n", "study.yaml"),
     ] {

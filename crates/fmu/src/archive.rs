@@ -1,4 +1,4 @@
-//! The archive: a zip file whose bytes depend on its files alone.
+//! The zip archive of an FMU. Its bytes depend only on its files.
 
 use crate::files::FmuFile;
 use crate::machine::FmuError;
@@ -12,7 +12,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 /// [`FmuError::Archive`] or [`FmuError::File`] if the archive cannot hold them.
 pub fn archive(files: &[FmuFile]) -> Result<Vec<u8>, FmuError> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    // No time of the clock: equal files, equal bytes.
+    // No time stamp, so that equal files give equal bytes.
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default())

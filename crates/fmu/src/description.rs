@@ -57,7 +57,7 @@ pub fn description(
         );
     }
     xml += "  </ModelVariables>\n  <ModelStructure>\n";
-    // Indices of the standard count from 1. Every output may depend on every input, which is what no list of them says.
+    // Indices of the standard count from 1. Without a list of dependencies, every output may depend on every input, which is the case here.
     let outputs: Vec<usize> = variables
         .iter()
         .enumerate()

@@ -3,13 +3,13 @@
 use mapper_core::{FittedMap, FittedNode, ReferenceState};
 use mapper_physics::compressor_map::tabulated_map::{MapError, MapRow, TabulatedMap};
 
-/// Lowest efficiency that an FMU's map holds: below it the fit has no compressor any more, and the model's floor is above it.
+/// Lowest efficiency in the map of an FMU. Below it the fit no longer describes a compressor.
 const LOWEST_EFFICIENCY: f64 = 0.05;
 
-/// The speed lines of a fit, its extrapolated ones included, without the far end of choke where nothing is compressed.
+/// The speed lines of a fit, including extrapolated ones, without the far choke end where the gas is not compressed.
 ///
 /// # Errors
-/// [`MapError`] if the remaining lines are not a map that a model can run on.
+/// [`MapError`] if the remaining lines cannot be simulated.
 pub fn table_of_fit(fitted: &FittedMap, reference: ReferenceState) -> Result<TabulatedMap, MapError> {
     let compresses =
         |node: &&FittedNode| node.pressure_ratio > 1.0 && (LOWEST_EFFICIENCY..=1.0).contains(&node.eta);

@@ -1,8 +1,9 @@
-//! A machine as an FMU: FMI 2.0 for co-simulation, in C source, with no file of the world touched.
+//! Exports a machine as an FMU (FMI 2.0 co-simulation, C source code), for system simulation programs. [`files`] makes the files in memory
+//! from an [`FmuMachine`], and [`archive`] packs them; this crate writes nothing to disk.
 //!
-//! The equations are C files that ship with the program (`c/`); what differs from machine to machine (parameters, start values, the
-//! map, the coefficients of the integrator) is written into one header, and the same list of variables makes that header and
-//! `modelDescription.xml`. The standard's own three headers are next to them, so that any C99 compiler builds the folder `sources`.
+//! The equations are C files that ship with the program (`c/`); one generated header contains parameters, start values, the map and the
+//! coefficients of the integrator. The header and `modelDescription.xml` come from the same list of variables. The three headers of the
+//! standard are included, so that any C99 compiler builds the folder `sources`.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -17,7 +17,7 @@ pub enum FmuMap {
 /// A machine to export.
 #[derive(Debug, Clone)]
 pub struct FmuMachine<'a> {
-    /// Its name, as people wrote it.
+    /// Its name for users.
     pub name: &'a str,
     /// One sentence on the origin of its numbers.
     pub origin: &'a str,
@@ -57,7 +57,7 @@ pub enum FmuError {
     /// The archive cannot be written.
     #[error("the archive cannot be written: {0}")]
     Archive(#[from] zip::result::ZipError),
-    /// Nor a file in it.
+    /// A file in the archive cannot be written.
     #[error("a file of the archive cannot be written: {0}")]
     File(#[from] std::io::Error),
 }

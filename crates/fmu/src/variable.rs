@@ -1,6 +1,6 @@
 //! One variable of an FMU.
 
-/// What a variable is to the importer.
+/// Role of a variable for the importer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Causality {
     /// Fixed before the simulation runs.

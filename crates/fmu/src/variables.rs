@@ -1,4 +1,4 @@
-//! Every variable of an FMU, in the order of value references: parameters, inputs, outputs.
+//! The variables of an FMU, in the order of value references: parameters, inputs, outputs.
 
 use crate::machine::{FmuMachine, FmuMap};
 use crate::variable::{Causality, Switch, Variable};

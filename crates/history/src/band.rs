@@ -1,9 +1,9 @@
-//! The band in which a figure has been: robust, so that one odd night does not widen it.
+//! The band of normal values of a metric. Robust statistics prevent one unusual night from widening it.
 
 use mapper_numerics::statistics::{median, robust_sigma};
 use serde::Serialize;
 
-/// Half width of the band in such standard deviations.
+/// Half width of the band, robust standard deviations.
 const WIDTH_SIGMAS: f64 = 4.0;
 
 /// Minimum half width of a band.
@@ -12,11 +12,11 @@ const WIDTH_SIGMAS: f64 = 4.0;
 pub enum Floor {
     /// In the unit of the figure.
     Absolute(f64),
-    /// Of the median's absolute value, ratio.
+    /// As a ratio of the absolute value of the median.
     Relative(f64),
 }
 
-/// The range that a figure has been in.
+/// The range of normal values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
     /// Median of the nights.
@@ -25,27 +25,27 @@ pub struct Band {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Nights it is made of.
+    /// Number of nights that it is based on.
     pub nights: usize,
 }
 
 impl Band {
-    /// Median -/+ 4 robust standard deviations (median absolute deviation), at least the floor. `None` without nights;
-    /// values that are not finite are left out.
+    /// The median -/+ 4 robust standard deviations (from the median absolute deviation), or -/+ the floor if that is wider. Values that are not
+    /// finite are ignored. `None` without values.
     pub fn of(values: &[f64], floor: Floor) -> Option<Band> {
         let values: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         let median = median(&values)?;
         let sigma = robust_sigma(values.iter().map(|value| value - median))?;
-        let least = match floor {
+        let min_half_width = match floor {
             Floor::Absolute(half_width) => half_width,
             Floor::Relative(ratio) => ratio * median.abs(),
         };
-        let half_width = (WIDTH_SIGMAS * sigma).max(least);
+        let half_width = (WIDTH_SIGMAS * sigma).max(min_half_width);
         Some(Band { median, low: median - half_width, high: median + half_width, nights: values.len() })
     }
 
-    /// Whether a value lies in it, ends included.
-    pub fn holds(&self, value: f64) -> bool {
+    /// Whether the band contains a value, ends included.
+    pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
 }
@@ -57,10 +57,10 @@ mod tests {
     #[test]
     fn equal_nights_give_the_floor() {
         let band = Band::of(&[0.7; 14], Floor::Absolute(5e-4)).unwrap();
-        assert!(band.holds(0.7004) && !band.holds(0.702) && !band.holds(0.698));
+        assert!(band.contains(0.7004) && !band.contains(0.702) && !band.contains(0.698));
         assert_eq!(band.nights, 14);
         let band = Band::of(&[-200.0], Floor::Relative(0.01)).unwrap();
-        assert!(band.holds(-201.9) && !band.holds(-202.1));
+        assert!(band.contains(-201.9) && !band.contains(-202.1));
     }
 
     #[test]
@@ -72,7 +72,7 @@ mod tests {
         let (quiet, odd) =
             (Band::of(&quiet, Floor::Absolute(0.0)).unwrap(), Band::of(&odd, Floor::Absolute(0.0)).unwrap());
         assert!(odd.high - odd.low < 1.5 * (quiet.high - quiet.low), "{odd:?} {quiet:?}");
-        assert!(!odd.holds(1.2));
+        assert!(!odd.contains(1.2));
     }
 
     #[test]

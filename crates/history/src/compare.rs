@@ -1,71 +1,71 @@
-//! Tonight against the band of the nights before, and what it means when something has left it.
+//! Compares a night with the nights before, and states the probable cause of a change.
 
 use crate::{Band, Metric, Night, PointQuantity, PointRow, RunKey, RunRow};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A figure of a run outside its band.
+/// A metric of a run outside its band.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Moved {
+pub struct MetricOutsideBand {
     /// The run.
     pub run: RunKey,
-    /// The figure.
+    /// The metric.
     pub figure: Metric,
-    /// Tonight's value; `None` if tonight has none and the nights before had.
+    /// Tonight's value; `None` if only the nights before have one.
     pub value: Option<f64>,
-    /// The range that it has been in.
+    /// Its range in the nights before.
     pub band: Band,
 }
 
-/// One point's shift.
+/// A point outside its band.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shift {
-    /// Which point, in words.
+    /// The point, in words.
     pub place: String,
     /// Tonight's value.
     pub value: f64,
-    /// The range that it has been in.
+    /// Its range in the nights before.
     pub band: Band,
 }
 
 /// Points of a run outside their bands, in one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MovedPoints {
+pub struct PointsOutsideBand {
     /// The run.
     pub run: RunKey,
     /// The quantity.
     pub quantity: PointQuantity,
-    /// Points that left their band, or have no value any more.
+    /// Number of points outside their band or without a value tonight.
     pub moved: usize,
-    /// Points compared.
+    /// Number of compared points.
     pub compared: usize,
     /// Mean shift of all points compared, unit of the quantity.
     pub mean_shift: f64,
     /// Mean of the bands' medians, unit of the quantity.
     pub mean_level: f64,
-    /// The largest shift; `None` if points only lost their value.
+    /// The largest shift; `None` if values are only missing.
     pub largest: Option<Shift>,
 }
 
-/// Tonight against the nights before.
+/// A night compared with the nights before.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Comparison {
     /// Largest number of earlier nights that a run was compared with; 0 on the first night.
     pub nights: usize,
-    /// Runs that failed tonight, with why.
+    /// Runs that failed tonight, each with its reason.
     pub failed: Vec<(RunKey, String)>,
-    /// Runs that the last nights had and tonight has not.
+    /// Runs of the last nights that tonight does not have.
     pub missing: Vec<RunKey>,
-    /// Figures outside their band.
-    pub moved: Vec<Moved>,
+    /// Metrics outside their band.
+    pub moved: Vec<MetricOutsideBand>,
     /// Points outside their band.
-    pub moved_points: Vec<MovedPoints>,
-    /// What moved, in sentences.
+    pub moved_points: Vec<PointsOutsideBand>,
+    /// Probable causes, one sentence each.
     pub conclusions: Vec<String>,
 }
 
 impl Comparison {
-    /// Whether tonight is as the nights before and nothing failed.
+    /// Whether nothing failed and nothing is outside its band.
     pub fn is_quiet(&self) -> bool {
         self.failed.is_empty()
             && self.missing.is_empty()
@@ -97,64 +97,64 @@ pub fn compare(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Compar
     comparison
 }
 
-fn compare_figures(run: &RunRow, before: &[&RunRow], moved: &mut Vec<Moved>) {
+fn compare_figures(run: &RunRow, before: &[&RunRow], moved: &mut Vec<MetricOutsideBand>) {
     for figure in Metric::ALL {
         let values: Vec<f64> =
             before.iter().filter_map(|earlier| earlier.figures.get(&figure).copied()).collect();
         let Some(band) = Band::of(&values, figure.floor()) else { continue };
         let value = run.figures.get(&figure).copied().filter(|value| value.is_finite());
-        if value.is_none_or(|value| !band.holds(value)) {
-            moved.push(Moved { run: run.key.clone(), figure, value, band });
+        if value.is_none_or(|value| !band.contains(value)) {
+            moved.push(MetricOutsideBand { run: run.key.clone(), figure, value, band });
         }
     }
 }
 
-/// A point's identity from night to night. The bits of its numbers, which come from the same file each night.
+/// Identity of a point from night to night: speed and opening bit for bit, because they come from the same file each night, and visit.
 type Place = (u64, u64, usize);
 
 fn place(point: &PointRow) -> Place {
     (point.speed_rpm.to_bits(), point.valve_opening_ratio.to_bits(), point.visit)
 }
 
-fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<MovedPoints>) {
+fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<PointsOutsideBand>) {
     let mut earlier: BTreeMap<Place, Vec<&PointRow>> = BTreeMap::new();
     for point in before.iter().flat_map(|run| &run.points) {
         earlier.entry(place(point)).or_default().push(point);
     }
     let tonight: BTreeMap<Place, &PointRow> = run.points.iter().map(|point| (place(point), point)).collect();
     for quantity in PointQuantity::ALL {
-        let (mut left, mut lost, mut compared) = (0, 0, 0);
+        let (mut outside, mut missing, mut compared) = (0, 0, 0);
         let (mut shift_sum, mut level_sum) = (0.0, 0.0);
         let mut largest: Option<(f64, Shift)> = None;
         for (place, points) in &earlier {
             let values: Vec<f64> = points.iter().filter_map(|point| quantity.of(point)).collect();
-            // A point that had a value on a few nights only has none that could be missed.
-            let usual = 2 * values.len() > before.len();
-            let Some(band) = Band::of(&values, quantity.floor()).filter(|_| usual) else { continue };
+            // A point with values in only a few nights is not compared.
+            let is_usual = 2 * values.len() > before.len();
+            let Some(band) = Band::of(&values, quantity.floor()).filter(|_| is_usual) else { continue };
             let point = tonight.get(place);
             let Some((point, value)) = point.and_then(|point| Some((point, quantity.of(point)?))) else {
-                lost += 1;
+                missing += 1;
                 continue;
             };
             compared += 1;
             let shift = value - band.median;
             shift_sum += shift;
             level_sum += band.median;
-            if band.holds(value) {
+            if band.contains(value) {
                 continue;
             }
-            left += 1;
+            outside += 1;
             if largest.as_ref().is_none_or(|(size, _)| shift.abs() > *size) {
                 largest = Some((shift.abs(), Shift { place: point.place(), value, band }));
             }
         }
-        if left + lost > 0 {
+        if outside + missing > 0 {
             let count = f64::from(u32::try_from(compared.max(1)).unwrap_or(u32::MAX));
-            moved.push(MovedPoints {
+            moved.push(PointsOutsideBand {
                 run: run.key.clone(),
                 quantity,
-                moved: left + lost,
-                compared: compared + lost,
+                moved: outside + missing,
+                compared: compared + missing,
                 mean_shift: shift_sum / count,
                 mean_level: level_sum / count,
                 largest: largest.map(|(_, shift)| shift),
@@ -163,7 +163,7 @@ fn compare_points(run: &RunRow, before: &[&RunRow], moved: &mut Vec<MovedPoints>
     }
 }
 
-/// Which part of the program the movements point at, a sentence per campaign and quantity.
+/// Which part of the program probably changed, one sentence for each campaign and quantity.
 fn conclusions(
     night: &Night,
     earlier: &BTreeMap<RunKey, Vec<RunRow>>,
@@ -194,7 +194,7 @@ fn conclusions(
                 }
                 let count = (points as f64).max(1.0);
                 let methods = methods.into_iter().collect::<Vec<_>>().join(" and ");
-                (quantity.show_shift(shift / count, level / count), points, methods)
+                (quantity.format_shift(shift / count, level / count), points, methods)
             };
             let (truth_shift, truth_points, _) = shown(truth);
             let (result_shift, result_points, methods) = shown(result);
@@ -217,7 +217,7 @@ fn conclusions(
     sentences
 }
 
-/// Inputs of the runs that are others than last night.
+/// Inputs of the runs that changed since the last night, as sentences.
 fn changed_inputs(night: &Night, earlier: &BTreeMap<RunKey, Vec<RunRow>>) -> Vec<String> {
     let mut campaigns = BTreeSet::new();
     let mut models = BTreeSet::new();

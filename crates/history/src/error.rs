@@ -1,4 +1,4 @@
-//! What can go wrong with a history.
+//! Errors of the history.
 
 use std::path::PathBuf;
 
@@ -14,26 +14,26 @@ pub enum HistoryError {
         source: std::io::Error,
     },
     /// The file does not exist, and only reading was requested.
-    #[error("there is no history at {}; `mapper nightly` makes one, `--db FILE` names another", .path.display())]
+    #[error("there is no history at {}; run a nightly campaign to make one, or name another file", .path.display())]
     Missing {
         /// The file.
         path: PathBuf,
     },
     /// The file is a database of something else, or of a newer program.
-    #[error("{} is not a history that this program can read: {reason}; name another file with `--db`", .path.display())]
+    #[error("{} is not a history that this program can read: {reason}; name another file", .path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What was found.
+        /// The reason.
         reason: String,
     },
     /// The file, or its directory, cannot be written.
-    #[error("the history {} cannot be written; name another one with `--db`", .path.display())]
+    #[error("the history {} cannot be written; check the permissions, or name another file", .path.display())]
     ReadOnly {
         /// The file.
         path: PathBuf,
     },
-    /// SQLite's own word.
+    /// Any other error of SQLite.
     #[error("the history {} cannot be used: {source}", .path.display())]
     Sqlite {
         /// The file.

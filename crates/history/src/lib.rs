@@ -1,8 +1,8 @@
-//! The history of nightly runs: one row a run, one row a point, in one SQLite file; and whether tonight's figures
-//! lie in the band of the nights before; and, over the machines of a production, what they have in common.
+//! Stores the results of nightly runs in one SQLite file ([`History`]) and finds changes in them.
 //!
-//! A night is written in one transaction, so that a process killed in mid-write leaves the history as it was. Two
-//! processes may write at once: the second waits for the first.
+//! For developers, who see the night after a change of the program ([`compare`]), and for production tests of many machines of one type
+//! ([`analyse_productions`]). The file has one row for each run and one for each point. A night is written in one transaction, so that a killed
+//! process leaves the history unchanged; concurrent processes wait for each other.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod band;
@@ -16,12 +16,12 @@ mod quantity;
 mod store;
 
 pub use band::{Band, Floor};
-pub use compare::{Comparison, Moved, MovedPoints, Shift, compare};
+pub use compare::{Comparison, MetricOutsideBand, PointsOutsideBand, Shift, compare};
 pub use error::HistoryError;
 pub use mapper_numerics::statistics::median;
 pub use metric::Metric;
 pub use night::{Night, PointRow, RunKey, RunRow};
-pub use outlier::{MACHINES_FOR_OUTLIERS, Outlier, Sign};
-pub use production::{Drift, Place, Production, Spread, Stand, productions};
+pub use outlier::{DeviationPattern, MIN_MACHINES_FOR_OUTLIERS, Outlier};
+pub use production::{Drift, Place, Production, Spread, Stand, analyse_productions};
 pub use quantity::PointQuantity;
 pub use store::{DEFAULT_NIGHTS, Filter, History, ListedRun, ObservedPoint, StoredNight};

@@ -1,9 +1,9 @@
-//! The figures of one run that are kept and watched.
+//! The metrics of a run that are stored and compared.
 
 use crate::Floor;
 use serde::{Deserialize, Serialize};
 
-/// One figure of a run. Efficiencies are fractions.
+/// A metric of a run. Efficiencies are fractions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
@@ -17,7 +17,7 @@ pub enum Metric {
     EtaMedianError,
     /// Largest absolute error of the efficiency, fraction.
     EtaWorstError,
-    /// Share of the points whose 95 % interval holds the true efficiency, ratio.
+    /// Share of the points whose 95 % interval contains the true efficiency, ratio.
     EtaCoverage,
     /// Mean identified heat-transfer coefficient, W/(m2 K).
     HMean,
@@ -64,15 +64,15 @@ impl Metric {
         }
     }
 
-    /// What it is, for people.
-    pub fn in_words(self) -> &'static str {
+    /// Description for users.
+    pub fn description(self) -> &'static str {
         match self {
             Metric::GoodPoints => "points that are good",
             Metric::EtaMean => "mean efficiency",
             Metric::EtaTrueMean => "mean true efficiency",
             Metric::EtaMedianError => "median error of the efficiency",
             Metric::EtaWorstError => "largest error of the efficiency",
-            Metric::EtaCoverage => "intervals that hold the true efficiency",
+            Metric::EtaCoverage => "intervals that contain the true efficiency",
             Metric::HMean => "mean heat-transfer coefficient",
             Metric::HTrueMean => "mean true heat-transfer coefficient",
             Metric::HMedianError => "median error of the heat-transfer coefficient",
@@ -86,8 +86,8 @@ impl Metric {
         Metric::ALL.into_iter().find(|figure| figure.name() == name)
     }
 
-    /// Unit in which people are shown it, and the factor from the stored value to it.
-    pub fn shown_unit(self) -> (&'static str, f64) {
+    /// Display unit, and the factor from the stored value to it.
+    pub fn display_unit(self) -> (&'static str, f64) {
         match self {
             Metric::GoodPoints => ("points", 1.0),
             Metric::EtaMean | Metric::EtaTrueMean | Metric::EtaCoverage => ("%", 100.0),
@@ -98,11 +98,11 @@ impl Metric {
         }
     }
 
-    /// Half width that its band has at least.
+    /// Minimum half width of its band.
     ///
-    /// Seeds are fixed, so that the same program gives the same bytes and the scatter of the nights is 0: the floor is
-    /// all there is. It is a quarter of the smallest change that has to be seen (0.2 points of efficiency), and far
-    /// above what another compiler's rounding does (1e-9).
+    /// Because seeds are fixed, an unchanged program repeats its results exactly and the scatter of the nights is 0; the floor then decides. It is
+    /// a quarter of the smallest change that must be detected (0.2 points of efficiency), and far above the rounding differences of another
+    /// compiler (1e-9).
     pub fn floor(self) -> Floor {
         match self {
             Metric::GoodPoints => Floor::Absolute(0.5),

@@ -4,7 +4,7 @@ use crate::Metric;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a run is, from night to night.
+/// Identity of a run from night to night.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct RunKey {
     /// Name of the campaign.
@@ -26,11 +26,11 @@ impl std::fmt::Display for RunKey {
 /// One identified point with its truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PointRow {
-    /// Speed aimed at, rpm.
+    /// Target speed, rpm.
     pub speed_rpm: f64,
     /// Valve opening relative to the nominal area.
     pub valve_opening_ratio: f64,
-    /// Which visit of this point, from 0: repeats come again.
+    /// Number of the visit to this point, from 0; repeats visit a point again.
     pub visit: usize,
     /// Identified efficiency, fraction.
     pub eta: Option<f64>,
@@ -56,13 +56,13 @@ pub struct RunRow {
     /// Which run.
     #[serde(flatten)]
     pub key: RunKey,
-    /// SHA-256 of the campaign as it was understood; empty if the run failed before.
+    /// SHA-256 of the campaign as parsed; empty if the run failed before.
     pub campaign_sha256: String,
     /// SHA-256 of the nominal model; empty if the run failed before.
     pub model_sha256: String,
     /// Why the run failed; `None` if it did not.
     pub failure: Option<String>,
-    /// The figures it has.
+    /// Its metrics.
     pub figures: BTreeMap<Metric, f64>,
     /// Its points.
     pub points: Vec<PointRow>,
@@ -79,7 +79,7 @@ pub struct Night {
     pub duration_s: f64,
     /// Program and version.
     pub program: String,
-    /// Whether what moves tonight is right: this night begins a new band.
+    /// Whether the changes of tonight are accepted: this night starts a new band.
     pub accepted: bool,
     /// The runs.
     pub runs: Vec<RunRow>,

@@ -1,6 +1,6 @@
-//! A production: what its machines have in common, how far they differ, and what the stand did to all of them.
+//! Statistics of a production: the average machine, the scatter between machines, and drift of the test stand.
 
-use crate::outlier::{Deviations, Outlier, outliers};
+use crate::outlier::{Deviations, Outlier, find_outliers};
 use crate::{ObservedPoint, PointQuantity, StoredNight};
 use mapper_numerics::mixed_model::{Effect, MixedFit, MixedModel};
 use mapper_numerics::statistics::mean;
@@ -8,11 +8,11 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Nights from which on a drift in time is looked for: two always lie on a line.
-const NIGHTS_FOR_A_DRIFT: usize = 3;
-const MS_A_DAY: f64 = 86_400_000.0;
+/// Minimum number of nights for a drift: two always lie on a line.
+const MIN_NIGHTS_FOR_DRIFT: usize = 3;
+const MS_PER_DAY: f64 = 86_400_000.0;
 
-/// What many machines gave, measured by one campaign and method.
+/// Results of many machines, measured with one campaign and method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Production {
     /// The campaign.
@@ -23,20 +23,20 @@ pub struct Production {
     pub runs: usize,
     /// The machines, by name.
     pub machines: Vec<String>,
-    /// Starts of the nights, ms since 1970-01-01 00:00 UTC, rising.
+    /// Start times of the nights, ms since 1970-01-01 00:00 UTC, ascending.
     pub nights_ms: Vec<i64>,
-    /// The points of the map, by speed and opening; outliers are not in them.
+    /// The points of the map by speed and opening, without outliers.
     pub places: Vec<Place>,
-    /// What the stand did to all machines alike, means over the points; `None` if there is one night.
+    /// Effect of the stand on all machines, mean over the points; `None` for a single night.
     pub stand: Option<Stand>,
-    /// Machines that are not like the others, farthest first; `None` if too few are there to say.
+    /// Machines that deviate from the others, largest deviation first; `None` if there are too few machines.
     pub outliers: Option<Vec<Outlier>>,
 }
 
 /// One point of the map over the production.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Place {
-    /// Speed aimed at, rpm.
+    /// Target speed, rpm.
     pub speed_rpm: f64,
     /// Valve opening relative to the nominal area.
     pub valve_opening_ratio: f64,
@@ -49,22 +49,22 @@ pub struct Place {
 /// Mean and scatter of a quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spread {
-    /// Of the average machine.
+    /// Value of the average machine.
     pub mean: f64,
-    /// Standard deviation between machines; `None` if each was measured once, so that it is within `rest_sigma`.
+    /// Standard deviation between machines; `None` if each was measured once: it is then part of `rest_sigma`.
     pub machine_sigma: Option<f64>,
-    /// Standard deviation between nights, a drift in time apart; `None` if there is one night.
+    /// Standard deviation between nights without the drift; `None` for a single night.
     pub night_sigma: Option<f64>,
     /// Standard deviation of one measurement of one machine in one night.
     pub rest_sigma: f64,
 }
 
-/// What all machines share from night to night.
+/// Effect of the stand on all machines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stand {
-    /// Drift of the efficiency, fraction a day; `None` if the nights are fewer than 3.
+    /// Drift of the efficiency, fraction per day; `None` for fewer than 3 nights.
     pub eta_drift: Option<Drift>,
-    /// Drift of h, ratio a day.
+    /// Relative drift of h, ratio per day.
     pub h_drift: Option<Drift>,
     /// Standard deviation of the efficiency between nights in addition to the drift, fraction.
     pub eta_night_sigma: f64,
@@ -72,10 +72,10 @@ pub struct Stand {
     pub h_night_sigma: f64,
 }
 
-/// A change with time, a day, and its 95 % interval.
+/// A change per day, with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Drift {
-    /// Change a day.
+    /// Change per day.
     pub a_day: f64,
     /// Lower end.
     pub low: f64,
@@ -83,8 +83,8 @@ pub struct Drift {
     pub high: f64,
 }
 
-/// One production for each campaign and method in a history.
-pub fn productions(nights: &[StoredNight], points: &[ObservedPoint]) -> Vec<Production> {
+/// Analyses the production of each campaign and method in a history.
+pub fn analyse_productions(nights: &[StoredNight], points: &[ObservedPoint]) -> Vec<Production> {
     let starts: BTreeMap<i64, i64> = nights.iter().map(|night| (night.id, night.started_ms)).collect();
     let mut by_key: BTreeMap<(&str, &str), Vec<&ObservedPoint>> = BTreeMap::new();
     for point in points {
@@ -92,19 +92,19 @@ pub fn productions(nights: &[StoredNight], points: &[ObservedPoint]) -> Vec<Prod
     }
     by_key
         .into_iter()
-        .filter_map(|((campaign, method), points)| production(campaign, method, &starts, &points))
+        .filter_map(|((campaign, method), points)| analyse_production(campaign, method, &starts, &points))
         .collect()
 }
 
 /// Observations of one place.
-struct Observed<'a> {
+struct PlaceObservations<'a> {
     points: Vec<&'a ObservedPoint>,
     machines: Vec<usize>,
     nights: Vec<usize>,
     days: Vec<f64>,
 }
 
-fn production(
+fn analyse_production(
     campaign: &str,
     method: &str,
     starts: &BTreeMap<i64, i64>,
@@ -121,7 +121,7 @@ fn production(
     let first_ms = *nights_ms.first()?;
     let runs: BTreeSet<(i64, &str, u64)> =
         points.iter().map(|point| (point.night_id, point.key.machine.as_str(), point.key.seed)).collect();
-    let mut by_place: BTreeMap<(u64, u64), Observed<'_>> = BTreeMap::new();
+    let mut by_place: BTreeMap<(u64, u64), PlaceObservations<'_>> = BTreeMap::new();
     for &point in points {
         let place = (point.point.speed_rpm.to_bits(), point.point.valve_opening_ratio.to_bits());
         let (Ok(machine), Some(start)) =
@@ -130,7 +130,7 @@ fn production(
             continue;
         };
         let Ok(night) = nights_ms.binary_search(start) else { continue };
-        let observed = by_place.entry(place).or_insert_with(|| Observed {
+        let observed = by_place.entry(place).or_insert_with(|| PlaceObservations {
             points: Vec::new(),
             machines: Vec::new(),
             nights: Vec::new(),
@@ -139,18 +139,18 @@ fn production(
         observed.points.push(point);
         observed.machines.push(machine);
         observed.nights.push(night);
-        observed.days.push((start - first_ms) as f64 / MS_A_DAY);
+        observed.days.push((start - first_ms) as f64 / MS_PER_DAY);
     }
-    let all: Vec<Observed<'_>> = by_place.into_values().collect();
-    let none_left_out = BTreeSet::new();
-    let measured = measure(&all, machines.len(), &none_left_out);
-    let outliers = outliers(&machines, &measured.deviations);
+    let all: Vec<PlaceObservations<'_>> = by_place.into_values().collect();
+    let no_machines = BTreeSet::new();
+    let measured = fit_places(&all, machines.len(), &no_machines);
+    let outliers = find_outliers(&machines, &measured.deviations);
     let out: BTreeSet<usize> = outliers
         .iter()
         .flatten()
         .filter_map(|outlier| machines.binary_search(&outlier.machine).ok())
         .collect();
-    let measured = if out.is_empty() { measured } else { measure(&all, machines.len(), &out) };
+    let measured = if out.is_empty() { measured } else { fit_places(&all, machines.len(), &out) };
     Some(Production {
         campaign: campaign.to_owned(),
         method: method.to_owned(),
@@ -163,25 +163,25 @@ fn production(
     })
 }
 
-/// All places fitted.
-struct Measured {
+/// The fits of all points of the map.
+struct ProductionFit {
     places: Vec<Place>,
     deviations: Vec<Deviations>,
-    eta: Vec<Fitted>,
-    h: Vec<Fitted>,
+    eta: Vec<PlaceFit>,
+    h: Vec<PlaceFit>,
 }
 
-fn measure(all: &[Observed<'_>], machines: usize, left_out: &BTreeSet<usize>) -> Measured {
+fn fit_places(all: &[PlaceObservations<'_>], machines: usize, left_out: &BTreeSet<usize>) -> ProductionFit {
     let mut measured =
-        Measured { places: Vec::new(), deviations: Vec::new(), eta: Vec::new(), h: Vec::new() };
+        ProductionFit { places: Vec::new(), deviations: Vec::new(), eta: Vec::new(), h: Vec::new() };
     for observed in all {
         let Some(first) = observed.points.first() else { continue };
-        let eta = fitted(observed, PointQuantity::Eta, left_out, |eta| eta);
-        let h = fitted(observed, PointQuantity::H, left_out, f64::ln);
+        let eta = fit_place(observed, PointQuantity::Eta, left_out, |eta| eta);
+        let h = fit_place(observed, PointQuantity::H, left_out, f64::ln);
         let (speed_rpm, valve_opening_ratio) = (first.point.speed_rpm, first.point.valve_opening_ratio);
         measured.deviations.push(Deviations {
             speed_rpm,
-            eta_mean: eta.as_ref().map_or(f64::NAN, Fitted::mean),
+            eta_mean: eta.as_ref().map_or(f64::NAN, PlaceFit::mean),
             eta: deviations(observed, PointQuantity::Eta, eta.as_ref(), machines, |eta| eta),
             ln_h: deviations(observed, PointQuantity::H, h.as_ref(), machines, f64::ln),
         });
@@ -197,17 +197,17 @@ fn measure(all: &[Observed<'_>], machines: usize, left_out: &BTreeSet<usize>) ->
     measured
 }
 
-/// A mixed model of one quantity at one place.
-struct Fitted {
+/// A mixed model of one quantity at one point of the map.
+struct PlaceFit {
     fit: MixedFit,
-    /// Places of machines and nights among the groups.
+    /// Index of machines and of nights among the groups of the model.
     machines: Option<usize>,
     nights: Option<usize>,
     with_drift: bool,
     middle_day: f64,
 }
 
-impl Fitted {
+impl PlaceFit {
     fn mean(&self) -> f64 {
         self.fit.coefficients[0].value
     }
@@ -226,20 +226,20 @@ impl Fitted {
         self.with_drift.then(|| self.fit.coefficients[1])
     }
 
-    /// What the stand adds in a night.
-    fn of_stand(&self, night: usize, day: f64) -> f64 {
+    /// Shift by the stand in one night.
+    fn stand_shift(&self, night: usize, day: f64) -> f64 {
         let scatter =
             self.nights.map_or(0.0, |group| self.fit.effects[group].get(night).map_or(0.0, |one| one.value));
         scatter + self.drift().map_or(0.0, |drift| drift.value * (day - self.middle_day))
     }
 }
 
-fn fitted(
-    observed: &Observed<'_>,
+fn fit_place(
+    observed: &PlaceObservations<'_>,
     quantity: PointQuantity,
     left_out: &BTreeSet<usize>,
     transform: fn(f64) -> f64,
-) -> Option<Fitted> {
+) -> Option<PlaceFit> {
     let kept: Vec<(usize, f64)> = (0..observed.points.len())
         .filter(|i| !left_out.contains(&observed.machines[*i]))
         .filter_map(|i| Some((i, transform(quantity.of(&observed.points[i].point)?))))
@@ -250,12 +250,12 @@ fn fitted(
     let (machines, nights) = (of(&observed.machines), of(&observed.nights));
     let different = |levels: &[usize]| levels.iter().collect::<BTreeSet<_>>().len();
     let days: Vec<f64> = kept.iter().map(|(i, _)| observed.days[*i]).collect();
-    let with_drift = different(&nights) >= NIGHTS_FOR_A_DRIFT;
+    let with_drift = different(&nights) >= MIN_NIGHTS_FOR_DRIFT;
     let middle_day = mean(&days)?;
     let fixed = DMatrix::from_fn(y.len(), 1 + usize::from(with_drift), |row, column| {
         if column == 0 { 1.0 } else { days[row] - middle_day }
     });
-    // With one measurement per machine, a machine's own deviation is indistinguishable from the rest.
+    // With one measurement per machine, the deviation of a machine is indistinguishable from the residual.
     let with_machines = different(&machines) < y.len() && different(&machines) > 1;
     let with_nights = different(&nights) > 1 && different(&nights) < y.len();
     let mut groups: Vec<&[usize]> = Vec::new();
@@ -273,14 +273,14 @@ fn fitted(
         groups.push(&alone);
     }
     let fit = MixedModel { y: &y, fixed, groups }.fit().ok()?;
-    Some(Fitted { fit, machines: of_machines, nights: of_nights, with_drift, middle_day })
+    Some(PlaceFit { fit, machines: of_machines, nights: of_nights, with_drift, middle_day })
 }
 
-/// How far each machine lies off the average one, what the stand did in its nights apart; `None` if it was not measured.
+/// Deviation of each machine from the average machine, after subtracting the shift by the stand; `None` if it was not measured.
 fn deviations(
-    observed: &Observed<'_>,
+    observed: &PlaceObservations<'_>,
     quantity: PointQuantity,
-    fitted: Option<&Fitted>,
+    fitted: Option<&PlaceFit>,
     machines: usize,
     transform: fn(f64) -> f64,
 ) -> Vec<Option<f64>> {
@@ -290,22 +290,21 @@ fn deviations(
         let Some(value) = quantity.of(&point.point).map(transform).filter(|value| value.is_finite()) else {
             continue;
         };
-        let stand = fitted.of_stand(observed.nights[i], observed.days[i]);
+        let stand = fitted.stand_shift(observed.nights[i], observed.days[i]);
         of_machine[observed.machines[i]].push(value - fitted.mean() - stand);
     }
     of_machine.iter().map(mean).collect()
 }
 
-/// What the places say together of the stand. Its errors are shared by all places, so that their errors do not shrink with the number
-/// of places.
-fn stand(measured: &Measured) -> Stand {
-    let drift = |fitted: &[Fitted]| {
-        let drifts: Vec<Effect> = fitted.iter().filter_map(Fitted::drift).collect();
+/// Effect of the stand, mean over all points. The points share its errors, so the standard error does not decrease with their number.
+fn stand(measured: &ProductionFit) -> Stand {
+    let drift = |fitted: &[PlaceFit]| {
+        let drifts: Vec<Effect> = fitted.iter().filter_map(PlaceFit::drift).collect();
         let a_day = mean(drifts.iter().map(|drift| drift.value))?;
         let half = 1.96 * mean(drifts.iter().map(|drift| drift.standard_error))?;
         Some(Drift { a_day, low: a_day - half, high: a_day + half })
     };
-    let sigma = |fitted: &[Fitted]| {
+    let sigma = |fitted: &[PlaceFit]| {
         mean(fitted.iter().filter_map(|one| one.nights.map(|group| one.fit.group_sigmas[group])))
             .unwrap_or(0.0)
     };

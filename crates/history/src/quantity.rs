@@ -1,10 +1,10 @@
-//! What is kept of each point.
+//! The quantities of a point that are compared.
 
 use crate::{Floor, PointRow};
 use serde::Serialize;
 
-/// One quantity of a point. The error is the identified value minus the true one, so that a model that moves truth
-/// and result alike shows in the absolute values.
+/// One quantity of a point. Both absolute values and errors are compared, because a changed model shifts truth and result equally and leaves the
+/// error unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PointQuantity {
@@ -12,13 +12,13 @@ pub enum PointQuantity {
     EtaTrue,
     /// Identified efficiency, fraction.
     Eta,
-    /// Identified less true efficiency, fraction.
+    /// Identified minus true efficiency, fraction.
     EtaError,
     /// True heat-transfer coefficient, W/(m2 K).
     HTrue,
     /// Identified heat-transfer coefficient, W/(m2 K).
     H,
-    /// Identified over true heat-transfer coefficient, less one, ratio.
+    /// Identified over true heat-transfer coefficient, minus one, ratio.
     HError,
 }
 
@@ -46,7 +46,7 @@ impl PointQuantity {
         .filter(|value| value.is_finite())
     }
 
-    /// In words.
+    /// Name for users.
     pub fn words(self) -> &'static str {
         match self {
             PointQuantity::EtaTrue => "true efficiency",
@@ -58,18 +58,18 @@ impl PointQuantity {
         }
     }
 
-    /// Half width that the band has at least; see [`crate::Metric::floor`].
+    /// Minimum half width of the band; see [`crate::Metric::floor`].
     pub fn floor(self) -> Floor {
         match self {
             PointQuantity::EtaTrue | PointQuantity::Eta | PointQuantity::EtaError => Floor::Absolute(5e-4),
-            // h answers to the third digit of everything; a hundredth is a change that matters.
+            // h reacts to small changes of any input; only a change of one per cent matters.
             PointQuantity::HTrue | PointQuantity::H => Floor::Relative(0.01),
             PointQuantity::HError => Floor::Absolute(0.01),
         }
     }
 
-    /// A shift of it for people: points for efficiencies, per cent of `level` for h.
-    pub fn show_shift(self, shift: f64, level: f64) -> String {
+    /// Formats a shift: in points for efficiencies, in per cent of `level` for h.
+    pub fn format_shift(self, shift: f64, level: f64) -> String {
         match self {
             PointQuantity::EtaTrue | PointQuantity::Eta | PointQuantity::EtaError => {
                 format!("{:+.2} points", 100.0 * shift)

@@ -1,4 +1,4 @@
-//! The file: one SQLite database.
+//! The history file, an SQLite database.
 
 use crate::{Comparison, HistoryError, Metric, Night, PointRow, RunKey, RunRow, compare};
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior, params};
@@ -7,20 +7,20 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Nights that make a band unless stated otherwise: two weeks.
+/// Default number of nights that a band is based on: two weeks.
 pub const DEFAULT_NIGHTS: usize = 14;
 
-/// Marks the file as one of ours: "mapr".
+/// SQLite application ID of history files: "mapr".
 const APPLICATION_ID: i32 = 0x6d61_7072;
-/// Layout of the tables; counts up with each change.
+/// Version of the table layout.
 const LAYOUT: i32 = 1;
-/// A night is written in milliseconds; a neighbour that holds the file for this long is stuck.
+/// Time to wait for a lock of another process. A night is written in milliseconds, so a longer lock is a fault.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// A night as it is listed.
+/// A stored night, without its runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StoredNight {
-    /// Number of the night, counting up.
+    /// Number of the night, ascending.
     pub id: i64,
     /// Name of the nightly campaign.
     pub name: String,
@@ -30,13 +30,13 @@ pub struct StoredNight {
     pub duration_s: f64,
     /// Program and version.
     pub program: String,
-    /// Whether it began a new band.
+    /// Whether it started a new band.
     pub accepted: bool,
-    /// Whether a figure had left its band.
+    /// Whether a metric was outside its band.
     pub moved: bool,
 }
 
-/// A run as it is listed, with its night.
+/// A stored run with its night.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ListedRun {
     /// Its night.
@@ -46,7 +46,7 @@ pub struct ListedRun {
     pub run: RunRow,
 }
 
-/// A point with the run and the night that it is of.
+/// A stored point with its run and night.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObservedPoint {
     /// Its night, by [`StoredNight::id`].
@@ -85,7 +85,7 @@ impl History {
                 .map_err(|source| HistoryError::Directory { path: parent.to_owned(), source })?;
         }
         let mut history = Self::connect(path, OpenFlags::default())?;
-        // Found out before a night of runs, not when they are to be stored.
+        // Checked before the runs of a night, not only when their results are stored.
         let writable = history.prepare().and_then(|()| {
             let begun = history.connection.transaction_with_behavior(TransactionBehavior::Immediate);
             let path = path.to_owned();
@@ -99,7 +99,7 @@ impl History {
         }
     }
 
-    /// Opens a history that is there, to read it.
+    /// Opens an existing history for reading.
     ///
     /// # Errors
     /// [`HistoryError::Missing`] if there is none, otherwise as [`History::open`].
@@ -107,7 +107,7 @@ impl History {
         if !path.exists() {
             return Err(HistoryError::Missing { path: path.to_owned() });
         }
-        // Reading a WAL database may have to make its side files, so that read-only would fail after a crash.
+        // A WAL database may need its side files to be created even for reading, so a read-only connection would fail after a crash.
         let mut history =
             Self::connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
         match history.prepare() {
@@ -116,7 +116,7 @@ impl History {
         }
     }
 
-    /// Opens a history in a place where nothing can be written. A night that a killed process was writing is not seen.
+    /// Opens a history in a directory without write permission. A night that a killed process did not finish is not visible.
     ///
     /// # Errors
     /// As [`History::open_existing`].
@@ -139,7 +139,7 @@ impl History {
         Ok(History { connection, path: path.to_owned() })
     }
 
-    /// Makes the tables in a new file; refuses what is not ours.
+    /// Creates the tables in a new file; rejects other databases.
     fn prepare(&mut self) -> Result<(), HistoryError> {
         let path = self.path.clone();
         let fail = |source: rusqlite::Error| match source.sqlite_error_code() {
@@ -149,8 +149,7 @@ impl History {
             _ => HistoryError::Sqlite { path: path.clone(), source },
         };
         let foreign = |reason: String| HistoryError::Foreign { path: path.clone(), reason };
-        // Another process may be switching at this very moment, which SQLite reports as busy at once; the mode stays
-        // with the file, so that it is enough if one of the two succeeds.
+        // SQLite reports busy at once if another process switches to WAL at the same time. The mode is stored in the file, so one success is enough.
         let reads_only = self.connection.is_readonly("main").map_err(fail)?;
         let switched = match reads_only {
             true => Ok(()),
@@ -171,7 +170,7 @@ impl History {
         }
         let transaction =
             self.connection.transaction_with_behavior(TransactionBehavior::Immediate).map_err(fail)?;
-        // Looked at again with the lock held: another process may have made the tables meanwhile.
+        // Checked again under the lock, because another process may have created the tables in the meantime.
         let application_id: i32 =
             transaction.pragma_query_value(None, "application_id", |row| row.get(0)).map_err(fail)?;
         let layout: i32 =
@@ -193,12 +192,11 @@ impl History {
         transaction.commit().map_err(fail)
     }
 
-    /// Compares a night with the band of the last `nights` nights and appends it, in one transaction. A night that has
-    /// moved, or is accepted as a new beginning, is marked so. Nights are distinguished by the time they began: of two in one millisecond, the
-    /// second gets the next free one.
+    /// Compares a night with the band of the last `nights` nights and appends it, in one transaction. Marks the night as moved or accepted. Nights
+    /// are identified by their start time; a second one in the same millisecond gets the next free time.
     ///
     /// # Errors
-    /// [`HistoryError::Sqlite`]; the history is then as it was.
+    /// [`HistoryError::Sqlite`]; the history is then unchanged.
     pub fn append(&mut self, night: &mut Night, nights: usize) -> Result<Comparison, HistoryError> {
         let path = self.path.clone();
         self.try_append(night, nights).map_err(|source| HistoryError::Sqlite { path, source })
@@ -230,7 +228,7 @@ impl History {
                     campaign.clone().into(),
                     machine.clone().into(),
                     method.clone().into(),
-                    // SQLite's integers are signed; the bits come back as they went.
+                    // SQLite integers are signed; the bits are preserved.
                     seed.cast_signed().into(),
                     run.campaign_sha256.clone().into(),
                     run.model_sha256.clone().into(),
@@ -292,7 +290,7 @@ impl History {
 }
 
 impl History {
-    /// The points of all runs that a filter takes and the nights they are of, oldest first.
+    /// The points of all runs that match a filter, and their nights, oldest first.
     ///
     /// # Errors
     /// [`HistoryError::Sqlite`].
@@ -378,7 +376,7 @@ fn run_of(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<RunRow> {
     })
 }
 
-/// The runs that make tonight's bands, newest first: of the last `nights` quiet nights since the last accepted one.
+/// The runs that the bands are based on, newest first: those of the last `nights` unmoved nights since the last accepted one.
 fn earlier(
     transaction: &Transaction<'_>,
     name: &str,
@@ -408,14 +406,14 @@ fn earlier(
     Ok(earlier)
 }
 
-/// Whether SQLite could not write: to the file, to its directory, or at all.
+/// Whether the file or its directory is not writable.
 fn is_read_only(error: &rusqlite::Error) -> bool {
     use rusqlite::ErrorCode;
     let code = error.sqlite_error_code();
     matches!(code, Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied))
 }
 
-/// NULL for what is not a number.
+/// Returns `None`, stored as NULL, for values that are not finite.
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
 }

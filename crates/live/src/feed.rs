@@ -1,9 +1,9 @@
 //! Converts session events into messages for browsers.
 
 use crate::live_run::LiveRun;
-use crate::operator_commands::Pressed;
+use crate::operator_commands::OperatorCommand;
 use crate::state::{
-    EVENTS_MAX, LoggedMessage, Now, POINTS_MAX, Reading, State, Step, TRACE_ROWS, Traced, Units,
+    LoggedMessage, MAX_EVENTS, MAX_POINTS, Now, Reading, State, Step, TRACE_ROWS, TracedChannel, Units,
 };
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, IdentifiedPoint, PlanStep, SignalGuard, StepMarker};
@@ -25,7 +25,7 @@ const TRACED: [Channel; 6] =
 
 /// Keeps the state and returns its changes.
 pub(crate) struct Feed {
-    kept: Mutex<Kept>,
+    kept: Mutex<FeedState>,
     display: Display,
     guards: Vec<SignalGuard>,
     plan: Vec<PlanStep>,
@@ -36,17 +36,17 @@ pub(crate) struct Feed {
     after_step: Arc<AtomicBool>,
 }
 
-struct Kept {
+struct FeedState {
     state: State,
     /// Rows not yet sent to browsers.
     unsent: VecDeque<Vec<Option<f64>>>,
     ticked: Option<Instant>,
     /// Excess of each step's actual duration over the planned one, s.
-    longer_s: Vec<f64>,
+    overrun_s: Vec<f64>,
     /// Whether the operator held the current step: its duration must not influence the forecast.
     held: bool,
     /// Number of started steps.
-    begun: usize,
+    started_steps: usize,
     soak_s: f64,
     /// Planned rig time after the current step, s.
     after_s: f64,
@@ -75,7 +75,7 @@ impl Feed {
             duration_s: soak_s + run.plan.duration_s(),
             pace: run.pace,
             traced: TRACED
-                .map(|channel| Traced {
+                .map(|channel| TracedChannel {
                     name: channel.symbol().to_owned(),
                     unit: display.unit_of(channel).to_owned(),
                 })
@@ -88,13 +88,13 @@ impl Feed {
             outcome: None,
             page: None,
         };
-        let kept = Kept {
+        let kept = FeedState {
             state,
             unsent: VecDeque::new(),
             ticked: None,
-            longer_s: Vec::new(),
+            overrun_s: Vec::new(),
             held: false,
-            begun: 0,
+            started_steps: 0,
             soak_s,
             after_s: 0.0,
         };
@@ -113,12 +113,12 @@ impl Feed {
     /// The complete state.
     pub(crate) fn snapshot(&self) -> Arc<str> {
         let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
-        self.say_what_is_asked(&mut kept.state);
+        self.update_operator_flags(&mut kept.state);
         message("snapshot", json!(kept.state))
     }
 
     /// Processes an event and returns messages for the observers.
-    pub(crate) fn take(&self, event: &SessionEvent) -> Vec<Arc<str>> {
+    pub(crate) fn process(&self, event: &SessionEvent) -> Vec<Arc<str>> {
         // Called on the identification thread, so that the rig does not wait for the map.
         let map = match event {
             SessionEvent::PointEstimated(point) => self.map_with(point),
@@ -137,7 +137,7 @@ impl Feed {
             }
             SessionEvent::RigTime { t_s } => {
                 kept.state.now.t_s = *t_s;
-                if kept.begun == 0 && kept.soak_s > 0.0 && *t_s > kept.soak_s {
+                if kept.started_steps == 0 && kept.soak_s > 0.0 && *t_s > kept.soak_s {
                     kept.state.now.phase = "warming up at the first point".to_owned();
                 }
                 (kept.state.now.left_s, kept.state.now.left_half_s) = kept.left_s();
@@ -169,14 +169,14 @@ impl Feed {
             SessionEvent::StepEnded(marker) => {
                 let held = std::mem::replace(&mut kept.held, self.operator.holds());
                 let planned_s = self.plan.get(marker.index).filter(|_| !held).map(|step| step.dwell_s);
-                kept.longer_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
+                kept.overrun_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
                 Vec::new()
             }
             SessionEvent::Reported(event) => {
                 let entry = LoggedMessage { t_s: event.t_s, message: event.message.clone() };
                 let new = message("told", json!(entry));
                 kept.state.events.push_back(entry);
-                while kept.state.events.len() > EVENTS_MAX {
+                while kept.state.events.len() > MAX_EVENTS {
                     kept.state.events.pop_front();
                 }
                 vec![new, self.tick(kept)]
@@ -184,7 +184,7 @@ impl Feed {
             SessionEvent::PointEstimated(point) => {
                 let shown = live_point(point, &self.display);
                 let new = message("point", json!(shown));
-                if kept.state.points.len() < POINTS_MAX {
+                if kept.state.points.len() < MAX_POINTS {
                     kept.state.points.push(shown);
                 }
                 let drawn = map.map(|map| {
@@ -207,27 +207,27 @@ impl Feed {
     /// The map with one additional point.
     fn map_with(&self, point: &IdentifiedPoint) -> Option<LiveMap> {
         let mut estimated = self.estimated.lock().ok()?;
-        if estimated.len() < POINTS_MAX {
+        if estimated.len() < MAX_POINTS {
             estimated.push(point.clone());
         }
         Some(live_map(&estimated, &self.campaign, &self.display))
     }
 
     /// Shows a pressed button before the run has processed it.
-    pub(crate) fn asked(&self, asked: Pressed) {
+    pub(crate) fn show_command(&self, asked: OperatorCommand) {
         if let Ok(mut kept) = self.kept.lock() {
-            kept.held |= asked == Pressed::Hold;
+            kept.held |= asked == OperatorCommand::Hold;
             let now = &mut kept.state.now;
             match asked {
-                Pressed::Hold => now.holds = true,
-                Pressed::GoOn => now.holds = false,
-                Pressed::StopAfterStep | Pressed::SafeNow => now.stops = true,
+                OperatorCommand::Hold => now.holds = true,
+                OperatorCommand::Continue => now.holds = false,
+                OperatorCommand::StopAfterStep | OperatorCommand::SafeNow => now.stops = true,
             }
         }
     }
 
     /// Shows the end of the run.
-    pub(crate) fn ended(&self, outcome: &str, page: Option<&Path>) -> Arc<str> {
+    pub(crate) fn show_end(&self, outcome: &str, page: Option<&Path>) -> Arc<str> {
         let Ok(mut kept) = self.kept.lock() else { return Arc::from("{}") };
         kept.state.outcome = Some(outcome.to_owned());
         kept.state.page = page.map(|page| page.display().to_string());
@@ -235,9 +235,9 @@ impl Feed {
         message("end", end)
     }
 
-    fn step(&self, kept: &mut Kept, marker: &StepMarker) {
+    fn step(&self, kept: &mut FeedState, marker: &StepMarker) {
         let forecast = self.plan.get(marker.index);
-        kept.begun = marker.number().unwrap_or(kept.begun);
+        kept.started_steps = marker.number().unwrap_or(kept.started_steps);
         if let Some(forecast) = forecast {
             kept.after_s = kept.state.duration_s - kept.soak_s - forecast.start_s - forecast.dwell_s;
         }
@@ -277,34 +277,34 @@ impl Feed {
             .collect();
     }
 
-    fn say_what_is_asked(&self, state: &mut State) {
+    fn update_operator_flags(&self, state: &mut State) {
         state.now.holds = self.operator.holds();
         state.now.stops = self.after_step.load(Ordering::SeqCst);
     }
 
-    fn tick(&self, kept: &mut Kept) -> Arc<str> {
-        self.say_what_is_asked(&mut kept.state);
+    fn tick(&self, kept: &mut FeedState) -> Arc<str> {
+        self.update_operator_flags(&mut kept.state);
         kept.ticked = Some(Instant::now());
         let rows: Vec<Vec<Option<f64>>> = kept.unsent.drain(..).collect();
         message("tick", json!({ "now": kept.state.now, "rows": rows }))
     }
 }
 
-impl Kept {
+impl FeedState {
     /// Remaining rig time, s, and half-width of its 95 % interval. Future steps are assumed to exceed their plan as the past ones did.
     fn left_s(&self) -> (f64, f64) {
-        let (state, count) = (&self.state, self.longer_s.len() as f64);
-        let to_come = state.steps.saturating_sub(self.begun) as f64;
-        let mean_s = if count > 0.0 { self.longer_s.iter().sum::<f64>() / count } else { 0.0 };
+        let (state, count) = (&self.state, self.overrun_s.len() as f64);
+        let remaining_steps = state.steps.saturating_sub(self.started_steps) as f64;
+        let mean_s = if count > 0.0 { self.overrun_s.iter().sum::<f64>() / count } else { 0.0 };
         let variance =
-            self.longer_s.iter().map(|s| (s - mean_s).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+            self.overrun_s.iter().map(|s| (s - mean_s).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
         // Each future step has its own scatter; all share the error of the mean.
-        let sigma_s = (variance * to_come * (1.0 + to_come / count.max(1.0))).sqrt();
+        let sigma_s = (variance * remaining_steps * (1.0 + remaining_steps / count.max(1.0))).sqrt();
         let planned_s = match &state.now.step {
             Some(step) => (step.end_s - state.now.t_s).max(0.0) + self.after_s,
             None => state.duration_s - state.now.t_s,
         };
-        ((planned_s + mean_s * to_come).max(0.0), mapper_core::half_width_95(sigma_s))
+        ((planned_s + mean_s * remaining_steps).max(0.0), mapper_core::half_width_95(sigma_s))
     }
 }
 

@@ -1,4 +1,4 @@
-//! The live page of a run.
+//! Shows a run while it is in progress: a web page with buttons for the operator, and a stream for Foxglove or Lichtblick.
 //!
 //! [`Observers`] receive the session's events. The page keeps a bounded state and serves browsers: the page itself, a stream of server-sent
 //! events, and four requests for the operator's buttons. A browser that is slow, gone or hostile affects only its own connection, never the run.
@@ -19,7 +19,7 @@ mod web_server;
 
 pub use live_error::LiveError;
 pub use live_run::LiveRun;
-pub use observers::{Asked, Observers};
+pub use observers::{ObserverRequest, Observers};
 #[cfg(feature = "foxglove")]
 pub use viewers::{Viewers, ViewersError};
 pub use web_server::tls::{TlsError, TlsFiles};

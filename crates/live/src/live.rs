@@ -3,7 +3,7 @@
 use crate::feed::Feed;
 use crate::live_error::LiveError;
 use crate::live_run::LiveRun;
-use crate::operator_commands::Pressed;
+use crate::operator_commands::OperatorCommand;
 use crate::web_server::access::Access;
 use crate::web_server::hub::Hub;
 use crate::web_server::server::{Served, serve};
@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Time for browsers to receive the last message.
-const FAREWELL: Duration = Duration::from_secs(1);
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The live page of a run.
 pub struct Live {
@@ -24,7 +24,7 @@ pub struct Live {
     address: SocketAddr,
     token: Option<String>,
     tls: Option<Tls>,
-    begun: OnceLock<(Arc<Feed>, Arc<Served>)>,
+    started: OnceLock<(Arc<Feed>, Arc<Served>)>,
 }
 
 impl Live {
@@ -39,7 +39,7 @@ impl Live {
         let listener = TcpListener::bind(address).map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;
         let token = if address.ip().is_loopback() { None } else { Some(token()?) };
-        Ok(Live { listener: Mutex::new(Some(listener)), address, token, tls, begun: OnceLock::new() })
+        Ok(Live { listener: Mutex::new(Some(listener)), address, token, tls, started: OnceLock::new() })
     }
 
     /// URL of the page. The token follows `#`, so that browsers never send it with the address.
@@ -54,8 +54,8 @@ impl Live {
     /// Network warning for the operator: other machines can connect, and all traffic is unencrypted.
     pub fn warning(&self) -> Option<&'static str> {
         (self.token.is_some() && self.tls.is_none()).then_some(
-            "the live page is open to other machines WITHOUT encryption: whoever listens on that net can read the readings and the token, \
-             and with the token press the buttons. Give --live-cert and --live-key, or stay on 127.0.0.1 and use a tunnel (ssh -L)",
+            "other computers can reach the live page WITHOUT encryption: everyone on the network can read the readings and the token, and use \
+             the buttons with the token. Use a certificate and a key, or serve on 127.0.0.1 and use a tunnel (ssh -L)",
         )
     }
 
@@ -63,42 +63,42 @@ impl Live {
     ///
     /// # Errors
     /// [`LiveError::Page`]: none in practice.
-    pub fn begin(&self, run: &LiveRun<'_>) -> Result<(), LiveError> {
+    pub fn start(&self, run: &LiveRun<'_>) -> Result<(), LiveError> {
         let Some(listener) = self.listener.lock().ok().and_then(|mut listener| listener.take()) else {
             return Ok(());
         };
         let feed = Arc::new(Feed::new(run));
-        let of_snapshot = feed.clone();
+        let feed_for_snapshots = feed.clone();
         let (operator, after_step, now) = (run.operator.clone(), run.after_step.clone(), run.now.clone());
-        let of_ask = feed.clone();
+        let feed_for_commands = feed.clone();
         let served = Arc::new(Served {
             page: live_page()?,
             access: Access::new(self.address, self.token.clone(), self.tls.is_some()),
             tls: self.tls.clone(),
             hub: Hub::default(),
-            snapshot: Box::new(move || of_snapshot.snapshot()),
+            snapshot: Box::new(move || feed_for_snapshots.snapshot()),
             ask: Box::new(move |asked| {
                 let what = match asked {
-                    Pressed::Hold => {
+                    OperatorCommand::Hold => {
                         operator.hold();
                         "the step is held"
                     }
-                    Pressed::GoOn => {
+                    OperatorCommand::Continue => {
                         operator.go_on();
-                        "the step goes on"
+                        "the step continues"
                     }
-                    Pressed::StopAfterStep => {
+                    OperatorCommand::StopAfterStep => {
                         after_step.store(true, Ordering::SeqCst);
                         "the run stops at the end of the step"
                     }
-                    Pressed::SafeNow => {
+                    OperatorCommand::SafeNow => {
                         after_step.store(true, Ordering::SeqCst);
                         now.store(true, Ordering::SeqCst);
                         "the rig goes into its safe state now"
                     }
                 };
                 operator.say(format!("operator, on the live page: {what}"));
-                of_ask.asked(asked);
+                feed_for_commands.show_command(asked);
             }),
             connections: Arc::default(),
         });
@@ -108,25 +108,25 @@ impl Live {
             .spawn(move || serve(&listener, &for_thread))
             .map_err(|source| LiveError::Listen { address: self.address, source })?;
         // This is the only start, because the listener was just taken.
-        let _ = self.begun.set((feed, served));
+        let _ = self.started.set((feed, served));
         Ok(())
     }
 
     /// Forwards a session event. Never waits for a browser.
     pub fn show(&self, event: &SessionEvent) {
-        let Some((feed, served)) = self.begun.get() else { return };
-        for message in feed.take(event) {
+        let Some((feed, served)) = self.started.get() else { return };
+        for message in feed.process(event) {
             served.hub.publish(&message);
         }
     }
 
     /// Reports the outcome and the run's page, and gives browsers a moment to receive them.
     pub fn end(&self, outcome: &str, page: Option<&std::path::Path>) {
-        let Some((feed, served)) = self.begun.get() else { return };
-        served.hub.publish(&feed.ended(outcome, page));
+        let Some((feed, served)) = self.started.get() else { return };
+        served.hub.publish(&feed.show_end(outcome, page));
         served.hub.close();
-        let until = Instant::now() + FAREWELL;
-        while served.connections.are_open() && Instant::now() < until {
+        let until = Instant::now() + CLOSE_TIMEOUT;
+        while served.connections.any_open() && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
     }

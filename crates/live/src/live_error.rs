@@ -13,7 +13,7 @@ pub enum LiveError {
         text: String,
     },
     /// The address is not available.
-    #[error("the live page cannot be served at {address}: {source}; choose another with `--live=ADDRESS`")]
+    #[error("the live page cannot be served at {address}: {source}; choose another address")]
     Listen {
         /// The address.
         address: SocketAddr,
@@ -21,7 +21,7 @@ pub enum LiveError {
         source: std::io::Error,
     },
     /// The system has no random numbers for a token.
-    #[error("the system gives no random numbers for a token: {0}")]
+    #[error("the system cannot generate random numbers for a token: {0}")]
     Token(getrandom::Error),
     /// The page could not be created: a defect of the program.
     #[error("failed to write the live page: {0}")]

@@ -11,9 +11,9 @@ use std::path::Path;
 #[cfg(feature = "foxglove")]
 use std::sync::OnceLock;
 
-/// Requested outputs.
+/// Outputs requested by the user.
 #[derive(Debug, Clone, Default)]
-pub struct Asked<'a> {
+pub struct ObserverRequest<'a> {
     /// Address of the page.
     pub page: Option<&'a str>,
     /// Certificate and key for TLS.
@@ -29,8 +29,8 @@ pub struct Observers<'a> {
     #[cfg(feature = "foxglove")]
     viewers: OnceLock<Viewers>,
     // Without the feature only the page uses it.
-    #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "viewers look at it"))]
-    asked: Asked<'a>,
+    #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "viewers use it"))]
+    asked: ObserverRequest<'a>,
 }
 
 impl<'a> Observers<'a> {
@@ -38,7 +38,7 @@ impl<'a> Observers<'a> {
     ///
     /// # Errors
     /// [`LiveError`] if the address is invalid or in use, or certificate and key are unusable.
-    pub fn open(asked: Asked<'a>) -> Result<Self, LiveError> {
+    pub fn open(asked: ObserverRequest<'a>) -> Result<Self, LiveError> {
         let page = asked.page.map(|address| Live::open(address, asked.tls.as_ref())).transpose()?;
         Ok(Observers {
             page,
@@ -49,12 +49,12 @@ impl<'a> Observers<'a> {
     }
 
     /// Whether the operator has buttons.
-    pub fn have_buttons(&self) -> bool {
+    pub fn has_operator_controls(&self) -> bool {
         self.page.is_some()
     }
 
     /// Whether any observer shows points as they are identified.
-    pub fn are_there(&self) -> bool {
+    pub fn show_points(&self) -> bool {
         #[cfg(feature = "foxglove")]
         if self.asked.viewers.is_some() {
             return true;
@@ -66,10 +66,10 @@ impl<'a> Observers<'a> {
     ///
     /// # Errors
     /// [`LiveError`] if the stream's address is not local or is in use.
-    pub fn begin(&self, run: &LiveRun<'_>) -> Result<Vec<String>, LiveError> {
+    pub fn start(&self, run: &LiveRun<'_>) -> Result<Vec<String>, LiveError> {
         let mut lines = Vec::new();
         if let Some(page) = &self.page {
-            page.begin(run)?;
+            page.start(run)?;
             lines.extend(page.warning().map(|warning| format!("warning: {warning}")));
             lines.push(format!("live page: {}", page.url()));
         }

@@ -7,9 +7,9 @@ use std::collections::VecDeque;
 /// Number of stored rows of readings, one per second of rig time.
 pub(crate) const TRACE_ROWS: usize = 300;
 /// Maximum number of stored events; the latest are kept.
-pub(crate) const EVENTS_MAX: usize = 200;
+pub(crate) const MAX_EVENTS: usize = 200;
 /// Maximum number of stored points, more than a night produces.
-pub(crate) const POINTS_MAX: usize = 2000;
+pub(crate) const MAX_POINTS: usize = 2000;
 
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct State {
@@ -25,7 +25,7 @@ pub(crate) struct State {
     pub(crate) duration_s: f64,
     pub(crate) pace: Option<f64>,
     /// Names and units of the columns of `rows`.
-    pub(crate) traced: Vec<Traced>,
+    pub(crate) traced: Vec<TracedChannel>,
     /// Run time, s, and readings.
     pub(crate) rows: VecDeque<Vec<Option<f64>>>,
     pub(crate) points: Vec<LivePoint>,
@@ -45,7 +45,7 @@ pub(crate) struct Units {
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct Traced {
+pub(crate) struct TracedChannel {
     pub(crate) name: String,
     pub(crate) unit: String,
 }

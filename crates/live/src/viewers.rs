@@ -15,7 +15,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 /// Queue length of one viewer, messages: three minutes of rig time.
-const WAITING_MAX: usize = 1024;
+const MAX_QUEUED_MESSAGES: usize = 1024;
 
 /// Topic of points identified separately during the run.
 const POINT_TOPIC: &str = "/point";
@@ -38,17 +38,15 @@ const POINT_FIELDS: [(&str, &str, &str); 9] = [
 pub enum ViewersError {
     /// The address is not a local one.
     #[error(
-        "`{text}` is not an address of this machine, such as 127.0.0.1:8765: viewers know no token, so that others get there by a \
-         tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
+        "`{text}` is not a local address, such as 127.0.0.1:8765, which is required because viewers send no token; other computers can connect \
+         by a tunnel (`ssh -L 8765:127.0.0.1:8765 STAND`)"
     )]
     Address {
         /// The given text.
         text: String,
     },
     /// The library cannot serve.
-    #[error(
-        "viewers cannot be served at {address}: {source}; choose another address with `--foxglove=ADDRESS`"
-    )]
+    #[error("viewers cannot be served at {address}: {source}; choose another address")]
     Serve {
         /// The address.
         address: SocketAddr,
@@ -86,12 +84,12 @@ impl Viewers {
         let topics = groups
             .map(|group| Topic::of_group(group, channels.iter().copied()))
             .chain([Topic::of_steps(), Topic::of_events(), point_topic()])
-            .filter_map(|topic| Some((topic.name, defined(&context, topic)?)))
+            .filter_map(|topic| Some((topic.name, define_topic(&context, topic)?)))
             .collect();
         let server = WebSocketServer::new()
             .name("mapper")
             .bind(address.ip().to_string(), address.port())
-            .message_backlog_size(WAITING_MAX)
+            .message_backlog_size(MAX_QUEUED_MESSAGES)
             .context(&context)
             .start_blocking()
             .map_err(|source| ViewersError::Serve { address, source })?;
@@ -110,23 +108,23 @@ impl Viewers {
         match event {
             SessionEvent::Readings { t_s, values } => {
                 for group in Group::ALL {
-                    self.say(group.topic(), *t_s, &readings_message(group, values));
+                    self.publish(group.topic(), *t_s, &readings_message(group, values));
                 }
             }
             SessionEvent::StepStarted(marker) => {
                 let (t_s, message) = step_message(marker, StepPhase::Start);
-                self.say("/step", t_s, &message);
+                self.publish("/step", t_s, &message);
             }
             SessionEvent::StepEnded(marker) => {
                 let (t_s, message) = step_message(marker, StepPhase::End);
-                self.say("/step", t_s, &message);
+                self.publish("/step", t_s, &message);
             }
             SessionEvent::Reported(event) => {
-                self.say("/event", event.t_s, &event_message(event));
+                self.publish("/event", event.t_s, &event_message(event));
             }
             SessionEvent::PointEstimated(point) => {
                 let t_s = point.window.map_or(0.0, |window| window.end_s);
-                self.say(POINT_TOPIC, t_s, &point_message(point));
+                self.publish(POINT_TOPIC, t_s, &point_message(point));
             }
             SessionEvent::RunStarted { .. }
             | SessionEvent::RigTime { .. }
@@ -137,7 +135,7 @@ impl Viewers {
         }
     }
 
-    fn say(&self, topic: &str, t_s: f64, message: &Value) {
+    fn publish(&self, topic: &str, t_s: f64, message: &Value) {
         let Some(channel) = self.topics.get(topic) else { return };
         // A run lasts days at most, so its nanoseconds fit.
         let log_time = self.start_time_ns.saturating_add((t_s.max(0.0) * 1e9).round() as u64);
@@ -146,7 +144,7 @@ impl Viewers {
 }
 
 /// Defines a topic for viewers; `None` if the library refuses it.
-fn defined(context: &Arc<Context>, topic: Topic) -> Option<Arc<RawChannel>> {
+fn define_topic(context: &Arc<Context>, topic: Topic) -> Option<Arc<RawChannel>> {
     let name = topic.name.trim_start_matches('/').replace('/', ".");
     ChannelBuilder::new(topic.name)
         .message_encoding("json")

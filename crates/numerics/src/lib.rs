@@ -1,8 +1,8 @@
-//! Numerics that know nothing of machines: statistics, noise with memory, damped least squares, minima and roots of
-//! scalar functions, nearest places, and work spread over the cores.
+//! General numerical methods for the physics and inference crates: [`statistics`], coloured noise, damped least squares, mixed models,
+//! minima and roots of scalar functions, and parallel work.
 //!
-//! A leaf: no other crate of the workspace is used here. What a library does as well is the library's: rayon shares the
-//! work, nalgebra solves the equations, statrs has the distributions.
+//! This crate uses no other crate of the workspace. It adds only what libraries do not offer: rayon distributes the work, nalgebra solves
+//! linear equations, statrs has the distributions.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

@@ -1,11 +1,10 @@
 //! The minimum of a scalar function on an interval.
 
-/// Evaluations after which the search ends wherever it is: golden section alone halves an interval in less than two, so
-/// that these are enough for all digits.
+/// Maximum number of evaluations. Golden section alone halves an interval in less than two, so that this is enough for all digits.
 const MAX_EVALUATIONS: usize = 200;
 /// The golden section's smaller part of an interval: (3 - sqrt(5)) / 2.
 const SECTION: f64 = 0.381_966_011_250_105_1;
-/// Relative distance below which values of a smooth function are all the same: square root of the rounding.
+/// Relative distance below which values of a smooth function cannot be distinguished: the square root of the rounding error.
 const RESOLUTION: f64 = 1.5e-8;
 
 /// Minimum of a function: its place and the value there.
@@ -19,9 +18,9 @@ pub struct Minimum {
 
 /// The minimum of `f` between `low` and `high` (finite, rising) to within `tolerance`, in the unit of the interval.
 ///
-/// Parabolas through the three best places, and golden section where they do not help: superlinear for smooth functions,
-/// never much slower than golden section. Finds one minimum; with several, sweep the interval before. Ends are never
-/// evaluated themselves. Values that are not finite count as larger than all others.
+/// Fits parabolas through the three best points, and uses golden section if they do not help: superlinear for smooth functions, never much
+/// slower than golden section. Finds one local minimum; if there may be several, search the interval on a grid first. The ends are never
+/// evaluated. Values that are not finite count as larger than all others.
 ///
 /// Source: R. P. Brent, Algorithms for Minimization without Derivatives (1973), chapter 5, procedure `localmin`.
 pub fn minimise(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) -> f64) -> Minimum {
@@ -83,7 +82,7 @@ pub fn minimise(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) -> f
     best
 }
 
-/// From `best` to the vertex of the parabola through the three; `None` where they make none.
+/// Step from `best` to the vertex of the parabola through the three points; `None` if they are on a line.
 fn parabola(best: Minimum, second: Minimum, third: Minimum) -> Option<f64> {
     let r = (best.at - second.at) * (best.value - third.value);
     let q = (best.at - third.at) * (best.value - second.value);

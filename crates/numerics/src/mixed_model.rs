@@ -1,9 +1,9 @@
-//! Linear mixed models with crossed groups: what every observation shares, what the members of a group share, and the rest.
+//! Linear mixed models with crossed groups: fixed effects, random effects of the groups, and the residual.
 
 use crate::minimise::minimise;
 use nalgebra::{DMatrix, DVector};
 
-/// Rounds of one variance after the other. Crossed groups hardly see each other: a few are enough.
+/// Iterations over the variances. A few are enough, because crossed groups hardly interact.
 const ROUNDS: usize = 60;
 /// Change of a share at which the rounds end.
 const SETTLED: f64 = 1e-7;
@@ -11,17 +11,17 @@ const SETTLED: f64 = 1e-7;
 const LARGEST_RATIO: f64 = 1e4;
 /// Part of the sum of squares below which nothing is left but rounding.
 const ROUNDING: f64 = 1e-14;
-/// Part of a column's square that the others leave, below which they say the same.
+/// Share of a column's square that is independent of the other columns; below this they count as linearly dependent.
 const COLLINEAR: f64 = 1e-12;
 
-/// A level is a place in a list: one beyond is a mistake, not a wish for memory.
+/// Maximum level; a larger one is a mistake in the data and would need too much memory.
 const MAX_LEVELS: usize = 100_000;
 
 /// Observations `y = fixed * coefficients + sum of the effect of each group's level + rest`, all effects and the rest independent and
 /// normal, the rest equally wide everywhere.
 #[derive(Debug, Clone)]
 pub struct MixedModel<'a> {
-    /// What is explained, n values in any unit.
+    /// The response, n values in any unit.
     pub y: &'a [f64],
     /// n rows, a column for each coefficient; of full rank.
     pub fixed: DMatrix<f64>,
@@ -29,7 +29,7 @@ pub struct MixedModel<'a> {
     pub groups: Vec<&'a [usize]>,
 }
 
-/// What was fitted. Units are those of `y`, over that of a column of `fixed` for coefficients.
+/// Result of a fit, in the unit of `y`; coefficients are per unit of their column of `fixed`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MixedFit {
     /// Coefficients of `fixed`.
@@ -38,11 +38,11 @@ pub struct MixedFit {
     pub group_sigmas: Vec<f64>,
     /// Standard deviation of the rest.
     pub rest_sigma: f64,
-    /// The effect of each level of each group, drawn towards 0 by what is not known of it (best linear unbiased prediction).
+    /// The effect of each level of each group, shrunk towards 0 (best linear unbiased prediction).
     pub effects: Vec<Vec<Effect>>,
 }
 
-/// One number and how well it is known.
+/// An estimate with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
     /// The number.
@@ -58,7 +58,7 @@ pub enum NoFit {
     TooFew,
     /// Rows, levels and values are not of one length, or a value is not finite.
     Form,
-    /// Columns of `fixed` say the same.
+    /// Columns of `fixed` are linearly dependent.
     Collinear,
 }
 
@@ -197,8 +197,8 @@ impl Sums {
         solved.log_determinant + free * solved.square.ln()
     }
 
-    /// Solves the equations. Effects are counted in standard deviations of their group, so that one without any causes no
-    /// division by zero.
+    /// Solves the equations. Effects are scaled by the standard deviation of their group, so that a zero variance causes no division by
+    /// zero.
     fn solve(&self, shares: &[f64]) -> Option<Solved> {
         let p = self.coefficients;
         let first_ratio = ratio(shares[0]);

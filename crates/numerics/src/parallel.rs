@@ -1,7 +1,7 @@
-//! Independent work spread over the cores.
+//! Parallel execution of independent work.
 //!
-//! Results come in the order of the items, whoever finished first, so that nothing depends on the number of cores. A panic
-//! in a worker is a panic of the caller: no result can go missing. Work is shared out by rayon, item by item.
+//! Results are in the order of the items, so that nothing depends on the number of cores. A panic in a worker becomes a panic of the
+//! caller, so that no result is lost.
 
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -9,17 +9,17 @@ use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// `work` on every item, on rayon's pool: as many threads as there are cores unless the program, or `RAYON_NUM_THREADS`, says
-/// otherwise. May be nested.
+/// `work` on every item, on rayon's pool: as many threads as there are cores unless the program, or `RAYON_NUM_THREADS`, says otherwise.
+/// Calls may be nested.
 ///
-/// While a worker waits for a nested call it may begin another item: long work whose number at a time matters belongs to
-/// [`try_map_on`].
+/// A worker that waits for a nested call may start another item. Use [`try_map_on`] for long work with a limited number of concurrent
+/// items.
 pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     items.par_iter().with_max_len(1).map(&work).collect()
 }
 
-/// The same with work that may fail. After a failure no later item is begun; items before it are still done, so that the
-/// error is that of the first item that fails, whatever the number of cores.
+/// The same with work that may fail. After a failure no later item is started. Earlier items are still finished, so that the returned error
+/// is that of the first failing item for any number of cores.
 ///
 /// # Errors
 /// That of the first item whose work fails.
@@ -81,7 +81,7 @@ where
             results.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
         }
     };
-    // Not rayon: a worker that waits for nested work would take up another item, and hold two.
+    // Not rayon, because a worker that waits for nested work would start another item and hold two.
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads.clamp(1, items.len().max(1))).map(|_| scope.spawn(run)).collect();
         for worker in workers {
@@ -95,8 +95,8 @@ where
     results.into_iter().map(|(_, result)| result).collect()
 }
 
-/// `work` with at most so many threads for all its [`map`] and [`try_map`]: one of several long pieces of work that share the
-/// cores out among themselves. If no threads are available, it runs on those of the whole program.
+/// `work` with at most so many threads for all its [`map`] and [`try_map`]: for long pieces of work that share the cores. If no threads are
+/// available, it runs on those of the whole program.
 pub fn confined<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
         Ok(pool) => pool.install(work),

@@ -17,7 +17,7 @@ impl NearestOnPolyline {
     /// Nearest place of the polyline through `vertices` to `point`; the first of several as near. `None` for less than two
     /// vertices, or coordinates that are not numbers.
     pub fn of(vertices: &[(f64, f64)], point: (f64, f64)) -> Option<Self> {
-        // A hair's breadth beyond an end is rounding.
+        // A tiny distance beyond an end is rounding error.
         const HAIR: f64 = 1e-6;
         let last = vertices.len().checked_sub(2)?;
         let on = |(segment, pair): (usize, &[(f64, f64)])| {

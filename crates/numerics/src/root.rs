@@ -24,7 +24,7 @@ pub fn root_between(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) 
             break;
         }
         let secant = b - fb * width / (fb - fa);
-        // Every third step bisects, so that the bracket halves however bent the function is.
+        // Every third step bisects, so that the bracket shrinks for any shape of the function.
         let inside = iteration % 3 != 2 && (secant - a) * (secant - b) < 0.0;
         let x = if inside { secant } else { a + 0.5 * width };
         let fx = f(x);
@@ -48,8 +48,8 @@ pub fn root_between(low: f64, high: f64, tolerance: f64, mut f: impl FnMut(f64) 
 /// The two ends of the interval, at most `tolerance` wide or of neighbouring floats, in which `is_low` changes from true to
 /// false; in the unit of `low` and `high`, which are finite and rise.
 ///
-/// Bisection: `low` is taken to be low and `high` not, without a look. If the condition changes more than once, one of the
-/// changes is found.
+/// Bisection. The condition is assumed to be true at `low` and false at `high`, without evaluation. If it changes more than once, one of
+/// the changes is found.
 pub fn bisect(low: f64, high: f64, tolerance: f64, mut is_low: impl FnMut(f64) -> bool) -> (f64, f64) {
     let (mut low, mut high) = (low, high);
     while high - low > tolerance {

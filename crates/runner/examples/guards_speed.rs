@@ -6,8 +6,8 @@
 #![allow(clippy::print_stdout, reason = "it is there to print")]
 
 use mapper_core::{
-    Backend, BackendError, CHANNELS, Channel, ChannelColumn, GuardName, MadeFrom, OperatingPoint, Plan,
-    PlanFigures, PlanStep, Predicted, Reaction, RigDescription, SafeTrajectory, SampleBatch, Setpoints,
+    Backend, BackendError, CHANNELS, Channel, ChannelColumn, GuardName, OperatingPoint, Plan, PlanFigures,
+    PlanInputHashes, PlanStep, Predicted, Reaction, RigDescription, SafeTrajectory, SampleBatch, Setpoints,
     SignalGuard, StepKind, SurgeVariation, UnpacedClock,
 };
 use mapper_runner::{
@@ -109,7 +109,7 @@ fn plan() -> Plan {
         campaign: "hour".to_owned(),
         objective: "listed".to_owned(),
         seed: 1,
-        made_from: MadeFrom {
+        made_from: PlanInputHashes {
             campaign_sha256: String::new(),
             model_sha256: String::new(),
             script_sha256: None,

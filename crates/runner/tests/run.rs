@@ -6,9 +6,9 @@ mod faults;
 
 use mapper_backends::virtual_lab::{LabSettings, VirtualLab};
 use mapper_core::{
-    Backend, BackendError, Channel, Event, EventKind, GuardName, MadeFrom, OperatingPoint, PacedClock, Plan,
-    PlanFigures, PlanStep, Predicted, Quality, Reaction, RigDescription, SampleBatch, Setpoints, SignalGuard,
-    StepKind, StepMarker, UnpacedClock, Wall,
+    Backend, BackendError, Channel, Event, EventKind, GuardName, OperatingPoint, PacedClock, Plan,
+    PlanFigures, PlanInputHashes, PlanStep, Predicted, Quality, Reaction, RigDescription, SampleBatch,
+    Setpoints, SignalGuard, StepKind, StepMarker, UnpacedClock, Wall,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
@@ -38,7 +38,7 @@ fn plan() -> Plan {
         campaign: "test".to_owned(),
         objective: "listed".to_owned(),
         seed: 1,
-        made_from: MadeFrom {
+        made_from: PlanInputHashes {
             campaign_sha256: String::new(),
             model_sha256: String::new(),
             script_sha256: None,

@@ -19,7 +19,7 @@ use mapper_core::{
     SafeTrajectory, SampleBatch, Setpoints, UnpacedClock, Wall,
 };
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
-use mapper_session::{BrokenOff, Registry, RunRequest, Session, SessionEvent};
+use mapper_session::{InterruptedRun, Registry, RunRequest, Session, SessionEvent};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -247,7 +247,7 @@ fn run(text: &str, parent: &Path, real_time: bool, stop_at: usize, resume: Optio
         _ => {}
     };
     let session = Session { on_event: &on_event, stop: &stop, ..Session::new(&registry) };
-    let resume = resume.map(|run| BrokenOff::read(run).unwrap());
+    let resume = resume.map(|run| InterruptedRun::read(run).unwrap());
     let request = RunRequest { resume, ..RunRequest::new(&campaign, text, parent) };
     let prepared = session.prepare(request).unwrap();
     let steps = &prepared.plan().steps;

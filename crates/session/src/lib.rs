@@ -1,7 +1,8 @@
-//! The application as a library, without argument parsing and text output.
+//! The application as a library: plans and runs campaigns, identifies recordings, and writes maps and reports.
 //!
-//! A [`Session`] gets its plug-ins, an observer and a stop flag from its creator. The command line, nightly runs, blind cases and any other
-//! program use the same session. A complete campaign, from its file to its map:
+//! For programs that offer these operations to users: the command line, the Python package, nightly runs and blind cases. Each creates a
+//! [`Session`] with its plug-ins, an observer and stop flags. The library neither parses arguments nor prints. A complete campaign, from its
+//! file to its map:
 //!
 //! ```
 //! use mapper_backends::virtual_lab;
@@ -22,8 +23,10 @@
 //! let (campaign, text) = (mapper_campaign::load(file)?, mapper_campaign::read_text(file)?);
 //! let runs = tempfile::tempdir()?;
 //! let results = session.run(RunRequest::new(&campaign, &text, runs.path()))?.results?;
-//! for scored in results.points.iter().filter(|scored| scored.point.eta.is_some()) {
-//!     println!("{:?} h = {:?} W/(m2 K)", scored.point.eta, scored.point.h_w_m2k);
+//! for point in results.points.iter().map(|scored| &scored.point) {
+//!     if let (Some(eta), Some(h_w_m2k)) = (point.eta, point.h_w_m2k) {
+//!         println!("eta = {eta:.3}, h = {h_w_m2k:.0} W/(m2 K)");
+//!     }
 //! }
 //! let map = results.compressor_map.ok_or("no map")?;
 //! assert_eq!(map.lines.len(), 6, "one line for each speed of the grid");
@@ -71,28 +74,28 @@ pub use mapper_diagnose::driven::cause_search::Which;
 pub use mapper_maps::table::DescriptionError;
 pub use mapper_report::with_messages;
 pub use mapper_runner::Operator;
-pub use nights::night_report::{keep_night_report, night_report_link, night_report_path};
+pub use nights::night_report::{night_report_link, night_report_path, write_night_report};
 pub use nights::nightly::PreparedNight;
 pub use nights::nightly_run::NightlyRun;
-pub use plan::campaign_forecast::Prospects;
+pub use plan::campaign_forecast::CampaignForecast;
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of};
 pub use plan::rehearsal::{Rehearsal, rehearse};
 pub use plan::stored_plan::stored_plan;
 pub use plan::surge::{SurgeForecast, surge_forecast};
 pub use recording::files::{Existing, json_text, write_file, write_new};
 pub use recording::identification_config::identification;
-pub use recording::log_inspection::{Inspected, inspect_log};
+pub use recording::log_inspection::{LogInspection, inspect_log};
 pub use recording::program::{PROGRAM, program_and_commit};
 pub use recording::recording_file::{Recorded, channel_map};
-pub use recording::resume::BrokenOff;
+pub use recording::resume::InterruptedRun;
 pub use registry::{MakeDriver, ReadEffect, Registry};
 pub use rig::drive::{Pace, drive, drive_paced, soak_s};
-pub use rig::rig_state::{Latch, Owner, RigStates, RigStatus, shared_state};
+pub use rig::rig_state::{Lockout, Owner, RigStates, RigStatus, shared_state_directory};
 pub use rig::sources::Sources;
 pub use run::prepared_run::{PreparedRun, RunOutcome, RunRequest};
 pub use run::recording_metadata::start_time_ns;
-pub use run::run_end::Ended;
-pub use run::run_stop::{Phase, RunStop, Signalled};
+pub use run::run_end::RunTermination;
+pub use run::run_stop::{Phase, RunStop, SignalResponse};
 pub use session::Session;
 pub use variant::{Variant, VariantError};
 

@@ -18,7 +18,7 @@ pub type ReadEffect = fn(&Path) -> Result<Arc<dyn Effect>, SessionError>;
 /// Creates a driver, a backend that is not a plug-in, from its name and settings.
 pub type MakeDriver = fn(&str, &serde_json::Value) -> Result<Box<dyn Backend>, BackendError>;
 
-/// All plug-ins of a session, and the commit of the program that creates it.
+/// All plug-ins of a session, and the source commit of the program that creates it.
 #[derive(Clone)]
 pub struct Registry {
     /// Rigs, real and simulated.
@@ -53,7 +53,7 @@ impl Default for Registry {
 }
 
 fn no_effect(path: &Path) -> Result<Arc<dyn Effect>, SessionError> {
-    Err(SessionError::EffectUnread { path: path.to_owned() })
+    Err(SessionError::EffectFilesUnsupported { path: path.to_owned() })
 }
 
 impl Registry {
@@ -62,18 +62,18 @@ impl Registry {
     /// # Errors
     /// [`SessionError::Backend`] if the name is unknown or the settings are wrong.
     pub fn make_backend(&self, campaign: &Campaign, model: &Model) -> Result<Box<dyn Backend>, SessionError> {
-        self.made(&campaign.backend, campaign, model).map_err(SessionError::Backend)
+        self.make_named_backend(&campaign.backend, campaign, model).map_err(SessionError::Backend)
     }
 
     /// Setpoint ranges of a campaign's rig, if they are known without starting a driver.
-    pub(crate) fn accepts(&self, campaign: &Campaign, model: &Model) -> Option<SetpointRanges> {
+    pub(crate) fn setpoint_ranges(&self, campaign: &Campaign, model: &Model) -> Option<SetpointRanges> {
         let BackendChoice { name, settings, .. } = &campaign.backend;
         let nominal = nominal_rig(campaign, model, &self.effects);
         BackendPlugin::make_by_name(&self.backends, name, &nominal, settings).ok()?.describe().accepts
     }
 
     /// Creates one backend by name.
-    pub(crate) fn made(
+    pub(crate) fn make_named_backend(
         &self,
         wanted: &BackendChoice,
         campaign: &Campaign,
@@ -98,7 +98,7 @@ impl Registry {
             let scripted = (self.read_effect)(path)?;
             let id = &scripted.info().id;
             if effects.iter().any(|effect| effect.info().id == *id) {
-                return Err(SessionError::EffectTaken { path: path.clone(), id: id.to_string() });
+                return Err(SessionError::DuplicateEffect { path: path.clone(), id: id.to_string() });
             }
             effects.push(scripted);
         }

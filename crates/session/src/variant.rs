@@ -1,4 +1,4 @@
-//! Variants of a machine: a nightly campaign runs them in turn instead of the nominal machine.
+//! Variants of a machine, which a nightly campaign runs in turn instead of the nominal machine.
 
 use mapper_campaign::Campaign;
 use serde::{Deserialize, Serialize};
@@ -8,11 +8,11 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Column of the serial number.
-const NAME: &str = "serial_number";
+const SERIAL_NUMBER_COLUMN: &str = "serial_number";
 /// Maximum size of a table of machines, bytes.
-const SIZE_LIMIT: u64 = 10_000_000;
+const MAX_TABLE_BYTES: u64 = 10_000_000;
 /// Maximum number of settings of one machine.
-const COLUMNS_LIMIT: usize = 64;
+const MAX_COLUMNS: usize = 64;
 /// First seed of drawn machines, far above those of campaigns. A machine keeps its own seed for any number of drawn machines.
 const FIRST_DRAWN_SEED: u64 = 1_000_000;
 
@@ -38,7 +38,7 @@ pub enum VariantError {
         source: std::io::Error,
     },
     /// The table is too large.
-    #[error("{} has {bytes} bytes; a table of machines has at most {SIZE_LIMIT}", .path.display())]
+    #[error("{} has {bytes} bytes; a table of machines has at most {MAX_TABLE_BYTES}", .path.display())]
     TooLarge {
         /// The table.
         path: PathBuf,
@@ -84,7 +84,7 @@ impl Variant {
     pub fn read(path: &Path) -> Result<Vec<Variant>, VariantError> {
         let unread = |source| VariantError::Read { path: path.to_owned(), source };
         let bytes = std::fs::metadata(path).map_err(unread)?.len();
-        if bytes > SIZE_LIMIT {
+        if bytes > MAX_TABLE_BYTES {
             return Err(VariantError::TooLarge { path: path.to_owned(), bytes });
         }
         let mut text = String::new();
@@ -98,7 +98,7 @@ impl Variant {
             (1..).zip(text.lines()).find(|(_, line)| !line.starts_with('#')).unwrap_or((1, ""));
         let delimiter = if header.contains(';') { ';' } else { ',' };
         let wrong_at = |line: u64, column: usize, problem: &str| {
-            wrong(format!("{problem}\n{}", shown(text, line, column, delimiter)))
+            wrong(format!("{problem}\n{}", mark_cell(text, line, column, delimiter)))
         };
         // A row with too few or too many cells is marked after its last cell.
         let form = |error: csv::Error| match error.kind() {
@@ -115,11 +115,15 @@ impl Variant {
             .trim(csv::Trim::All)
             .from_reader(text.trim_start_matches('\u{feff}').as_bytes());
         let columns: Vec<String> = reader.headers().map_err(form)?.iter().map(str::to_owned).collect();
-        let Some(name) = columns.iter().position(|column| column == NAME) else {
-            return Err(wrong_at(at, 0, &format!("no column is called `{NAME}`; name each machine in one")));
+        let Some(name) = columns.iter().position(|column| column == SERIAL_NUMBER_COLUMN) else {
+            return Err(wrong_at(
+                at,
+                0,
+                &format!("no column is called `{SERIAL_NUMBER_COLUMN}`; name each machine in one"),
+            ));
         };
-        if columns.len() > COLUMNS_LIMIT {
-            return Err(wrong(format!("{} columns; at most {COLUMNS_LIMIT} are allowed", columns.len())));
+        if columns.len() > MAX_COLUMNS {
+            return Err(wrong(format!("{} columns; at most {MAX_COLUMNS} are allowed", columns.len())));
         }
         if let Some(twice) = columns.iter().enumerate().find(|(i, column)| columns[..*i].contains(column)) {
             return Err(wrong_at(at, twice.0, &format!("the column `{}` appears twice", twice.1)));
@@ -130,7 +134,11 @@ impl Variant {
             let line = row.position().map_or(0, csv::Position::line);
             let serial_number = row.get(name).unwrap_or_default().to_owned();
             if serial_number.is_empty() {
-                return Err(wrong_at(line, name, &format!("line {line}: the machine has no `{NAME}`")));
+                return Err(wrong_at(
+                    line,
+                    name,
+                    &format!("line {line}: the machine has no `{SERIAL_NUMBER_COLUMN}`"),
+                ));
             }
             if !names.insert(serial_number.clone()) {
                 let twice = format!("line {line}: the machine {serial_number} appears twice");
@@ -150,7 +158,7 @@ impl Variant {
     }
 
     /// Machines drawn from the campaign's declared tolerances. Repeated calls return the same machines.
-    pub fn drawn(campaign: &Campaign, count: usize) -> Vec<Variant> {
+    pub fn draw(campaign: &Campaign, count: usize) -> Vec<Variant> {
         let kind = campaign.machine.serial_number.as_deref().unwrap_or(&campaign.machine.name);
         (0..count)
             .map(|index| Variant {
@@ -167,7 +175,7 @@ impl Variant {
     ///
     /// # Errors
     /// [`VariantError::Occupied`]. The backend itself checks for unknown settings.
-    pub fn put_into(&self, campaign: &mut Campaign) -> Result<(), VariantError> {
+    pub fn apply_to(&self, campaign: &mut Campaign) -> Result<(), VariantError> {
         campaign.machine.serial_number = Some(self.serial_number.clone());
         for (key, text) in &self.settings {
             let mut at = &mut campaign.backend.settings;
@@ -182,14 +190,14 @@ impl Variant {
                 };
                 at = map.entry(part).or_insert(Value::Null);
             }
-            *at = value(text);
+            *at = parse_cell(text);
         }
         Ok(())
     }
 }
 
 /// A line of the table with a caret below the start of a cell, or after the last cell.
-fn shown(text: &str, line: u64, column: usize, delimiter: char) -> String {
+fn mark_cell(text: &str, line: u64, column: usize, delimiter: char) -> String {
     let number = line.to_string();
     let index = usize::try_from(line.saturating_sub(1)).unwrap_or(usize::MAX);
     let line = text.lines().nth(index).unwrap_or_default();
@@ -199,7 +207,7 @@ fn shown(text: &str, line: u64, column: usize, delimiter: char) -> String {
 }
 
 /// A cell as YAML would read it: a number, or text.
-fn value(text: &str) -> Value {
+fn parse_cell(text: &str) -> Value {
     if let Ok(whole) = text.parse::<u64>() {
         return json!(whole);
     }
@@ -255,7 +263,7 @@ mod tests {
             [("deviations.convection", "+5 %"), ("machine.alpha_area", "0.1"), ("tolerances_seed", "7")];
         let settings = settings.map(|(key, text)| (key.to_owned(), text.to_owned())).into();
         let machine = Variant { serial_number: "X-1".to_owned(), settings };
-        machine.put_into(&mut campaign).unwrap();
+        machine.apply_to(&mut campaign).unwrap();
         assert_eq!(
             campaign.backend.settings,
             json!({
@@ -266,7 +274,7 @@ mod tests {
         assert_eq!(campaign.machine.serial_number.as_deref(), Some("X-1"));
         let settings = [("noise.of.t2".to_owned(), "1".to_owned())].into();
         let error =
-            Variant { serial_number: "X-2".to_owned(), settings }.put_into(&mut campaign).unwrap_err();
+            Variant { serial_number: "X-2".to_owned(), settings }.apply_to(&mut campaign).unwrap_err();
         assert!(error.to_string().contains("noise.of.t2"), "{error}");
     }
 }

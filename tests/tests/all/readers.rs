@@ -70,8 +70,8 @@ fn mistakes_of_readers_are_reported_at_their_place() {
     let recording = made_once(&other).run.join("recording.mcap");
     let replay = format!("{{replay: {{recording: {}}}}}", recording.display());
     for (readers, words) in [
-        ("  bench: {backend: {virtual_lab: {}}, channels: [T2]}\n".to_owned(), "a reader is only read"),
-        (format!("  bench: {{backend: {replay}}}\n"), "is given by the rig too"),
+        ("  bench: {backend: {virtual_lab: {}}, channels: [T2]}\n".to_owned(), "is only read"),
+        (format!("  bench: {{backend: {replay}}}\n"), "also comes from the rig"),
         (format!("  bench: {{backend: {replay}, channels: [T9]}}\n"), "no channel is called `T9`"),
         (
             format!(

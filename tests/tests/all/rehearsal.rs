@@ -376,7 +376,7 @@ fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
     // The campaign is the same to the letter; the rig behind the driver is not.
     std::fs::copy(&other.path, &built_in.path).unwrap();
     let refused = run(&["--plan", plan.to_str().unwrap()]);
-    assert!(refused.stderr.contains("what the rig says of itself changed since"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("description of the rig"), "{}", refused.stderr);
     assert_ne!(refused.code, Some(0));
 
     // Broken off behind its second step, the run does not go on there either; on its own rig it does.
@@ -390,7 +390,7 @@ fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
     let resume =
         || done(with_drivers(&["run".as_ref(), "--resume".as_ref(), broken.as_os_str(), "--json".as_ref()]));
     let refused = resume().exits(4);
-    assert!(refused.stderr.contains("what the rig says of itself"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("description of the rig"), "{}", refused.stderr);
     std::fs::write(&built_in.path, &built_in.text).unwrap();
     let points = resume().exits(0).json()["points"].as_array().unwrap().len();
     assert_eq!(points, 5, "four points and the first again");

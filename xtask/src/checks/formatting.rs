@@ -1,4 +1,4 @@
-//! Formatting of every file, those included that `cargo fmt` does not see.
+//! Formats or checks every Rust file, including those that `cargo fmt` does not find.
 
 use crate::error::Error;
 use crate::step::{command, run};

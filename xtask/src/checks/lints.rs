@@ -1,4 +1,4 @@
-//! Lints, and the documentation from the libraries that they have checked.
+//! Lints and documentation.
 
 use crate::step::command;
 use crate::workspace;
@@ -13,8 +13,8 @@ pub fn lints(features: &[&str]) -> Command {
 
 /// The documentation of the members of the workspace, with warnings denied.
 ///
-/// The environment is the one that `cargo clippy` gives to the compiler: with it Cargo takes the members as the lints have checked
-/// them, and without it each is checked again. Should another release of clippy use other variables, that is all that happens.
+/// Uses the environment variables that `cargo clippy` sets, so that Cargo reuses its results. If a release of clippy uses other variables,
+/// the members are only checked again.
 pub fn documentation() -> Command {
     let head = ["doc", "--no-deps", "--workspace", "--all-features", "--quiet"];
     let mut documentation = command(workspace::cargo(), &head);

@@ -8,8 +8,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Types, style, tests and notebooks, with the package put together from its Python files and the debug build. The wheel differs in
-/// the optimisation alone; building it would double the time.
+/// Checks types, style, tests and notebooks of the package, assembled from its Python files and the debug build. The wheel differs only in
+/// optimisation, and building it would double the time.
 pub fn check(offered: &Offered) -> Result<(), Error> {
     let home = workspace::target_dir().join("python-package");
     let package = home.join("mapper");
@@ -32,7 +32,7 @@ pub fn check(offered: &Offered) -> Result<(), Error> {
         run(of(&["-m", "mypy"]))?;
         run(of(&["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]))
     };
-    // Both at once: neither keeps two processors busy.
+    // Run in parallel, because each uses only one processor.
     let (tested, executed) = std::thread::scope(|scope| {
         let tests = scope.spawn(tests);
         let executed = execute_notebooks(&of);

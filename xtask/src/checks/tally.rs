@@ -12,12 +12,12 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Adds what a line says; most say nothing.
+    /// Adds the counts of a line, if it has any.
     pub fn count(&mut self, line: &str) {
         let line = line.trim_start();
         let counts = match line.strip_prefix("test result: ") {
             Some(counts) => counts,
-            // Of the line `Summary [ 1.2s] 12 tests run: 11 passed (1 slow), 1 failed, 2 skipped` what is after the colon.
+            // The part after the colon of `Summary [ 1.2s] 12 tests run: 11 passed (1 slow), 1 failed, 2 skipped`.
             None if line.starts_with("Summary [") => {
                 line.split_once("run: ").map_or("", |(_, counts)| counts)
             }

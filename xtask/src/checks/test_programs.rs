@@ -1,4 +1,4 @@
-//! Test programs run and counted.
+//! Runs test programs and counts their tests.
 
 use crate::checks::tally::Tally;
 use crate::error::Error;
@@ -57,7 +57,7 @@ pub fn run(mut command: Command, tally: &mut Tally) -> Result<bool, Error> {
     Ok(child.wait().map_err(start)?.success())
 }
 
-/// The line that says it all.
+/// Prints the summary line.
 pub fn close(tally: &Tally, well: bool) {
     let verdict = if well { "ok" } else { "FAILED" };
     let Tally { passed, failed, ignored } = tally;

@@ -1,4 +1,4 @@
-//! `cargo xtask docs`: documents that the program itself writes.
+//! `cargo xtask docs`: generates documents with the program.
 
 use crate::constants;
 use crate::error::Error;
@@ -18,7 +18,7 @@ pub enum Mode {
     Check,
 }
 
-/// What is generated below docs: files, and folders with all that is in them.
+/// Generated files and folders below docs.
 const GENERATED: &[&str] = &[
     "images/plan.svg",
     "images/turbo_a.svg",
@@ -53,14 +53,14 @@ measurements; press it again to stop immediately.
 
 /// Writes or checks everything that is generated.
 pub fn docs(mode: Mode) -> Result<(), Error> {
-    // Made next to the real ones, and compared by content: whether there is a git, and what it knows, does not matter.
+    // The documents are made in another directory and compared by content, independently of git.
     let made = workspace::target_dir().join("xtask-docs");
     let docs = workspace::root().join("docs");
     if made.exists() {
         fs::remove_dir_all(&made).map_err(at(&made))?;
     }
     let programs = build()?;
-    // Side by side: each has one core to do.
+    // In parallel, because each uses one core.
     let (reproduced, others) = std::thread::scope(|scope| {
         let others = scope.spawn(|| {
             for page in ["sequences", "campaign"] {
@@ -155,7 +155,7 @@ fn mapped(programs: &Programs, made: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// What the program makes of measured data: text and picture.
+/// Results of the program for measured data: text and picture.
 fn measured(programs: &Programs, made: &Path) -> Result<(), Error> {
     let file = |name: &str| format!("{MEASURED}/{name}");
     let out = workspace::target_dir().join("xtask-docs-measured");
@@ -180,11 +180,10 @@ struct Programs {
     reference_docs: PathBuf,
 }
 
-/// Builds them as the tests are built: what is computed is the same to the bit in every profile, and a clone that is
-/// being worked on has most of it already.
+/// Builds them with the profile of the tests: results are identical in every profile, and most of the build usually exists already.
 fn build() -> Result<Programs, Error> {
-    // The whole workspace and a test of it are named so that libraries have the features that they have in the tests. One
-    // test: with all of them, those that depend on what the machine offers would be built again without that.
+    // Names the whole workspace and one test, so that libraries have the same features as in the tests. With all tests, those that depend
+    // on capabilities of the computer would be rebuilt.
     let arguments =
         ["build", "--quiet", "--workspace", "--all-features", "--test", "turbine", "--bin", "mapper"];
     let examples = ["--example", EXAMPLE];

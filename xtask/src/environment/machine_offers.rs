@@ -1,10 +1,10 @@
-//! What this machine offers to tests that need more than Rust.
+//! Capabilities of this computer for tests that need more than Rust.
 
 use crate::{environment::machine, workspace};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// What was found.
+/// The capabilities.
 pub struct Offered {
     /// A Python with the packages of the tests.
     pub python: PathBuf,
@@ -17,7 +17,7 @@ pub struct Offered {
 }
 
 impl Offered {
-    /// With this Python.
+    /// Detects the capabilities; `python` is the Python of the tests.
     pub fn with(python: PathBuf) -> Self {
         Offered {
             python,
@@ -27,7 +27,7 @@ impl Offered {
         }
     }
 
-    /// A command that knows of it. All commands that build get the same, so that nothing is built again.
+    /// Passes the capabilities to a command as environment variables. All build commands get the same, so that nothing is rebuilt.
     pub fn to(&self, mut command: Command) -> Command {
         command.env("MAPPER_TEST_PYTHON", &self.python);
         command.env("MAPPER_TEST_CHROMIUM", "chromium");

@@ -1,4 +1,4 @@
-//! A Python of the tests' own, with the packages of tests/python/requirements.txt and no others.
+//! The Python environment of the tests, with only the packages of tests/python/requirements.txt.
 
 use crate::error::Error;
 use crate::step::{self, command, run, say};
@@ -6,7 +6,7 @@ use crate::workspace;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What the pinned numpy and scipy ask for.
+/// Minimum version of Python for the pinned numpy and scipy.
 const OLDEST: (&str, &str) = ("3.11", "(3, 11)");
 
 /// Its Python, whether it has been made or not.
@@ -18,11 +18,11 @@ fn home() -> PathBuf {
     workspace::target_dir().join("python-env")
 }
 
-/// Makes the environment, or keeps the one that is there where it was made from the same list. Returns its Python.
+/// Creates the environment, unless one with the same packages exists. Returns its Python.
 pub fn prepare() -> Result<PathBuf, Error> {
     let wanted = read(&workspace::root().join("tests/python/requirements.txt"))?;
     let (home, python) = (home(), python());
-    // Written last: an environment without it was left half made.
+    // Written last, because its absence marks an incomplete environment.
     let stamp = home.join("made-from.txt");
     let made_from = fs::read_to_string(&stamp).unwrap_or_default();
     if made_from == wanted && step::succeeds(&python.to_string_lossy(), &["-c", "import mcap"]) {
@@ -34,7 +34,7 @@ pub fn prepare() -> Result<PathBuf, Error> {
         fs::remove_dir_all(&home).map_err(|source| Error::File { path: home.clone(), source })?;
     }
     run(command("python3", &["-m", "venv", &home.to_string_lossy()]))?;
-    // Wheels alone: building scipy from source would need a Fortran compiler and half an hour.
+    // Only wheels, because building scipy from source needs a Fortran compiler and half an hour.
     let arguments = ["-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet"];
     let list = ["--only-binary", ":all:", "--requirement", "tests/python/requirements.txt"];
     run(command(&python, &[&arguments[..], &list].concat()))?;

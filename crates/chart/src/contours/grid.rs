@@ -13,7 +13,7 @@ pub struct StructuredGrid {
     z: Vec<f64>,
 }
 
-/// Why numbers make no grid.
+/// Why a grid cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GridError {
     /// A column of numbers has the wrong length.

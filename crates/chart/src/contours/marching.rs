@@ -1,4 +1,4 @@
-//! Contour lines: marching squares that knows about missing values.
+//! Contour lines by marching squares with support for missing values.
 //!
 //! Source: W. E. Lorensen, H. E. Cline, "Marching cubes", SIGGRAPH 1987, in two dimensions; the two readings of a
 //! saddle are distinguished by the mean of the four corners. A crossing is found on each cell edge by linear

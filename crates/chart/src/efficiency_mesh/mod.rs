@@ -1,5 +1,5 @@
-//! Efficiency between the points of a compressor map, as a mesh over flow and pressure ratio: one for the picture among
-//! the map's files and for the page, so that both show the same contours.
+//! Efficiency between the points of a compressor map, as a mesh over flow and pressure ratio: used for the picture of a map and for the
+//! page, so that both show the same contours.
 
 mod fitted;
 mod levels;

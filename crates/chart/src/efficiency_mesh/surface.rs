@@ -1,4 +1,4 @@
-//! Efficiency between the measured points, for pictures alone, and only where points stand on all sides.
+//! Efficiency between the measured points, used only for pictures and only inside the measured region.
 //!
 //! Each speed line is a row of a structured grid. Along a line the position runs from 0 at its surge-side point to 1
 //! at its choke-side point, by length on the map with both axes scaled to the map's spans; flow, pressure ratio and
@@ -6,10 +6,9 @@
 //! corrected speed. A monotone cubic never leaves the range of the two values it joins, so the picture shows no
 //! efficiency better than the best measured nor worse than the worst.
 //!
-//! NaN (no support): before the first and after the last point of a line that has an efficiency, and between two
-//! lines wherever one of them has none. A point without efficiency between two with one is bridged. Lines with fewer
-//! than two places on the map take no part. Points closer than 1 % of the map's diagonal (repeats) count as one, their
-//! mean.
+//! NaN (no support): before the first and after the last point of a line that has an efficiency, and between two lines wherever one of them
+//! has none. A point without efficiency between two with one is bridged. Lines with fewer than two distinct points are not used. Points
+//! closer than 1 % of the map's diagonal (repeats) count as one, their mean.
 
 use super::monotone::Monotone;
 use crate::StructuredGrid;
@@ -78,7 +77,7 @@ pub fn ordered<'a>(map: &CompressorMap, line: &'a SpeedLine) -> Vec<&'a MapPoint
 
 /// The speed line as drawn: (corrected flow, kg/s; pressure ratio) from surge to choke side, the surface's own edge.
 ///
-/// A line that takes no part in the surface gives its points as they are.
+/// For a line that is not used in the surface, the measured points are returned.
 pub fn speed_curve(map: &CompressorMap, line: &SpeedLine) -> Vec<(f64, f64)> {
     match spans(map).and_then(|spans| row(line, spans)) {
         Some(row) => row.nodes.iter().map(|node| (node[0], node[1])).collect(),

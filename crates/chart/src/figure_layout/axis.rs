@@ -1,6 +1,6 @@
 //! An axis as the caller describes it.
 
-/// Title with unit, and the range if it is not to follow the data.
+/// Title with unit, and the range if it does not follow the data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// Title; say the unit in it, e.g. `corrected mass flow, kg/s`.
@@ -9,7 +9,7 @@ pub struct Axis {
     pub low: Option<f64>,
     /// Upper end, in the axis' unit; `None` follows the data.
     pub high: Option<f64>,
-    /// Numbers at the axis are values times this, so that the title's unit may be another than that of what is drawn; `None`: 1.
+    /// Factor from the drawn values to the numbers at the axis, if the title has another unit; `None` for 1.
     pub written_times: Option<f64>,
     /// Ticks with their labels instead of round numbers, e.g. names of cases.
     pub ticks: Option<Vec<(f64, String)>>,

@@ -1,4 +1,4 @@
-//! Cutting lines and areas at a rectangle, so that no viewer needs to.
+//! Clips lines and areas at a rectangle, so that the picture does not depend on clipping by the viewer.
 
 /// An axis-parallel rectangle, px: left, top, right, bottom.
 #[derive(Debug, Clone, Copy, PartialEq)]

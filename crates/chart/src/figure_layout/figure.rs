@@ -14,7 +14,7 @@ pub enum LegendPlace {
     None,
 }
 
-/// One pair of axes with what it shows.
+/// A pair of axes with its items.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
     /// Title, e.g. `(a) 110 to 50 krpm`; empty for none.

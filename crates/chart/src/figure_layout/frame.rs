@@ -1,4 +1,4 @@
-//! From the axes' units to px.
+//! Conversion from the units of the axes to px.
 
 use crate::figure_layout::clip::Rect;
 use crate::figure_layout::ticks::{labels, nice_ticks, usable_range};
@@ -16,7 +16,7 @@ pub(crate) struct Scale {
 impl Scale {
     /// Share of the axis at a value, 0 at its low end, 1 at its high end; NaN for a value that is not finite.
     ///
-    /// What lies more than a million axes away is drawn as if it were there: the cut at the frame keeps its digits.
+    /// Values are limited to a million times the axis length, so that clipping at the frame keeps its precision.
     fn share(&self, value: f64) -> f64 {
         if value.is_finite() {
             ((value - self.low) / (self.high - self.low)).clamp(-1e6, 1e6)
@@ -101,8 +101,8 @@ pub(crate) fn scales(panel: &Panel, width_px: f64, height_px: f64) -> (Scale, Sc
     (scale(&panel.x, x, (width_px / 75.0) as usize), scale(&panel.y, y, (height_px / 48.0) as usize))
 }
 
-/// Makes room for error bars, up to half the span of the points on each side, so that one hopeless point cannot
-/// squeeze all the others together.
+/// Makes room for error bars, up to half the span of the points on each side, so that one very uncertain point does not compress all
+/// others.
 fn widen(
     extent: &mut Extent,
     points: Extent,

@@ -1,4 +1,4 @@
-//! Positions of all parts on the paper.
+//! Positions of all parts of a figure.
 
 use crate::figure_layout::clip::Rect;
 use crate::figure_layout::frame::{Frame, scales};

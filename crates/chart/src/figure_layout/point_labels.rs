@@ -31,7 +31,7 @@ pub(crate) struct PlacedLabel {
     pub leader: Option<(Px, Px)>,
 }
 
-/// What texts keep away from.
+/// Obstacles for texts.
 pub(crate) struct Surroundings {
     inside: Rect,
     /// Markers and texts, which no text may cover.
@@ -94,7 +94,7 @@ impl Surroundings {
         Some(label)
     }
 
-    /// What lines through a text cost, and what its own leader line runs through.
+    /// Cost of lines that cross a text, and of obstacles that its leader line crosses.
     fn crossed_px(&self, around: &Rect, point: Px, leader: Option<(Px, Px)>) -> f64 {
         let through =
             |lines: &[(Px, Px)]| lines.iter().filter(|line| touches(line.0, line.1, around)).count();

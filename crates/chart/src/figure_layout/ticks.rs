@@ -37,7 +37,7 @@ pub fn nice_ticks(low: f64, high: f64, target: usize) -> Vec<f64> {
 
 /// Multiples of `step` in the range, at most `most`.
 fn ticks_with_step(low: f64, high: f64, step: f64, most: usize) -> Vec<f64> {
-    // Indices instead of repeated addition: no drift, and a bounded loop whatever the numbers are.
+    // Indices instead of repeated addition avoid accumulated rounding errors and an endless loop.
     let first = (low / step - 1e-9).ceil();
     let count = ((high / step + 1e-9).floor() - first + 1.0).clamp(0.0, most as f64) as usize;
     (0..count).map(|i| (first + i as f64) * step).map(|tick| if tick == 0.0 { 0.0 } else { tick }).collect()

@@ -80,7 +80,7 @@ fn panel(drawing: &mut Drawing, placed: &PlacedPanel<'_>) {
     drawing.close_group();
 }
 
-/// What texts on contour lines keep away from: markers, arrow heads and texts at the ends of lines.
+/// Positions that labels of contour lines avoid: markers, arrow heads and texts at the ends of lines.
 fn obstacles(frame: &Frame, items: &[Item]) -> Vec<(f64, f64)> {
     let mut out = Vec::new();
     for item in items {
@@ -154,7 +154,7 @@ fn line(drawing: &mut Drawing, frame: &Frame, line: &Line, late: &mut Vec<LateTe
     }
     let (Some(label), Some(at)) = (&line.end_label, end_label_at(frame, line)) else { return };
     let width = width_px(&label.text, LABEL_PX);
-    // Two texts upon each other say nothing: the earlier one stays.
+    // Overlapping texts are illegible, so the earlier one is kept.
     let covered = |earlier: &LateText| {
         (earlier.at.0 - at.0).abs() < 0.5 * (width + width_px(&earlier.text, LABEL_PX))
             && (earlier.at.1 - at.1).abs() < LABEL_PX
@@ -294,7 +294,7 @@ fn contours(
     }
 }
 
-/// Comes last, so that it sees all that it has to avoid.
+/// Called last, because the labels avoid everything else.
 fn point_labels(drawing: &mut Drawing, placed: &PlacedPanel<'_>, late: &mut Vec<LateText>) {
     let texts = late.iter().map(|text| text_box(text.at, &text.text, &text.style)).collect();
     let mut surroundings = Surroundings::of(&placed.frame, &placed.panel.items, texts);

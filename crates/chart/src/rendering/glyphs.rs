@@ -1,8 +1,7 @@
-//! Letters as outlines, from the font that comes along (DejaVu Sans, free licence), so that the same figure gives the
-//! same pixels on a machine without fonts.
+//! Outlines of letters from a built-in font (DejaVu Sans, free licence), so that a figure gives the same pixels on every computer.
 //!
-//! Letters stand one after the other from left to right, kerned by the font's own table: what titles, units and
-//! numbers need. Scripts that join or run the other way keep their form in the SVG, where the viewer sets the text.
+//! Letters are placed from left to right with the kerning of the font, which is sufficient for titles, units and numbers. Joined or
+//! right-to-left scripts are correct only in the SVG, where the viewer sets the text.
 
 use crate::drawing::{Px, TextStyle};
 use crate::items::TextAnchor;
@@ -23,7 +22,7 @@ impl Fonts {
         Ok(Fonts { regular, bold: Face::parse(dejavu::sans::bold(), 0)? })
     }
 
-    /// The outline of a text whose vertical middle is at `at`; `None` if nothing is to be seen, e.g. of blanks.
+    /// The outline of a text whose vertical middle is at `at`; `None` if nothing is visible, e.g. for blanks.
     pub(crate) fn outline(&self, at: Px, text: &str, style: &TextStyle) -> Option<Path> {
         let face = if style.bold { &self.bold } else { &self.regular };
         let em = style.size_px as f32 / f32::from(face.units_per_em());
@@ -31,7 +30,7 @@ impl Fonts {
         let mut before: Option<GlyphId> = None;
         for c in text.chars() {
             let shown = if c.is_whitespace() { ' ' } else { c };
-            // Glyph 0 is the font's box for what it does not have.
+            // Glyph 0 is the font's replacement for missing characters.
             let glyph = face.glyph_index(shown).unwrap_or_default();
             pen.x += before.map_or(0.0, |before| kerning(face, before, glyph));
             face.outline_glyph(glyph, &mut pen);
@@ -53,7 +52,7 @@ impl Fonts {
     }
 }
 
-/// What the font adds to the advance between two glyphs, font units.
+/// Kerning between two glyphs, font units.
 fn kerning(face: &Face<'_>, left: GlyphId, right: GlyphId) -> f32 {
     let tables = face.tables().kern.into_iter().flat_map(|kern| kern.subtables);
     let mut horizontal = tables.filter(|table| table.horizontal && !table.variable);

@@ -49,7 +49,7 @@ impl Figure {
 fn pixels(drawing: &Drawing, scale: f32) -> Result<Pixmap, PngError> {
     let size = |px: f64| px.ceil() * f64::from(scale);
     let (width, height) = (size(drawing.width_px), size(drawing.height_px));
-    // Not a number counts as too large.
+    // NaN counts as too large.
     if !(width >= 1.0 && height >= 1.0 && width * height <= MAX_PIXELS) {
         return Err(PngError::Size { width, height });
     }
@@ -145,7 +145,7 @@ fn trace(builder: &mut PathBuilder, points: &[Px]) {
     }
 }
 
-/// As in the SVG: what is not a number is 0.
+/// NaN counts as 0, as in the SVG.
 fn finite(value: f64) -> f32 {
     if value.is_finite() { value as f32 } else { 0.0 }
 }

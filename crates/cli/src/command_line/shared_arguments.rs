@@ -1,4 +1,4 @@
-//! What several commands are given: campaigns, channel maps, reference states.
+//! Arguments that several commands share: campaigns, channel maps, reference states.
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
@@ -10,7 +10,7 @@ use mapper_recording::ChannelMap;
 use mapper_session::map_description;
 use std::path::{Path, PathBuf};
 
-/// What is stated about a map file.
+/// Statements about a map file.
 #[derive(Debug, Default, Args)]
 pub struct MapReading {
     /// Reference state of the file's corrected quantities, if the file does not give it: SAE, Garrett, BorgWarner or "T, P"
@@ -19,10 +19,10 @@ pub struct MapReading {
     /// Corrected speed of the design point, for a file with relative speeds (NPSS, pyCycle), e.g. "150000 rpm"
     #[arg(long, value_name = "SPEED")]
     pub design_speed: Option<String>,
-    /// Map description (YAML): what the file leaves open; `mapper map inspect --write-description` writes one
+    /// Map description (YAML) with data that are not in the file; `mapper map inspect --write-description` writes one
     #[arg(long, value_name = "FILE")]
     pub description: Option<PathBuf>,
-    /// What the file leaves open, as in a map description, e.g. `flow=lb/min`, `speed=#1 [krpm]`; may be repeated
+    /// One entry of a map description, e.g. `flow=lb/min`, `speed=#1 [krpm]`; may be repeated
     #[arg(long = "with", value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub with: Vec<(String, String)>,
 }
@@ -48,7 +48,7 @@ pub fn given_campaign(path: Option<&Path>) -> Result<Option<Campaign>, Failure> 
     path.map(|path| mapper_campaign::load(path).map_err(Failure::of_campaign)).transpose()
 }
 
-/// The channel map of an option; that of our own recordings by default.
+/// The channel map of an option; by default the one for recordings of this program.
 pub fn channel_map(path: Option<&Path>) -> Result<ChannelMap, Failure> {
     Ok(path.map(mapper_session::channel_map).transpose()?.unwrap_or_else(ChannelMap::native))
 }

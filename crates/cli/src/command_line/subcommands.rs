@@ -1,4 +1,4 @@
-//! A set of commands as clap sees it.
+//! Declares a set of commands for clap.
 
 /// Declares the modules, and an enum with one variant for each `module::Options`, whose help is their documentation; its
 /// `run` runs the one that was asked for.
@@ -16,7 +16,7 @@ macro_rules! subcommands {
         }
 
         impl $name {
-            /// Runs the command that was asked for.
+            /// Runs the selected command.
             pub fn run(&self) -> Result<(), Failure> {
                 match self {
                     $($name::$options(options) => options.run(),)+

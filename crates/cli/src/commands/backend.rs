@@ -14,7 +14,6 @@ use std::path::{Path, PathBuf};
 /// List the backends, or check one against the rules for every backend
 #[derive(Debug, Args)]
 pub struct Backend {
-    /// What to do.
     #[command(subcommand)]
     command: BackendCommand,
     /// Print one JSON object on standard output
@@ -22,12 +21,11 @@ pub struct Backend {
     pub json: bool,
 }
 
-/// What to do with backends.
 #[derive(Debug, Subcommand)]
 enum BackendCommand {
     /// List the backends that campaigns may name
     List,
-    /// Check the backend of a campaign against every rule of the interface. It is armed, given setpoints and made safe: never on a rig with a machine
+    /// Check the backend of a campaign against every rule of the interface. It arms the rig, sends setpoints and makes it safe: never use it on a rig with a machine
     Check {
         /// Name of the backend
         name: String,
@@ -38,7 +36,6 @@ enum BackendCommand {
 }
 
 impl Backend {
-    /// Lists or checks.
     pub fn run(&self) -> Result<(), Failure> {
         match &self.command {
             BackendCommand::List => self.list(),
@@ -47,7 +44,7 @@ impl Backend {
     }
 
     fn list(&self) -> Result<(), Failure> {
-        let found = drivers::places().all();
+        let found = drivers::locations().all();
         let driver = |found: &DriverLocation| {
             let known = KNOWN.iter().find(|(name, ..)| *name == found.name);
             let summary = known.map_or("driver", |(_, summary, _)| summary);
@@ -89,13 +86,14 @@ impl Backend {
         let registry = registry::registry();
         let named = campaign.backend.name.clone();
         if named != name {
-            // What is built in does without settings; a driver has an address at least, which another one's are not.
+            // Built-in backends need no settings. A driver needs at least an address, and the settings of another backend do not contain
+            // it.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
                 let is_known = KNOWN.iter().any(|(known, ..)| *known == name);
-                let words = match is_known || drivers::places().find(name).is_some() {
+                let words = match is_known || drivers::locations().find(name).is_some() {
                     false => format!("there is no backend `{name}`; `mapper backend list` shows all"),
                     true => format!(
-                        "this campaign names `{named}`, not `{name}`, and has no settings for that: `mapper backend check {named} --campaign {}`",
+                        "this campaign names `{named}`, not `{name}`, and has no settings for `{name}`; use `mapper backend check {named} --campaign {}`",
                         path.display()
                     ),
                 };
@@ -110,7 +108,7 @@ impl Backend {
             .make_backend(&campaign, &model)
             .map_err(|error| Failure::in_campaign(error, path))?
             .describe();
-        // A rig that another runner has, or that is latched, is left alone.
+        // A rig that is in use or locked out must not be touched.
         let states = RigStates::new(&rig_states::directory(None));
         let claim = rig.exclusive.as_deref().map(|rig| states.claim(rig, None)).transpose()?;
         let make = || match registry.make_backend(&campaign, &model) {
@@ -121,7 +119,7 @@ impl Backend {
         let limits = &campaign.limits;
         let setpoints = Setpoints {
             mode: RigMode::Running,
-            // A slow machine, whatever it is.
+            // A low P3 keeps any machine slow.
             p3_pa: limits.p3_min_pa + 0.1 * (limits.p3_max_pa - limits.p3_min_pa),
             t3_k: campaign.boundary.t3_k,
             valve_opening_ratio: 1.0,

@@ -25,7 +25,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// Checks a campaign, makes its plan or rehearses its script, and says in a line what it is; warnings come before it.
+    /// Checks a campaign, makes its plan or rehearses its script, and prints a summary after any warnings.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = match mapper_campaign::load(&self.campaign) {
             Ok(campaign) => campaign,
@@ -39,7 +39,7 @@ impl Check {
             Err(error) => return Err(Failure::of_campaign(error)),
         };
         let model = nominal_model(&campaign)?;
-        // The backend reads its settings now, so that a mistake in them does not wait for the night.
+        // The backend reads its settings now, so that mistakes in them are reported before the run.
         let registry = registry::registry();
         registry
             .make_sources(&campaign, &model)
@@ -48,12 +48,12 @@ impl Check {
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
         let stop = interrupt::stop_flag()?;
         let session = Session { stop: &stop, ..Session::new(&registry) };
-        let prospects = session.prospects(&campaign, &model)?;
+        let forecast = session.forecast_campaign(&campaign, &model)?;
         let text = mapper_campaign::read_text(&self.campaign).map_err(|error| {
             Failure::new(Code::Failure, format!("failed to read {}: {error}", self.campaign.display()))
         })?;
-        let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, prospects.concerns);
-        let (steps, duration_s) = (prospects.steps, prospects.duration_s);
+        let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, forecast.concerns);
+        let (steps, duration_s) = (forecast.steps, forecast.duration_s);
         let lines = mapper_campaign::resolved_lines(&campaign, &model);
         if self.json {
             return standard_output::print_json(&json!({
@@ -64,33 +64,33 @@ impl Check {
                 "steps": steps,
                 "minutes": duration_s / 60.0,
                 "backend": campaign.backend.name,
-                "expected": prospects.verdicts,
-                "advice": prospects.advice,
+                "expected": forecast.verdicts,
+                "advice": forecast.advice,
                 "findings": [],
                 "omitted": 0,
                 "warnings": warnings.list,
             }));
         }
         if warnings.count() > 0 {
-            standard_output::warn(&warnings.render(output_options::warns_in_colour()));
+            standard_output::warn(&warnings.render(output_options::is_stderr_coloured()));
         }
-        let forecast = match &campaign.sequence {
+        let forecast_by = match &campaign.sequence {
             Some(_) => " by its script on the nominal machine",
             None => "",
         };
-        let at_most = if prospects.is_planned { "" } else { "at most " };
+        let at_most = if forecast.is_planned { "" } else { "at most " };
         let number = match warnings.count() {
             0 => String::new(),
             1 => ", 1 warning".to_owned(),
             count => format!(", {count} warnings"),
         };
         standard_output::print(&format!(
-            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of the rig's time{forecast}.\n{}{}{}{}",
+            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of rig time{forecast_by}.\n{}{}{}{}",
             self.campaign.display(),
             campaign.points.len(),
             campaign.backend.name,
             duration(duration_s),
-            verdict_forecast_text(prospects.verdicts, &prospects.advice),
+            verdict_forecast_text(forecast.verdicts, &forecast.advice),
             declared_sensors_text(&campaign),
             assumed_text(&campaign),
             lines_text(&campaign, &lines),

@@ -1,4 +1,4 @@
-//! `mapper drift`: whether the rig stayed the same while a map was made.
+//! `mapper drift`: searches recordings for drift of the rig.
 
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::exit_code::Code;
@@ -12,10 +12,10 @@ use mapper_session::{Recorded, Session, SessionError};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Say whether the rig stayed the same while a map was made: which sensor drifts, or the machine, since when and how fast
+/// Check whether the rig drifted while a map was made: which sensor, or the machine, since when and how fast
 #[derive(Debug, Args)]
 pub struct Drift {
-    /// Run directories, MCAP files or logs, in the order in which they were made; with `--recording`, their campaign
+    /// Run directories, MCAP files or logs in chronological order; with `--recording`, their campaign
     #[arg(required = true, value_name = "RECORDING|CAMPAIGN")]
     pub paths: Vec<PathBuf>,
     /// Recording, instead of by its place; may be given more than once
@@ -38,7 +38,6 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// Reads, judges, prints.
     pub fn run(&self) -> Result<(), Failure> {
         let (files, given) = self.sources()?;
         let map = channel_map(self.channels.as_deref())?;
@@ -46,9 +45,9 @@ impl Drift {
         let read = |file: &PathBuf| Recorded::read_run(&registry, file, &map, given.as_ref());
         let runs = files.iter().map(read).collect::<Result<Vec<_>, SessionError>>()?;
         let recorded: Vec<Recorded> = runs.into_iter().flatten().collect();
-        // clap asks for one.
+        // clap requires at least one.
         let Some(first) = recorded.first() else { return Ok(()) };
-        let campaign = first.known("Give it with `--campaign FILE`")?;
+        let campaign = first.require_campaign()?;
         let drift = Session::new(&registry).drift(&recorded, campaign, &map)?;
         if let Some(path) = &self.corrected {
             let corrected =
@@ -77,7 +76,7 @@ impl Drift {
     fn sources(&self) -> Result<(&[PathBuf], Option<Campaign>), Failure> {
         let named = !self.recording.is_empty();
         if named && self.paths.len() > 1 {
-            let message = "`--recording` needs one campaign, that of the machine that was recorded";
+            let message = "`--recording` needs exactly one campaign, that of the recorded machine";
             return Err(Failure::new(Code::BadInput, message));
         }
         let (files, campaign) =

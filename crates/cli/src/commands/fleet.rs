@@ -4,10 +4,9 @@ use crate::command_line::subcommands::subcommands;
 use crate::output::failure::Failure;
 use clap::Args;
 
-/// Work in many pieces on many cores or machines: maps, diagnoses, calibrations, studies
+/// Run studies of many items on many cores or computers: maps, diagnoses, calibrations
 #[derive(Debug, Args)]
 pub struct Fleet {
-    /// What to do.
     #[command(subcommand)]
     command: FleetCommand,
 }
@@ -24,7 +23,6 @@ subcommands! { FleetCommand:
 }
 
 impl Fleet {
-    /// Runs the sub-command that was asked for.
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
     }

@@ -7,7 +7,6 @@ use clap::Args;
 /// Diagnose the gap between nominal model and rig, and check that diagnosis on withheld data
 #[derive(Debug, Args)]
 pub struct Gap {
-    /// What to do.
     #[command(subcommand)]
     command: GapCommand,
 }
@@ -22,7 +21,6 @@ subcommands! { GapCommand:
 }
 
 impl Gap {
-    /// Runs the sub-command that was asked for.
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
     }

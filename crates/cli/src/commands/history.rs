@@ -1,4 +1,4 @@
-//! `mapper history`: what the nights gave.
+//! `mapper history`: results of the nightly runs.
 
 use crate::command_line::subcommands::subcommands;
 use crate::output::failure::Failure;
@@ -15,7 +15,7 @@ subcommands! { HistoryCommand:
     fleet::Fleet,
 }
 
-/// Which runs of which history.
+/// Selected runs of a history.
 #[derive(Debug, Args)]
 pub struct Chosen {
     /// The history
@@ -28,7 +28,7 @@ pub struct Chosen {
     #[arg(long, value_name = "METHOD")]
     pub method: Option<String>,
     /// Only nights since this day (UTC)
-    #[arg(long, value_name = "YYYY-MM-DD", value_parser = day)]
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = parse_day)]
     pub since: Option<jiff::Timestamp>,
 }
 
@@ -36,13 +36,13 @@ pub struct Chosen {
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct History {
-    /// What to say of them instead
+    /// Other statistics
     #[command(subcommand)]
     command: Option<HistoryCommand>,
     #[command(flatten)]
     pub chosen: Chosen,
     /// Show this figure instead of the default ones; may be given more than once
-    #[arg(long, value_name = "FIGURE", value_parser = figure)]
+    #[arg(long, value_name = "FIGURE", value_parser = parse_metric)]
     pub figure: Vec<Metric>,
     /// A row for each run, instead of the medians over the seeds
     #[arg(long)]
@@ -57,22 +57,22 @@ pub struct History {
     pub replace: Replace,
 }
 
-fn figure(text: &str) -> Result<Metric, String> {
+fn parse_metric(text: &str) -> Result<Metric, String> {
     Metric::find(text).ok_or_else(|| {
         let names: Vec<&str> = Metric::ALL.into_iter().map(Metric::name).collect();
         format!("there is no figure `{text}`; the figures are {}", names.join(", "))
     })
 }
 
-/// Midnight UTC at the begin of a day.
-fn day(text: &str) -> Result<jiff::Timestamp, String> {
+/// Parses a day; returns its start in UTC.
+fn parse_day(text: &str) -> Result<jiff::Timestamp, String> {
     let day: jiff::civil::Date = text.parse().map_err(|error| format!("{error}; write e.g. 2026-11-21"))?;
     let midnight = day.to_zoned(jiff::tz::TimeZone::UTC).map_err(|error| error.to_string())?;
     Ok(midnight.timestamp())
 }
 
-/// Figures that are shown by default.
-const SHOWN: [Metric; 6] = [
+/// Metrics that are shown by default.
+const DEFAULT_METRICS: [Metric; 6] = [
     Metric::GoodPoints,
     Metric::EtaMean,
     Metric::EtaMedianError,
@@ -91,18 +91,18 @@ impl Chosen {
     }
 }
 
-fn opened(chosen: &Chosen) -> Result<mapper_history::History, Failure> {
+fn open_history(chosen: &Chosen) -> Result<mapper_history::History, Failure> {
     Ok(mapper_history::History::open_existing(&chosen.db).map_err(SessionError::from)?)
 }
 
 impl History {
-    /// Lists, filters, prints JSON, draws.
     pub fn run(&self) -> Result<(), Failure> {
         if let Some(command) = &self.command {
             return command.run();
         }
-        let runs = opened(&self.chosen)?.runs(&self.chosen.filter()).map_err(SessionError::from)?;
-        let figures: Vec<Metric> = if self.figure.is_empty() { SHOWN.to_vec() } else { self.figure.clone() };
+        let runs = open_history(&self.chosen)?.runs(&self.chosen.filter()).map_err(SessionError::from)?;
+        let figures: Vec<Metric> =
+            if self.figure.is_empty() { DEFAULT_METRICS.to_vec() } else { self.figure.clone() };
         if let Some(path) = &self.svg {
             let report_of = |started_ms| night_report_link(path, &self.chosen.db, started_ms);
             self.replace.write(path, history_svg(&runs, &figures, report_of).as_bytes())?;

@@ -16,7 +16,7 @@ pub struct Identify {
     /// Run directory, MCAP file, or log of another program (see `mapper log inspect`); several of the same machine are identified together, each point once
     #[arg(required = true)]
     pub recordings: Vec<PathBuf>,
-    /// Leave what a run leaves (points, map, pictures, report) in this directory; existing files are not replaced
+    /// Write the results of a run (points, map, pictures, report) to this directory; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -35,11 +35,10 @@ pub struct Identify {
     pub json: bool,
 }
 
-/// What shows more than the first look.
-const MORE: &str = "the same command with `--full`";
+/// The command that shows all details.
+const FULL_COMMAND: &str = "the same command with `--full`";
 
 impl Identify {
-    /// Identifies all steps of the recordings.
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
@@ -58,7 +57,12 @@ impl Identify {
             let results = session.identify_into(recorded, &map, method, directory)?;
             return match self.json {
                 true => standard_output::print_json(&results),
-                false => standard_output::print(&results_text(&display, &results, MORE, self.shown.shown())),
+                false => standard_output::print(&results_text(
+                    &display,
+                    &results,
+                    FULL_COMMAND,
+                    self.shown.shown(),
+                )),
             };
         }
         let found = session.identify(recorded, &map, method)?;
@@ -68,7 +72,7 @@ impl Identify {
             false => standard_output::print(&identified_text(
                 &display,
                 &found,
-                MORE,
+                FULL_COMMAND,
                 &warnings,
                 self.shown.shown(),
             )),
@@ -83,7 +87,7 @@ pub enum MethodArgument {
     Steady,
     /// Efficiency and heat-transfer coefficient from the transient (Burke et al.)
     Dynamic,
-    /// All points together: what they share is fitted over all of them
+    /// All points together, with common parameters
     Joint,
 }
 

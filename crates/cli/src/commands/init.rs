@@ -22,29 +22,29 @@ pub struct Init {
     /// Name of the campaign and of its files
     #[arg(default_value = "my_turbo")]
     pub name: String,
-    /// Diameter of the compressor's wheel at its exit, e.g. 60mm; asked for on a terminal if it is not given
-    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    /// Diameter of the compressor wheel at its exit, e.g. 60mm; asked for on a terminal if omitted
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_m)]
     pub wheel: Option<f64>,
     /// Diameter of the compressor's inlet pipe
-    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_m)]
     pub inlet_pipe: Option<f64>,
     /// Diameter of the compressor's outlet pipe
-    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_m)]
     pub outlet_pipe: Option<f64>,
     /// P1 and P2 are measured at the wall, not as total pressures
     #[arg(long)]
     pub static_taps: bool,
     /// Diameter of the T2 probe
-    #[arg(long, value_name = "LENGTH", value_parser = length_m)]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length_m)]
     pub probe: Option<f64>,
     /// The machine's own map, in any layout that `mapper map inspect` understands
     #[arg(long, value_name = "FILE")]
     pub map: Option<PathBuf>,
     /// Reference state of the map and the results: SAE, Garrett, BorgWarner
-    #[arg(long, value_name = "NAME", default_value = "SAE", value_parser = reference)]
+    #[arg(long, value_name = "NAME", default_value = "SAE", value_parser = parse_reference)]
     pub reference: &'static NamedReference,
     /// Lowest and highest corrected speed, e.g. 45krpm 140krpm; those of the map if they are not given
-    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], value_parser = speed_rpm)]
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], value_parser = parse_speed_rpm)]
     pub speeds: Vec<f64>,
     /// Source of the recordings
     #[arg(long, value_enum, default_value = "virtual-lab")]
@@ -69,11 +69,10 @@ pub enum Rig {
 }
 
 impl Init {
-    /// Writes the files.
     pub fn run(&self) -> Result<(), Failure> {
         let named = self.name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
         if !named || self.name.is_empty() || self.name.len() > 64 || self.name.starts_with(['-', '_']) {
-            let message = "the name is part of file names: write letters, digits, `_` and `-`, at most 64";
+            let message = "the name becomes part of file names; use at most 64 letters, digits, `_` and `-`";
             return Err(Failure::new(Code::BadInput, message));
         }
         let request = FirstCampaignRequest {
@@ -84,7 +83,7 @@ impl Init {
                 Rig::GasStand => FirstRig::GasStand,
                 Rig::Log => FirstRig::Log,
             },
-            wheel_diameter_m: self.wheel.map_or_else(asked_wheel_m, Ok)?,
+            wheel_diameter_m: self.wheel.map_or_else(ask_wheel_diameter_m, Ok)?,
             inlet_diameter_m: self.inlet_pipe,
             outlet_diameter_m: self.outlet_pipe,
             has_static_taps: self.static_taps,
@@ -111,37 +110,37 @@ impl Init {
     }
 }
 
-/// The wheel's diameter, asked for on a terminal.
-fn asked_wheel_m() -> Result<f64, Failure> {
+/// Asks for the wheel diameter on a terminal.
+fn ask_wheel_diameter_m() -> Result<f64, Failure> {
     let missing = |why: &str| Failure::new(Code::BadInput, format!("{why}; give it with `--wheel 60mm`"));
     if !std::io::stdin().is_terminal() {
-        return Err(missing("the diameter of the compressor's wheel is needed"));
+        return Err(missing("the diameter of the compressor wheel is required"));
     }
     standard_output::warn("Diameter of the compressor's wheel at its exit, e.g. 60mm: ");
     let mut line = String::new();
-    // A diameter has a few characters; a terminal that sends more sends no diameter.
+    // Limited, because a diameter has only a few characters.
     let read = std::io::stdin().lock().take(64).read_line(&mut line);
     read.map_err(|error| missing(&format!("failed to read the diameter: {error}")))?;
-    length_m(&line).map_err(|error| missing(&error))
+    parse_length_m(&line).map_err(|error| missing(&error))
 }
 
-/// A quantity whose unit may follow the number without a blank, which a shell would need quotes for.
-fn quantity(kind: Kind, text: &str) -> Result<f64, String> {
+/// Parses a quantity whose unit may follow the number without a blank, because a shell would need quotes around a blank.
+fn parse_quantity(kind: Kind, text: &str) -> Result<f64, String> {
     let unit = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
     let spaced = format!("{} {}", text[..unit].trim(), text[unit..].trim());
     let value = parse(kind, spaced.trim()).map_err(|error| format!("{error}: {}", error.remedy(kind)))?;
     if value > 0.0 { Ok(value) } else { Err("it must be above 0".to_owned()) }
 }
 
-fn length_m(text: &str) -> Result<f64, String> {
-    quantity(Kind::Length, text)
+fn parse_length_m(text: &str) -> Result<f64, String> {
+    parse_quantity(Kind::Length, text)
 }
 
-fn speed_rpm(text: &str) -> Result<f64, String> {
-    quantity(Kind::Speed, text)
+fn parse_speed_rpm(text: &str) -> Result<f64, String> {
+    parse_quantity(Kind::Speed, text)
 }
 
-fn reference(name: &str) -> Result<&'static NamedReference, String> {
+fn parse_reference(name: &str) -> Result<&'static NamedReference, String> {
     let found = NAMED_REFERENCES.iter().find(|row| row.name.eq_ignore_ascii_case(name));
     found.ok_or_else(|| "it is not one of SAE, Garrett, BorgWarner".to_owned())
 }

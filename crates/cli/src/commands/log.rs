@@ -7,7 +7,6 @@ use clap::Args;
 /// Look into the log of a test stand
 #[derive(Debug, Args)]
 pub struct Log {
-    /// What to do with the log
     #[command(subcommand)]
     command: LogCommand,
 }
@@ -17,7 +16,6 @@ subcommands! { LogCommand:
 }
 
 impl Log {
-    /// Runs the sub-command that was asked for.
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
     }

@@ -7,7 +7,6 @@ use clap::Args;
 /// Fit, convert and compare compressor maps
 #[derive(Debug, Args)]
 pub struct Map {
-    /// What to do with the map
     #[command(subcommand)]
     command: MapCommand,
 }
@@ -24,7 +23,6 @@ subcommands! { MapCommand:
 }
 
 impl Map {
-    /// Runs the sub-command that was asked for.
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
     }

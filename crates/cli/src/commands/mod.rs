@@ -1,4 +1,4 @@
-//! One file a command: its options, its call, its words. To add one, write its file, and its line below.
+//! One file for each command, with its options and its output. To add a command, write its file and add a line below.
 
 use crate::command_line::subcommands::subcommands;
 use crate::output::failure::Failure;

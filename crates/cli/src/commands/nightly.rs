@@ -1,4 +1,4 @@
-//! `mapper nightly`: full maps on the simulated rig, kept in a history and compared with the nights before.
+//! `mapper nightly`: runs full maps on the simulated rig and compares them with the nights before.
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
@@ -12,12 +12,12 @@ use mapper_campaign::load_nightly;
 use mapper_history::{History, Night};
 use mapper_report::night_text;
 use mapper_session::{
-    ErrorKind, PROGRAM, PreparedNight, Session, SessionError, keep_night_report, night_report_path,
+    ErrorKind, PROGRAM, PreparedNight, Session, SessionError, night_report_path, write_night_report,
 };
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Run every map of a nightly campaign on the simulated rig and say what moved against the last nights
+/// Run every map of a nightly campaign on the simulated rig and show changes since the last nights
 #[derive(Debug, Args)]
 pub struct Nightly {
     /// Nightly campaign (YAML): campaigns, methods, seeds
@@ -25,7 +25,7 @@ pub struct Nightly {
     /// History to compare with and append to, instead of the file's `history`
     #[arg(long, value_name = "FILE")]
     pub db: Option<PathBuf>,
-    /// Accept what moved tonight: begin a new band with this night
+    /// Accept the changes of tonight: start a new band with this night
     #[arg(long)]
     pub accept: bool,
     /// Take the runs from this merged study of `mapper fleet` instead of running them
@@ -40,11 +40,10 @@ pub struct Nightly {
 }
 
 impl Nightly {
-    /// Runs the night, appends it, says what moved.
     pub fn run(&self) -> Result<(), Failure> {
         let nightly = load_nightly(&self.nightly).map_err(SessionError::from)?;
         let prepared = PreparedNight::new(&nightly)?;
-        // Opened before the work: a history that cannot be written is known at once, not in the morning.
+        // Opened before the runs, so that a history without write permission is reported at once.
         let path = self.db.clone().unwrap_or_else(|| nightly.history.clone());
         let mut history = History::open(&path).map_err(SessionError::from)?;
         let (registry, stop, progress) =
@@ -55,9 +54,9 @@ impl Nightly {
         let runs = match &self.fleet {
             Some(directory) => {
                 let rows = mapper_validation::studies::rows_of(directory, &registry)?;
-                prepared.checked(rows)
+                prepared.check_rows(rows)
             }
-            None => session.night(&prepared, self.jobs),
+            None => session.run_night(&prepared, self.jobs),
         };
         progress.clear();
         let runs = runs.map_err(|error| match error.kind() {
@@ -75,7 +74,7 @@ impl Nightly {
             runs,
         };
         let comparison = history.append(&mut night, nightly.nights).map_err(SessionError::from)?;
-        keep_night_report(&path, &night, &comparison)?;
+        write_night_report(&path, &night, &comparison)?;
         if self.json {
             standard_output::print_json(&json!({
                 "history": path,
@@ -91,7 +90,7 @@ impl Nightly {
             return Ok(());
         }
         let message =
-            "tonight differs from the nights before; if the change is right, `--accept` begins a new band";
+            "tonight differs from the nights before; if the change is intended, accept it with `--accept`";
         Err(if self.json { Failure::printed(Code::Moved) } else { Failure::new(Code::Moved, message) })
     }
 }

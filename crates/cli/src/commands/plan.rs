@@ -19,7 +19,7 @@ use mapper_session::{
 };
 use std::path::PathBuf;
 
-/// Show the steps of a campaign: order, turbine pressure, what each is expected to give, how long it takes
+/// Show the steps of a campaign: order, turbine pressure, expected results, duration
 #[derive(Debug, Args)]
 pub struct Plan {
     /// Campaign file (YAML)
@@ -36,11 +36,11 @@ pub struct Plan {
     /// Also compare with the other orders of the same points and with conventional mapping
     #[arg(long)]
     pub compare: bool,
-    /// Make this jump after all other steps, e.g. the one that a gap diagnosis asks for: 130krpm@0.5 50krpm@0.7
-    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = operating_point)]
+    /// Add this jump after all other steps, e.g. one that a gap diagnosis recommends: 130krpm@0.5 50krpm@0.7
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = parse_operating_point)]
     pub append: Vec<OperatingPoint>,
-    /// Say what the jump between two points gives and what forbids it, e.g. 110krpm@0.5 50krpm@0.7
-    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = operating_point)]
+    /// Show the expected results of the jump between two points, and the limits that it violates, e.g. 110krpm@0.5 50krpm@0.7
+    #[arg(long, num_args = 2, value_names = ["FROM", "TO"], value_parser = parse_operating_point)]
     pub why: Vec<OperatingPoint>,
     /// Effort of the search: 1 is normal, 100 takes a hundred times as long
     #[arg(long, value_name = "FACTOR", hide_short_help = true)]
@@ -50,12 +50,12 @@ pub struct Plan {
 }
 
 /// A point as `speed@opening`; the speed carries its unit.
-fn operating_point(text: &str) -> Result<OperatingPoint, String> {
+fn parse_operating_point(text: &str) -> Result<OperatingPoint, String> {
     let form = || format!("`{text}` is not a point; write speed@opening, e.g. 110krpm@0.5");
     let (speed, opening) = text.split_once('@').ok_or_else(form)?;
     let opening: f64 = opening.trim().parse().map_err(|_| form())?;
     let digits = speed.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(speed.len());
-    // Units are written apart from their value elsewhere; here a blank would need quotes.
+    // Elsewhere a blank precedes the unit; here it would need quotes.
     let spaced = format!("{} {}", speed[..digits].trim(), speed[digits..].trim());
     let speed_rpm = parse(Kind::Speed, spaced.trim()).map_err(|error| error.to_string())?;
     if !(opening > 0.0 && opening <= 2.5 && speed_rpm > 0.0) {
@@ -65,12 +65,11 @@ fn operating_point(text: &str) -> Result<OperatingPoint, String> {
 }
 
 impl Plan {
-    /// Makes the plan of a campaign and prints it.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let model = nominal_model(&campaign)?;
         if let Some(source) = &campaign.sequence {
-            return self.scripted(&campaign, &model, source);
+            return self.run_script(&campaign, &model, source);
         }
         let inputs = PlanInputs::of(&campaign)?;
         let request = inputs.request(&campaign, &model);
@@ -94,7 +93,7 @@ impl Plan {
         self.store(&plan)?;
         if let Some(path) = &self.svg {
             let request = PlanRequest { order: VisitOrder::SpeedLines, appended: None, ..request.clone() };
-            // Limits that the plan keeps may forbid this order.
+            // The limits may not allow this order.
             let speed_lines = make_plan(&request).ok();
             self.replace.write(path, plan_svg(&campaign, &model, &plan, speed_lines.as_ref()).as_bytes())?;
         }
@@ -116,9 +115,9 @@ impl Plan {
     }
 
     /// Rehearses a script and prints the forecast plan.
-    fn scripted(&self, campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<(), Failure> {
+    fn run_script(&self, campaign: &Campaign, model: &Model, source: &SequenceSource) -> Result<(), Failure> {
         if !(self.why.is_empty() && self.append.is_empty()) {
-            let message = "the steps of this campaign come from its script: write the jump there; --why and --append are for campaigns with a grid";
+            let message = "--why and --append need a campaign with a grid, but the steps of this campaign come from its script; add the jump to the script";
             return Err(Failure::new(Code::BadInput, message));
         }
         let (registry, stop) = (registry::registry(), interrupt::stop_flag()?);
@@ -136,8 +135,8 @@ impl Plan {
         }
         let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
         standard_output::print(&format!(
-            "{}{notes}Forecast: the script {} was rehearsed on the nominal machine; what it measures on the rig may lead it \
-             another way.\n",
+            "{}{notes}Forecast: the script {} was rehearsed on the nominal machine; on the rig it may take other steps, depending on the \
+             measurements.\n",
             plan_text(campaign, &plan),
             source.path.display()
         ))

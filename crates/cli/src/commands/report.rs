@@ -43,7 +43,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// Identifies the runs and writes the page.
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;
@@ -53,13 +52,13 @@ impl Report {
         let others = runs.split_off(1.min(runs.len()));
         let shown = runs.pop().ok_or(SessionError::NoRecording)?;
         let first = shown.first().ok_or(SessionError::NoRecording)?;
-        let gap = self.gap.as_deref().map(|file| diagnosed(file, &registry, first, &map)).transpose()?;
+        let gap = self.gap.as_deref().map(|file| diagnose(file, &registry, first, &map)).transpose()?;
         let page = Session::new(&registry).page(shown, others, &map, gap.as_ref())?;
         let out = self.out.clone().unwrap_or_else(|| match self.runs.as_slice() {
             [run] if run.is_dir() => run.join("report.html"),
             _ => PathBuf::from("report.html"),
         });
-        // The page of a run directory is made from its recording: it may be made again.
+        // The page of a run directory is made from its recording, so it may be replaced.
         let is_own = self.out.is_none() && out.parent().is_some_and(|parent| !parent.as_os_str().is_empty());
         let replace = Replace { force: self.replace.force || is_own };
         replace.write(&out, page.as_bytes())?;
@@ -81,12 +80,7 @@ impl Report {
     }
 }
 
-fn diagnosed(
-    file: &Path,
-    registry: &Registry,
-    recorded: &Recorded,
-    map: &ChannelMap,
-) -> Result<Gap, Failure> {
+fn diagnose(file: &Path, registry: &Registry, recorded: &Recorded, map: &ChannelMap) -> Result<Gap, Failure> {
     let campaign = mapper_campaign::load(file).map_err(Failure::of_campaign)?;
     let effects = registry.effects_with(&[])?;
     let progress = output_options::progress();

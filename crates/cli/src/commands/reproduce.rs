@@ -20,7 +20,6 @@ pub struct Reproduce {
 }
 
 impl Reproduce {
-    /// Makes the page and its pictures, and says in a line per statement what came out.
     pub fn run(&self) -> Result<(), Failure> {
         let progress = output_options::progress();
         let mut done = 0;
@@ -57,7 +56,7 @@ impl Reproduce {
     }
 }
 
-/// Writes a file of the reproduction; one of the same name is replaced, it is made of nothing but this program.
+/// Writes a file of the reproduction. An existing file is replaced, because the program can always make it again.
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     path.parent()
         .map_or(Ok(()), std::fs::create_dir_all)

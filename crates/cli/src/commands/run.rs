@@ -1,4 +1,4 @@
-//! `mapper run`: the whole way from a campaign to a map.
+//! `mapper run`: runs a campaign and makes the map.
 
 use crate::output::detail_options::ShownArguments;
 use crate::output::exit_code::Code;
@@ -13,11 +13,11 @@ use crate::{
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
-use mapper_live::{Asked, LiveError, LiveRun, Observers, TlsFiles};
+use mapper_live::{ObserverRequest, LiveError, LiveRun, Observers, TlsFiles};
 use mapper_report::{plan_text, with_messages};
 use mapper_session::{
-    BrokenOff, Ended, Operator, Phase, PreparedRun, RunOutcome, RunRequest, Session, SessionError,
-    SessionEvent, recording::run_directory, soak_s, start_time_ns,
+    InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, RunTermination, Session,
+    SessionError, SessionEvent, recording::run_directory, soak_s, start_time_ns,
 };
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -29,22 +29,22 @@ pub struct Run {
     /// Campaign file (YAML)
     #[arg(required_unless_present = "resume")]
     pub campaign: Option<PathBuf>,
-    /// Go on with a run that was broken off, from its directory; refused when machine, campaign, plan or backend are others
+    /// Resume an interrupted run from its directory; machine, campaign, plan and backend must be unchanged
     #[arg(long, value_name = "RUN", conflicts_with_all = ["plan", "out", "dry_run"])]
     pub resume: Option<PathBuf>,
-    /// Run this stored plan instead of making one; refused when campaign or model have changed since
+    /// Run this stored plan instead of making one; campaign and model must be unchanged
     #[arg(long, value_name = "FILE")]
     pub plan: Option<PathBuf>,
-    /// Show the plan and what would be written, and touch nothing
+    /// Only show the plan and the files that would be written
     #[arg(long)]
     pub dry_run: bool,
-    /// Directory for the run's own directory, instead of the campaign's `outputs.directory`
+    /// Parent of the run directory, instead of the campaign's `outputs.directory`
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Run the rig's time by the clock: 1 is real time, 10 ten times as fast; as fast as it goes if it is left out and the rig is simulated
+    /// Pace of the rig's time: 1 is real time, 10 ten times as fast [default: real time; as fast as possible for a simulated rig]
     #[arg(long, value_name = "FACTOR", hide_short_help = true)]
     pub pace: Option<f64>,
-    /// Serve a live page with buttons to hold and to stop; from other machines by the token that is printed
+    /// Serve a live page with buttons to hold and to stop; other computers need the printed token
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:7373")]
     pub live: Option<String>,
     /// Serve it over TLS with this certificate (PEM)
@@ -65,7 +65,6 @@ pub struct Run {
 }
 
 impl Run {
-    /// Plans, runs, records, identifies, assembles, reports.
     pub fn run(&self) -> Result<(), Failure> {
         let kept = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
         let Some(file) = self.campaign.clone().or(kept) else { return Ok(()) };
@@ -73,29 +72,29 @@ impl Run {
         let campaign_text = mapper_campaign::read_text(&file).map_err(|error| {
             Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
         })?;
-        let resume = self.resume.as_deref().map(BrokenOff::read).transpose()?;
+        let resume = self.resume.as_deref().map(InterruptedRun::read).transpose()?;
         if self.pace.is_some_and(|pace| !(pace.is_finite() && pace > 0.0)) {
             return Err(Failure::new(Code::BadInput, "--pace takes a number above 0"));
         }
-        let parent = self.out.clone().unwrap_or_else(|| in_home(&campaign.outputs.directory));
+        let parent = self.out.clone().unwrap_or_else(|| expand_home(&campaign.outputs.directory));
         let started = jiff::Timestamp::now();
         let (registry, stop, progress) =
             (registry::registry(), interrupt::run_stop()?, output_options::progress());
         progress.begin("planning");
         let states = rig_states::directory(None);
         let started_ns = u64::try_from(started.as_nanosecond()).unwrap_or(0);
-        let onlookers = self.onlookers().map_err(Failure::of_live)?;
+        let observers = self.observers().map_err(Failure::of_live)?;
         let on_event = |event: &SessionEvent| {
             if matches!(event, SessionEvent::RigReleased) {
                 stop.enter(Phase::Results);
             }
             progress.show(event);
-            onlookers.show(event);
+            observers.show(event);
         };
         let operator = Arc::new(Operator::default());
         let session = Session {
-            operator: onlookers.have_buttons().then_some(&*operator),
-            estimates: onlookers.are_there(),
+            operator: observers.has_operator_controls().then_some(&*operator),
+            estimates: observers.show_points(),
             registry: &registry,
             on_event: &on_event,
             stop: &stop.now,
@@ -114,11 +113,11 @@ impl Run {
         let prepared = session.prepare(request).map_err(|error| Failure::in_campaign(error, &file))?;
         if self.dry_run {
             progress.clear();
-            return self.dry(&campaign, &prepared, &parent);
+            return self.print_dry_run(&campaign, &prepared, &parent);
         }
         stop.enter(Phase::Rig);
         let pace = self.pace.or((!prepared.rig().simulated_time).then_some(1.0));
-        let looked_at = LiveRun {
+        let live_run = LiveRun {
             campaign: &campaign,
             plan: prepared.plan(),
             pace,
@@ -128,7 +127,7 @@ impl Run {
             after_step: stop.after_step.clone(),
             now: stop.now.clone(),
         };
-        for line in onlookers.begin(&looked_at).map_err(Failure::of_live)? {
+        for line in observers.start(&live_run).map_err(Failure::of_live)? {
             standard_output::warn(&format!("{line}\n"));
         }
         let outcome = match pace {
@@ -138,14 +137,14 @@ impl Run {
             None => prepared.run(&session)?,
         };
         progress.clear();
-        onlookers
+        observers
             .end(&outcome.sentence(), outcome.results.as_ref().ok().map(|results| results.page.as_path()));
         self.report_outcome(&campaign, outcome)
     }
 
-    fn onlookers(&self) -> Result<Observers<'_>, LiveError> {
+    fn observers(&self) -> Result<Observers<'_>, LiveError> {
         let tls = self.live_cert.clone().zip(self.live_key.clone());
-        Observers::open(Asked {
+        Observers::open(ObserverRequest {
             page: self.live.as_deref(),
             tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
             #[cfg(feature = "foxglove")]
@@ -161,25 +160,27 @@ impl Run {
         let unwritten = results.as_ref().ok().and_then(|results| results.unwritten.clone());
         let kept = "the rig is safe and the recording is kept";
         let failure = match end {
-            Ended::Completed if unwritten.is_some() => {
-                Some(Failure::new(Code::Failure, unwritten.unwrap_or_default()))
+            RunTermination::Completed if unwritten.is_some() => {
+                let unwritten = unwritten.unwrap_or_default();
+                let message = format!("{unwritten} (`mapper run --resume {}`)", directory.display());
+                Some(Failure::new(Code::Failure, message))
             }
-            Ended::Completed if unusable => Some(Failure::new(
+            RunTermination::Completed if unusable => Some(Failure::new(
                 Code::BadRecording,
-                "no point is usable: the reasons stand above and in the report",
+                "no point is usable; the reasons are listed above and in the report",
             )),
-            Ended::Completed => None,
-            Ended::Drifted { reason } => {
+            RunTermination::Completed => None,
+            RunTermination::Drifted { reason } => {
                 Some(Failure::new(Code::Rig, format!("{reason}. The rig is safe and the recording is kept")))
             }
-            Ended::Interrupted { t_s } => Some(Failure::new(
+            RunTermination::Interrupted { t_s } => Some(Failure::new(
                 Code::Interrupted,
                 format!("stopped by the operator at {t_s:.0} s; {kept}"),
             )),
-            Ended::Tripped { t_s, reason } => {
+            RunTermination::Tripped { t_s, reason } => {
                 Some(Failure::new(Code::Rig, format!("stopped at {t_s:.1} s: {reason}; {kept}")))
             }
-            Ended::Failed(source) => {
+            RunTermination::Failed(source) => {
                 let recording = recording.clone();
                 Some(SessionError::Run { source, recording }.into())
             }
@@ -195,7 +196,7 @@ impl Run {
                     self.shown.shown(),
                 ))?;
             }
-            // Stopped before there was anything to identify: why it was stopped is what counts.
+            // Without results, only the reason for the stop matters.
             (Err(_), Some(_)) if !self.json => {}
             (results, failure) => {
                 let mut value = match results {
@@ -211,9 +212,9 @@ impl Run {
         failure.map_or(Ok(()), Err)
     }
 
-    fn dry(&self, campaign: &Campaign, prepared: &PreparedRun<'_>, parent: &Path) -> Result<(), Failure> {
-        let (rig, plan) = (prepared.rig(), prepared.plan());
-        let would_write = parent.join(format!("{}-<time>", campaign.name));
+    fn print_dry_run(&self, campaign: &Campaign, run: &PreparedRun<'_>, out: &Path) -> Result<(), Failure> {
+        let (rig, plan) = (run.rig(), run.plan());
+        let would_write = out.join(format!("{}-<time>", campaign.name));
         if self.json {
             return standard_output::print_json(&json!({
                 "dry_run": true,
@@ -225,8 +226,8 @@ impl Run {
         }
         let samples = (soak_s(campaign) + plan.duration_s()) * rig.sample_rate_hz;
         standard_output::print(&format!(
-            "{}Dry run: nothing was touched. The rig would be `{}` {}, {} channels at {} Hz ({samples:.0} samples), the \
-             results would go to {}.\n",
+            "{}Dry run: nothing was started or written. The rig is `{}` {}, {} channels at {} Hz ({samples:.0} samples); the results would be \
+             in {}.\n",
             plan_text(campaign, plan),
             rig.backend,
             rig.version,
@@ -238,7 +239,7 @@ impl Run {
 }
 
 /// A directory of a campaign, with `~` as in a shell.
-fn in_home(directory: &str) -> PathBuf {
+fn expand_home(directory: &str) -> PathBuf {
     let home = std::env::var_os("HOME").filter(|home| !home.is_empty());
     match (directory.strip_prefix("~/"), home) {
         (Some(rest), Some(home)) => PathBuf::from(home).join(rest),

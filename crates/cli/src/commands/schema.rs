@@ -9,7 +9,6 @@ use clap::Args;
 pub struct Schema {}
 
 impl Schema {
-    /// Prints the schema.
     pub fn run(&self) -> Result<(), Failure> {
         standard_output::print_json(&mapper_campaign::json_schema())
     }

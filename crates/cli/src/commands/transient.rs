@@ -1,4 +1,4 @@
-//! `mapper transient`: a log in which nothing rests.
+//! `mapper transient`: identifies a log without steady steps.
 
 use crate::command_line::shared_arguments::{channel_map, given_campaign};
 use crate::output::failure::Failure;
@@ -19,8 +19,8 @@ pub struct Transient {
     /// Campaign with the machine and its geometry, instead of the one attached to the recording
     #[arg(long, value_name = "FILE")]
     pub campaign: Option<PathBuf>,
-    /// Fit what lies before this time of the log and predict the rest, e.g. "13.2 s" [default: fit everything]
-    #[arg(long, value_name = "TIME", value_parser = seconds)]
+    /// Fit the log up to this time and predict the rest, e.g. "13.2 s" [default: fit everything]
+    #[arg(long, value_name = "TIME", value_parser = parse_time_s)]
     pub fit_until: Option<f64>,
     /// Side of the machine
     #[arg(long, default_value = "compressor")]
@@ -28,7 +28,7 @@ pub struct Transient {
     /// Also try a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
     pub effects: Vec<PathBuf>,
-    /// Leave text, JSON and pictures in this directory
+    /// Write text, JSON and pictures to this directory
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Print one JSON object on standard output
@@ -39,13 +39,12 @@ pub struct Transient {
 }
 
 /// A time with its unit, s.
-fn seconds(text: &str) -> Result<f64, String> {
+fn parse_time_s(text: &str) -> Result<f64, String> {
     let duration = mapper_campaign::units::parse(mapper_campaign::units::Kind::Duration, text);
     duration.map_err(|error| error.to_string())
 }
 
 impl Transient {
-    /// Fits, predicts, and reports the residual and its cause.
     pub fn run(&self) -> Result<(), Failure> {
         let map = channel_map(self.channels.as_deref())?;
         let given = given_campaign(self.campaign.as_deref())?;

@@ -1,13 +1,13 @@
-//! How much of identified points is shown.
+//! Level of detail of identified points.
 
 use crate::output::output_options;
 use crate::terminal::Shown;
 use clap::Args;
 
-/// Of a command that prints identified points.
+/// Options of commands that print identified points.
 #[derive(Debug, Args)]
 pub struct ShownArguments {
-    /// Show everything: wide tables, what all points share, repeats, sensors, the zero
+    /// Show everything: wide tables, common parameters, repeats, sensors, the zero
     #[arg(long)]
     pub full: bool,
     /// Show the simulator's truth next to the points

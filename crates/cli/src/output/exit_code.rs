@@ -1,4 +1,4 @@
-//! What the process returns.
+//! Exit codes of the process.
 
 /// Exit codes, stable for scripts; `mapper --help` lists them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,9 +13,9 @@ pub enum Code {
     NoPlan = 4,
     /// The rig failed or a guard tripped; the rig is safe and what was recorded is kept.
     Rig = 5,
-    /// The recording does not hold what identification needs.
+    /// The recording lacks data that identification needs.
     BadRecording = 6,
-    /// A nightly run failed, or one of its figures left the band of the nights before.
+    /// A nightly run failed, or a metric is outside the band of the nights before.
     Moved = 7,
     /// Items of a fleet are missing or failed.
     Incomplete = 8,
@@ -27,12 +27,12 @@ pub enum Code {
 pub const HELP: &str = "\
 Exit codes:
   0    done
-  1    a file could not be read or written, or the program is at fault
+  1    a file could not be read or written, or the program has a defect
   2    wrong arguments
   3    the campaign or another input file has mistakes (all are printed)
-  4    there is no plan, or the plan given is stale
-  5    the rig failed, a guard tripped, the rig is in use, latched or not guarded as it needs; the recording is kept
-  6    the recording does not hold what identification needs
-  7    a nightly run failed, or one of its figures left the band of the nights before
-  8    items of a fleet are missing or failed (all are named)
+  4    no plan is possible, or the given plan is stale
+  5    the rig failed, a guard tripped, or the rig is in use, locked out or without its required guards; the recording is kept
+  6    the recording lacks data that identification needs
+  7    a nightly run failed, or a metric is outside the band of the nights before
+  8    items of a fleet are missing or failed (all are listed)
   130  stopped by the operator; the rig is safe, the recording is kept";

@@ -1,4 +1,4 @@
-//! How the program ends if it could not do what it was asked.
+//! Reports a failure at the end of the program.
 
 use crate::output::failure::Failure;
 use crate::output::{output_options, standard_output};
@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 /// Prints the failure, with `--json` as an object if none was printed yet.
 pub fn failed(failure: &Failure) -> ExitCode {
-    let Some(code) = failure.say() else { return ExitCode::SUCCESS };
+    let Some(code) = failure.report() else { return ExitCode::SUCCESS };
     if output_options::json() && !standard_output::has_printed() {
         // A reader that has gone away receives nothing.
         let _ = standard_output::print_json(&failure.json());

@@ -1,7 +1,8 @@
-//! Why a command ended early, with what to print and what to return.
+//! Failures of commands, with message and exit code.
 
 use crate::output::exit_code::Code;
-use crate::output::terminal_lines::on_terminal;
+use crate::output::remedy::{command_for, fleet_command_for};
+use crate::output::terminal_lines::wrap_for_terminal;
 use crate::output::{output_options, standard_error};
 use mapper_campaign::{CampaignError, Findings, NightlyError};
 use mapper_core::BackendError;
@@ -23,12 +24,12 @@ pub struct Failure {
     message: String,
     /// Mistakes of a file, for programs.
     findings: Option<Value>,
-    manner: Manner,
+    presentation: Presentation,
 }
 
 /// How a failure is reported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Manner {
+enum Presentation {
     /// In a sentence behind "mapper: ".
     Sentence,
     /// The message has its own layout (a rendered list of mistakes).
@@ -42,7 +43,13 @@ enum Manner {
 impl Failure {
     /// A failure with a message that completes "mapper: ".
     pub fn new(code: Code, message: impl std::fmt::Display) -> Self {
-        Failure { code, message: message.to_string(), findings: None, manner: Manner::Sentence }
+        Failure { code, message: message.to_string(), findings: None, presentation: Presentation::Sentence }
+    }
+
+    /// A library error with the command for its remedy, if there is one.
+    fn with_command(code: Code, error: &dyn std::fmt::Display, command: Option<String>) -> Self {
+        let command = command.map(|command| format!(" ({command})")).unwrap_or_default();
+        Failure::new(code, format!("{error}{command}"))
     }
 
     /// All mistakes of a campaign, or that it cannot be read.
@@ -57,14 +64,13 @@ impl Failure {
     fn of_findings(findings: &Findings) -> Self {
         Failure {
             code: Code::BadInput,
-            message: findings.render(output_options::warns_in_colour()),
+            message: findings.render(output_options::is_stderr_coloured()),
             findings: Some(json!(findings.list)),
-            manner: Manner::Rendered,
+            presentation: Presentation::Rendered,
         }
     }
 
-    /// An error of a session that has to do with a campaign file: a mistake in the backend's settings or in the formats of
-    /// the map is shown in its text.
+    /// A session error that concerns a campaign file. A mistake in the backend settings or in the map formats is shown at its line.
     pub fn in_campaign(error: SessionError, campaign: &Path) -> Self {
         let Ok(text) = mapper_campaign::read_text(campaign) else { return error.into() };
         let findings = match &error {
@@ -85,13 +91,14 @@ impl Failure {
         Failure::of_campaign(CampaignError::Mistakes(Box::new(findings)))
     }
 
-    /// The live page cannot be had.
+    /// The live page is not available.
     pub fn of_live(error: LiveError) -> Self {
         let code = if matches!(error, LiveError::Address { .. }) { Code::BadInput } else { Code::Failure };
-        Failure::new(code, error)
+        let command = matches!(error, LiveError::Listen { .. }).then(|| "`--live=ADDRESS`".to_owned());
+        Failure::with_command(code, &error, command)
     }
 
-    /// What a kind of study found, as the command of its own says it.
+    /// An error of a kind of study, reported as by the command of that kind.
     fn of_kind(error: Box<dyn std::error::Error + Send + Sync>) -> Self {
         let error = match error.downcast::<CampaignError>() {
             Ok(error) => return Failure::of_campaign(*error),
@@ -113,29 +120,29 @@ impl Failure {
 
     /// Standard output was closed by its reader: a normal end of a pipe.
     pub fn closed_pipe() -> Self {
-        Failure { manner: Manner::ClosedPipe, ..Failure::new(Code::Failure, "") }
+        Failure { presentation: Presentation::ClosedPipe, ..Failure::new(Code::Failure, "") }
     }
 
     /// A failure whose message is in the JSON on standard output.
     pub fn printed(code: Code) -> Self {
-        Failure { manner: Manner::Printed, ..Failure::new(code, "") }
+        Failure { presentation: Presentation::Printed, ..Failure::new(code, "") }
     }
 
-    /// Prints the message to standard error and gives the exit code; `None` if the reader went away: a normal end.
-    pub fn say(&self) -> Option<ExitCode> {
-        match self.manner {
-            Manner::ClosedPipe => return None,
-            Manner::Printed => {}
-            Manner::Rendered => standard_error::say_rendered(&self.message),
-            Manner::Sentence => {
-                let sentence = format!("mapper: {}\n", shortened(&self.message));
-                standard_error::say(&on_terminal(&sentence, terminal_size_of(std::io::stderr())));
+    /// Prints the message to standard error and returns the exit code; `None` after a closed pipe, which is a normal end.
+    pub fn report(&self) -> Option<ExitCode> {
+        match self.presentation {
+            Presentation::ClosedPipe => return None,
+            Presentation::Printed => {}
+            Presentation::Rendered => standard_error::say_rendered(&self.message),
+            Presentation::Sentence => {
+                let sentence = format!("mapper: {}\n", shorten(&self.message));
+                standard_error::say(&wrap_for_terminal(&sentence, terminal_size_of(std::io::stderr())));
             }
         }
         Some(ExitCode::from(self.code as u8))
     }
 
-    /// Code, message, and what to do: the text behind the message's last semicolon, or with the first mistake.
+    /// Code, message, and remedy: that of the first mistake, or the text after the last semicolon of the message.
     pub fn json(&self) -> Value {
         let first = self.findings.as_ref().and_then(|findings| findings.get(0));
         let (message, help) = match first {
@@ -150,13 +157,13 @@ impl Failure {
     }
 }
 
-/// Longest message, letters: a file can bring ten thousand names into one.
-const MESSAGE_LIMIT: usize = 4000;
+/// Maximum length of a message, characters: a file could put thousands of names into one.
+const MAX_MESSAGE_CHARS: usize = 4000;
 
-/// A message that fits a few screens. No colour in it is ours.
-fn shortened(message: &str) -> String {
+/// Shortens a message to a few screens, and replaces escape characters, which can only come from file contents.
+fn shorten(message: &str) -> String {
     let message = message.replace('\u{1b}', "\u{fffd}");
-    match message.char_indices().nth(MESSAGE_LIMIT) {
+    match message.char_indices().nth(MAX_MESSAGE_CHARS) {
         None => message,
         Some((end, _)) => format!("{} ... (and {} bytes more)", &message[..end], message.len() - end),
     }
@@ -173,7 +180,7 @@ impl From<SessionError> for Failure {
             ErrorKind::Interrupted => Code::Interrupted,
         };
         match error {
-            SessionError::Exists { .. } if output_options::replaces() => {
+            SessionError::Exists { .. } if output_options::has_force() => {
                 Failure::new(code, format!("{error}, or replace it with `--force`"))
             }
             SessionError::Campaign(error) => Failure::of_campaign(error),
@@ -181,7 +188,7 @@ impl From<SessionError> for Failure {
             | SessionError::ChannelMap(ChannelMapError::Mistakes(findings))
             | SessionError::MapWork(MapWorkError::Description(DescriptionError::Mistakes(findings)))
             | SessionError::Record(RecordError::ChannelMap(findings)) => Failure::of_findings(&findings),
-            error => Failure::new(code, error),
+            error => Failure::with_command(code, &error, command_for(&error)),
         }
     }
 }
@@ -202,7 +209,7 @@ impl From<BlindError> for Failure {
 impl From<FleetError> for Failure {
     fn from(error: FleetError) -> Self {
         let code = match &error {
-            FleetError::File { .. } | FleetError::Queue { .. } | FleetError::NothingTried { .. } => {
+            FleetError::File { .. } | FleetError::Queue { .. } | FleetError::UnknownCost { .. } => {
                 Code::Failure
             }
             FleetError::Interrupted => Code::Interrupted,
@@ -212,7 +219,7 @@ impl From<FleetError> for Failure {
             FleetError::StudyFile(StudyFileError::Mistakes(findings)) => Failure::of_findings(&findings),
             FleetError::StudyFile(error) => Failure::new(Code::Failure, error),
             FleetError::Kind(error) => Failure::of_kind(error),
-            error => Failure::new(code, error),
+            error => Failure::with_command(code, &error, fleet_command_for(&error)),
         }
     }
 }

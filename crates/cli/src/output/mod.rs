@@ -5,6 +5,7 @@ pub(crate) mod exit_code;
 pub(crate) mod exit_report;
 pub(crate) mod failure;
 pub(crate) mod output_options;
+pub(crate) mod remedy;
 pub(crate) mod standard_error;
 pub(crate) mod standard_output;
 pub(crate) mod terminal_lines;

@@ -1,6 +1,6 @@
 //! Output of the program: colours, progress, JSON. Chosen once on the command line, for all commands.
 
-use crate::terminal::{ColourChoice, Progress, ProgressManner, is_coloured, understands_escapes};
+use crate::terminal::{ColourChoice, Progress, ProgressFormat, is_coloured, understands_escapes};
 use clap::{ArgMatches, Args, ColorChoice};
 use mapper_report::Paint;
 use std::ffi::OsString;
@@ -14,7 +14,7 @@ pub struct OutputOptions {
     #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t, help_heading = "Output")]
     color: ColorChoice,
     /// Progress on standard error [default: a bar on a terminal, lines in a pipe, none with --json]
-    #[arg(long, global = true, value_parser = ProgressManner::NAMES, value_name = "FORM", help_heading = "Output")]
+    #[arg(long, global = true, value_parser = ProgressFormat::NAMES, value_name = "FORM", help_heading = "Output")]
     progress: Option<String>,
 }
 
@@ -22,7 +22,7 @@ pub struct OutputOptions {
 #[derive(Debug, Clone, Copy, Default)]
 struct ChosenOptions {
     colour: ColourChoice,
-    progress: Option<ProgressManner>,
+    progress: Option<ProgressFormat>,
     json: bool,
     replaces: bool,
 }
@@ -36,14 +36,14 @@ fn chosen() -> ChosenOptions {
     CHOSEN.get().copied().unwrap_or_default()
 }
 
-/// Keeps the chosen options, for all that is printed later.
-pub fn keep(arguments: &OutputOptions, matches: &ArgMatches) {
+/// Stores the chosen options for all later output.
+pub fn set_options(arguments: &OutputOptions, matches: &ArgMatches) {
     let colour = match arguments.color {
         ColorChoice::Auto => ColourChoice::Auto,
         ColorChoice::Always => ColourChoice::Always,
         ColorChoice::Never => ColourChoice::Never,
     };
-    let progress = arguments.progress.as_deref().map(ProgressManner::named);
+    let progress = arguments.progress.as_deref().map(ProgressFormat::named);
     let command = std::iter::successors(Some(matches), |of| of.subcommand().map(|(_, deeper)| deeper)).last();
     let json =
         command.is_some_and(|of| of.try_get_one::<bool>("json").ok().flatten().is_some_and(|json| *json));
@@ -52,8 +52,8 @@ pub fn keep(arguments: &OutputOptions, matches: &ArgMatches) {
     let _ = CHOSEN.set(ChosenOptions { colour, progress, json, replaces });
 }
 
-/// Whether arguments that could not be read ask for JSON and for no colours.
-pub fn of_raw(arguments: &[OsString]) -> (bool, ColorChoice) {
+/// Whether invalid arguments request JSON, and their choice of colours.
+pub fn scan_raw_arguments(arguments: &[OsString]) -> (bool, ColorChoice) {
     let given = |words: &[&str]| arguments.windows(words.len()).any(|window| window == words);
     let never = given(&["--color", "never"]) || given(&["--color=never"]);
     let always = given(&["--color", "always"]) || given(&["--color=always"]);
@@ -65,8 +65,8 @@ pub fn of_raw(arguments: &[OsString]) -> (bool, ColorChoice) {
     (given(&["--json"]), colour)
 }
 
-/// Keeps how all commands are listed, for completions and manual pages.
-pub fn keep_commands(commands: fn() -> clap::Command) {
+/// Stores the list of commands for completions and manual pages.
+pub fn set_commands(commands: fn() -> clap::Command) {
     let _ = COMMANDS.set(commands);
 }
 
@@ -80,8 +80,8 @@ pub fn json() -> bool {
     chosen().json
 }
 
-/// Whether the command can replace files that are there.
-pub fn replaces() -> bool {
+/// Whether the command has an option to replace existing files.
+pub fn has_force() -> bool {
     chosen().replaces
 }
 
@@ -91,7 +91,7 @@ pub fn paint() -> Paint {
 }
 
 /// Whether standard error is coloured.
-pub fn warns_in_colour() -> bool {
+pub fn is_stderr_coloured() -> bool {
     coloured(shows_escapes(&std::io::stderr()))
 }
 
@@ -107,9 +107,9 @@ fn coloured(terminal: bool) -> bool {
 /// The display of progress.
 pub fn progress() -> Progress {
     let usual = match (shows_escapes(&std::io::stderr()), json()) {
-        (true, _) => ProgressManner::Bar,
-        (false, true) => ProgressManner::Quiet,
-        (false, false) => ProgressManner::Lines,
+        (true, _) => ProgressFormat::Bar,
+        (false, true) => ProgressFormat::Quiet,
+        (false, false) => ProgressFormat::Lines,
     };
     Progress::new(chosen().progress.unwrap_or(usual))
 }

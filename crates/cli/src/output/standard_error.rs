@@ -1,4 +1,4 @@
-//! Text next to the output.
+//! Standard error.
 
 use mapper_core::terminal_text;
 use std::io::Write;
@@ -8,7 +8,7 @@ pub fn say(text: &str) {
     say_rendered(&terminal_text(text));
 }
 
-/// The same for a text with colours of its own, in which names of files and keys are harmless already.
+/// Writes coloured text whose file names and keys are already free of control characters.
 pub fn say_rendered(text: &str) {
     let _ = write!(std::io::stderr().lock(), "{text}");
 }

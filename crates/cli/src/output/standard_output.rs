@@ -1,9 +1,9 @@
-//! Standard output, whose reader may go away at any time.
+//! Standard output. Its reader may close the pipe at any time.
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_error;
-use crate::output::terminal_lines::on_terminal;
+use crate::output::terminal_lines::wrap_for_terminal;
 use clap::Args;
 use mapper_core::terminal_text;
 use mapper_session::{Existing, MapOut, MapWork, SessionError, write_file};
@@ -16,16 +16,16 @@ use terminal_size::terminal_size_of;
 /// Whether the one JSON object has been printed.
 static PRINTED: AtomicBool = AtomicBool::new(false);
 
-/// Of a command that writes files.
+/// Options of commands that write files.
 #[derive(Debug, Args)]
 pub struct Replace {
-    /// Replace files that are there already
+    /// Replace existing files
     #[arg(long)]
     pub force: bool,
 }
 
 impl Replace {
-    /// What becomes of a file that is there.
+    /// Treatment of an existing file.
     pub fn existing(&self) -> Existing {
         if self.force { Existing::Replaced } else { Existing::Kept }
     }
@@ -41,7 +41,7 @@ impl Replace {
     }
 }
 
-/// A file for the map of a command.
+/// Options for the map file of a command.
 #[derive(Debug, Args)]
 pub struct MapTarget {
     /// Write the map to this new file; its extension gives the format unless `--to` does
@@ -66,7 +66,7 @@ impl MapTarget {
 
 /// Writes text to standard output, on a terminal with long sentences wrapped to its width. A closed pipe ends the command quietly.
 pub fn print(text: &str) -> Result<(), Failure> {
-    write(&on_terminal(&terminal_text(text), terminal_size_of(std::io::stdout())))
+    write(&wrap_for_terminal(&terminal_text(text), terminal_size_of(std::io::stdout())))
 }
 
 fn write(text: &str) -> Result<(), Failure> {
@@ -77,12 +77,12 @@ fn write(text: &str) -> Result<(), Failure> {
     })
 }
 
-/// Writes what is already laid out to standard error: warnings, which no program reads.
+/// Writes warnings, already formatted, to standard error.
 pub fn warn(text: &str) {
     standard_error::say(text);
 }
 
-/// Writes the result of a command on map files, and what it assumed about them.
+/// Writes the result of an operation on map files, and its assumptions as warnings.
 pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
     work.warnings.iter().for_each(|warning| warn(&format!("{warning}\n")));
     if as_json { print_json(&work.json) } else { print(&work.text) }
@@ -90,13 +90,13 @@ pub fn print_map_work(work: &MapWork, as_json: bool) -> Result<(), Failure> {
 
 /// Writes one JSON object and a line end to standard output.
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
-    // JSON has its own way to write control characters, and programs get every letter.
+    // JSON escapes control characters itself, so programs get the text unchanged.
     write(&mapper_session::json_text(value)?)?;
     PRINTED.store(true, Ordering::Relaxed);
     Ok(())
 }
 
-/// Whether a JSON object was printed: there is room for one.
+/// Whether a JSON object was printed; only one is allowed.
 pub fn has_printed() -> bool {
     PRINTED.load(Ordering::Relaxed)
 }

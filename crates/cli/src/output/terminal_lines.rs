@@ -1,10 +1,10 @@
-//! Lines as wide as the terminal.
+//! Wraps lines to the width of the terminal.
 
 use mapper_report::wrapped;
 use terminal_size::{Height, Width};
 
-/// The text with its long lines wrapped; as it is without a terminal, so that other programs get whole lines.
-pub fn on_terminal(text: &str, size: Option<(Width, Height)>) -> String {
+/// Wraps long lines to the width of the terminal. Without a terminal the text is unchanged, so that other programs get whole lines.
+pub fn wrap_for_terminal(text: &str, size: Option<(Width, Height)>) -> String {
     let Some((Width(columns), _)) = size else { return text.to_owned() };
     let columns = usize::from(columns);
     let lines = text.split_inclusive('\n').map(|line| {

@@ -1,7 +1,7 @@
 //! The text next to a progress bar.
 
 /// Progress of a run: `step` counts from 1 and is 0 before the first step.
-pub(crate) fn run_words(step: usize, steps: usize, t_s: f64, duration_s: f64, left_s: f64) -> String {
+pub(crate) fn progress_text(step: usize, steps: usize, t_s: f64, duration_s: f64, left_s: f64) -> String {
     let place = match step {
         0 => "before step 1".to_owned(),
         step => format!("step {step} of {}", steps.max(step)),
@@ -30,11 +30,13 @@ mod tests {
     #[test]
     fn words_fit_next_to_a_bar_of_80_columns() {
         assert_eq!(
-            run_words(12, 57, 1320.0, 7440.0, 1.4),
+            progress_text(12, 57, 1320.0, 7440.0, 1.4),
             "step 12 of 57, 22 min of 2 h 04 min of rig time, 1.4 s left"
         );
-        assert!(run_words(0, 0, 7441.0, 7440.0, 0.0).starts_with("before step 1, 2 h 04 min of 2 h 04 min"));
-        let longest = run_words(999, 999, 99.0 * 3600.0, 99.9 * 3600.0, 99.9 * 3600.0);
+        assert!(
+            progress_text(0, 0, 7441.0, 7440.0, 0.0).starts_with("before step 1, 2 h 04 min of 2 h 04 min")
+        );
+        let longest = progress_text(999, 999, 99.0 * 3600.0, 99.9 * 3600.0, 99.9 * 3600.0);
         assert!(longest.len() <= 78, "{longest}");
         assert_eq!(
             [9.94, 9.96, 99.4, 99.6, 3599.0].map(short),

@@ -9,5 +9,5 @@ mod progress;
 mod results_text;
 
 pub use colour::{ColourChoice, is_coloured, understands_escapes};
-pub use progress::{Progress, ProgressManner};
+pub use progress::{Progress, ProgressFormat};
 pub use results_text::{Shown, identified_text, results_text};

@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar, lines, or JSON.
 
-use crate::terminal::bar_text::{run_words, short};
+use crate::terminal::bar_text::{progress_text, short};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use mapper_core::{StepMarker, terminal_text};
 use mapper_report::{with_messages, wrapped};
@@ -12,11 +12,11 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Interval at which the clock of a bar is redrawn.
-const TICK: Duration = Duration::from_millis(250);
+const REDRAW_INTERVAL: Duration = Duration::from_millis(250);
 /// Maximum width of a warning, columns.
 const COLUMNS: usize = 80;
 /// Number of times in a run that a program receives the rig's time.
-const RIG_TIMES: f64 = 200.0;
+const RIG_TIME_MESSAGES: f64 = 200.0;
 /// The current activity is above the bar, the progress below it.
 const RUN_BAR: &str = "{prefix}\n[{bar:14}] {msg}";
 const PIECES_BAR: &str = "[{bar:30}] {pos} of {len}, {elapsed} so far{msg}";
@@ -25,7 +25,7 @@ const SPINNER: &str = "{spinner} {wide_msg} {elapsed}";
 
 /// The consumer of the progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ProgressManner {
+pub enum ProgressFormat {
     /// A user at a terminal.
     Bar,
     /// A file that is read later: one line per step.
@@ -36,17 +36,17 @@ pub enum ProgressManner {
     Quiet,
 }
 
-impl ProgressManner {
+impl ProgressFormat {
     /// As written on the command line.
     pub const NAMES: [&str; 4] = ["bar", "lines", "json", "off"];
 
     /// The format of this name; an unknown name shows nothing.
     pub fn named(name: &str) -> Self {
         match name {
-            "bar" => ProgressManner::Bar,
-            "lines" => ProgressManner::Lines,
-            "json" => ProgressManner::Json,
-            _ => ProgressManner::Quiet,
+            "bar" => ProgressFormat::Bar,
+            "lines" => ProgressFormat::Lines,
+            "json" => ProgressFormat::Json,
+            _ => ProgressFormat::Quiet,
         }
     }
 
@@ -54,9 +54,9 @@ impl ProgressManner {
     fn shows(self, event: &SessionEvent) -> bool {
         use SessionEvent as E;
         match self {
-            ProgressManner::Quiet => false,
-            ProgressManner::Json => !matches!(event, E::Readings { .. }),
-            ProgressManner::Lines => {
+            ProgressFormat::Quiet => false,
+            ProgressFormat::Json => !matches!(event, E::Readings { .. }),
+            ProgressFormat::Lines => {
                 matches!(
                     event,
                     E::RunStarted { .. }
@@ -66,7 +66,7 @@ impl ProgressManner {
                         | E::PiecesDone { .. }
                 )
             }
-            ProgressManner::Bar => !matches!(
+            ProgressFormat::Bar => !matches!(
                 event,
                 E::StepEnded(_) | E::Readings { .. } | E::PointEstimated(_) | E::PointIdentified(_)
             ),
@@ -75,16 +75,16 @@ impl ProgressManner {
 }
 
 /// Maximum number of queued events.
-const QUEUE: usize = 4096;
-/// Longest wait of a session for a slow consumer. It waits once; after that, events are lost until the queue has room.
-const PATIENCE: Duration = Duration::from_millis(10);
+const MAX_QUEUED_EVENTS: usize = 4096;
+/// Maximum time that a session waits for a slow consumer. It waits once; after that, events are lost until the queue has room.
+const SEND_TIMEOUT: Duration = Duration::from_millis(10);
 /// Longest wait at the end for the queued events to be shown.
-const LAST_WORDS: Duration = Duration::from_secs(1);
+const FLUSH_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Shows the events of a session. Many threads may send them; a separate thread shows them, so no sender waits for a terminal
 /// or a pipe. A terminal on hold (Ctrl-S) or a pipe without a reader loses lines; the run and its guards continue.
 pub struct Progress {
-    manner: ProgressManner,
+    manner: ProgressFormat,
     to: SyncSender<Queued>,
     stalled: AtomicBool,
 }
@@ -97,12 +97,12 @@ enum Queued {
 
 impl Progress {
     /// Shows nothing before the first event.
-    pub fn new(manner: ProgressManner) -> Self {
-        let (to, queued) = sync_channel(QUEUE);
+    pub fn new(manner: ProgressFormat) -> Self {
+        let (to, queued) = sync_channel(MAX_QUEUED_EVENTS);
         // If the thread cannot be started, nothing is shown and the work continues.
         let started =
             std::thread::Builder::new().name("progress".to_owned()).spawn(move || show_all(manner, &queued));
-        let manner = if started.is_ok() { manner } else { ProgressManner::Quiet };
+        let manner = if started.is_ok() { manner } else { ProgressFormat::Quiet };
         Progress { manner, to, stalled: AtomicBool::new(false) }
     }
 
@@ -114,7 +114,7 @@ impl Progress {
         match self.to.try_send(Queued::Event(Box::new(event.clone()))) {
             Ok(()) => self.stalled.store(false, Ordering::Relaxed),
             Err(TrySendError::Full(queued)) if !self.stalled.load(Ordering::Relaxed) => {
-                std::thread::sleep(PATIENCE);
+                std::thread::sleep(SEND_TIMEOUT);
                 self.stalled.store(self.to.try_send(queued).is_err(), Ordering::Relaxed);
             }
             Err(_) => {}
@@ -135,7 +135,7 @@ impl Progress {
     pub fn clear(&self) {
         let (done, is_done) = sync_channel(1);
         if self.to.try_send(Queued::Clear(done)).is_ok() {
-            let _ = is_done.recv_timeout(LAST_WORDS);
+            let _ = is_done.recv_timeout(FLUSH_TIMEOUT);
         }
     }
 }
@@ -147,19 +147,19 @@ impl Drop for Progress {
     }
 }
 
-fn show_all(manner: ProgressManner, queued: &Receiver<Queued>) {
+fn show_all(manner: ProgressFormat, queued: &Receiver<Queued>) {
     let target = match manner {
-        ProgressManner::Bar => ProgressDrawTarget::stderr(),
+        ProgressFormat::Bar => ProgressDrawTarget::stderr(),
         _ => ProgressDrawTarget::hidden(),
     };
-    let shown = Shown { bar: ProgressBar::with_draw_target(None, target) };
+    let shown = ProgressDisplay { bar: ProgressBar::with_draw_target(None, target) };
     let mut state = State::default();
     for queued in queued {
         match (queued, manner) {
-            (Queued::Event(event), ProgressManner::Json) => print_json(&event, &mut state),
-            (Queued::Event(event), ProgressManner::Lines) => say_lines(&event, &mut state),
-            (Queued::Event(event), ProgressManner::Bar) => shown.draw(&event, &mut state),
-            (Queued::Event(_), ProgressManner::Quiet) => {}
+            (Queued::Event(event), ProgressFormat::Json) => print_json(&event, &mut state),
+            (Queued::Event(event), ProgressFormat::Lines) => say_lines(&event, &mut state),
+            (Queued::Event(event), ProgressFormat::Bar) => shown.draw(&event, &mut state),
+            (Queued::Event(_), ProgressFormat::Quiet) => {}
             (Queued::Clear(done), _) => {
                 shown.bar.finish_and_clear();
                 let _ = done.try_send(());
@@ -185,22 +185,22 @@ struct State {
 }
 
 /// The bar.
-struct Shown {
+struct ProgressDisplay {
     bar: ProgressBar,
 }
 
-impl Shown {
+impl ProgressDisplay {
     fn draw(&self, event: &SessionEvent, state: &mut State) {
         match event {
             SessionEvent::RunStarted { steps, duration_s, .. } => {
                 (state.steps, state.duration_s, state.step) = (*steps, *duration_s, 0);
                 self.look(state, RUN_BAR, Some(duration_s.ceil() as u64));
-                self.bar.set_prefix("at rest, then warming up");
+                self.bar.set_prefix("soak, then warm-up");
             }
             SessionEvent::RigTime { t_s } => {
                 self.bar.set_position(*t_s as u64);
                 let left_s = self.bar.eta().as_secs_f64();
-                self.bar.set_message(run_words(state.step, state.steps, *t_s, state.duration_s, left_s));
+                self.bar.set_message(progress_text(state.step, state.steps, *t_s, state.duration_s, left_s));
             }
             SessionEvent::StepStarted(marker) => {
                 state.step = marker.number().unwrap_or(state.step);
@@ -253,7 +253,7 @@ impl Shown {
             None => self.bar.unset_length(),
         }
         self.bar.set_message("");
-        self.bar.enable_steady_tick(TICK);
+        self.bar.enable_steady_tick(REDRAW_INTERVAL);
     }
 }
 
@@ -279,7 +279,7 @@ fn say_lines(event: &SessionEvent, state: &mut State) {
             "{:8.1} s  {}, {}, for {}, {} left",
             marker.start_s,
             marker.number().map_or_else(
-                || "a step once more".to_owned(),
+                || "repeated step".to_owned(),
                 |number| format!("step {number} of {}", state.steps.max(number))
             ),
             place(marker),
@@ -340,7 +340,7 @@ fn print_json(event: &SessionEvent, state: &mut State) {
     match event {
         SessionEvent::RunStarted { duration_s, .. } => state.duration_s = *duration_s,
         SessionEvent::RigTime { t_s } => {
-            if *t_s < state.sent_s + state.duration_s / RIG_TIMES {
+            if *t_s < state.sent_s + state.duration_s / RIG_TIME_MESSAGES {
                 return;
             }
             state.sent_s = *t_s;

@@ -28,7 +28,7 @@ pub struct Shown {
 }
 
 /// Results of a run, or of identified recordings.
-struct Found<'a> {
+struct ShownResults<'a> {
     points: &'a [ScoredPoint],
     two_parameter: &'a [TwoParameter],
     map: Option<&'a CompressorMap>,
@@ -44,9 +44,9 @@ struct Found<'a> {
 
 /// The results of a run: a table, notes, verdict and files. `more`: the command that shows the rest, in words.
 pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: Shown) -> String {
-    let mut text = found_text(
+    let mut text = shown_results_text(
         units,
-        &Found {
+        &ShownResults {
             points: &results.points,
             two_parameter: &results.two_parameter,
             map: results.compressor_map.as_ref(),
@@ -82,7 +82,7 @@ pub fn identified_text(
     shown: Shown,
 ) -> String {
     let warnings = warnings.iter().map(|warning| format!("recording: {warning}"));
-    let found = Found {
+    let found = ShownResults {
         points: &identified.points,
         two_parameter: &identified.two_parameter,
         map: None,
@@ -94,10 +94,10 @@ pub fn identified_text(
         remarks: identified.remarks.iter().cloned().chain(warnings).collect(),
         more,
     };
-    found_text(units, &found, shown)
+    shown_results_text(units, &found, shown)
 }
 
-fn found_text(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
+fn shown_results_text(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
     let mut text = if shown.full { full(units, found, shown) } else { short(units, found, shown) };
     let has = |verdict| found.points.iter().any(|scored| scored.point.verdict == verdict);
     let worst = [Verdict::Unusable, Verdict::Doubtful].into_iter().find(|verdict| has(*verdict));
@@ -107,7 +107,7 @@ fn found_text(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
     text
 }
 
-fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
+fn short(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
     let mut text = String::new();
     if let Some(disagreement) = disagreement_text(found.points, found.two_parameter, units) {
         text.push_str(&wrapped(&disagreement, COLUMNS, 2));
@@ -137,7 +137,7 @@ fn short(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
     text
 }
 
-fn full(units: &DisplayUnits, found: &Found<'_>, shown: Shown) -> String {
+fn full(units: &DisplayUnits, found: &ShownResults<'_>, shown: Shown) -> String {
     let mut text = disagreement_text(found.points, found.two_parameter, units).unwrap_or_default();
     text.push_str(&points_text(found.points, units, shown.truth));
     if let Some(shared) = shared_errors_text(found.points.iter().map(|scored| &scored.point), units) {

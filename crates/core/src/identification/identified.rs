@@ -44,7 +44,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// The verdict after a warning; an unusable point stays unusable.
+    /// The verdict after a warning: doubtful, or still unusable.
     pub fn doubted(self) -> Self {
         match self {
             Verdict::Good | Verdict::Doubtful => Verdict::Doubtful,

@@ -1,18 +1,17 @@
-//! How the gas before the compressor's wheel exchanges heat with the housing.
+//! Heat transfer between the gas upstream of the compressor wheel and the housing.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Model of the heat-transfer coefficient before the wheel. It matters only if part of the internal area lies there
-/// (alpha_A above 0).
+/// Model of the heat-transfer coefficient upstream of the wheel. It has an effect only if part of the internal area lies there (alpha_A above 0).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::names_alone)]
+#[schemars(transform = crate::schema::flatten_to_names)]
 pub enum InletConvection {
-    /// One coefficient before and after compression, as eqs. 1 and 3 of Burke et al. have it.
+    /// The same coefficient upstream and downstream of the wheel, as in eqs. 1 and 3 of Burke et al.
     #[default]
     Shared,
-    /// Its own, by the Nusselt law of the outlet at the inlet's diameter and the inlet's temperature (their Appendix A).
+    /// A separate coefficient, from the Nusselt law of the outlet with diameter and temperature of the inlet (their Appendix A).
     Own,
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Whether a shared parameter is taken as declared or estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::names_alone)]
+#[schemars(transform = crate::schema::flatten_to_names)]
 pub enum Choice {
     /// As declared.
     Fixed,
@@ -18,11 +18,11 @@ pub enum Choice {
 /// Variation of the efficiency within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::names_alone)]
+#[schemars(transform = crate::schema::flatten_to_names)]
 pub enum EfficiencyWithinStep {
     /// Constant.
     Constant,
-    /// As a smooth surface through all points varies between the sample's place on the map and the step's end.
+    /// Varies as a smooth surface through all points does, between the sample's position on the map and the end of the step.
     #[default]
     Shaped,
 }
@@ -30,11 +30,11 @@ pub enum EfficiencyWithinStep {
 /// Variation of the heat-transfer coefficient within a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::names_alone)]
+#[schemars(transform = crate::schema::flatten_to_names)]
 pub enum ConvectionWithinStep {
     /// Constant, and independent of the other points.
     Constant,
-    /// By a Nusselt law that all points share, each with a deviation of its own.
+    /// Follows a Nusselt law that all points share; each point has its own deviation from it.
     #[default]
     Law,
 }
@@ -49,8 +49,8 @@ pub struct JointSettings {
     pub probe: Choice,
     /// Factor on the heat-transfer coefficient if the metal is hotter than the gas; 1 if `fixed`.
     pub direction: Choice,
-    /// Whether the heat-transfer coefficient before the wheel equals that after it or follows the inlet's own diameter; as
-    /// in `machine.geometry` if `fixed`.
+    /// Whether the heat-transfer coefficient upstream of the wheel equals that downstream or follows the inlet's own diameter; as in
+    /// `machine.geometry` if `fixed`.
     pub inlet_h: Choice,
     /// Offsets of the sensors, with their declared uncertainty as prior.
     pub offsets: Choice,

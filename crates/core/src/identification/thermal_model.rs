@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
-    /// Found from the recording.
+    /// Estimated from the recording.
     Fitted,
-    /// Taken as declared, without using the recording.
+    /// The declared value; the recording was not used.
     Assumed,
     /// The recording adds no information to the declared value.
     NotIdentifiable,
@@ -66,7 +66,7 @@ pub struct ConvectionLaw {
 
 /// Two shared parameters that the recording hardly distinguishes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Entangled {
+pub struct CorrelatedPair {
     /// Symbol of one.
     pub first: String,
     /// Symbol of the other.
@@ -87,7 +87,7 @@ pub struct ProfilePoint {
 
 /// The assumed model of the heat-transfer coefficient before the wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct FoundInlet {
+pub struct IdentifiedInlet {
     /// The model used for the other parameters of this result.
     pub convection: InletConvection,
     /// Diameter of the inlet in its own law, m.
@@ -116,7 +116,7 @@ pub struct ThermalModel {
     pub alpha_area_profile: Vec<ProfilePoint>,
     /// Model of h before the wheel; `None` if it has no effect, since no area lies there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub inlet: Option<FoundInlet>,
+    pub inlet: Option<IdentifiedInlet>,
     /// Tip diameter of the T2 probe (eqs. 11-12), m; 0 is an ideal probe.
     pub probe_diameter_m: SharedValue,
     /// Factor on the coefficient if the metal is hotter than the gas it touches.
@@ -124,7 +124,7 @@ pub struct ThermalModel {
     /// Offsets of readings (reading minus true value), by channel, K or Pa.
     pub offsets: BTreeMap<Channel, SharedValue>,
     /// Parameters that are nearly indistinguishable (correlation beyond 0.95 in size).
-    pub entangled: Vec<Entangled>,
+    pub entangled: Vec<CorrelatedPair>,
     /// Evidence against the model; empty if there is none.
     #[serde(deserialize_with = "with_values")]
     pub doubts: Vec<ModelDoubt>,

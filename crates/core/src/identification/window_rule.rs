@@ -27,11 +27,11 @@ impl WindowRule {
 
     /// Share of a step, at its end, in which its operating point must have settled for a method that evaluates the step from
     /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may pass through a momentary rest.
-    const AT_REST_RATIO: f64 = 0.25;
+    const SETTLED_END_RATIO: f64 = 0.25;
 
     /// The same for a step of `dwell_s`, s: at most [`Self::SHORTEST_S`].
-    pub fn rest_at_end_s(dwell_s: f64) -> f64 {
-        (Self::AT_REST_RATIO * dwell_s).min(Self::SHORTEST_S)
+    pub fn settled_end_s(dwell_s: f64) -> f64 {
+        (Self::SETTLED_END_RATIO * dwell_s).min(Self::SHORTEST_S)
     }
 
     /// Start and end of the window of a step that lasts `dwell_s`, s after its jump, if the operating point settles

@@ -17,7 +17,7 @@ pub enum ExportError {
         source: Cause,
     },
     /// A coordinate is not a number: JSON would turn it into null, and the file could not be read back.
-    #[error("step {}: {quantity} is {value}; the format cannot hold it; leave the point out of the map", step_number(*step))]
+    #[error("step {}: {quantity} is {value}, which the format cannot represent; remove the point from the map", step_number(*step))]
     NotFinite {
         /// Index of the step, from 0.
         step: usize,
@@ -27,21 +27,19 @@ pub enum ExportError {
         value: f64,
     },
     /// The format is a table over the whole map, and the map has only points.
-    #[error(
-        "`{format}` needs a fitted map, not points alone; fit it (`mapper map fit FILE --out NEW`), or see why the fit was not possible"
-    )]
+    #[error("`{format}` needs a fitted map, but this one has only points; fit it first")]
     NeedsFit {
         /// The format.
         format: &'static str,
     },
     /// The format has no maps of turbines.
-    #[error("maps of turbines are not written as `{format}`; choose csv, sae, json, modelica or simscape")]
+    #[error("turbine maps cannot be written as `{format}`; choose csv, sae, json, modelica or simscape")]
     NoTurbine {
         /// The format.
         format: &'static str,
     },
     /// The format is read-only.
-    #[error("maps are only read from `{format}`; choose another format to write")]
+    #[error("`{format}` can only be read; choose another format to write")]
     OnlyRead {
         /// The format.
         format: &'static str,
@@ -67,7 +65,7 @@ pub enum ImportError {
         limit: usize,
     },
     /// Not text.
-    #[error("line {line} has control characters and is not text; save the map as CSV or text")]
+    #[error("line {line} contains control characters, so the file is not text; save the map as CSV or text")]
     NotText {
         /// Line, from 1.
         line: usize,
@@ -91,7 +89,7 @@ pub enum ImportError {
         form: &'static str,
     },
     /// The map of a turbine.
-    #[error("line {line}: `{text}` is the map of a turbine; this command needs the map of a compressor")]
+    #[error("line {line}: `{text}` belongs to a turbine map, but a compressor map is needed here")]
     Turbine {
         /// Line, from 1.
         line: usize,
@@ -100,7 +98,7 @@ pub enum ImportError {
     },
     /// The format has no maps of turbines.
     #[error(
-        "maps of turbines are not read from `{format}`; give a table of points as CSV, text or workbook, or JSON of `mapper`"
+        "turbine maps cannot be read from `{format}`; give a table of points as CSV, text or workbook, or JSON written by this program"
     )]
     NoTurbine {
         /// The format.
@@ -108,7 +106,7 @@ pub enum ImportError {
     },
     /// A column whose unit decides its size by powers of ten.
     #[error(
-        "line {line}: the column `{heading}` has no unit; write it into the heading, or give it: `--with {key}={example}`"
+        "line {line}: the column `{heading}` has no unit; write it into the heading, or state it in a map description, e.g. `{key}={example}`"
     )]
     NoUnit {
         /// Line of the heading, from 1.
@@ -122,7 +120,7 @@ pub enum ImportError {
     },
     /// A table without a column that every map has.
     #[error(
-        "line {line}: no column holds the {missing}; found: {found}; name it in the heading, with its unit (`flow [kg/s]`)"
+        "line {line}: no column contains the {missing} (found: {found}); name it in its heading, with the unit, e.g. `flow [kg/s]`"
     )]
     NoColumn {
         /// Line of the heading, from 1.
@@ -134,7 +132,7 @@ pub enum ImportError {
     },
     /// A file of tables without one of them.
     #[error(
-        "the file has no table of the {missing}; mapper looks for the names of T-MATS (NcVec, WcArray, PRArray, EffArray), pyCycle and NPSS (NcMap, WcMap, PRmap, effMap)"
+        "the file has no table of the {missing}; tables have the names of T-MATS (NcVec, WcArray, PRArray, EffArray), or of pyCycle and NPSS (NcMap, WcMap, PRmap, effMap)"
     )]
     NoTable {
         /// The missing quantity.
@@ -142,7 +140,7 @@ pub enum ImportError {
     },
     /// Tables whose sizes do not belong together.
     #[error(
-        "the tables do not fit together: {speeds} speeds, {flows} flows, {pressure_ratios} pressure ratios, {efficiencies} efficiencies; each needs the same number of values per speed"
+        "the sizes of the tables do not match: {speeds} speeds, {flows} flows, {pressure_ratios} pressure ratios, {efficiencies} efficiencies; each needs the same number of values per speed"
     )]
     TableSize {
         /// Number of speeds.
@@ -156,8 +154,8 @@ pub enum ImportError {
     },
     /// Speeds relative to a design point that the file does not give.
     #[error(
-        "the speeds are relative to a design speed that the file does not give (the fastest is {fastest}); give the corrected speed of its \
-         design point, e.g. `--design-speed \"150000 rpm\"`"
+        "the speeds are relative to a design speed that is not in the file (the highest is {fastest}); state the corrected speed of the design \
+         point, e.g. `design_speed=150000 rpm`"
     )]
     RelativeSpeed {
         /// The largest of them.
@@ -165,8 +163,7 @@ pub enum ImportError {
     },
     /// A design speed for speeds that are not relative.
     #[error(
-        "`--design-speed` belongs to maps with relative speeds; the speeds of this file are in rpm already (the fastest is {fastest} rpm): \
-         leave it out"
+        "a design speed was stated, but the speeds of this file are in rpm already (the highest is {fastest} rpm); leave it out"
     )]
     DesignSpeedUnused {
         /// The largest speed, rpm.
@@ -174,8 +171,8 @@ pub enum ImportError {
     },
     /// Scaled flows without unit and without the flow of the design point.
     #[error(
-        "the file does not give the unit of its flows, and programs for gas turbines use lb/s as well as kg/s; give the unit \
-         (`--with flow=kg/s`), or the corrected flow of the design point (`--with \"design_flow=0.2 kg/s\"`)"
+        "the file does not state the unit of its flows, and gas turbine programs use lb/s as well as kg/s; state the unit (`flow=kg/s`), or the \
+         corrected flow of the design point (`design_flow=0.2 kg/s`)"
     )]
     FlowUnit,
     /// A design point that the tables do not have.
@@ -189,14 +186,14 @@ pub enum ImportError {
         /// Its auxiliary coordinate.
         rline: f64,
     },
-    /// A statement of the user that is not one about this file.
+    /// An invalid statement of the user about this file.
     #[error("{key}: `{text}` {problem}")]
     Description {
         /// Key of the statement.
         key: &'static str,
         /// Its text.
         text: String,
-        /// Why it is none.
+        /// The problem.
         problem: String,
     },
     /// A workbook that cannot be read.
@@ -207,7 +204,7 @@ pub enum ImportError {
     },
     /// A compressed file that cannot be unpacked.
     #[error(
-        "the compressed file cannot be unpacked: {problem}; unpack it by hand (`gunzip FILE`) to see whether it is whole"
+        "the compressed file cannot be unpacked: {problem}; check with `gunzip -t FILE` whether it is complete"
     )]
     Packed {
         /// The problem.
@@ -215,8 +212,8 @@ pub enum ImportError {
     },
     /// All lines slower than any turbocharger's.
     #[error(
-        "the fastest speed line turns at {speed_corrected_rpm} rpm only: no turbocharger is that slow; if the file has krpm, say so in its \
-         heading (`speed [krpm]`)"
+        "the fastest speed line has only {speed_corrected_rpm} rpm, which is too slow for a turbocharger; if the speeds are in krpm, write that \
+         in the heading (`speed [krpm]`)"
     )]
     Slow {
         /// The fastest corrected speed, rpm.
@@ -224,8 +221,8 @@ pub enum ImportError {
     },
     /// More flow than an inlet can pass.
     #[error(
-        "line {line}: no compressor passes {flow_corrected_kg_s} kg/s at {speed_corrected_rpm} rpm ({most_kg_s:.2} kg/s at most); if the \
-         file has g/s, kg/h or lb/min, say so in its heading (`flow [g/s]`)"
+        "line {line}: {flow_corrected_kg_s} kg/s at {speed_corrected_rpm} rpm is more than any compressor passes ({most_kg_s:.2} kg/s); if the \
+         flows are in g/s, kg/h or lb/min, write that in the heading (`flow [g/s]`)"
     )]
     Flow {
         /// Line, from 1.
@@ -248,7 +245,7 @@ pub enum ImportError {
         text: String,
     },
     /// A value without physical meaning.
-    #[error("line {line}: {quantity} = {value} has no meaning; it must be {needed}")]
+    #[error("line {line}: {quantity} = {value} is not possible; it must be {needed}")]
     Value {
         /// Line, from 1.
         line: usize,
@@ -260,10 +257,10 @@ pub enum ImportError {
         needed: &'static str,
     },
     /// Not a map in JSON.
-    #[error("not a map as `mapper` writes it: {0}")]
+    #[error("the JSON is not a map written by this program: {0}")]
     Json(#[from] serde_json::Error),
     /// A field of a JSON map is not a valid number.
-    #[error("{place}: {quantity} = {value} has no meaning; it must be {needed}")]
+    #[error("{place}: {quantity} = {value} is not possible; it must be {needed}")]
     Field {
         /// Which line and point of the map.
         place: String,
@@ -276,13 +273,14 @@ pub enum ImportError {
     },
     /// The corrected quantities have no reference state.
     #[error(
-        "the map does not give the reference state of its corrected flows and speeds; give `--reference`: {}, or \"298 K, 100 kPa\"",
+        "the file does not state the reference state of its corrected flows and speeds; state it: {}, or a temperature and a pressure, e.g. \
+         \"298 K, 100 kPa\"",
         crate::usual_references()
     )]
     NoReference,
     /// The reference states of file and user differ.
     #[error(
-        "the map says that it refers to {found}, `--reference` says {given}; leave `--reference` out, or correct the file"
+        "the file has the reference state {found}, but {given} was stated; leave the statement out, or correct the file"
     )]
     ReferenceConflict {
         /// In the file.
@@ -300,10 +298,10 @@ pub enum ImportError {
         text: String,
     },
     /// The file is empty.
-    #[error("the file holds no points")]
+    #[error("the file contains no points")]
     Empty,
     /// More points than any map has.
-    #[error("line {line}: the file has more than {limit} points; no map has that many")]
+    #[error("line {line}: the file has more than {limit} points, which is more than a map has")]
     TooMany {
         /// Line at which the limit was passed.
         line: usize,
@@ -311,7 +309,7 @@ pub enum ImportError {
         limit: usize,
     },
     /// The format is write-only.
-    #[error("maps are only written as `{format}`; give a CSV, JSON or SAE file")]
+    #[error("`{format}` can only be written; give a CSV, JSON or SAE file")]
     OnlyWritten {
         /// The format.
         format: &'static str,

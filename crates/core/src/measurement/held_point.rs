@@ -1,9 +1,9 @@
-//! The point that a step held, from measurements: it distinguishes points if no commands were recorded.
+//! The operating point of a step as measured. It distinguishes points if no commands were recorded.
 
 use crate::{Channel, Recording, Series, StepMarker};
 
-/// Channels that jump between the points of a map, each with its smallest relative change; a smaller change means the same
-/// point. Temperatures follow for minutes, so they do not mark the beginning of a step.
+/// Channels that jump between the points of a map, with the relative change from which two points differ. Temperatures are not among them,
+/// because they take minutes to follow.
 pub const JUMPS: [(Channel, f64); 4] = [
     (Channel::ShaftSpeed, 0.01),
     (Channel::CompressorFlow, 0.02),
@@ -46,20 +46,20 @@ impl HeldPoint {
         })
     }
 
-    /// Whether two steps held the same point: equal speed and P3, and equal opening of the valve, or if that is unknown
-    /// equal flow, each within the size of a jump. A point without speed matches none.
+    /// Whether two steps were at the same point: equal speed and P3, and equal valve opening, or equal flow if the opening is unknown, each within
+    /// the size of a jump. A point without speed matches none.
     pub fn is_same(&self, other: &HeldPoint) -> bool {
         let ratio =
             |channel: Channel| JUMPS.iter().find(|(of, _)| *of == channel).map_or(0.0, |(_, ratio)| *ratio);
         let alike = |a: f64, b: f64, ratio: f64| (a - b).abs() <= ratio * a.abs().max(b.abs());
         let unknown_or_alike = |a: f64, b: f64, ratio: f64| a.is_nan() && b.is_nan() || alike(a, b, ratio);
         let opening = (self.valve_opening_ratio, other.valve_opening_ratio);
-        let third = if opening.0.is_nan() && opening.1.is_nan() {
+        let same_opening = if opening.0.is_nan() && opening.1.is_nan() {
             alike(self.flow_kg_s, other.flow_kg_s, ratio(Channel::CompressorFlow))
         } else {
             alike(opening.0, opening.1, VALVE_JUMP_RATIO)
         };
-        third
+        same_opening
             && alike(self.speed_rpm, other.speed_rpm, ratio(Channel::ShaftSpeed))
             && unknown_or_alike(self.p3_pa, other.p3_pa, ratio(Channel::P3))
     }

@@ -3,9 +3,9 @@
 use crate::{Element, HeldPoint, Recording, Series, StepKind, StepMarker};
 use std::collections::BTreeMap;
 
-/// Time between two joined recordings, s: far more than the thermal memory of any housing, so that the last step of
-/// one never counts as the start of the first jump of the next.
-const BETWEEN_S: f64 = 3600.0;
+/// Time between two joined recordings, s: much longer than the thermal time constant of any housing, so that the last step of one
+/// recording does not count as the start of the first jump of the next.
+const RECORDING_GAP_S: f64 = 3600.0;
 /// Tolerance of the commands within which steps of logs without targets are at the same point.
 const SAME_COMMAND_RATIO: f64 = 5e-3;
 
@@ -18,29 +18,28 @@ pub struct StepOrigin {
     pub step: usize,
 }
 
-/// Joins recordings in the given order; a single one stays unchanged. Times and indices of steps continue from
-/// recording to recording. Points are distinguished by their targets, by their commands, or if neither is known by
-/// measurements. A point of an earlier recording is a repeat if the same jump leads to it, and a
-/// return if another one does, so that each point is on the map once. The origins are those of the steps, in order.
-pub fn joined(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin>) {
+/// Joins recordings in the given order; a single one stays unchanged. Times and step indices continue from recording to recording. Steps at a
+/// point of an earlier recording become repeats if the same jump led to it, and returns otherwise, so that each point is on the map once. Points
+/// are compared by target, by command, or by measurement if neither is known. Also returns the origin of each step, in order.
+pub fn join_recordings(recordings: Vec<Recording>) -> (Recording, Vec<StepOrigin>) {
     let alone = recordings.len() < 2;
     let mut whole = Recording::default();
     let mut origins = Vec::new();
     // The measured point of each step and of the one before it, if only measurements identify the points.
-    let mut held: Vec<Held> = Vec::new();
+    let mut step_points: Vec<StepPoints> = Vec::new();
     for (number, mut recording) in recordings.into_iter().enumerate() {
         origins.extend(recording.steps.iter().map(|step| StepOrigin { recording: number, step: step.index }));
         if alone {
             return (recording, origins);
         }
-        let shift_s = end_s(&whole).map_or(0.0, |end_s| end_s + BETWEEN_S) - start_s(&recording);
+        let shift_s = end_s(&whole).map_or(0.0, |end_s| end_s + RECORDING_GAP_S) - start_s(&recording);
         let before = whole.steps.len();
         let points: Vec<Option<HeldPoint>> =
             recording.steps.iter().map(|step| HeldPoint::of(&recording, step)).collect();
         let from = std::iter::once(None).chain(points.iter().copied());
-        held.extend(points.iter().copied().zip(from));
-        for (step, held_now) in recording.steps.iter_mut().zip(held[before..].to_vec()) {
-            step.kind = kind((step, held_now), &whole.steps[..before], &held);
+        step_points.extend(points.iter().copied().zip(from));
+        for (step, own_points) in recording.steps.iter_mut().zip(step_points[before..].to_vec()) {
+            step.kind = kind((step, own_points), &whole.steps[..before], &step_points);
             step.index = whole.steps.len();
             step.start_s += shift_s;
             step.end_s += shift_s;
@@ -63,15 +62,19 @@ fn append<K: Ord>(whole: &mut BTreeMap<K, Series>, more: BTreeMap<K, Series>, sh
 }
 
 /// The measured points of a step and of the step before it.
-type Held = (Option<HeldPoint>, Option<HeldPoint>);
+type StepPoints = (Option<HeldPoint>, Option<HeldPoint>);
 
-fn kind((step, held): (&StepMarker, Held), earlier: &[StepMarker], earlier_held: &[Held]) -> StepKind {
+fn kind(
+    (step, held): (&StepMarker, StepPoints),
+    earlier: &[StepMarker],
+    earlier_held: &[StepPoints],
+) -> StepKind {
     let same = |a: Option<HeldPoint>, b: Option<HeldPoint>| match (a, b) {
         (Some(a), Some(b)) => a.is_same(&b),
         (None, None) => true,
         _ => false,
     };
-    let at_the_point = |(other, other_held): &(&StepMarker, &Held)| match (step.to, other.to, held.0) {
+    let at_the_point = |(other, other_held): &(&StepMarker, &StepPoints)| match (step.to, other.to, held.0) {
         (Some(to), Some(other), _) => to == other,
         (None, None, Some(_)) => same(held.0, other_held.0),
         (None, None, None) => {
@@ -89,8 +92,9 @@ fn kind((step, held): (&StepMarker, Held), earlier: &[StepMarker], earlier_held:
     if step.kind != StepKind::Point || there.peek().is_none() {
         return step.kind;
     }
-    let by_the_same_jump =
-        |(other, other_held): (&StepMarker, &Held)| other.from == step.from && same(held.1, other_held.1);
+    let by_the_same_jump = |(other, other_held): (&StepMarker, &StepPoints)| {
+        other.from == step.from && same(held.1, other_held.1)
+    };
     if there.any(by_the_same_jump) { StepKind::Repeat } else { StepKind::Return }
 }
 
@@ -144,7 +148,7 @@ mod tests {
         let mut first = recording(0.0, &[(None, at(5e4)), (at(5e4), at(9e4))]);
         first.steps[1].kind = StepKind::Repeat;
         let second = recording(700.0, &[(None, at(7e4)), (at(7e4), at(9e4))]);
-        let (whole, _) = joined(vec![first, second]);
+        let (whole, _) = join_recordings(vec![first, second]);
         assert_eq!(whole.steps[3].kind, StepKind::Point);
     }
 
@@ -152,7 +156,7 @@ mod tests {
     fn what_was_visited_before_is_no_new_point() {
         let first = recording(0.0, &[(None, at(5e4)), (at(5e4), at(9e4))]);
         let second = recording(700.0, &[(None, at(7e4)), (at(5e4), at(9e4)), (at(9e4), at(5e4))]);
-        let (whole, origins) = joined(vec![first, second]);
+        let (whole, origins) = join_recordings(vec![first, second]);
         let kinds: Vec<_> = whole.steps.iter().map(|step| step.kind).collect();
         use StepKind::{Point, Repeat, Return};
         assert_eq!(kinds, [Point, Point, Point, Repeat, Return]);
@@ -163,7 +167,7 @@ mod tests {
         for step in &whole.steps {
             assert_eq!(t2.slice(step.start_s, step.end_s).0.len(), 11);
         }
-        assert!(whole.steps[2].start_s - whole.steps[1].end_s >= BETWEEN_S);
+        assert!(whole.steps[2].start_s - whole.steps[1].end_s >= RECORDING_GAP_S);
     }
 
     /// Speeds and flows that were held for 100 s each, without commands.
@@ -199,7 +203,7 @@ mod tests {
         let first = measured(&[(6e4, 0.03), (9e4, 0.05), (9e4, 0.04)]);
         // Set by hand: the same jump, the first point of the first run by another jump, and a new point.
         let second = measured(&[(6.02e4, 0.0301), (9.03e4, 0.0496), (6e4, 0.03), (9e4, 0.045)]);
-        let (whole, _) = joined(vec![first, second]);
+        let (whole, _) = join_recordings(vec![first, second]);
         let kinds: Vec<_> = whole.steps[3..].iter().map(|step| step.kind).collect();
         use StepKind::{Point, Repeat, Return};
         assert_eq!(kinds, [Repeat, Repeat, Return, Point]);
@@ -208,6 +212,6 @@ mod tests {
     #[test]
     fn one_recording_stays_as_it_is() {
         let only = recording(3.0, &[(None, None), (None, None)]);
-        assert_eq!(joined(vec![only.clone()]).0, only);
+        assert_eq!(join_recordings(vec![only.clone()]).0, only);
     }
 }

@@ -1,4 +1,4 @@
-//! Batches of samples, one behind the other and cut in two.
+//! Joins and splits batches of samples.
 
 use crate::{ChannelColumn, ElementColumn, Provenance, Quality, SampleBatch, TruthColumn};
 

@@ -1,4 +1,4 @@
-//! Plausible readings of a turbocharger on a gas stand: one table for all checks of readings.
+//! Plausible readings of a turbocharger on a gas stand, in one table for all checks.
 
 use crate::{Channel, Dimension};
 use std::ops::RangeInclusive;
@@ -16,15 +16,15 @@ pub struct Plausible {
 ///
 /// | | running | why | any |
 /// |---|---|---|---|
-/// | shaft speed | 1e3..4e5 rpm | the largest idle above the first, the smallest stay below the second | 0..1e7 |
-/// | flows | 1e-4..20 kg/s | from what leaks through a small one at idle to engines of 10 MW | -100..100 |
-/// | P1 | 30..600 kPa | absolute, from a throttled inlet at altitude to the outlet of a stage before it | 100..1e9 |
-/// | other pressures | 50 kPa..2 MPa | absolute; gauge readings at part load lie below; to three stages of boost | 100..1e9 |
-/// | T1, ambient | 220..390 K | from an arctic cell to the outlet of a stage without a cooler | 100..3000 |
-/// | T2 | 220..700 K | what compressor wheels stand | 100..3000 |
-/// | compressor housing | 220..800 K | what aluminium does not stand any more | 100..3000 |
+/// | shaft speed | 1e3..4e5 rpm | idle of the largest machines to the maximum of the smallest | 0..1e7 |
+/// | flows | 1e-4..20 kg/s | leakage of a small machine at idle to engines of 10 MW | -100..100 |
+/// | P1 | 30..600 kPa | absolute; throttled inlet at altitude to the outlet of an upstream stage | 100..1e9 |
+/// | other pressures | 50 kPa..2 MPa | absolute; gauge readings at part load are lower; up to three stages of boost | 100..1e9 |
+/// | T1, ambient | 220..390 K | arctic cell to the outlet of an upstream stage without a cooler | 100..3000 |
+/// | T2 | 220..700 K | limit of compressor wheels | 100..3000 |
+/// | compressor housing | 220..800 K | above the limit of aluminium | 100..3000 |
 /// | oil | 220..480 K | oil burns above | 100..3000 |
-/// | turbine side | 220..1600 K | exhaust gas that melts turbines | 100..3000 |
+/// | turbine side | 220..1600 K | above the limit of turbine materials | 100..3000 |
 pub fn plausible(channel: Channel) -> Plausible {
     let running = match channel {
         Channel::ShaftSpeed => 1e3..=4e5,

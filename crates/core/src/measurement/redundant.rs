@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 /// Maximum number of sensors on one channel.
 pub const MAX_ELEMENTS: usize = 16;
 
-/// Deviation of a single reading from the median of all, in standard deviations of noise and offset together, from which it is
-/// skipped while the rig runs. The identification excludes sensors based on the whole recording.
+/// While the rig runs, a reading that deviates from the median of all by more than this is skipped; standard deviations of noise and offset
+/// together. Identification excludes sensors based on the whole recording instead.
 const LIVE_LIMIT_SIGMAS: f64 = 8.0;
 
 /// Exponent of a probe's lag with its diameter: `tau ~ d^2/Nu`, and Nu (eq. 11) about as `d^0.5` at the Reynolds numbers of
@@ -108,12 +108,12 @@ impl RedundantSensors {
 
     /// Weights of the sensors that `in_use` names by their index from 0; their sum is 1, and the others have 0.
     pub fn weights(&self, in_use: impl Fn(usize) -> bool) -> Vec<f64> {
-        let gains_alone = self
+        let only_gains = self
             .elements
             .iter()
             .all(|element| element.declared.offset_sigma == 0.0 && element.declared.gain_sigma_ratio > 0.0);
         let variance = |declared: &DeclaredUncertainty| {
-            if gains_alone {
+            if only_gains {
                 declared.gain_sigma_ratio.powi(2)
             } else {
                 declared.noise_sigma.powi(2) + declared.offset_sigma.powi(2)
@@ -176,7 +176,7 @@ impl RedundantSensors {
                 declared.noise_sigma.hypot(declared.offset_sigma).hypot(declared.gain_sigma_ratio * middle);
             reads(index) && (sigma <= 0.0 || (readings[index] - middle).abs() <= LIVE_LIMIT_SIGMAS * sigma)
         };
-        // If two contradict each other, both are far from their median.
+        // Two sensors that contradict each other are both far from their median; then both are used.
         let any_near = (0..self.elements.len()).any(near);
         let weights = self.weights(|index| if any_near { near(index) } else { reads(index) });
         let used = weights.iter().zip(readings).filter(|(weight, _)| **weight > 0.0);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct ChannelColumn {
     /// Its channel.
     pub channel: Channel,
-    /// SI values, as long as the batch's `t_s`. NaN if the sensor gave nothing.
+    /// SI values, as long as the batch's `t_s`; NaN for missing readings.
     pub values: Vec<f64>,
 }
 

@@ -28,10 +28,10 @@ pub struct StepMarker {
 
 impl StepMarker {
     /// First index of steps that a resumed run repeats outside its plan: no plan has that many steps.
-    pub const AGAIN_FROM: usize = 1_000_000;
+    pub const FIRST_REPEAT_INDEX: usize = 1_000_000;
 
     /// Number of the step in its run, from 1; `None` for a repeated one outside the plan.
     pub fn number(&self) -> Option<usize> {
-        (self.index < StepMarker::AGAIN_FROM).then(|| step_number(self.index))
+        (self.index < StepMarker::FIRST_REPEAT_INDEX).then(|| step_number(self.index))
     }
 }

@@ -160,7 +160,7 @@ pub trait Backend: Send {
 #[derive(Debug, thiserror::Error)]
 pub enum BackendError {
     /// A call out of order in the life cycle.
-    #[error("the rig is {state}; `{call}` needs it to be {needed}: a fault of the program that drives it")]
+    #[error("`{call}` was called while the rig is {state}, not {needed}: a defect of the calling program")]
     OutOfOrder {
         /// The call.
         call: &'static str,
@@ -171,7 +171,7 @@ pub enum BackendError {
     },
     /// A setpoint outside the range of the rig.
     #[error(
-        "{quantity} = {} is outside what the rig can do ({low} to {})",
+        "{quantity} = {} is outside the range of the rig ({low} to {})",
         with_unit(value, unit),
         with_unit(high, unit)
     )]
@@ -202,7 +202,7 @@ pub enum BackendError {
     Simulation {
         /// Run time, s.
         t_s: f64,
-        /// Why.
+        /// The reason.
         source: BackendCause,
     },
     /// A call did not return in time.
@@ -218,7 +218,7 @@ pub enum BackendError {
     Lost {
         /// Run time, s.
         t_s: f64,
-        /// Why.
+        /// The reason.
         source: BackendCause,
     },
 }

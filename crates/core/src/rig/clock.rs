@@ -5,8 +5,8 @@ pub trait Clock {
     /// Returns when the run may continue to `t_s` (seconds since arming).
     fn wait_until(&mut self, t_s: f64);
 
-    /// Whether time passes without [`wait_until`](Self::wait_until), as on a rig. By default it does not.
-    fn goes_on_by_itself(&self) -> bool {
+    /// Whether time passes outside [`wait_until`](Self::wait_until), as it does on a real rig.
+    fn advances_by_itself(&self) -> bool {
         false
     }
 }
@@ -48,7 +48,7 @@ impl<W: Wall> PacedClock<W> {
 }
 
 impl<W: Wall> Clock for PacedClock<W> {
-    fn goes_on_by_itself(&self) -> bool {
+    fn advances_by_itself(&self) -> bool {
         true
     }
 
@@ -56,7 +56,7 @@ impl<W: Wall> Clock for PacedClock<W> {
         let now_s = self.wall.now_s();
         let start_s = *self.start_s.get_or_insert(now_s);
         let left_s = start_s + t_s / self.speed_ratio - now_s;
-        // A late call does not wait: a slow disk delays one poll, not all later ones.
+        // A late call does not wait, so that a slow disk delays one poll and not all later ones.
         if left_s > 0.0 {
             self.wall.wait_s(left_s);
         }

@@ -50,7 +50,7 @@ impl std::fmt::Display for GuardName {
 /// Reaction when a guard trips, mildest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::names_alone)]
+#[schemars(transform = crate::schema::flatten_to_names)]
 pub enum Reaction {
     /// Report it, and continue.
     Note,
@@ -97,11 +97,11 @@ pub struct SignalGuard {
     pub change: Option<LargestChange>,
     /// Hysteresis: a value beyond a bound counts until it is this far back, unit of the channel, >= 0.
     pub hysteresis: f64,
-    /// A value trips after this time beyond a bound, s, >= 0.
+    /// The guard trips when a value has been beyond a bound for this time, s, >= 0.
     pub dwell_s: f64,
     /// The guard trips after this time without a good reading, s, > 0.
     pub age_s: f64,
-    /// A reading trips if it has not changed by a bit for this time after a jump of the setpoints, s; `None`: not checked.
+    /// The guard trips if the reading has not changed at all for this time after a jump of the setpoints, s; `None`: not checked.
     pub frozen_s: Option<f64>,
     /// Reaction to a bound; a missing signal ends the run in any case.
     pub reaction: Reaction,

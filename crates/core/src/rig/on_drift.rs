@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Reaction when a repeated jump differs from its first visit, and differs again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[schemars(transform = crate::schema::names_alone)]
+#[schemars(transform = crate::schema::flatten_to_names)]
 pub enum OnDrift {
     /// The run ends in the safe state, for inspection by an operator.
     Hold,

@@ -6,11 +6,11 @@ use crate::{OperatingPoint, RigMode, SafeTrajectory, SetpointRange, SetpointRang
 const HEATER_OFF_K: f64 = 293.15;
 
 impl SafeTrajectory {
-    /// Setpoints `after_s` into the shutdown that began at `from`: heater off, valve open, P3 down at its slew. `None` if the air is to
-    /// be cut: at once without a slew, at the end of the shutdown, and once P3 is at `p3_min_pa`.
+    /// Setpoints `after_s` into the shutdown that began at `from`: heater off, valve open, P3 falling at its slew rate. `None` means that the air
+    /// must be cut off: without a slew rate at once, otherwise at the end of the shutdown or once P3 has reached `p3_min_pa`.
     ///
-    /// The rig's ranges bound heater and valve: a rig that does not accept 293 K gets its lowest setpoint, since a rejected command
-    /// would cut the air at full pressure.
+    /// Heater and valve setpoints are limited to the ranges of the rig. A rig that does not accept 293 K gets its lowest setpoint, because a
+    /// rejected command would cut off the air at full pressure.
     pub fn setpoints(
         &self,
         from: &Setpoints,

@@ -19,8 +19,8 @@ pub struct Soak {
 }
 
 impl Soak {
-    /// Sensors that must agree at rest: temperatures, and pressures.
-    pub const ALIKE: [&'static [Channel]; 2] =
+    /// Sensors that must read the same at standstill: temperatures, and pressures.
+    pub const EQUAL_AT_REST: [&'static [Channel]; 2] =
         [&[Channel::T1, Channel::T2, Channel::Tc, Channel::TOil], &[Channel::P1, Channel::P2]];
     /// Default temperature non-uniformity of a soak: 0.05 K.
     pub const TEMPERATURE_SIGMA_K: f64 = 0.05;

@@ -106,8 +106,8 @@ impl SurgeMark {
 }
 
 impl Recording {
-    /// Removes the approaches to surge and everything after the first of them: they come after the points, contain
-    /// none, and must not affect any. `None` if the recording has none.
+    /// Removes the approaches to surge, and everything after the first of them, and returns them. They contain no points and must not affect the
+    /// identification of any. `None` if the recording has none.
     pub fn split_off_approaches(&mut self) -> Option<Recording> {
         let first = self.steps.iter().position(|step| step.kind == StepKind::Approach)?;
         let from_s = self.steps[first].start_s;

@@ -107,7 +107,7 @@ pub struct PlanStep {
 
 /// Hashes of the plan's inputs; a plan whose hashes no longer match is stale.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MadeFrom {
+pub struct PlanInputHashes {
     /// SHA-256 of the campaign as parsed (defaults filled in, units resolved).
     pub campaign_sha256: String,
     /// SHA-256 of the nominal model's parameters and map.
@@ -169,7 +169,7 @@ pub struct Plan {
     /// Seed of the search (and of simulated rigs).
     pub seed: u64,
     /// The inputs of the plan.
-    pub made_from: MadeFrom,
+    pub made_from: PlanInputHashes,
     /// Time at the first point before the first step starts, s.
     pub warm_up_s: f64,
     /// Time at standstill conditions after the last step, s.

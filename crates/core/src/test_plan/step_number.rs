@@ -1,26 +1,26 @@
-//! The number of a step: from 1 in files and in all text, while code uses an index from 0.
+//! The number of a step: files and texts count from 1, code uses an index from 0.
 //!
-//! Serde adapters for the fields with such an index: this module for one named `step`, [`list`], [`lists`] and [`option`] for several
-//! and for a missing one, [`entry`] for plans and step markers, which have another form in older files.
+//! The serde adapters write the number and read it back as an index: this module for one step, [`list`] and [`lists`] for several, [`option`] for
+//! an optional one, [`entry`] for plans and step markers, which have another form in older files.
 
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 
 /// The number of the step at an index, from 1.
-pub fn step_number(place: usize) -> usize {
-    place.saturating_add(1)
+pub fn step_number(index: usize) -> usize {
+    index.saturating_add(1)
 }
 
-fn place<E: Error>(number: usize) -> Result<usize, E> {
+fn index_of<E: Error>(number: usize) -> Result<usize, E> {
     number.checked_sub(1).ok_or_else(|| E::custom("steps count from 1, and this one has the number 0"))
 }
 
-/// Writes the number of the step at `place`.
+/// Writes the number of the step at `index`.
 ///
 /// # Errors
 /// Those of the serializer.
-pub fn serialize<S: Serializer>(place: &usize, serializer: S) -> Result<S::Ok, S::Error> {
-    step_number(*place).serialize(serializer)
+pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    step_number(*index).serialize(serializer)
 }
 
 /// Reads a number from 1 as an index.
@@ -28,7 +28,7 @@ pub fn serialize<S: Serializer>(place: &usize, serializer: S) -> Result<S::Ok, S
 /// # Errors
 /// Those of the deserializer; 0 is not a valid step.
 pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
-    place(usize::deserialize(deserializer)?)
+    index_of(usize::deserialize(deserializer)?)
 }
 
 /// Several steps.
@@ -65,18 +65,18 @@ pub mod option {
     use super::{Serialize, Serializer};
     use crate::step_number;
 
-    /// Writes the number of the step at `place`, or null.
+    /// Writes the number of the step at `index`, or null.
     ///
     /// # Errors
     /// Those of the serializer.
-    pub fn serialize<S: Serializer>(place: &Option<usize>, serializer: S) -> Result<S::Ok, S::Error> {
-        place.map(step_number).serialize(serializer)
+    pub fn serialize<S: Serializer>(index: &Option<usize>, serializer: S) -> Result<S::Ok, S::Error> {
+        index.map(step_number).serialize(serializer)
     }
 }
 
 /// For a flattened field: `step` from 1. Files of version 0.1.0 have `index` from 0 instead; the name distinguishes them.
 pub mod entry {
-    use super::{Deserialize, Deserializer, Error, Serialize, Serializer, place};
+    use super::{Deserialize, Deserializer, Error, Serialize, Serializer, index_of};
     use crate::step_number;
 
     #[derive(serde::Serialize)]
@@ -94,8 +94,8 @@ pub mod entry {
     ///
     /// # Errors
     /// Those of the serializer.
-    pub fn serialize<S: Serializer>(place: &usize, serializer: S) -> Result<S::Ok, S::Error> {
-        Written { step: step_number(*place) }.serialize(serializer)
+    pub fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+        Written { step: step_number(*index) }.serialize(serializer)
     }
 
     /// Reads `step` or `index`.
@@ -105,7 +105,7 @@ pub mod entry {
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
         let Read { step, index } = Read::deserialize(deserializer)?;
         match step {
-            Some(step) => place(step),
+            Some(step) => index_of(step),
             None => index.ok_or_else(|| D::Error::missing_field("step")),
         }
     }
@@ -130,15 +130,15 @@ mod tests {
 
     #[test]
     fn files_count_from_one_and_those_of_0_1_0_still_read() {
-        for place in [0, 1, 57, 999_999] {
-            let text = serde_json::to_string(&Marked { index: place, at: 0.1 }).unwrap();
-            assert!(text.contains(&format!("\"step\":{}", place + 1)) && !text.contains("index"), "{text}");
-            let old = format!("{{\"at\":0.1,\"index\":{place}}}");
+        for index in [0, 1, 57, 999_999] {
+            let text = serde_json::to_string(&Marked { index, at: 0.1 }).unwrap();
+            assert!(text.contains(&format!("\"step\":{}", index + 1)) && !text.contains("index"), "{text}");
+            let old = format!("{{\"at\":0.1,\"index\":{index}}}");
             for text in [text, old] {
-                assert_eq!(serde_json::from_str::<Marked>(&text).unwrap(), Marked { index: place, at: 0.1 });
+                assert_eq!(serde_json::from_str::<Marked>(&text).unwrap(), Marked { index, at: 0.1 });
             }
-            let text = serde_json::to_string(&Named { step: place }).unwrap();
-            assert_eq!(serde_json::from_str::<Named>(&text).unwrap(), Named { step: place });
+            let text = serde_json::to_string(&Named { step: index }).unwrap();
+            assert_eq!(serde_json::from_str::<Named>(&text).unwrap(), Named { step: index });
         }
     }
 

@@ -9,9 +9,9 @@ pub struct VerdictForecast {
     pub points: usize,
     /// Those expected to be good.
     pub good: usize,
-    /// Whether the steps may turn out to contain too little information to check what is declared: all points would then be doubtful.
+    /// Whether the steps may contain too little information to check the declared parameters, which would make all points doubtful.
     pub near_limit: bool,
-    /// Expected standard error of efficiency, root mean square of the points, fraction; `None` if the steps cannot check what is declared.
+    /// Expected standard error of efficiency, root mean square over the points, fraction; `None` if the steps cannot check the declared parameters.
     pub eta_standard_error: Option<f64>,
     /// Rig time, s.
     pub duration_s: f64,

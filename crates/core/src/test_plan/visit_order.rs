@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 // Without descriptions of its own the schema is one list of names: a message can suggest the intended one.
-#[schemars(transform = crate::schema::names_alone)]
+#[schemars(transform = crate::schema::flatten_to_names)]
 #[schemars(extend("x-removed" = {
     "sum_gradient": "write `order: thermal_gradient`, its new name",
     "worst_gradient": "write `order: min_gradient`, its new name",

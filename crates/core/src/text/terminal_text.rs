@@ -1,19 +1,18 @@
-//! Makes text safe for terminals, which obey the control characters in it.
+//! Makes text safe for terminals, which interpret control characters.
 
 use std::borrow::Cow;
 
-/// Colours and weights that this program writes itself: normal, bold, the eight colours.
+/// Escape codes that this program writes itself: normal, bold, the eight colours.
 const OWN_CODES: [&str; 11] = ["0", "1", "30", "31", "32", "33", "34", "35", "36", "37", "39"];
 
-/// Replaces all that a terminal would obey or that reverses the order of letters: control characters except line ends and tabs,
-/// escape sequences except colours, and the marks for writing from right to left. Names of files, channels and units come from
-/// outside, and so do the messages of drivers.
+/// Replaces control characters except line ends and tabs, escape sequences except colours, and marks for right-to-left text. Names of files,
+/// channels and units, and messages of drivers, come from outside and could otherwise control the terminal or hide text.
 pub fn terminal_text(text: &str) -> Cow<'_, str> {
-    let doubtful = |c: char| {
+    let unsafe_char = |c: char| {
         c.is_control() && !matches!(c, '\n' | '\t')
             || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
-    if !text.contains(doubtful) {
+    if !text.contains(unsafe_char) {
         return Cow::Borrowed(text);
     }
     let mut safe = String::with_capacity(text.len());
@@ -24,7 +23,7 @@ pub fn terminal_text(text: &str) -> Cow<'_, str> {
         let (this, after) = rest.split_at(length);
         rest = after;
         let ends_line = letter == '\r' && rest.starts_with('\n');
-        if !ends_line && doubtful(letter) && length == letter.len_utf8() {
+        if !ends_line && unsafe_char(letter) && length == letter.len_utf8() {
             safe.push('\u{fffd}')
         } else {
             safe.push_str(this)

@@ -30,7 +30,7 @@ pub enum FleetError {
         source: serde_json::Error,
     },
     /// The directory has no study.
-    #[error("there is no study in {}; make one with `mapper fleet make STUDY.yaml --out DIR`", .directory.display())]
+    #[error("there is no study in {}; make one", .directory.display())]
     NoStudy {
         /// The directory.
         directory: PathBuf,
@@ -46,7 +46,7 @@ pub enum FleetError {
         known: u32,
     },
     /// The directory holds another study.
-    #[error("{} holds the study `{found}` ({kind}) already; choose another directory", .directory.display())]
+    #[error("{} already contains the study `{found}` ({kind}); choose another directory", .directory.display())]
     OtherStudy {
         /// The directory.
         directory: PathBuf,
@@ -57,8 +57,8 @@ pub enum FleetError {
     },
     /// Study and program are of different versions.
     #[error(
-        "{} was made by {made_by}; this is {program}. Results of two versions are never mixed; use the first, or make the \
-         study again in a new directory", .directory.display()
+        "{} was made by {made_by}, but this is {program}, and results of two versions are never mixed; use {made_by}, or make a new study in \
+         another directory", .directory.display()
     )]
     OtherProgram {
         /// The directory.
@@ -77,7 +77,7 @@ pub enum FleetError {
         known: String,
     },
     /// A study has no items, or too many.
-    #[error("the study asks for {items} items; 1 to {most} are allowed")]
+    #[error("the study has {items} items; 1 to {most} are allowed")]
     Items {
         /// Number of items.
         items: usize,
@@ -85,28 +85,28 @@ pub enum FleetError {
         most: usize,
     },
     /// Two items of a study are the same.
-    #[error("the items {first} and {second} are the same work; name each once")]
-    Twice {
+    #[error("the items {first} and {second} are identical; list each once")]
+    DuplicateItem {
         /// One.
         first: String,
         /// The other.
         second: String,
     },
     /// An item's file was changed.
-    #[error("{} has been changed: its hash is not its name; make the study again with `mapper fleet make`", .path.display())]
+    #[error("{} has been changed: its hash differs from its name; make the study again", .path.display())]
     Changed {
         /// The file.
         path: PathBuf,
     },
     /// An item that the study does not have.
-    #[error("the study has no item {hash}; `mapper fleet status DIR --items` lists them")]
+    #[error("the study has no item {hash}; choose one from its list of items")]
     NoItem {
         /// The requested item.
         hash: Hash,
     },
     /// The cost of an item is unknown.
-    #[error("nothing was tried yet: every item that was tried failed, the first with: {why}")]
-    NothingTried {
+    #[error("the cost is unknown, because every item so far has failed; the first failed with: {why}")]
+    UnknownCost {
         /// The cause.
         why: String,
     },
@@ -117,7 +117,7 @@ pub enum FleetError {
         why: String,
     },
     /// No item is left to do.
-    #[error("all {items} items are done; merge with `mapper fleet merge {}`", .directory.display())]
+    #[error("all {items} items are done; merge the study {}", .directory.display())]
     NothingLeft {
         /// Number of items.
         items: usize,
@@ -125,17 +125,17 @@ pub enum FleetError {
         directory: PathBuf,
     },
     /// A retry without an earlier submission.
-    #[error("{} was not submitted yet; submit it with `mapper fleet submit`", .directory.display())]
+    #[error("{} has not been submitted yet; submit it", .directory.display())]
     NotSubmitted {
         /// The directory.
         directory: PathBuf,
     },
     /// Tasks of an earlier submission are still in the queue.
     #[error(
-        "{} is in the queue already: job {job} has {tasks} tasks that wait or run; wait until they end, or cancel the job, and then \
-         use `mapper fleet retry`", .directory.display()
+        "{} is already in the queue: job {job} has {tasks} waiting or running tasks; wait until they end, or cancel the job, and then retry",
+        .directory.display()
     )]
-    InTheQueue {
+    StillQueued {
         /// The directory.
         directory: PathBuf,
         /// The job.
@@ -144,7 +144,7 @@ pub enum FleetError {
         tasks: usize,
     },
     /// The queue rejected the submission.
-    #[error("the queue did not take {}: {answer}; its template is {template}", .script.display())]
+    #[error("the queue rejected {}: {answer}; check the template {template}", .script.display())]
     Queue {
         /// The command.
         script: PathBuf,
@@ -157,7 +157,9 @@ pub enum FleetError {
     #[error(transparent)]
     Kind(Box<dyn std::error::Error + Send + Sync>),
     /// Stopped by the operator.
-    #[error("stopped by the operator; what is done is kept, and the same command goes on from there")]
+    #[error(
+        "stopped by the operator; finished items are kept, and the same command continues with the others"
+    )]
     Interrupted,
 }
 

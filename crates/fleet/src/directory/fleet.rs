@@ -1,7 +1,7 @@
 //! The directory of a study and its layout.
 
 use crate::directory::part::{Expected, Part, PartRefusal};
-use crate::{FleetError, Hash, Kind, Listed, Study};
+use crate::{FleetError, Hash, ItemEntry, Kind, Study};
 use std::path::{Path, PathBuf};
 
 /// A study in its directory.
@@ -70,22 +70,22 @@ impl Fleet {
         self.parts().join(part_name(hash))
     }
 
-    /// Marks the item as in progress; contains the name of the worker.
-    pub(crate) fn begun(&self, hash: &Hash) -> PathBuf {
+    /// File that marks the item as in progress; contains the name of the worker.
+    pub(crate) fn progress_marker(&self, hash: &Hash) -> PathBuf {
         self.directory.join(BEGUN).join(hash.to_string())
     }
 
     /// State of an item's part, damage of its body included; `None` without a part.
-    pub(crate) fn head(&self, item: &Listed) -> Option<Result<Part, PartRefusal>> {
-        Some(self.whole(item)?.map(|(part, _)| part))
+    pub(crate) fn read_part_header(&self, item: &ItemEntry) -> Option<Result<Part, PartRefusal>> {
+        Some(self.read_part(item)?.map(|(part, _)| part))
     }
 
     /// An item's part with its body; `None` without a part.
-    pub(crate) fn whole(&self, item: &Listed) -> Option<Result<(Part, String), PartRefusal>> {
+    pub(crate) fn read_part(&self, item: &ItemEntry) -> Option<Result<(Part, String), PartRefusal>> {
         Part::read(&self.part(&item.hash), self.expected(item))
     }
 
-    fn expected<'a>(&'a self, item: &'a Listed) -> Expected<'a> {
+    fn expected<'a>(&'a self, item: &'a ItemEntry) -> Expected<'a> {
         Expected { hash: &item.hash, program: &self.study.program }
     }
 }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Largest file of an item, bytes: a campaign with its map file.
-const LARGEST_BYTES: u64 = 32 << 20;
+const MAX_FILE_BYTES: u64 = 32 << 20;
 
 /// The work, and the program that does it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,7 +39,7 @@ impl Item {
     /// # Errors
     /// [`FleetError::File`], [`FleetError::Changed`] if the hash differs, [`FleetError::Content`].
     pub fn read(path: &Path, hash: &Hash) -> Result<Item, FleetError> {
-        let bytes = read_at_most(path, LARGEST_BYTES)?;
+        let bytes = read_at_most(path, MAX_FILE_BYTES)?;
         if Hash::of(&bytes) != *hash {
             return Err(FleetError::Changed { path: path.to_owned() });
         }

@@ -25,7 +25,7 @@ pub struct Drafts {
 
 /// Environment of an item's work.
 #[derive(Clone, Copy)]
-pub struct At<'a> {
+pub struct WorkContext<'a> {
     /// A temporary directory of its own.
     pub scratch: &'a Path,
     /// Set from outside to stop.
@@ -90,16 +90,16 @@ pub trait Kind: Sync {
     /// [`FleetError::Kind`] with all mistakes of the study.
     fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError>;
 
-    /// Does one item; what it returns is JSON. Equal payloads give equal results on any machine.
+    /// Does one item and returns JSON. Equal payloads give equal results on any computer.
     ///
     /// # Errors
     /// [`WorkError`].
-    fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError>;
+    fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError>;
 
     /// Merges the parts, which come one by one in the order of the study, into the result. Returns a one-line description. Missing
     /// and failed parts are left out.
     ///
     /// # Errors
-    /// [`FleetError`] if a file cannot be written or a part's result is not what [`Kind::work`] makes.
+    /// [`FleetError`] if a file cannot be written, or a part's result was not made by [`Kind::work`].
     fn merge(&self, settings: &Value, parts: &mut Results<'_>, out: &Output) -> Result<String, FleetError>;
 }

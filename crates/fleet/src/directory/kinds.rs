@@ -1,4 +1,4 @@
-//! The kind that a study names.
+//! Lookup of the kind of a study.
 
 use crate::{FleetError, Kind, StudyFile};
 
@@ -13,7 +13,7 @@ pub fn kind_of<'a>(study: &StudyFile, kinds: &[&'a dyn Kind]) -> Result<&'a dyn 
     let known = kinds.iter().map(|kind| format!("{} ({})", kind.name(), kind.summary()));
     let remedy = format!("write `study: KIND`; the kinds are {}", known.collect::<Vec<_>>().join(", "));
     let message = match study.kind.as_str() {
-        "" => "it does not say what kind of study it is".to_owned(),
+        "" => "the kind of study is missing".to_owned(),
         other => format!("`{other}` is not a kind of study"),
     };
     Err(study.mistake("study", message, &remedy).into())

@@ -8,9 +8,9 @@ use std::io::Read;
 use std::path::Path;
 
 /// Largest first line, bytes.
-const LONGEST_HEAD_BYTES: usize = 4096;
+const MAX_HEADER_BYTES: usize = 4096;
 /// Largest result of one item, bytes.
-const LARGEST_BODY_BYTES: u64 = 64 << 20;
+const MAX_BODY_BYTES: u64 = 64 << 20;
 
 /// The outcome of an item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,17 +48,17 @@ pub enum PartRefusal {
     /// It cannot be read.
     #[error("cannot be read: {0}")]
     Unread(String),
-    /// It does not begin like a part.
+    /// It does not start with the header of a part.
     #[error("is not a part")]
     NotAPart,
     /// Its header names another item.
-    #[error("holds the item {0}")]
+    #[error("contains the item {0}")]
     OtherItem(Hash),
     /// Another version made it.
     #[error("was made by {0}")]
     OtherProgram(String),
     /// Its length differs from its header.
-    #[error("has {found} bytes of {stated}")]
+    #[error("has {found} bytes instead of {stated}")]
     Length {
         /// Actual length.
         found: u64,
@@ -77,7 +77,7 @@ pub enum PartRefusal {
     #[error("has been changed: its checksum is wrong")]
     Checksum,
     /// The kind cannot read its content.
-    #[error("does not hold what it should: {0}")]
+    #[error("has the wrong content: {0}")]
     Content(String),
 }
 
@@ -101,7 +101,7 @@ impl Part {
             item: *of.0,
             program: of.1.program.clone(),
             outcome: outcome.0,
-            // A clock that goes backwards gives no duration.
+            // Zero if the clock went backwards.
             duration_s: if cost.0.is_finite() { cost.0.max(0.0) } else { 0.0 },
             memory_bytes: cost.1,
             body_bytes: outcome.1.len() as u64,
@@ -132,8 +132,8 @@ fn unread(error: impl std::fmt::Display) -> PartRefusal {
 fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), PartRefusal> {
     let mut file = File::open(path).map_err(unread)?;
     let length = file.metadata().map_err(unread)?.len();
-    let mut bytes = Vec::with_capacity(LONGEST_HEAD_BYTES);
-    (&mut file).take(LONGEST_HEAD_BYTES as u64).read_to_end(&mut bytes).map_err(unread)?;
+    let mut bytes = Vec::with_capacity(MAX_HEADER_BYTES);
+    (&mut file).take(MAX_HEADER_BYTES as u64).read_to_end(&mut bytes).map_err(unread)?;
     let end = bytes.iter().position(|byte| *byte == b'\n').ok_or(PartRefusal::NotAPart)?;
     let part: Part = serde_json::from_slice(&bytes[..end]).map_err(|_| PartRefusal::NotAPart)?;
     if part.item != *expected.hash {
@@ -142,8 +142,8 @@ fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), Pa
     if part.program != expected.program {
         return Err(PartRefusal::OtherProgram(part.program));
     }
-    if part.body_bytes > LARGEST_BODY_BYTES {
-        return Err(PartRefusal::TooLarge { found: part.body_bytes, limit: LARGEST_BODY_BYTES });
+    if part.body_bytes > MAX_BODY_BYTES {
+        return Err(PartRefusal::TooLarge { found: part.body_bytes, limit: MAX_BODY_BYTES });
     }
     let found = length.saturating_sub(end as u64 + 1);
     if found != part.body_bytes {
@@ -154,7 +154,7 @@ fn open(path: &Path, expected: Expected<'_>) -> Result<(Part, File, Vec<u8>), Pa
 
 fn read_body(path: &Path, expected: Expected<'_>) -> Result<(Part, String), PartRefusal> {
     let (part, file, mut body) = open(path, expected)?;
-    file.take(LARGEST_BODY_BYTES + 1).read_to_end(&mut body).map_err(unread)?;
+    file.take(MAX_BODY_BYTES + 1).read_to_end(&mut body).map_err(unread)?;
     if Hash::of(&body) != part.body_sha256 {
         return Err(PartRefusal::Checksum);
     }

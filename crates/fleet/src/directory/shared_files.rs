@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The worker's identity and its clocks: nothing here reads a clock by itself.
+/// Identity and clocks of the worker; this crate reads no clock itself.
 #[derive(Clone, Copy)]
 pub struct Machine<'a> {
     /// Name of the machine and the process, for display; unique among concurrent workers.

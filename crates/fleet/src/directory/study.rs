@@ -12,12 +12,12 @@ pub(crate) const LAYOUT: u32 = 1;
 /// Maximum number of items of a study.
 pub(crate) const MAX_ITEMS: usize = 1_000_000;
 /// Largest file of a study, bytes: a million items.
-const LARGEST_BYTES: u64 = 256 << 20;
+const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// One item in the list.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Listed {
+pub struct ItemEntry {
     /// Its file's name.
     pub hash: Hash,
     /// Its display name.
@@ -39,12 +39,12 @@ pub struct Study {
     /// Input of merging.
     pub settings: Value,
     /// The items.
-    pub items: Vec<Listed>,
+    pub items: Vec<ItemEntry>,
 }
 
 impl Study {
     pub(crate) fn read(path: &Path) -> Result<Study, FleetError> {
-        let bytes = read_at_most(path, LARGEST_BYTES)?;
+        let bytes = read_at_most(path, MAX_FILE_BYTES)?;
         // Checked first: another layout may have other keys.
         #[derive(Deserialize)]
         struct Head {
@@ -71,7 +71,7 @@ impl Study {
         let mut names: BTreeMap<Hash, &str> = BTreeMap::new();
         for item in &self.items {
             if let Some(first) = names.insert(item.hash, &item.name) {
-                return Err(FleetError::Twice { first: first.to_owned(), second: item.name.clone() });
+                return Err(FleetError::DuplicateItem { first: first.to_owned(), second: item.name.clone() });
             }
         }
         Ok(())

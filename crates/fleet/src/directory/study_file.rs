@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file in messages.
 static DOCUMENT: Document = Document { name: "study", example: "campaigns/fleet/blind.yaml" };
 /// Largest file of a study, bytes: some ten thousand names of campaigns.
-const LARGEST_BYTES: usize = 4 << 20;
+const MAX_FILE_BYTES: usize = 4 << 20;
 
 /// Errors of reading a study file.
 #[derive(Debug, thiserror::Error)]
@@ -39,7 +39,7 @@ pub struct StudyFile {
 
 impl StudyFile {
     /// A file that it names, relative to its own directory.
-    pub fn beside(&self, file: &Path) -> PathBuf {
+    pub fn sibling_path(&self, file: &Path) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
@@ -77,7 +77,7 @@ impl StudyFile {
 /// [`StudyFileError`].
 pub fn open_study(path: &Path) -> Result<StudyFile, StudyFileError> {
     let mistakes = |findings| StudyFileError::Mistakes(Box::new(findings));
-    let text = mapper_yaml::open(&DOCUMENT, path, LARGEST_BYTES)
+    let text = mapper_yaml::open(&DOCUMENT, path, MAX_FILE_BYTES)
         .map_err(|source| StudyFileError::Read { path: path.to_owned(), source })?
         .map_err(mistakes)?;
     let (tree, notes) = mapper_yaml::read(Source::new(&DOCUMENT, path, &text)).map_err(mistakes)?;

@@ -3,13 +3,13 @@
 use crate::directory::fleet::{BEGUN, ITEMS, LOGS, PARTS, STUDY};
 use crate::directory::shared_files::{Durability, make_directory, write_whole};
 use crate::directory::study::{LAYOUT, MAX_ITEMS};
-use crate::{Drafts, Fleet, FleetError, Hash, Item, Kind, Listed, Study, StudyFile};
+use crate::{Drafts, Fleet, FleetError, Hash, Item, ItemEntry, Kind, Study, StudyFile};
 use std::collections::BTreeSet;
 use std::path::Path;
 
 /// The outcome.
 #[derive(Debug)]
-pub struct Made {
+pub struct CreatedStudy {
     /// The study in its directory.
     pub fleet: Fleet,
     /// New items.
@@ -18,21 +18,21 @@ pub struct Made {
     pub gone: usize,
 }
 
-impl Made {
+impl CreatedStudy {
     /// Makes the directory of a study. If it holds an earlier state of the same study, items are added and removed, and the parts
     /// stay. Equal studies give equal bytes.
     ///
     /// # Errors
     /// [`FleetError`]: the study has mistakes, the directory holds another study or that of another version, a file cannot be
     /// written.
-    pub fn make(
+    pub fn create(
         study: &StudyFile,
         kind: &dyn Kind,
         directory: &Path,
         program: &str,
         writer: &str,
-    ) -> Result<Made, FleetError> {
-        let earlier = earlier(study, directory, program)?;
+    ) -> Result<CreatedStudy, FleetError> {
+        let earlier = existing_items(study, directory, program)?;
         let Drafts { items, settings } = kind.items(study)?;
         if !(1..=MAX_ITEMS).contains(&items.len()) {
             return Err(FleetError::Items { items: items.len(), most: MAX_ITEMS });
@@ -56,7 +56,7 @@ impl Made {
                 write_whole(&folder.join(format!("{hash}.json")), &[&bytes], writer, Durability::Unsynced)?;
                 new += 1;
             }
-            listed.push(Listed { hash, name: item.name });
+            listed.push(ItemEntry { hash, name: item.name });
         }
         let study = Study {
             layout: LAYOUT,
@@ -70,12 +70,12 @@ impl Made {
         // Written last, so that the listed items exist.
         study.write(&directory.join(STUDY), writer)?;
         let kept = study.items.iter().filter(|item| earlier.contains(&item.hash)).count();
-        Ok(Made { fleet: Fleet::new(directory.to_owned(), study), new, gone: earlier.len() - kept })
+        Ok(CreatedStudy { fleet: Fleet::new(directory.to_owned(), study), new, gone: earlier.len() - kept })
     }
 }
 
 /// The items already in the directory.
-fn earlier(study: &StudyFile, directory: &Path, program: &str) -> Result<BTreeSet<Hash>, FleetError> {
+fn existing_items(study: &StudyFile, directory: &Path, program: &str) -> Result<BTreeSet<Hash>, FleetError> {
     match Fleet::open(directory, program) {
         Ok(Fleet { study: found, .. }) if found.name == study.name && found.kind == study.kind => {
             Ok(found.items.into_iter().map(|item| item.hash).collect())

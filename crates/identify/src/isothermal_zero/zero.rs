@@ -290,7 +290,7 @@ fn sigma_of_mean(noise_sigma: f64, stretch_s: f64, config: &IdentifyConfig) -> f
 
 /// Channels that read the same at standstill, and the non-uniformity of each group.
 fn groups(settings: &ZeroSettings) -> [(&'static [Channel], f64); 2] {
-    let [temperatures, pressures] = Soak::ALIKE;
+    let [temperatures, pressures] = Soak::EQUAL_AT_REST;
     [(temperatures, settings.temperature_sigma_k), (pressures, settings.pressure_sigma_pa)]
 }
 

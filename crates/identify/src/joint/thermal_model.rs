@@ -12,7 +12,7 @@ use crate::joint::step_model::rows::StepRows;
 use crate::joint::uncertainty::profile;
 use crate::joint::uncertainty::quantity::is_offset;
 use crate::joint::uncertainty::smoothness::Smoothed;
-use mapper_core::{ConvectionLaw, Entangled, EstimateUncertainty, Origin, SharedValue, ThermalModel};
+use mapper_core::{ConvectionLaw, CorrelatedPair, EstimateUncertainty, Origin, SharedValue, ThermalModel};
 use mapper_inference::interval::IDENTIFIED_RATIO;
 
 /// Correlation above which two parameters count as entangled.
@@ -59,7 +59,7 @@ pub(crate) fn thermal_model(
             let correlation = covariance.shared[(row, column)]
                 / (covariance.shared[(row, row)] * covariance.shared[(column, column)]).sqrt();
             if correlation.abs() > ENTANGLED {
-                entangled.push(Entangled { first: symbol(*a), second: symbol(*b), correlation });
+                entangled.push(CorrelatedPair { first: symbol(*a), second: symbol(*b), correlation });
             }
         }
     }

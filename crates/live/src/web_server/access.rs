@@ -27,7 +27,7 @@ impl Access {
     }
 
     /// Whether the request uses the server's own host name. This rejects pages that reach the address by DNS rebinding.
-    pub(crate) fn calls_by_name(&self, request: &Request) -> bool {
+    pub(crate) fn has_own_host(&self, request: &Request) -> bool {
         let Some(host) = &request.host else { return false };
         self.hosts.as_ref().is_none_or(|hosts| hosts.iter().any(|own| own.eq_ignore_ascii_case(host)))
     }
@@ -71,9 +71,9 @@ mod tests {
     #[test]
     fn another_name_another_page_and_another_token_are_refused() {
         let here = Access::new("127.0.0.1:7373".parse().unwrap(), None, false);
-        assert!(here.calls_by_name(&request("localhost:7373", None, None)));
-        assert!(!here.calls_by_name(&request("evil.example:7373", None, None)));
-        assert!(!here.calls_by_name(&request("localhost:80", None, None)));
+        assert!(here.has_own_host(&request("localhost:7373", None, None)));
+        assert!(!here.has_own_host(&request("evil.example:7373", None, None)));
+        assert!(!here.has_own_host(&request("localhost:80", None, None)));
         let from = |origin| request("127.0.0.1:7373", origin, None);
         assert!(here.is_of_own_page(&from(Some("http://127.0.0.1:7373"))));
         assert!(!here.is_of_own_page(&from(Some("http://evil.example"))));
@@ -81,7 +81,7 @@ mod tests {
         assert!(here.has_token(&from(None)), "none is needed on this machine");
 
         let there = Access::new("192.0.2.7:7373".parse().unwrap(), Some("abc".to_owned()), true);
-        assert!(!there.calls_by_name(&request("localhost:7373", None, None)));
+        assert!(!there.has_own_host(&request("localhost:7373", None, None)));
         for (given, right) in
             [("Bearer abc", true), ("Bearer abd", false), ("Bearer ab", false), ("abc", false)]
         {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Maximum number of connections that have not sent a request yet or read the page. A new one replaces the oldest. Browsers send a request
 /// within milliseconds of connecting, so a button works even if other clients keep connections open.
-const BRIEF_MAX: usize = 32;
+const MAX_BRIEF_CONNECTIONS: usize = 32;
 
 /// All open connections.
 #[derive(Debug, Default)]
@@ -38,7 +38,7 @@ impl Connections {
             let counts = |one: &&Open| one.brief.is_some() && of.is_none_or(|address| one.address == address);
             open.iter().filter(counts).count()
         };
-        if brief(&open, None) >= BRIEF_MAX {
+        if brief(&open, None) >= MAX_BRIEF_CONNECTIONS {
             // The first of equals is the oldest, because the list is in order of arrival.
             let most = open.iter().map(|one| brief(&open, Some(one.address))).max();
             let leaves = |one: &Open| one.brief.is_some() && Some(brief(&open, Some(one.address))) == most;
@@ -54,7 +54,7 @@ impl Connections {
     }
 
     /// Whether any is open.
-    pub(crate) fn are_open(&self) -> bool {
+    pub(crate) fn any_open(&self) -> bool {
         !self.lock().is_empty()
     }
 
@@ -66,7 +66,7 @@ impl Connections {
 
 impl Connection {
     /// Marks an accepted stream, which is never replaced.
-    pub(crate) fn stays(&self) {
+    pub(crate) fn mark_as_stream(&self) {
         if let Some(own) = self.all.lock().iter_mut().find(|one| one.number == self.number) {
             own.brief = None;
         }
@@ -96,8 +96,8 @@ mod tests {
             clients.push(client);
             (all.admit(&stream).unwrap(), stream)
         };
-        let held: Vec<_> = (0..BRIEF_MAX).map(|_| come()).collect();
-        held[0].0.stays();
+        let held: Vec<_> = (0..MAX_BRIEF_CONNECTIONS).map(|_| come()).collect();
+        held[0].0.mark_as_stream();
         let more: Vec<_> = (0..3).map(|_| come()).collect();
         // The stream does not count; the two oldest brief connections have been closed.
         let ended = |client: &mut TcpStream| {
@@ -107,6 +107,6 @@ mod tests {
         let gone: Vec<usize> = (0..clients.len()).filter(|place| ended(&mut clients[*place])).collect();
         assert_eq!(gone, [1, 2]);
         drop((held, more));
-        assert!(!all.are_open());
+        assert!(!all.any_open());
     }
 }

@@ -4,9 +4,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 
 /// Queue length of a browser. A browser that falls further behind is disconnected and restarts with the complete state.
-const WAITING_MAX: usize = 64;
+const MAX_QUEUED_MESSAGES: usize = 64;
 /// Maximum number of connected browsers.
-const CLIENTS_MAX: usize = 16;
+const MAX_CLIENTS: usize = 16;
 
 /// Sends messages to all browsers and never waits for any of them.
 #[derive(Debug, Default)]
@@ -18,10 +18,10 @@ impl Hub {
     /// Adds a browser that starts with `first`; `None` if there are too many already.
     pub(crate) fn join(&self, first: Arc<str>) -> Option<Receiver<Arc<str>>> {
         let mut clients = self.clients.lock().ok()?;
-        if clients.len() >= CLIENTS_MAX {
+        if clients.len() >= MAX_CLIENTS {
             return None;
         }
-        let (send, receive) = sync_channel(WAITING_MAX);
+        let (send, receive) = sync_channel(MAX_QUEUED_MESSAGES);
         send.try_send(first).ok()?;
         clients.push(send);
         Some(receive)
@@ -56,14 +56,14 @@ mod tests {
             assert_eq!(&*quick.recv().unwrap(), expected);
         }
         // The slow browser gets the messages in its queue and then the end.
-        assert_eq!(slow.iter().count(), WAITING_MAX);
+        assert_eq!(slow.iter().count(), MAX_QUEUED_MESSAGES);
     }
 
     #[test]
     fn there_is_room_for_so_many() {
         let hub = Hub::default();
         let all: Vec<_> = std::iter::from_fn(|| hub.join("".into())).take(100).collect();
-        assert_eq!(all.len(), CLIENTS_MAX);
+        assert_eq!(all.len(), MAX_CLIENTS);
         drop(all);
         hub.publish(&"".into());
         assert!(hub.join("".into()).is_some(), "who has gone makes room");

@@ -4,11 +4,11 @@ use std::io::Read;
 use std::time::{Duration, Instant};
 
 /// Maximum size of a request head, bytes.
-const HEAD_MAX: usize = 8192;
+const MAX_HEAD_BYTES: usize = 8192;
 /// Maximum number of headers.
-const HEADERS_MAX: usize = 64;
+const MAX_HEADERS: usize = 64;
 /// Maximum time for a request to arrive.
-pub(crate) const ARRIVES_WITHIN: Duration = Duration::from_secs(10);
+pub(crate) const REQUEST_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The fields of a request that are used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,17 +22,17 @@ pub(crate) struct Request {
 
 /// Reads the head of a request; the body is ignored. `None` if it is invalid, too long, or too slow.
 pub(crate) fn read_request(stream: &mut impl Read) -> Option<Request> {
-    let until = Instant::now() + ARRIVES_WITHIN;
+    let until = Instant::now() + REQUEST_TIMEOUT;
     let (mut head, mut piece) = (Vec::new(), [0; 1024]);
     loop {
         let count = stream.read(&mut piece).ok().filter(|count| *count > 0)?;
         head.extend_from_slice(&piece[..count]);
-        let mut headers = [httparse::EMPTY_HEADER; HEADERS_MAX];
+        let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);
         if parsed.parse(&head).ok()?.is_complete() {
             return request_of(&parsed);
         }
-        if head.len() > HEAD_MAX || Instant::now() > until {
+        if head.len() > MAX_HEAD_BYTES || Instant::now() > until {
             return None;
         }
     }

@@ -1,10 +1,10 @@
 //! The server: one thread per connection, one request per connection.
 
-use crate::operator_commands::Pressed;
+use crate::operator_commands::OperatorCommand;
 use crate::web_server::access::Access;
 use crate::web_server::connections::{Connection, Connections};
 use crate::web_server::hub::Hub;
-use crate::web_server::request::{ARRIVES_WITHIN, Request, read_request};
+use crate::web_server::request::{REQUEST_TIMEOUT, Request, read_request};
 use crate::web_server::tls::{Punctual, Tls};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -13,9 +13,9 @@ use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 /// Maximum time that a browser may block one read or write.
-const PATIENCE: Duration = Duration::from_secs(5);
+const IO_TIMEOUT: Duration = Duration::from_secs(5);
 /// Bytes of a page per write.
-const PIECE: usize = 1 << 14;
+const WRITE_BYTES: usize = 1 << 14;
 /// Interval of heartbeats on an idle stream. Browsers reconnect after a longer silence.
 const HEARTBEAT: Duration = Duration::from_secs(2);
 const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
@@ -31,7 +31,7 @@ pub(crate) struct Served {
     /// The complete state as a message.
     pub(crate) snapshot: Box<dyn Fn() -> Arc<str> + Send + Sync>,
     /// Executes a button command.
-    pub(crate) ask: Box<dyn Fn(Pressed) + Send + Sync>,
+    pub(crate) ask: Box<dyn Fn(OperatorCommand) + Send + Sync>,
     /// The open connections.
     pub(crate) connections: Arc<Connections>,
 }
@@ -50,10 +50,10 @@ pub(crate) fn serve(listener: &TcpListener, served: &Arc<Served>) {
 }
 
 fn connected(stream: TcpStream, served: &Served, connection: &Connection) -> std::io::Result<()> {
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_read_timeout(Some(IO_TIMEOUT))?;
+    stream.set_write_timeout(Some(IO_TIMEOUT))?;
     stream.set_nodelay(true)?;
-    let mut stream = Punctual { stream, until: Instant::now() + ARRIVES_WITHIN };
+    let mut stream = Punctual { stream, until: Instant::now() + REQUEST_TIMEOUT };
     match &served.tls {
         None => answer(&mut stream, served, connection),
         Some(tls) => tls.over(stream, |stream| answer(stream, served, connection)),
@@ -63,7 +63,7 @@ fn connected(stream: TcpStream, served: &Served, connection: &Connection) -> std
 fn answer(stream: &mut (impl Read + Write), served: &Served, connection: &Connection) -> std::io::Result<()> {
     let Some(request) = read_request(stream) else { return plain(stream, "400 Bad Request") };
     let access = &served.access;
-    if !access.calls_by_name(&request) || access.is_of_another_page(&request) {
+    if !access.has_own_host(&request) || access.is_of_another_page(&request) {
         return plain(stream, "403 Forbidden");
     }
     match (request.method.as_str(), request.path.as_str()) {
@@ -88,12 +88,12 @@ fn may_ask(access: &Access, request: &Request) -> bool {
     access.is_of_own_page(request) && access.has_token(request)
 }
 
-fn asked(path: &str) -> Option<Pressed> {
+fn asked(path: &str) -> Option<OperatorCommand> {
     match path {
-        "/ask/hold" => Some(Pressed::Hold),
-        "/ask/go-on" => Some(Pressed::GoOn),
-        "/ask/stop" => Some(Pressed::StopAfterStep),
-        "/ask/safe" => Some(Pressed::SafeNow),
+        "/ask/hold" => Some(OperatorCommand::Hold),
+        "/ask/go-on" => Some(OperatorCommand::Continue),
+        "/ask/stop" => Some(OperatorCommand::StopAfterStep),
+        "/ask/safe" => Some(OperatorCommand::SafeNow),
         _ => None,
     }
 }
@@ -110,8 +110,8 @@ fn page(stream: &mut impl Write, page: &str) -> std::io::Result<()> {
          Content-Type: text/html; charset=utf-8\r\nContent-Length: {length}\r\n\r\n"
     )?;
     // Limits a client that reads one byte at a time.
-    let until = Instant::now() + PATIENCE;
-    for piece in page.as_bytes().chunks(PIECE) {
+    let until = Instant::now() + IO_TIMEOUT;
+    for piece in page.as_bytes().chunks(WRITE_BYTES) {
         if Instant::now() > until {
             return Err(ErrorKind::TimedOut.into());
         }
@@ -125,7 +125,7 @@ fn events(stream: &mut impl Write, served: &Served, connection: &Connection) -> 
     let Some(messages) = served.hub.join((served.snapshot)()) else {
         return plain(stream, "503 Service Unavailable");
     };
-    connection.stays();
+    connection.mark_as_stream();
     write!(stream, "HTTP/1.1 200 OK\r\n{HEADERS}Content-Type: text/event-stream\r\n\r\n")?;
     loop {
         match messages.recv_timeout(HEARTBEAT) {
@@ -164,7 +164,7 @@ mod tests {
         std::thread::spawn(move || serve(&listener, &served));
         let send = |head: &str| {
             let mut stream = TcpStream::connect(address).unwrap();
-            stream.set_read_timeout(Some(PATIENCE)).unwrap();
+            stream.set_read_timeout(Some(IO_TIMEOUT)).unwrap();
             stream.write_all(head.as_bytes()).unwrap();
             stream
         };

@@ -1,4 +1,4 @@
-//! The mixture: which part of the noise has memory, and how long it lasts.
+//! The model of coloured noise: share and time constant of its first-order part.
 
 use super::first_order;
 
@@ -46,7 +46,7 @@ impl ColouredNoise {
             + first_order::variance_of_mean(first_order, length_s, self.time_constant_s)
     }
 
-    /// Number of independent readings whose mean scatters as that of `samples` readings over `length_s` does.
+    /// Number of independent readings whose mean has the same standard deviation as the mean of `samples` readings over `length_s`.
     pub fn effective_samples(self, samples: usize, length_s: f64) -> f64 {
         1.0 / self.variance_of_mean(samples, length_s)
     }

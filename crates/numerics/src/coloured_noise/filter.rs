@@ -1,8 +1,8 @@
-//! Turns residuals whose noise is white plus first-order into independent ones of unit variance.
+//! Whitens residuals with white plus first-order noise: the results are independent and have unit variance.
 //!
-//! The innovations of a Kalman filter whose state is the first-order part: the same linear recursion for a residual and
-//! for each of its derivatives, and gaps in time cost nothing. Source: B. D. O. Anderson, J. B. Moore, Optimal Filtering
-//! (1979), chapter 5.
+//! The innovations of a Kalman filter whose state is the first-order part: the same linear recursion applies to a residual and to each of
+//! its derivatives, and gaps in time need no special treatment. Source: B. D. O. Anderson, J. B. Moore, Optimal Filtering (1979), chapter
+//! 5.
 
 use super::ColouredNoise;
 use super::first_order;
@@ -14,20 +14,20 @@ pub struct WhiteningFilter {
     gains: Vec<[f64; 3]>,
 }
 
-/// Variances of a row's noise, over that of one sample.
+/// Variances of a row's noise, relative to the variance of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockNoise {
-    /// Of what is independent from row to row.
+    /// Part that is independent from row to row.
     pub white: f64,
-    /// Of what lasts.
+    /// First-order part.
     pub first_order: f64,
 }
 
 impl BlockNoise {
     /// Noise of the mean of `samples` readings over `block_s`, whose variance is 1 each.
     ///
-    /// Means of a first-order process over blocks correlate as [`first_order::block_covariance`] says, so this is the
-    /// first-order part; what the mean's own variance has less than that is taken from the white part.
+    /// Means of a first-order process over blocks correlate as [`first_order::block_covariance`] says, which gives the first-order part.
+    /// The white part is reduced so that the total variance of the mean is correct.
     pub fn of_mean(noise: ColouredNoise, samples: f64, block_s: f64) -> Self {
         let share = noise.first_order_variance_ratio();
         let white = noise.white_variance_ratio() / samples.max(1.0);
@@ -36,7 +36,7 @@ impl BlockNoise {
         }
         let first_order = first_order::block_covariance(share, block_s, noise.time_constant_s);
         let own = first_order::variance_of_mean(share, block_s, noise.time_constant_s);
-        // Never quite without: a filter that trusts rows without end is useless.
+        // Never zero: a filter that trusts each row completely is useless.
         BlockNoise { white: (white + own - first_order).max(0.02 * (white + own)), first_order }
     }
 }

@@ -17,7 +17,7 @@ pub fn variance_of_mean(variance: f64, length_s: f64, time_constant_s: f64) -> f
     if time_constant_s <= 0.0 || x.is_infinite() {
         return 0.0;
     }
-    // The formula takes numbers near 1 from each other: below this its series is good to 1e-14, and it is not.
+    // The formula subtracts nearly equal numbers; below this limit the series is accurate to 1e-14 and the formula is not.
     if x < 0.02 {
         let series = [-2.0 / 5040.0, 2.0 / 720.0, -2.0 / 120.0, 2.0 / 24.0, -2.0 / 6.0, 1.0];
         return variance * series.into_iter().fold(0.0, |sum, term| sum * x + term);
@@ -32,7 +32,7 @@ pub fn variance_of_mean(variance: f64, length_s: f64, time_constant_s: f64) -> f
 /// memory falls; in the unit of `variance`. For a time constant of 0 it is infinite.
 pub fn block_covariance(variance: f64, length_s: f64, time_constant_s: f64) -> f64 {
     let x = length_s / time_constant_s;
-    // Digits are lost below; the next term of the series is x^2 / 12.
+    // The formula loses digits below this limit; the next term of the series is x^2 / 12.
     if x < 1e-4 {
         return variance;
     }

@@ -1,12 +1,12 @@
-//! Means over stretches of samples: their covariance, and the factor that makes them independent.
+//! Means over blocks of samples: their covariance, and the factor that whitens them.
 
 use super::ColouredNoise;
 use super::first_order::memory;
 use nalgebra::DMatrix;
 
-/// Time constants beyond which correlation is left out: 6e-6 of it is left.
+/// Distance in time constants beyond which correlation is neglected; it is 6e-6 there.
 const FORGOTTEN: f64 = 12.0;
-/// Below so many samples in a block all pairs are summed.
+/// Blocks with fewer samples than this are summed over all pairs.
 const FEW_SAMPLES: usize = 4;
 
 /// Covariance of means of noise with standard deviation 1; one row for each block.

@@ -1,5 +1,5 @@
-//! Normal equations in the shape of an arrow: many groups of a few parameters each, that touch only themselves and the ones
-//! that all groups share. The groups are eliminated one by one, so that the work grows with their number, not with its cube.
+//! Normal equations with an arrow-shaped matrix: many groups of a few parameters each, coupled only through parameters that all groups
+//! share. The groups are eliminated one by one, so that the work grows with their number, not with its cube.
 //!
 //! Source: B. Triggs, P. McLauchlan, R. Hartley, A. Fitzgibbon, "Bundle adjustment - a modern synthesis" (2000), section 6.1,
 //! where this is the reduced camera system.
@@ -15,7 +15,7 @@ pub struct ArrowBlock<const L: usize> {
     pub mixed: OMatrix<f64, Const<L>, Dyn>,
     /// Right side.
     pub right: SVector<f64, L>,
-    /// Whether the group has a say in the shared parameters; one without only follows them.
+    /// Whether the group contributes to the shared parameters; otherwise it only follows them.
     pub shares: bool,
 }
 

@@ -1,25 +1,25 @@
-//! How strongly steps are damped, and the search for a step that helps.
+//! Damping of the steps, and the search for a step that reduces the cost.
 
 /// How the damping changes. All are ratios of the normal matrix's diagonal, or factors on them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DampingRule {
     /// Initial value.
     pub start: f64,
-    /// Factor after a step that does not help, above 1.
+    /// Factor after a rejected step, above 1.
     pub growth: f64,
-    /// Factor after one that does, below 1.
+    /// Factor after an accepted step, below 1.
     pub relief: f64,
-    /// Minimum value after a step that does not help, so that a long way down is not taken back in small steps.
+    /// Minimum value after a rejected step, so that a very small damping recovers in few steps.
     pub renewed: f64,
-    /// Least that relief makes of it.
+    /// Minimum value after an accepted step.
     pub least: f64,
-    /// Beyond it the search ends: steps are too short to change anything.
+    /// Maximum value; beyond it steps are too short to change anything, and the search ends.
     pub most: f64,
     /// Steps tried before the search ends.
     pub tries: usize,
 }
 
-/// The damping of a fit as it goes on.
+/// The damping during a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Damping {
     rule: DampingRule,
@@ -32,10 +32,10 @@ impl Damping {
         Damping { rule, value: rule.start }
     }
 
-    /// Tries steps, each damped more than the one before, until `trial` makes something of one: it is handed the damping and
-    /// answers `None` where the equations cannot be solved or the step does not help. `None` where no step helps.
+    /// Tries steps with increasing damping until `trial` accepts one. `trial` gets the damping and returns `None` if the equations cannot
+    /// be solved or the step does not reduce the cost. Returns `None` if no step is accepted.
     ///
-    /// The damping that helped, relieved, is where the next search starts.
+    /// The next search starts from the accepted damping, reduced.
     pub fn search<T>(&mut self, mut trial: impl FnMut(f64) -> Option<T>) -> Option<T> {
         for _ in 0..self.rule.tries {
             if let Some(found) = trial(self.value) {

@@ -1,13 +1,13 @@
-//! A normal distribution that ends where a quantity has to.
+//! A normal distribution truncated at the bounds of a quantity.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// The part of a normal distribution between two bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundedNormal {
-    /// Mean before the bounds count.
+    /// Mean of the untruncated distribution.
     pub mean: f64,
-    /// Standard deviation before the bounds count, above 0.
+    /// Standard deviation of the untruncated distribution, above 0.
     pub sigma: f64,
     /// Lowest value.
     pub low: f64,
@@ -39,8 +39,8 @@ impl BoundedNormal {
         if (above && value < at) || (!above && value > at) { 1.0 } else { 0.0 }
     }
 
-    /// Value below which `share` (between 0 and 1) of what lies between the bounds is; the nearest bound where nothing is
-    /// left between them in numbers of a computer.
+    /// Value below which `share` (between 0 and 1) of what lies between the bounds is; the nearest bound if the probability between them
+    /// underflows.
     pub fn quantile(&self, share: f64) -> f64 {
         let upward = self.upward();
         let (near, far) = self.tails();

@@ -1,4 +1,4 @@
-//! Quantiles of the distributions that intervals are made of.
+//! Quantiles of distributions, for confidence intervals.
 
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use statrs::function::beta::inv_beta_reg;
@@ -9,11 +9,11 @@ pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 /// 95 % quantile of the standard normal distribution: a quantity this far above a threshold exceeds it in 95 of 100 cases.
 pub const NORMAL_95: f64 = 1.644_853_626_951_472;
 
-/// Standard deviations that a normal quantity is off once in 22 times by chance: a hint.
+/// Threshold for a hint, in standard deviations: a normal quantity exceeds it by chance once in 22 times.
 pub const HINT_SIGMAS: f64 = 2.0;
-/// The same once in 370 times: enough to doubt one number.
+/// Threshold to doubt one number: exceeded by chance once in 370 times.
 pub const DOUBT_SIGMAS: f64 = 3.0;
-/// The same once in 16,000 times: enough to leave out one of hundreds.
+/// Threshold to exclude one number of hundreds: exceeded by chance once in 16,000 times.
 pub const EXCLUDE_SIGMAS: f64 = 4.0;
 
 /// 95 % quantile of chi-square with one degree of freedom: the square of [`NORMAL_975`].

@@ -1,7 +1,7 @@
-//! The statistics of a handful of numbers.
+//! Statistics of lists of numbers.
 //!
-//! All take slices as well as iterators, and one policy holds for all of them: nothing is left out silently. Without values the answer is `None`; a NaN among the values
-//! makes the answer NaN, as numpy does. Whoever wants gaps ignored filters them before.
+//! All functions take slices and iterators, and none skips values silently. Without values the result is `None`; a NaN among the values
+//! makes the result NaN, as in numpy. To ignore gaps, filter them first.
 
 mod bounded_normal;
 mod distributions;

@@ -19,7 +19,7 @@ pub fn rms<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64> {
 pub fn standard_deviation<T: Borrow<f64>>(values: impl IntoIterator<Item = T>) -> Option<f64> {
     let values: Vec<f64> = values.into_iter().map(|value| *value.borrow()).collect();
     let mean = mean(&values)?;
-    // Two passes: the sum of squares minus the square of the sum loses all digits where the spread is small.
+    // Two passes, because the sum of squares minus the square of the sum loses all digits if the spread is small.
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (values.len() > 1).then(|| (squares / (values.len() - 1) as f64).sqrt())
 }

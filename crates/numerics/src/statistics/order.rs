@@ -33,8 +33,7 @@ pub fn median_of_sorted(sorted: &[f64]) -> Option<f64> {
 /// The value nearest to `share` (0 to 1) of the way from the smallest to the largest: always one of the values.
 /// `None` without values, NaN where a value is NaN.
 ///
-/// In the unit of the values. For searches whose way depends on the last digit: what people read is [`median`] and
-/// [`quantile`].
+/// In the unit of the values. For searches that depend on the last digit; use [`median`] and [`quantile`] for results.
 pub fn nearest_rank<T: Borrow<f64>>(values: impl IntoIterator<Item = T>, share: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().map(|value| *value.borrow()).collect();
     let place = (share.clamp(0.0, 1.0) * values.len().checked_sub(1)? as f64).round() as usize;

@@ -1,4 +1,4 @@
-//! A spread that a few values far off do not widen.
+//! A standard deviation that outliers hardly affect.
 
 use super::order::median;
 use std::borrow::Borrow;
@@ -6,8 +6,8 @@ use std::borrow::Borrow;
 /// Standard deviation over median size of a normal distribution about 0: 1 / quantile(0.75).
 pub const MEDIAN_SIZE_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
-/// Standard deviation of normally distributed deviations about 0, in their unit, from their median size, which up to half
-/// of them being anything at all leaves finite. `None` without values, NaN where one of them is NaN.
+/// Standard deviation of normally distributed deviations about 0, in their unit, from their median absolute value, which stays finite with
+/// up to half outliers. `None` without values, NaN where one of them is NaN.
 ///
 /// Source: F. R. Hampel, "The influence curve and its role in robust estimation", J. Am. Stat. Assoc. 69 (1974).
 pub fn robust_sigma<T: Borrow<f64>>(deviations: impl IntoIterator<Item = T>) -> Option<f64> {

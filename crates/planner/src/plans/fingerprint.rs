@@ -1,7 +1,7 @@
 //! Hashes of what a plan was made from.
 
 use crate::request::PlanRequest;
-use mapper_core::MadeFrom;
+use mapper_core::PlanInputHashes;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 
@@ -15,10 +15,10 @@ pub fn sha256_hex(text: &str) -> String {
 }
 
 /// What `request` is made of.
-pub fn made_from(request: &PlanRequest<'_>) -> MadeFrom {
+pub fn made_from(request: &PlanRequest<'_>) -> PlanInputHashes {
     // Debug prints every parameter with all its digits.
     let model = format!("{:?} {}", request.model.params, request.model.map.fingerprint());
-    MadeFrom {
+    PlanInputHashes {
         campaign_sha256: sha256_hex(request.campaign_canonical),
         model_sha256: sha256_hex(&model),
         script_sha256: None,

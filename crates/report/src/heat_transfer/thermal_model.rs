@@ -1,7 +1,7 @@
 //! The parameters that the points of a campaign share, as text.
 
 use crate::point_results::warning_text::model_doubt_text;
-use mapper_core::{FoundInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95};
+use mapper_core::{IdentifiedInlet, InletConvection, Origin, SharedValue, ThermalModel, half_width_95};
 use std::fmt::Write;
 
 /// The thermal model as lines of text, one for each number.
@@ -76,7 +76,7 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
 }
 
 /// The relation for h before the wheel, and whether the recording determines it, as one line without its end.
-pub(crate) fn inlet_text(inlet: &FoundInlet) -> String {
+pub(crate) fn inlet_text(inlet: &IdentifiedInlet) -> String {
     let named = |convection: InletConvection| match convection {
         InletConvection::Shared => "that behind it".to_owned(),
         InletConvection::Own => format!("the same law at the inlet's {:.1} mm", 1e3 * inlet.diameter_m),
@@ -103,11 +103,11 @@ pub(crate) fn inlet_text(inlet: &FoundInlet) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{Entangled, ProfilePoint};
+    use mapper_core::{CorrelatedPair, ProfilePoint};
 
     #[test]
     fn the_correlation_of_h_before_the_wheel_and_its_evidence_are_reported() {
-        let open = FoundInlet {
+        let open = IdentifiedInlet {
             convection: InletConvection::Shared,
             diameter_m: 0.04,
             origin: Origin::NotIdentifiable,
@@ -117,12 +117,12 @@ mod tests {
         let text = inlet_text(&open);
         assert!(text.contains("inlet's 40.0 mm") && text.contains("0.207"), "{text}");
         assert!(text.contains("the intervals contain both"), "{text}");
-        let fitted = FoundInlet { convection: InletConvection::Own, origin: Origin::Fitted, ..open };
+        let fitted = IdentifiedInlet { convection: InletConvection::Own, origin: Origin::Fitted, ..open };
         assert!(
             inlet_text(&fitted)
                 .ends_with("the same law at the inlet's 40.0 mm, says the recording (probability 0.67)")
         );
-        assert!(inlet_text(&FoundInlet { origin: Origin::Assumed, ..open }).ends_with("(declared)"));
+        assert!(inlet_text(&IdentifiedInlet { origin: Origin::Assumed, ..open }).ends_with("(declared)"));
     }
 
     /// Parameters that the recording cannot determine are reported in text and in files.
@@ -141,7 +141,7 @@ mod tests {
             probe_diameter_m: SharedValue::assumed(0.0),
             direction_factor: SharedValue::assumed(1.0),
             offsets: std::collections::BTreeMap::new(),
-            entangled: vec![Entangled {
+            entangled: vec![CorrelatedPair {
                 first: "alpha_A".to_owned(),
                 second: "direction factor".to_owned(),
                 correlation: 0.97,

@@ -1,6 +1,6 @@
 //! Progress and cost of a study, as text.
 
-use mapper_fleet::{Cost, Lacking, Merged, Status, Submission};
+use mapper_fleet::{Cost, MergeOutcome, Status, Submission, UnfinishedItem};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -34,14 +34,14 @@ pub fn status_text(name: &str, status: &Status, queue: Option<&BTreeMap<String, 
 }
 
 /// Every item without a result, and the files that were left out.
-fn lacking_text(status: &Status, shown: impl Fn(&Lacking) -> bool) -> String {
+fn lacking_text(status: &Status, shown: impl Fn(&UnfinishedItem) -> bool) -> String {
     let mut text = String::new();
     for (items, what) in [(&status.failed, "failed"), (&status.refused, "left out, its part")] {
         list(&mut text, items, |item| {
             format!("{what}: {} ({}): {}", item.name, item.hash.short(), item.why.as_deref().unwrap_or("-"))
         });
     }
-    let missing: Vec<&Lacking> = status.missing.iter().filter(|item| shown(item)).collect();
+    let missing: Vec<&UnfinishedItem> = status.missing.iter().filter(|item| shown(item)).collect();
     list(&mut text, &missing, |item| {
         let begun = item.why.as_ref().map_or_else(String::new, |who| format!(", begun by {who}"));
         format!("missing: {} ({}){begun}", item.name, item.hash.short())
@@ -62,12 +62,12 @@ fn list<T>(text: &mut String, items: &[T], line: impl Fn(&T) -> String) {
 }
 
 /// The merged result and the missing items.
-pub fn merged_text(merged: &Merged) -> String {
+pub fn merged_text(merged: &MergeOutcome) -> String {
     let status = &merged.status;
     let mut text = lacking_text(status, |_| true);
     match &merged.result {
         Some((path, description)) => {
-            let of = if status.lacking() > 0 { " (incomplete)" } else { "" };
+            let of = if status.unfinished() > 0 { " (incomplete)" } else { "" };
             let _ = writeln!(
                 text,
                 "merged {} of {} items{of} in {}\n{description}",

@@ -60,9 +60,9 @@ pub fn history_svg(
         if nights.len() == 1 { "1 night".to_owned() } else { format!("{} nights", nights.len()) }
     ));
     for figure in figures {
-        let (unit, factor) = figure.shown_unit();
+        let (unit, factor) = figure.display_unit();
         let mut panel = Panel::new(Axis::new("night (UTC)").ticks(dates(first_ms, last_ms)), Axis::new(unit))
-            .title(format!("{}, {unit} ({figure})", figure.in_words()));
+            .title(format!("{}, {unit} ({figure})", figure.description()));
         let (mut rings, mut of_points) = (Vec::new(), Vec::new());
         for ((campaign, method), colour) in lines.iter().zip(COLOURS.iter().cycle()) {
             let mut nights: BTreeMap<(i64, i64), (bool, &str, Vec<f64>)> = BTreeMap::new();

@@ -11,7 +11,7 @@ pub fn time(ms: i64, format: &str) -> String {
 }
 
 fn heads(first: &[&str], figures: &[Metric]) -> Vec<String> {
-    let figure_heads = figures.iter().map(|figure| format!("{figure} {}", figure.shown_unit().0));
+    let figure_heads = figures.iter().map(|figure| format!("{figure} {}", figure.display_unit().0));
     first.iter().map(|head| (*head).to_owned()).chain(figure_heads).collect()
 }
 
@@ -20,7 +20,7 @@ fn shown(figure: Metric, value: Option<f64>) -> String {
         Metric::GoodPoints | Metric::HMean | Metric::HTrueMean | Metric::RigMinutes => 1,
         _ => 3,
     };
-    number::number(value.map(|value| figure.shown_unit().1 * value), decimals)
+    number::number(value.map(|value| figure.display_unit().1 * value), decimals)
 }
 
 fn state(listed: &ListedRun) -> &'static str {

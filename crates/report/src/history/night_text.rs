@@ -14,7 +14,7 @@ pub fn night_text(night: &Night, comparison: &Comparison, path: &Path) -> String
         let _ = writeln!(text, "missing  {run}: the last nights had it");
     }
     for moved in &comparison.moved {
-        let (unit, factor) = moved.figure.shown_unit();
+        let (unit, factor) = moved.figure.display_unit();
         let value = moved.value.map_or_else(|| "-".to_owned(), |value| format!("{:.4}", factor * value));
         let _ = writeln!(
             text,
@@ -29,7 +29,7 @@ pub fn night_text(night: &Night, comparison: &Comparison, path: &Path) -> String
         );
     }
     for moved in &comparison.moved_points {
-        let shift = |shift| moved.quantity.show_shift(shift, moved.mean_level);
+        let shift = |shift| moved.quantity.format_shift(shift, moved.mean_level);
         let _ = write!(
             text,
             "moved    {}: {} at {} of {} points, by {} on average",
@@ -40,7 +40,7 @@ pub fn night_text(night: &Night, comparison: &Comparison, path: &Path) -> String
             shift(moved.mean_shift),
         );
         if let Some(largest) = &moved.largest {
-            let by = moved.quantity.show_shift(largest.value - largest.band.median, largest.band.median);
+            let by = moved.quantity.format_shift(largest.value - largest.band.median, largest.band.median);
             let _ = write!(text, ", largest at {} ({by})", largest.place);
         }
         text.push('\n');

@@ -2,7 +2,9 @@
 
 use crate::formatting::{number, table};
 use crate::history::history_text::time;
-use mapper_history::{Drift, MACHINES_FOR_OUTLIERS, Outlier, Place, Production, Sign, Spread, Stand};
+use mapper_history::{
+    DeviationPattern, Drift, MIN_MACHINES_FOR_OUTLIERS, Outlier, Place, Production, Spread, Stand,
+};
 
 /// Everything, a table and a few sentences for each campaign and method.
 pub fn production_text(productions: &[Production]) -> String {
@@ -46,7 +48,7 @@ fn one(production: &Production) -> String {
         text.push_str(&of_stand(stand, production));
     }
     text.push_str(&match &production.outliers {
-        None => format!("fewer than {MACHINES_FOR_OUTLIERS} machines: outliers are not determined\n"),
+        None => format!("fewer than {MIN_MACHINES_FOR_OUTLIERS} machines: outliers are not determined\n"),
         Some(outliers) if outliers.is_empty() => "no machine is an outlier\n".to_owned(),
         Some(outliers) => {
             let lines: String = outliers.iter().map(of_outlier).collect();
@@ -102,14 +104,14 @@ fn of_stand(stand: &Stand, production: &Production) -> String {
 
 fn of_outlier(outlier: &Outlier) -> String {
     let shown = match outlier.sign {
-        Sign::EfficiencyEverywhere => {
+        DeviationPattern::EfficiencyEverywhere => {
             format!("efficiency {:+.2} % of it at all speeds", 100.0 * outlier.eta_ratio)
         }
-        Sign::EfficiencyAtLowSpeed => format!(
+        DeviationPattern::EfficiencyAtLowSpeed => format!(
             "efficiency {:+.2} % of it at the lowest speed, falling as 1/speed^2",
             100.0 * outlier.eta_ratio_at_lowest_speed
         ),
-        Sign::HeatTransfer => format!("h {:+.2} % everywhere", 100.0 * outlier.h_ratio),
+        DeviationPattern::HeatTransfer => format!("h {:+.2} % everywhere", 100.0 * outlier.h_ratio),
     };
     format!(
         "  {}: {shown} ({:.1} robust standard deviations)\n    probable cause: {}\n",

@@ -187,7 +187,7 @@ impl Run<'_, '_> {
             if self.with.steps.is_ready() {
                 break;
             }
-            if self.sent.is_some() && self.with.clock.goes_on_by_itself() {
+            if self.sent.is_some() && self.with.clock.advances_by_itself() {
                 self.watch(self.now_s + self.sample_s, false, true)?;
             }
         }

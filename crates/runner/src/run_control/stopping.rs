@@ -11,7 +11,7 @@ impl Run<'_, '_> {
     /// Waits for the clock; `false` if a stop came first.
     pub(crate) fn waited_until(&mut self, t_s: f64, in_step: bool) -> bool {
         let mut look_s = self.now_s + LOOK_S;
-        while look_s < t_s && self.with.clock.goes_on_by_itself() {
+        while look_s < t_s && self.with.clock.advances_by_itself() {
             self.with.clock.wait_until(look_s);
             if self.stops(in_step) {
                 return false;

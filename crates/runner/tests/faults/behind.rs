@@ -60,7 +60,7 @@ pub(crate) const OVER_THE_PROTOCOL: &[(f64, Fault, Ends)] = &[
     (FAULT_S, Fault::Reordered, Ends::Lost("a sample at")),
     (FAULT_S, Fault::Backward(100.0), Ends::Lost("a sample at")),
     (FAULT_S, Fault::Torn(T2), Ends::Lost("values for")),
-    (60.0, Fault::Refuses, Ends::Fails("outside what the rig can do")),
+    (60.0, Fault::Refuses, Ends::Fails("outside the range of the rig")),
     // Faults of the driver, which continues to run.
     (FAULT_S, Fault::Panics, Ends::Lost("the driver failed")),
     (FAULT_S, Fault::Lost, Ends::InDoubt("Cut its air by hand")),

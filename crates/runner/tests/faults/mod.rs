@@ -233,7 +233,7 @@ fn a_link_that_is_gone_for_a_second_is_lost_samples_and_one_that_waits_is_nothin
 fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_in_doubt() {
     let refused = night(&[(60.0, Fault::Refuses)], &usual());
     let error = refused.end.unwrap_err();
-    assert!(error.to_string().contains("outside what the rig can do") && !error.leaves_doubt(), "{error}");
+    assert!(error.to_string().contains("outside the range of the rig") && !error.leaves_doubt(), "{error}");
     assert!(!refused.rig.safe_at_s.is_empty());
     let panicked = night(&[(FAULT_S, Fault::Panics)], &usual());
     let error = panicked.end.unwrap_err();

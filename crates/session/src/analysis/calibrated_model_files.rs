@@ -16,7 +16,7 @@ struct Diagnosis {
     found: Option<Found>,
 }
 
-/// The identified machine, from the file that `mapper gap diagnose --json` prints.
+/// The identified machine, from the JSON of a diagnosis.
 ///
 /// # Errors
 /// [`SessionError::File`] if it cannot be read, [`SessionError::TwinFile`] if it is not a diagnosis.
@@ -24,7 +24,11 @@ pub fn found_in(path: &Path) -> Result<Found, SessionError> {
     let diagnosis: Diagnosis = serde_json::from_str(&text_of(path)?)
         .map_err(|error| wrong(path, format!("not a diagnosis: {error}")))?;
     diagnosis.found.ok_or_else(|| {
-        wrong(path, "it does not hold what was found; make it with `mapper gap diagnose --json`, of one recording and without --healthy".to_owned())
+        wrong(
+            path,
+            "it contains no identified machine; diagnose one recording without reference recordings"
+                .to_owned(),
+        )
     })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::recording::fusing::{Fused, fused, recordings};
 use crate::recording::identification_config::identification_with;
-use crate::recording::recording_file::{Recorded, all_differ, attached_campaign, same_machine};
+use crate::recording::recording_file::{Recorded, attached_campaign, check_all_distinct, check_machine};
 use crate::{Session, SessionError, plan::planning};
 use mapper_campaign::Campaign;
 use mapper_core::Recording;
@@ -34,7 +34,7 @@ impl Session<'_> {
         map: &ChannelMap,
     ) -> Result<Drift, SessionError> {
         for (index, recorded) in recorded.iter().enumerate() {
-            if let Err(other) = same_machine(recorded, campaign) {
+            if let Err(other) = check_machine(recorded, campaign) {
                 let reason = format!("No verdict: recording {}: {other}.", index + 1);
                 return Ok(Drift {
                     report: DriftReport::without_verdict(reason),
@@ -43,7 +43,7 @@ impl Session<'_> {
                 });
             }
         }
-        all_differ(recorded)?;
+        check_all_distinct(recorded)?;
         let mut model = planning::nominal_model(campaign)?;
         let config = identification_with(campaign, map);
         let Fused { recordings, config, channels } = fused(recordings(recorded), config, Some(campaign), map);

@@ -38,7 +38,7 @@ pub(crate) fn experiments(
     let mut all: Vec<Experiment> =
         allowed_jumps(campaign, model)?.into_iter().map(Experiment::jump).collect();
     // Temperature steps need a declared range of accepted setpoints.
-    if let Some(accepts) = registry.accepts(campaign, model) {
+    if let Some(accepts) = registry.setpoint_ranges(campaign, model) {
         let places = corners(&campaign.points);
         all.extend(places.iter().flat_map(|point| temperature_steps(campaign, model, *point, &accepts)));
     }

@@ -37,7 +37,7 @@ impl Session<'_> {
         out: &Path,
     ) -> Result<RigFiles, SessionError> {
         let first = recorded.first().ok_or(SessionError::NoRecording)?;
-        let campaign = first.known("Give `--campaign FILE`")?.clone();
+        let campaign = first.require_campaign()?.clone();
         let identified = self.identify(recorded, map, None)?;
         let points: Vec<IdentifiedPoint> = identified.points_alone().cloned().collect();
         let (machine, params) = (&campaign.machine.name, &campaign.machine.params);

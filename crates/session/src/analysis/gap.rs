@@ -5,7 +5,7 @@ use crate::plan::planning::nominal_model;
 use crate::plan::planning::plan;
 use crate::recording::fusing::{Fused, fused, recordings};
 use crate::recording::identification_config::identification_with;
-use crate::recording::recording_file::{Recorded, same_machine};
+use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker};
@@ -143,7 +143,7 @@ impl Session<'_> {
         if let Some(Next::Sensor { reason, .. }) = &mut diagnosis.next
             && with_a_law
         {
-            "the law is to be confirmed: give it to the next diagnosis with --effect, and measure there"
+            "the law needs confirmation: measure there, and add the law as an effect to the next diagnosis"
                 .clone_into(reason);
         }
         // Reader warnings belong to the remarks of the diagnosis.
@@ -164,7 +164,7 @@ impl Session<'_> {
         campaign: &Campaign,
         map: &ChannelMap,
     ) -> Result<Prepared, SessionError> {
-        same_machine(recorded, campaign)?;
+        check_machine(recorded, campaign)?;
         let mut model = nominal_model(campaign)?;
         // A recording that does not permit a drift search may still have a gap.
         let drift = self.drift(slice::from_ref(recorded), campaign, map).ok();

@@ -1,14 +1,14 @@
 //! Converts a recording into identified points, with their truth if known. All commands use this module.
 
-use crate::plan::surge::marks_of;
+use crate::plan::surge::find_surge_marks;
 use crate::recording::fusing::fused;
 use crate::recording::identification_config::{declared_conditions, identification_of, identification_with};
-use crate::recording::recording_file::{Recorded, all_differ, same_machine};
+use crate::recording::recording_file::{Recorded, check_all_distinct, check_machine};
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
     Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, SurgeNotFound,
-    ThermalModel, joined,
+    ThermalModel, join_recordings,
 };
 use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_with_rig,
@@ -125,7 +125,7 @@ impl Session<'_> {
     ///
     /// # Errors
     /// [`SessionError::NoRecording`] for an empty list, [`SessionError::MachineUnknown`] if neither campaign nor channel map defines the
-    /// machine, [`SessionError::OtherMachine`] if a recording is of another machine, [`SessionError::NotTogether`] if the recordings' own
+    /// machine, [`SessionError::OtherMachine`] if a recording is of another machine, [`SessionError::DifferentCampaigns`] if the recordings' own
     /// campaigns differ, [`SessionError::Identify`] if data that the method needs are missing.
     pub fn identify(
         &self,
@@ -146,15 +146,13 @@ impl Session<'_> {
         truths: AwaitedTruths<'_>,
     ) -> Result<Identified, SessionError> {
         let campaign = same_campaign(&recorded)?.cloned();
-        all_differ(&recorded)?;
+        check_all_distinct(&recorded)?;
         let campaign = campaign.as_ref();
         let mut config = match (campaign, &map.machine) {
             (Some(campaign), _) => identification_with(campaign, map),
             (None, Some(machine)) => identification_of(machine, map),
             (None, None) => {
-                return Err(SessionError::MachineUnknown {
-                    remedy: "Give `--campaign FILE`, or `machine:` with `compressor_internal_area` in the channel map",
-                });
+                return Err(SessionError::MachineUnknown { channel_map_suffices: true });
             }
         };
         let mut remarks = Vec::new();
@@ -180,7 +178,7 @@ impl Session<'_> {
         remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| rest_unused(first, &fused.config)));
         let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
         let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
-        let (recording, origins) = joined(fused.recordings.into_iter().map(off).collect());
+        let (recording, origins) = join_recordings(fused.recordings.into_iter().map(off).collect());
         let declared = campaign.filter(|campaign| campaign.tolerances_declared);
         let model = declared.map(nominal_model).transpose()?;
         let nominal = declared.zip(model.as_ref());
@@ -255,7 +253,7 @@ fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionErro
     let first = recorded.first().ok_or(SessionError::NoRecording)?;
     let Some(campaign) = &first.campaign else { return Ok(None) };
     for other in recorded {
-        same_machine(other, campaign)?;
+        check_machine(other, campaign)?;
         let Some(theirs) = &other.campaign else { continue };
         let differs = if theirs.machine != campaign.machine {
             "machine"
@@ -267,7 +265,7 @@ fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionErro
             continue;
         };
         let (first, other) = (first.path.clone(), other.path.clone());
-        return Err(SessionError::NotTogether { first, other, differs });
+        return Err(SessionError::DifferentCampaigns { first, other, differs });
     }
     Ok(Some(campaign))
 }
@@ -313,7 +311,7 @@ fn sought(
     let mut all: Option<SoughtSurge> = None;
     for (Source { approaches, .. }, truth) in sources.iter().zip(truths) {
         let Some(approaches) = approaches.clone().map(&off) else { continue };
-        let SurgeMarks { marks, remarks, surges } = marks_of(&approaches, campaign, config);
+        let SurgeMarks { marks, remarks, surges } = find_surge_marks(&approaches, campaign, config);
         let marks = score_marks(truth, &approaches, config.reference, marks);
         let together =
             all.get_or_insert_with(|| SoughtSurge { marks: Vec::new(), remarks: Vec::new(), surges: 0 });

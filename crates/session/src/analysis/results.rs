@@ -4,7 +4,7 @@ use crate::analysis::budget_file::budget_csv;
 use crate::analysis::identification::{Identified, SoughtSurge};
 use crate::recording::files::{json_text, write_new};
 use crate::recording::program::program_and_commit;
-use crate::recording::recording_file::{Recorded, together};
+use crate::recording::recording_file::{Recorded, merge_parts};
 use crate::{Gap, Registry, Session, SessionError, recording::run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
@@ -162,7 +162,7 @@ impl Session<'_> {
             remarks.extend(read.warnings.iter().map(ToString::to_string));
             all.push(Recorded::of(recording.clone(), read, Some(campaign.clone())));
         }
-        let all = together(parts.iter().map(|part| (part.soaked, part.saved.as_ref())).zip(all));
+        let all = merge_parts(parts.iter().map(|part| (part.soaked, part.saved.as_ref())).zip(all));
         let identified = self.identify(all, &ChannelMap::native(), None)?;
         let mut files = paths.into_iter();
         let recording = files.next().ok_or(SessionError::NoRecording)?;
@@ -177,10 +177,9 @@ impl Session<'_> {
         };
         let (results, written) =
             self.written(&origin, identified, (recording, further), remarks, directory)?;
-        let unwritten = written.err().map(|error| {
-            let run = directory.display();
-            format!("{error}; make room, then write the results with `mapper run --resume {run}`, which does not use the rig")
-        });
+        let unwritten = written
+            .err()
+            .map(|error| format!("{error}; make room, then resume the run, which does not use the rig"));
         Ok(Results { unwritten, ..results })
     }
 

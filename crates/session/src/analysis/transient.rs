@@ -3,7 +3,7 @@
 use crate::plan::planning::nominal_model;
 use crate::recording::files::{Existing, json_text, write_file};
 use crate::recording::identification_config::declared;
-use crate::recording::recording_file::{Recorded, same_machine};
+use crate::recording::recording_file::{Recorded, check_machine};
 use crate::{Session, SessionError};
 use mapper_core::ExportError;
 use mapper_diagnose::driven::cause_search::{Ask, Diagnosis, Which, diagnose};
@@ -55,8 +55,8 @@ impl Session<'_> {
         fit_until_s: Option<f64>,
         effects: &[Arc<dyn Effect>],
     ) -> Result<Transient, SessionError> {
-        let campaign = recorded.known("Give `--campaign FILE` with the machine and its geometry")?;
-        same_machine(recorded, campaign)?;
+        let campaign = recorded.require_campaign()?;
+        check_machine(recorded, campaign)?;
         let recording = &recorded.read.recording;
         let fit_until_s = fit_until_s.unwrap_or(f64::INFINITY);
         let identified = match side {

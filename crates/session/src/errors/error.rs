@@ -1,7 +1,6 @@
 //! Errors of a session.
 
 use crate::errors::error_kind::ErrorKind;
-use crate::errors::error_words::{in_doubt_text, word};
 use crate::errors::map_work_error::MapWorkError;
 use crate::variant::VariantError;
 use mapper_campaign::{CampaignError, NightlyError};
@@ -31,10 +30,7 @@ pub enum SessionError {
     #[error(transparent)]
     Nightly(#[from] NightlyError),
     /// A nightly campaign lists a campaign whose steps come from a script.
-    #[error(
-        "{}: a nightly run compares the same points night after night; the steps of this campaign come from a script, \
-         which may visit others. Give it a grid instead of `sequence`", .path.display()
-    )]
+    #[error("{}: the points of a script may differ between nights; replace `sequence` by a grid", .path.display())]
     NightlySequence {
         /// The campaign.
         path: PathBuf,
@@ -44,17 +40,15 @@ pub enum SessionError {
     Variant(#[from] VariantError),
     /// Two runs of a night have the same campaign, machine, method and seed.
     #[error("{key} appears twice in the nightly campaign; give each campaign its own name")]
-    NightlyTwice {
+    DuplicateNightlyRun {
         /// The run.
         key: String,
     },
-    /// Rows made elsewhere do not match the runs of this night.
-    #[error(
-        "the runs that were made elsewhere are not those of this nightly campaign: {lacks}; make the study again from it"
-    )]
-    OtherNight {
+    /// Rows of a study do not match the runs of this night.
+    #[error("the study does not belong to this nightly campaign: {difference}; make a new study")]
+    NightlyMismatch {
         /// What differs.
-        lacks: String,
+        difference: String,
     },
     /// A log without steps has too little data.
     #[error(transparent)]
@@ -67,10 +61,10 @@ pub enum SessionError {
     NoRecording,
     /// The recordings cannot be identified together.
     #[error(
-        "{} and {} cannot be identified together: their campaigns have another {differs}; identify each by itself, or give the campaign \
-         that holds for all with `--campaign`", .first.display(), .other.display()
+        "{} and {} cannot be identified together: the {differs} of their campaigns differs; identify each separately, or give one campaign \
+         for all", .first.display(), .other.display()
     )]
-    NotTogether {
+    DifferentCampaigns {
         /// The first recording.
         first: PathBuf,
         /// The recording that differs from it.
@@ -101,10 +95,7 @@ pub enum SessionError {
         source: serde_json::Error,
     },
     /// A stored plan no longer matches its inputs.
-    #[error(
-        "{} is stale: {} changed since it was made; make it again with `mapper plan CAMPAIGN --out FILE`",
-        .path.display(), .changed.join(" and ")
-    )]
+    #[error("{} is stale: {} changed since it was made; make a new plan", .path.display(), .changed.join(" and "))]
     StalePlan {
         /// The file.
         path: PathBuf,
@@ -115,7 +106,7 @@ pub enum SessionError {
     #[error(transparent)]
     Backend(BackendError),
     /// An auxiliary instrument cannot be created, or delivers the wrong channels.
-    #[error("the reader at `{at}`: {source}")]
+    #[error("the auxiliary instrument at `{at}`: {source}")]
     Reader {
         /// Key path of the instrument in the campaign.
         at: String,
@@ -125,29 +116,26 @@ pub enum SessionError {
         source: mapper_core::BackendCause,
     },
     /// A stored plan violates a limit that applies to every plan.
-    #[error("{}: {why}; make it again with `mapper plan CAMPAIGN --out FILE`", .path.display())]
-    WrongPlan {
+    #[error("{} is not a valid plan: {why}; make a new plan", .path.display())]
+    InvalidPlan {
         /// The file.
         path: PathBuf,
         /// What is wrong.
         why: String,
     },
     /// No point was identified from a recording.
-    #[error("no point was identified: the recording has no step that is long enough to be one. {why}")]
+    #[error("no point was identified: no step of the recording is long enough. {why}")]
     NoPoints {
         /// What is known about the recording.
         why: String,
     },
     /// A recording was given twice.
-    #[error(
-        "{} and {} hold the same readings; give each recording once, or its noise would count as new evidence",
-        .0[0].display(),
-        .0[1].display()
-    )]
+    #[error("{} and {} contain the same readings, whose noise would count as independent evidence; give each recording once",
+        .0[0].display(), .0[1].display())]
     SameRecording([PathBuf; 2]),
     /// A resumed run was given to a command that follows one recording.
     #[error("{run} was resumed and has several recordings; give one of them, e.g. {run}/recording.mcap", run = .0.display())]
-    Resumed(PathBuf),
+    SeveralRecordings(PathBuf),
     /// A run cannot be resumed.
     #[error("{} cannot be resumed: {why}", .run.display())]
     NotResumable {
@@ -156,8 +144,8 @@ pub enum SessionError {
         /// The reason.
         why: String,
     },
-    /// Another runner has the rig.
-    #[error("the rig `{rig}` is in use by {owner}; wait for its end, or stop it there")]
+    /// Another runner uses the rig.
+    #[error("the rig `{rig}` is in use by {owner}; wait until that run ends, or stop it")]
     RigInUse {
         /// The rig.
         rig: String,
@@ -166,23 +154,22 @@ pub enum SessionError {
     },
     /// A runner ended without releasing the rig.
     #[error(
-        "the rig `{rig}` was left by {owner}, which ended with the rig in its hands; a driver makes it safe by itself then. Look at the rig; then go on with \
-         `mapper run --resume {}`, or clear it with `mapper rig acknowledge {}`", .run.display(), word(.rig)
+        "the rig `{rig}` was not released by {owner}, which has ended; its driver should have made it safe. Inspect the rig; then resume \
+         that run, or acknowledge that the rig is safe"
     )]
     RigAbandoned {
         /// The rig.
         rig: String,
-        /// The run that left it.
+        /// The run that did not release it.
         run: PathBuf,
-        /// The owner that left it.
+        /// The process that did not release it.
         owner: String,
     },
     /// The rig is locked out, and the lockout has not been acknowledged.
     #[error(
-        "the rig `{rig}` is latched since the run {}: {reason}. Look at the rig; then clear it with `mapper rig acknowledge {}`",
-        .run.display(), word(.rig)
+        "the rig `{rig}` has been locked out since the run {}: {reason}. Inspect the rig; then acknowledge that it is safe", .run.display()
     )]
-    RigLatched {
+    RigLockedOut {
         /// The rig.
         rig: String,
         /// The reason.
@@ -191,40 +178,40 @@ pub enum SessionError {
         run: PathBuf,
     },
     /// The rig has no lockout and no abandoned run, or no rig has this name.
-    #[error("nothing was acknowledged: the rig `{rig}` is in no doubt, or its name is another; {}", in_doubt_text(.in_doubt))]
+    #[error("the rig `{rig}` needs no acknowledgement, or there is no rig of that name; {}", awaiting_text(.awaiting))]
     NothingToAcknowledge {
         /// The rig.
         rig: String,
         /// Rigs that wait for acknowledgement.
-        in_doubt: Vec<String>,
+        awaiting: Vec<String>,
     },
     /// The rig could not be armed, so the run did not start.
     #[error(transparent)]
     NotArmed(RunError),
     /// The preflight check refused the run.
-    #[error("the run was not begun: {0}")]
+    #[error("the run was not started: {0}")]
     Preflight(String),
     /// The rig needs a guard that the campaign does not have.
     #[error(
-        "backend `{backend}` must not be run without these guards: {guards}; give their limits in `limits:` or `guards:` of the \
-         campaign, with a reaction that ends the run"
+        "backend `{backend}` requires guards that the campaign does not have: {guards}; set their limits under `limits:` or `guards:`, \
+         with a reaction that ends the run"
     )]
-    Unguarded {
+    MissingGuards {
         /// The backend.
         backend: String,
         /// What is missing.
         guards: String,
     },
     /// A guard watches a channel that the rig does not deliver.
-    #[error("backend `{backend}` does not deliver what is to be guarded: {channels}")]
-    GuardBlind {
+    #[error("backend `{backend}` does not deliver these guarded channels: {channels}")]
+    GuardWithoutChannel {
         /// The backend.
         backend: String,
         /// Channels and their guards.
         channels: String,
     },
     /// A run failed; the rig is safe.
-    #[error("{source}\nThe recording up to then is {}.", .recording.display())]
+    #[error("{source}\nThe recording up to the failure is {}.", .recording.display())]
     Run {
         /// The reason.
         source: RunError,
@@ -241,7 +228,7 @@ pub enum SessionError {
     #[error("the rehearsal failed: {0}")]
     Rehearsal(#[source] RunError),
     /// A guard tripped in the rehearsal of a script.
-    #[error("in the rehearsal on the nominal machine at {t_s:.1} s {reason}")]
+    #[error("a guard tripped at {t_s:.1} s of the rehearsal on the nominal machine: {reason}")]
     RehearsalTripped {
         /// Run time, s.
         t_s: f64,
@@ -259,13 +246,13 @@ pub enum SessionError {
     Effect(Box<dyn std::error::Error + Send + Sync>),
     /// This program cannot read effects from files.
     #[error("{}: this program does not read effects from files", .path.display())]
-    EffectUnread {
+    EffectFilesUnsupported {
         /// The file.
         path: PathBuf,
     },
     /// A suspected effect has the same name as another.
     #[error("{}: there is already an effect `{id}`; choose another name", .path.display())]
-    EffectTaken {
+    DuplicateEffect {
         /// The script.
         path: PathBuf,
         /// The name.
@@ -284,10 +271,13 @@ pub enum SessionError {
     #[error(transparent)]
     ChannelMap(#[from] ChannelMapError),
     /// The recorded machine is unknown.
-    #[error("the machine is not known: the recording carries no campaign. {remedy}")]
+    #[error(
+        "the recorded machine is unknown, because the recording has no campaign; give its campaign{}",
+        if *.channel_map_suffices { ", or a channel map with `machine:` and its `compressor_internal_area`" } else { "" }
+    )]
     MachineUnknown {
-        /// What to do.
-        remedy: &'static str,
+        /// Whether the machine of a channel map is sufficient.
+        channel_map_suffices: bool,
     },
     /// The recording is of another machine.
     #[error("{0}: use the campaign of the machine that was recorded")]
@@ -351,8 +341,8 @@ pub enum SessionError {
         known: Vec<&'static str>,
     },
     /// The extension of a new file matches no known map format.
-    #[error("{}: give the format by the extension or by `--to`: {}", .path.display(), .known.join(", "))]
-    FormatUnstated {
+    #[error("{}: the extension belongs to no map format; use another extension, or name one of the formats {}", .path.display(), .known.join(", "))]
+    UnknownOutputFormat {
         /// The file.
         path: PathBuf,
         /// Formats and their extensions.
@@ -370,7 +360,7 @@ pub enum SessionError {
     #[error(transparent)]
     Fmu(#[from] crate::errors::fmu_error::FmuExportError),
     /// The file already exists.
-    #[error("{} is there already and is kept; choose another name", .path.display())]
+    #[error("{} already exists and is not replaced; choose another name", .path.display())]
     Exists {
         /// The file.
         path: PathBuf,
@@ -402,6 +392,14 @@ pub enum SessionError {
     Interrupted,
 }
 
+/// The rigs that wait for acknowledgement.
+fn awaiting_text(rigs: &[String]) -> String {
+    match rigs {
+        [] => "no rig waits for one".to_owned(),
+        rigs => format!("these wait for one: {}", rigs.join(", ")),
+    }
+}
+
 impl SessionError {
     /// A file that could not be read, written or created.
     pub(crate) fn file(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
@@ -423,18 +421,18 @@ impl SessionError {
             E::Campaign(CampaignError::Mistakes(_))
             | E::Nightly(NightlyError::Mistakes(_))
             | E::NightlySequence { .. }
-            | E::NightlyTwice { .. }
+            | E::DuplicateNightlyRun { .. }
             | E::Variant(_)
-            | E::OtherNight { .. }
+            | E::NightlyMismatch { .. }
             | E::NoRecording
-            | E::NotTogether { .. }
+            | E::DifferentCampaigns { .. }
             | E::Method { .. }
             | E::Model(_)
             | E::Backend(_)
             | E::Reader { .. }
             | E::Effect(_)
-            | E::EffectTaken { .. }
-            | E::EffectUnread { .. }
+            | E::DuplicateEffect { .. }
+            | E::EffectFilesUnsupported { .. }
             | E::ChannelMap(ChannelMapError::Mistakes(_))
             | E::MachineUnknown { .. }
             | E::NothingToAcknowledge { .. }
@@ -442,7 +440,7 @@ impl SessionError {
             | E::MapWork(_)
             | E::UnknownFormat { .. }
             | E::UnknownExtension { .. }
-            | E::FormatUnstated { .. }
+            | E::UnknownOutputFormat { .. }
             | E::Fit { .. }
             | E::Fmu(_)
             | E::FirstMap(_)
@@ -450,18 +448,18 @@ impl SessionError {
             | E::Export(ExportError::NeedsFit { .. })
             | E::Script(_)
             | E::SameRecording(_)
-            | E::Resumed(_) => ErrorKind::BadInput,
-            E::Unguarded { .. }
-            | E::GuardBlind { .. }
+            | E::SeveralRecordings(_) => ErrorKind::BadInput,
+            E::MissingGuards { .. }
+            | E::GuardWithoutChannel { .. }
             | E::RigInUse { .. }
             | E::RigAbandoned { .. }
-            | E::RigLatched { .. }
+            | E::RigLockedOut { .. }
             | E::NotArmed(_)
             | E::Preflight(_) => ErrorKind::Rig,
             E::Plan(_)
             | E::NotAPlan { .. }
             | E::StalePlan { .. }
-            | E::WrongPlan { .. }
+            | E::InvalidPlan { .. }
             | E::NotResumable { .. }
             | E::RehearsalTripped { .. }
             | E::NoSteps { .. } => ErrorKind::NoPlan,

@@ -10,7 +10,7 @@ pub enum MapWorkError {
     /// A map description cannot be read or has mistakes.
     #[error(transparent)]
     Description(#[from] DescriptionError),
-    /// A statement about a map file that is none.
+    /// An invalid statement about a map file.
     #[error(transparent)]
     Key(#[from] KeyError),
     /// A compressor map without a fit.
@@ -34,7 +34,7 @@ pub enum MapWorkError {
     },
     /// A table whose points are corrected already.
     #[error(
-        "{} is not a table of measured points, which has N, flow, P1, T1, P2 and T2; the columns that were found are shown by `mapper map inspect`",
+        "{} is not a table of measured points, which has columns for N, flow, P1, T1, P2 and T2; inspect the columns that were recognised",
         .path.display()
     )]
     NotMeasured {
@@ -59,22 +59,22 @@ pub enum MapWorkError {
     },
     /// A conversion of efficiencies without their definition.
     #[error(
-        "the file does not name the definition of its efficiencies: give it by `--efficiency`, e.g. `--efficiency \"constant_gamma 1.4\"`"
+        "the file does not state how its efficiencies are defined; state the definition, e.g. `constant_gamma 1.4`"
     )]
     NoDefinition,
     /// The map of a compressor and that of a turbine.
-    #[error("{} is the map of a turbine, the other file that of a compressor; give two maps of the same machine", .turbine.display())]
+    #[error("{} is a turbine map, the other file a compressor map; give two maps of the same machine", .turbine.display())]
     TwoMachines {
         /// The file of the turbine.
         turbine: PathBuf,
     },
-    /// An option that turbine maps do not have.
-    #[error("{} is the map of a turbine: its quantities are reduced, so `{option}` has no meaning; leave it out", .path.display())]
+    /// A request that turbine maps cannot fulfil, because their quantities are reduced.
+    #[error("{} is a turbine map and has no {property}; leave that out", .path.display())]
     NotOfTurbine {
         /// The file.
         path: PathBuf,
-        /// The option.
-        option: &'static str,
+        /// The requested property.
+        property: &'static str,
     },
     /// A picture that cannot be made.
     #[error("failed to draw the picture: {problem}")]

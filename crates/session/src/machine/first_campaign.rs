@@ -1,7 +1,7 @@
-//! The first campaign of a machine: a commented file, its nominal map and a channel map, from the wheel's diameter.
+//! The first campaign of a machine: a commented file, its nominal map and a channel map, made from the wheel diameter.
 
 use crate::machine::first_map::{FirstMap, MapLines};
-use crate::machine::first_request::{FirstCampaignRequest, FirstRig, digits};
+use crate::machine::first_request::{FirstCampaignRequest, FirstRig, significant_digits};
 use crate::recording::files::write_new;
 use crate::{Registry, SessionError};
 use mapper_campaign::{AssumedSize, Campaign, CampaignError, similar_sizes};
@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// Its steps dwell 60 s: all 30 machines of `benches/first_campaign.py` have at least 80 % good points with it.
+/// Template of the campaign. Its steps dwell 60 s: all 30 machines of `benches/first_campaign.py` then have at least 80 % good points.
 const CAMPAIGN: &str = include_str!("../../templates/campaign.yaml");
 const CHANNELS: &str = include_str!("../../templates/channels.yaml");
 const ZERO: &str = include_str!("../../templates/zero.yaml");
@@ -67,10 +67,9 @@ pub fn first_campaign(
     let file = |ending: &str| request.directory.join(format!("{}{ending}", request.name));
     let (campaign_path, map_path) = (file(".yaml"), request.directory.join(&map.file_name));
     let text = campaign_text(request, &map);
-    let campaign = checked(&text, &campaign_path, &map)?;
+    let campaign = check_campaign(&text, &campaign_path, &map)?;
     let channels = (request.rig != FirstRig::VirtualLab).then(|| file("_channels.yaml"));
     std::fs::create_dir_all(&request.directory).map_err(SessionError::file("create", &request.directory))?;
-    // The campaign last: without it the other files mean nothing.
     for path in [Some(&campaign_path), channels.as_ref()].into_iter().flatten() {
         if path.exists() {
             return Err(SessionError::Exists { path: path.clone() });
@@ -78,8 +77,12 @@ pub fn first_campaign(
     }
     write_new(&map_path, map.text.as_bytes())?;
     if let Some(path) = &channels {
-        write_new(path, filled(CHANNELS, &[("reference", request.reference.name.to_owned())]).as_bytes())?;
+        write_new(
+            path,
+            fill_template(CHANNELS, &[("reference", request.reference.name.to_owned())]).as_bytes(),
+        )?;
     }
+    // The campaign comes last, because it refers to the other files.
     write_new(&campaign_path, text.as_bytes())?;
     Ok(FirstCampaign {
         campaign: campaign_path,
@@ -91,7 +94,7 @@ pub fn first_campaign(
 }
 
 /// The campaign of the text, or its mistakes.
-fn checked(text: &str, path: &Path, map: &FirstMap) -> Result<Campaign, SessionError> {
+fn check_campaign(text: &str, path: &Path, map: &FirstMap) -> Result<Campaign, SessionError> {
     let files = |asked: &Path| match asked.file_name() {
         Some(name) if name == map.file_name.as_str() => Ok(map.text.clone()),
         _ => Err(Error::from(ErrorKind::NotFound)),
@@ -115,7 +118,7 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
     let tap = |diameter_m: Option<f64>, size: &str| match request.has_static_taps {
         true => {
             let own = diameter_m.map(|m| 1e3 * m).or_else(|| similar_mm(request, size));
-            format!("static, pipe_diameter: {} mm", digits(own.unwrap_or(0.0), 3))
+            format!("static, pipe_diameter: {} mm", significant_digits(own.unwrap_or(0.0), 3))
         }
         false => "total".to_owned(),
     };
@@ -126,22 +129,23 @@ fn campaign_text(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         ("geometry", geometry(request, map)),
         ("map_file", map.file_name.clone()),
         ("reference", request.reference.name.to_owned()),
-        ("flow_noise", digits(FLOW_NOISE_KG_S * wheel_ratio * wheel_ratio, 2)),
+        ("flow_noise", significant_digits(FLOW_NOISE_KG_S * wheel_ratio * wheel_ratio, 2)),
         ("inlet_tap", tap(request.inlet_diameter_m, "compressor.inlet_diameter")),
         ("outlet_tap", tap(request.outlet_diameter_m, "compressor.outlet_diameter")),
-        ("probe", format!("{} mm", digits(1e3 * request.probe_diameter_m.unwrap_or(0.0), 3))),
+        ("probe", format!("{} mm", significant_digits(1e3 * request.probe_diameter_m.unwrap_or(0.0), 3))),
         ("lines", lines(&map.lines)),
-        // A log has its rest, if there was one, in its readings.
+        // A log contains its own standstill, if there was one.
         ("zero", if request.rig == FirstRig::Log { String::new() } else { ZERO.to_owned() }),
         ("speed_limit", format!("{} krpm", (SPEED_LIMIT_RATIO * map.lines.highest_rpm() / 1e3).ceil())),
     ];
     // The backend has placeholders of its own.
-    filled(&CAMPAIGN.replace("{{backend}}\n", request.rig.backend()), &values)
+    fill_template(&CAMPAIGN.replace("{{backend}}\n", request.rig.backend()), &values)
 }
 
 fn lines(lines: &MapLines) -> String {
-    let line =
-        |rpm: &f64| format!("    - {{speed_corrected: {} krpm, points: {POINTS}}}", digits(rpm / 1e3, 6));
+    let line = |rpm: &f64| {
+        format!("    - {{speed_corrected: {} krpm, points: {POINTS}}}", significant_digits(rpm / 1e3, 6))
+    };
     lines.speeds_rpm.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
@@ -153,17 +157,21 @@ fn similar_mm(request: &FirstCampaignRequest, key: &str) -> Option<f64> {
 /// The geometry: known sizes as keys, the others as comments with their assumed values.
 fn geometry(request: &FirstCampaignRequest, map: &FirstMap) -> String {
     let sizes = similar_sizes(request.wheel_diameter_m);
-    let mm = |diameter_m: Option<f64>| diameter_m.map(|m| format!("{} mm", digits(1e3 * m, 4)));
+    let mm = |diameter_m: Option<f64>| diameter_m.map(|m| format!("{} mm", significant_digits(1e3 * m, 4)));
     let known = |size: &AssumedSize| match size.key.as_str() {
         "compressor.inlet_diameter" => mm(request.inlet_diameter_m),
         "compressor.outlet_diameter" => mm(request.outlet_diameter_m),
         // A turbine and a valve that fit the flow of the machine's own map.
         "turbine.choked_flow" | "outlet.valve_area" => map.flow_ratio.map(|ratio| {
-            format!("{} {}    # fits the map's choke flow", digits(ratio * size.value, 3), size.unit)
+            format!(
+                "{} {}    # fits the map's choke flow",
+                significant_digits(ratio * size.value, 3),
+                size.unit
+            )
         }),
         _ => None,
     };
-    let wheel = format!("{} mm", digits(1e3 * request.wheel_diameter_m, 6));
+    let wheel = format!("{} mm", significant_digits(1e3 * request.wheel_diameter_m, 6));
     let mut text = String::new();
     for side in ["compressor", "turbine", "bearing", "outlet"] {
         let mut rows = Vec::new();
@@ -174,13 +182,13 @@ fn geometry(request: &FirstCampaignRequest, map: &FirstMap) -> String {
             let Some(key) = size.key.strip_prefix(side).and_then(|rest| rest.strip_prefix('.')) else {
                 continue;
             };
-            // The Nusselt laws have no dimension: they stay.
+            // Coefficients of Nusselt laws are dimensionless and do not scale with the wheel.
             if key.contains('.') {
                 continue;
             }
             rows.push(match known(size) {
                 Some(value) => (true, format!("{key}: {value}")),
-                None => (false, format!("{key}: {} {}", digits(size.value, 3), size.unit)),
+                None => (false, format!("{key}: {} {}", significant_digits(size.value, 3), size.unit)),
             });
         }
         let mark = |is_known: bool| if is_known { "" } else { "# " };
@@ -191,13 +199,13 @@ fn geometry(request: &FirstCampaignRequest, map: &FirstMap) -> String {
         }
     }
     if let Some(inertia) = sizes.iter().find(|size| size.key == "shaft_inertia") {
-        text += &format!("    # shaft_inertia: {} {}", digits(inertia.value, 3), inertia.unit);
+        text += &format!("    # shaft_inertia: {} {}", significant_digits(inertia.value, 3), inertia.unit);
     }
     text
 }
 
 /// A template with its placeholders replaced.
-fn filled(template: &str, values: &[(&str, String)]) -> String {
+fn fill_template(template: &str, values: &[(&str, String)]) -> String {
     values
         .iter()
         .fold(template.to_owned(), |text, (key, value)| text.replace(&format!("{{{{{key}}}}}"), value))

@@ -42,7 +42,7 @@ pub struct FirstCampaignRequest {
 }
 
 /// A number with at most this many significant digits, without trailing zeros.
-pub(crate) fn digits(value: f64, count: usize) -> String {
+pub(crate) fn significant_digits(value: f64, count: usize) -> String {
     let rounded: f64 = format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value);
     if rounded != 0.0 && rounded.abs() < 1e-3 { format!("{rounded:e}") } else { rounded.to_string() }
 }

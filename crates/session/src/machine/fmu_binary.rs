@@ -24,7 +24,7 @@ pub(crate) fn with_binary(fmu: &mut Vec<FmuFile>, identifier: &str) -> Result<St
         std::env::var("CC").ok().filter(|name| !name.is_empty()).unwrap_or_else(|| "cc".to_owned());
     let failed = |why: String| FmuExportError::Compiler { compiler: compiler.clone(), why };
     let Some((platform, ending)) = PLATFORM else {
-        return Err(failed("FMI 2.0 has no name for libraries of this computer; leave `--compile` out and let the importer compile".to_owned()).into());
+        return Err(FmuExportError::Platform.into());
     };
     let scratch =
         tempfile::tempdir().map_err(SessionError::file("create", Path::new("a temporary directory")))?;
@@ -52,9 +52,7 @@ pub(crate) fn with_binary(fmu: &mut Vec<FmuFile>, identifier: &str) -> Result<St
         .args(&sources)
         .arg("-lm")
         .output()
-        .map_err(|error| {
-            failed(format!("{error}; install a C compiler, name one in CC, or leave `--compile` out"))
-        })?;
+        .map_err(|error| failed(error.to_string()))?;
     if !output.status.success() {
         let stderr = String::from_utf8_lossy(&output.stderr);
         return Err(failed(stderr.chars().take(2000).collect()).into());

@@ -32,7 +32,7 @@ pub struct WrittenFmu {
 }
 
 /// A machine to be exported as an FMU.
-struct Made {
+struct FmuExport {
     name: String,
     origin: String,
     params: Params,
@@ -61,7 +61,7 @@ impl Session<'_> {
             Some(table) => (FmuMap::Table(table?), "map from its table"),
         };
         let origin = format!("nominal machine of a campaign: {form}, thermal model as declared");
-        write(Made { name: machine.name.clone(), origin, params, map }, campaign, compile, out, existing)
+        write(FmuExport { name: machine.name.clone(), origin, params, map }, campaign, compile, out, existing)
     }
 
     /// Identifies a recording by its campaign's method and writes the identified map and, for the joint method, the thermal model. Parameters
@@ -78,9 +78,9 @@ impl Session<'_> {
         existing: Existing,
     ) -> Result<WrittenFmu, SessionError> {
         let first = recorded.first().ok_or(SessionError::NoRecording)?;
-        let campaign = first.known("Give `--campaign FILE`")?.clone();
+        let campaign = first.require_campaign()?.clone();
         let identified = self.identify(recorded, channels, None)?;
-        // Points without map coordinates are skipped; they do not prevent a map.
+        // Points without map coordinates are skipped; the others may still form a map.
         let has_place = |point: &&IdentifiedPoint| {
             let place = [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm];
             place.iter().all(|value| value.is_finite())
@@ -103,7 +103,7 @@ impl Session<'_> {
         } else {
             "as declared"
         };
-        let made = Made {
+        let export = FmuExport {
             name: name.clone(),
             origin: format!(
                 "identified by the {} method: fitted map of {} points on {} speed lines, compressor's heat transfer {law}; \
@@ -113,15 +113,15 @@ impl Session<'_> {
                 map.lines.len()
             ),
             params: thermal
-                .map_or(campaign.machine.params, |found| with_found(&campaign.machine.params, found)),
+                .map_or(campaign.machine.params, |found| with_identified(&campaign.machine.params, found)),
             map: FmuMap::Table(table),
         };
-        write(made, &campaign, compile, out, existing)
+        write(export, &campaign, compile, out, existing)
     }
 }
 
 /// Declared parameters, replaced by the identified values if they exist.
-pub(crate) fn with_found(declared: &Params, found: &ThermalModel) -> Params {
+pub(crate) fn with_identified(declared: &Params, found: &ThermalModel) -> Params {
     let mut params = *declared;
     let compressor = &mut params.compressor;
     compressor.internal_area_m2 = found.internal_area_m2;
@@ -149,18 +149,18 @@ pub(crate) fn with_found(declared: &Params, found: &ThermalModel) -> Params {
 }
 
 fn write(
-    made: Made,
+    export: FmuExport,
     campaign: &Campaign,
     compile: bool,
     out: &Path,
     existing: Existing,
 ) -> Result<WrittenFmu, SessionError> {
-    let start = start(&made, campaign).map_err(FmuExportError::Start)?;
+    let start = start(&export, campaign).map_err(FmuExportError::Start)?;
     let machine = FmuMachine {
-        name: &made.name,
-        origin: &made.origin,
-        params: &made.params,
-        map: &made.map,
+        name: &export.name,
+        origin: &export.origin,
+        params: &export.params,
+        map: &export.map,
         boundary: &start.boundary,
         start: &start.state,
     };
@@ -169,17 +169,17 @@ fn write(
     write_file(out, &archive(&files).map_err(FmuExportError::Fmu)?, existing)?;
     Ok(WrittenFmu {
         file: out.to_owned(),
-        origin: made.origin.clone(),
+        origin: export.origin.clone(),
         start_speed_rpm: start.state.shaft_speed_rpm(),
         binary,
     })
 }
 
 /// Start state: steady at the middle point of the grid, or at the first other point with a steady state.
-fn start(made: &Made, campaign: &Campaign) -> Result<SteadyState, SteadyError> {
-    let model = match &made.map {
-        FmuMap::ClosedForm(map) => Model::new(made.params, Arc::new(*map)),
-        FmuMap::Table(map) => Model::new(made.params, Arc::new(map.clone())),
+fn start(export: &FmuExport, campaign: &Campaign) -> Result<SteadyState, SteadyError> {
+    let model = match &export.map {
+        FmuMap::ClosedForm(map) => Model::new(export.params, Arc::new(*map)),
+        FmuMap::Table(map) => Model::new(export.params, Arc::new(map.clone())),
     };
     let mut points = campaign.points.clone();
     points.sort_by(|a, b| a.speed_rpm.total_cmp(&b.speed_rpm));

@@ -102,14 +102,14 @@ impl Registry {
     /// The format of a new map file, by name or by the file's extension.
     ///
     /// # Errors
-    /// [`SessionError::FormatUnstated`] if neither gives a format.
+    /// [`SessionError::UnknownOutputFormat`] if neither gives a format.
     pub fn format_of(&self, path: &Path, name: Option<&str>) -> Result<&'static MapFormat, SessionError> {
         let file = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         let found = match name {
             Some(name) => self.written_format(name).ok(),
             None => self.formats.written_to(file),
         };
-        found.ok_or_else(|| SessionError::FormatUnstated {
+        found.ok_or_else(|| SessionError::UnknownOutputFormat {
             path: path.to_owned(),
             known: self
                 .formats

@@ -19,23 +19,23 @@ use mapper_report::{
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// The result of a command.
+/// The result of an operation on map files.
 #[derive(Debug)]
 pub struct MapWork {
-    /// For people.
+    /// The result for people.
     pub text: String,
-    /// For programs.
+    /// The result for programs.
     pub json: Value,
-    /// What was assumed about the files.
+    /// Assumptions about the files.
     pub warnings: Vec<String>,
 }
 
-/// The map of a file.
+/// A map that was read from a file.
 #[derive(Debug)]
 pub enum MapFile {
-    /// Of a compressor.
+    /// A compressor map.
     Compressor(ImportedMap),
-    /// Of a turbine.
+    /// A turbine map.
     Turbine(ImportedTurbine),
 }
 
@@ -44,9 +44,9 @@ pub enum MapFile {
 pub struct MapOut<'a> {
     /// The file.
     pub path: &'a Path,
-    /// Name of its format; by the extension if none is given.
+    /// Name of its format; `None` selects it by the extension.
     pub format: Option<&'a str>,
-    /// What becomes of a file that is there.
+    /// Treatment of an existing file.
     pub existing: Existing,
 }
 
@@ -75,7 +75,7 @@ impl Registry {
         }
     }
 
-    /// How a map file is understood; `description` is a new file for the map description.
+    /// Shows how a map file is read. `description` is a new file for the map description.
     ///
     /// # Errors
     /// As [`Registry::read_map_file`], and those of writing.
@@ -124,7 +124,7 @@ impl Registry {
         Ok(MapWork { text, json, warnings: Vec::new() })
     }
 
-    /// Fits a map and writes it if asked.
+    /// Fits a map, and writes it to `out`.
     ///
     /// # Errors
     /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
@@ -213,12 +213,12 @@ impl Registry {
                 Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
             }
             MapFile::Turbine(found) => {
-                let asked = [
-                    (to_reference.is_some(), "--to-reference"),
-                    (efficiencies.0.is_some() || efficiencies.1.is_some(), "--to-efficiency"),
+                let requested = [
+                    (to_reference.is_some(), "reference state"),
+                    (efficiencies.0.is_some() || efficiencies.1.is_some(), "definition of efficiency"),
                 ];
-                if let Some((_, option)) = asked.into_iter().find(|(asked, _)| *asked) {
-                    return Err(MapWorkError::NotOfTurbine { path: path.to_owned(), option }.into());
+                if let Some((_, property)) = requested.into_iter().find(|(requested, _)| *requested) {
+                    return Err(MapWorkError::NotOfTurbine { path: path.to_owned(), property }.into());
                 }
                 let (map, fitted_here) = write_turbine_fitted_if_needed(path, out, format, found.map)?;
                 let (points, lines) = (map.points.len(), map.lines().count());
@@ -240,7 +240,8 @@ impl Registry {
         }
     }
 
-    /// Removes the heat that a hot map shows, or a given one (W), and writes the map if asked.
+    /// Removes the heat transfer from a map measured hot, and writes it to `out`. `heat_w` is the heat flow, W; it is estimated from the map if
+    /// `None`.
     ///
     /// # Errors
     /// As [`Registry::read_map`], [`MapWorkError::NotCorrected`], and those of writing.
@@ -264,7 +265,7 @@ impl Registry {
         Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
     }
 
-    /// Compares two maps of the same machine; `picture` is a new file with both.
+    /// Compares two maps of the same machine. `picture` is a new file that shows both.
     ///
     /// # Errors
     /// As [`Registry::read_map_file`], [`MapWorkError`], and those of writing.
@@ -295,8 +296,8 @@ impl Registry {
             }
             (MapFile::Turbine(a), MapFile::Turbine(b)) => {
                 if picture.is_some() {
-                    let option = "--picture";
-                    return Err(MapWorkError::NotOfTurbine { path: paths[0].to_owned(), option }.into());
+                    let property = "picture of a comparison";
+                    return Err(MapWorkError::NotOfTurbine { path: paths[0].to_owned(), property }.into());
                 }
                 let comparison = compare_turbines(&a.map, &b.map)
                     .map_err(|source| MapWorkError::TurbineNotFitted { path: paths[0].to_owned(), source })?;
@@ -314,7 +315,7 @@ impl Registry {
     }
 }
 
-/// Writes a turbine map; a format that is a table gets a fitted one. Returns the written map and whether it was fitted here.
+/// Writes a turbine map, fitted first if the format tabulates the whole map. Returns the written map and whether it was fitted here.
 fn write_turbine_fitted_if_needed(
     path: &Path,
     out: MapOut<'_>,

@@ -1,7 +1,8 @@
-//! Tables of steady points: from N, flow, P1, T1, P2, T2 to a map with uncertainties, without heat if the housing was measured.
+//! Reduces tables of steady points (N, flow, P1, T1, P2, T2) to a map with uncertainties. Heat transfer is removed if the housing temperature was
+//! measured.
 
 use crate::analysis::budget_file::budget_csv;
-use crate::machine::fmu_file::with_found;
+use crate::machine::fmu_file::with_identified;
 use crate::machine::map_work::{MapOut, MapWork, warnings};
 use crate::recording::files::Existing;
 use crate::recording::identification_config::{assumed_sensors, identification};
@@ -21,8 +22,8 @@ use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;
 
-/// The machine and the sensors of a table.
-struct Stand {
+/// The machine and the sensors with which a table was measured.
+struct TestStand {
     name: String,
     config: IdentifyConfig,
     /// The thermal model: parameters, standard uncertainty of h as a ratio, origin.
@@ -30,37 +31,37 @@ struct Stand {
     remarks: Vec<String>,
 }
 
-/// The part of `points.json` that counts here.
+/// The part of `points.json` that is needed here.
 #[derive(Deserialize)]
 struct PointsFile {
     thermal: Option<ThermalModel>,
 }
 
-impl Stand {
-    /// Nothing but the table is known.
-    fn unknown(table: &Path) -> Stand {
+impl TestStand {
+    /// Default sensors and no thermal model, for a table without a campaign.
+    fn unknown(table: &Path) -> TestStand {
         let config =
             IdentifyConfig { air: Air::DRY, declared: assumed_sensors(), ..IdentifyConfig::default() };
-        let remark = "No sensors are declared: temperatures count as class A of IEC 60751, pressures as class 0.1, the flow as 0.5 %; \
-                      declare your own in a campaign and give it by `--machine`.";
+        let remark = "No sensors are declared. Assumed are class A of IEC 60751 for temperatures, class 0.1 for pressures and 0.5 % for the \
+                      flow; declare yours in a campaign and give it as the machine.";
         let name = table.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Stand { name, config, heat: None, remarks: vec![remark.to_owned()] }
+        TestStand { name, config, heat: None, remarks: vec![remark.to_owned()] }
     }
 
     /// A campaign, or a run directory with its identified thermal model.
-    fn read(path: &Path) -> Result<Stand, SessionError> {
+    fn read(path: &Path) -> Result<TestStand, SessionError> {
         if !path.is_dir() {
-            return Ok(Stand::of(&mapper_campaign::load(path)?, path, None));
+            return Ok(TestStand::of(&mapper_campaign::load(path)?, path, None));
         }
         let campaign = mapper_campaign::load(&path.join(run_directory::CAMPAIGN))?;
         let points = path.join(run_directory::POINTS);
         let bytes = std::fs::read(&points).map_err(SessionError::file("read", &points))?;
         let file: PointsFile = serde_json::from_slice(&bytes)
             .map_err(|error| SessionError::file("read", &points)(error.into()))?;
-        Ok(Stand::of(&campaign, path, file.thermal.as_ref()))
+        Ok(TestStand::of(&campaign, path, file.thermal.as_ref()))
     }
 
-    fn of(campaign: &Campaign, path: &Path, found: Option<&ThermalModel>) -> Stand {
+    fn of(campaign: &Campaign, path: &Path, found: Option<&ThermalModel>) -> TestStand {
         let mut config = identification(campaign);
         let declared = (campaign.machine.params, campaign.tolerances.convection_ratio);
         let law = found.and_then(|found| Some((found, found.convection.as_ref()?)));
@@ -70,18 +71,18 @@ impl Stand {
                 let of_a = a.value.map_or(0.0, |value| a.uncertainty.combined_standard_error() / value);
                 config.alpha_area_ratio = found.alpha_area_ratio.value.unwrap_or(config.alpha_area_ratio);
                 config.alpha_area_sigma_ratio = found.alpha_area_ratio.uncertainty.combined_standard_error();
-                ((with_found(&declared.0, found), of_a.hypot(law.deviation_ratio)), "identified")
+                ((with_identified(&declared.0, found), of_a.hypot(law.deviation_ratio)), "identified")
             }
             None => (declared, "declared"),
         };
         let heat = Some((params, ratio, format!("{origin} in {}", path.display())));
-        Stand { name: campaign.machine.name.clone(), config, heat, remarks: Vec::new() }
+        TestStand { name: campaign.machine.name.clone(), config, heat, remarks: Vec::new() }
     }
 }
 
 impl Registry {
-    /// Makes a map of a table of steady points. `machine`: a campaign, or a run directory whose thermal model was identified; `budget`: a
-    /// new file for the uncertainties by source.
+    /// Makes a map from a table of steady points. `machine` is a campaign, or a run directory with an identified thermal model; `budget` is a new
+    /// file for the uncertainties by source.
     ///
     /// # Errors
     /// As [`Registry::read_map`], [`MapWorkError`], [`SessionError::Campaign`], and those of writing.
@@ -94,8 +95,8 @@ impl Registry {
         budget: Option<(&Path, Existing)>,
     ) -> Result<MapWork, SessionError> {
         let format = out.map(|out| out.format(self)).transpose()?;
-        let Stand { name, mut config, heat, mut remarks } =
-            machine.map_or_else(|| Ok(Stand::unknown(path)), Stand::read)?;
+        let TestStand { name, mut config, heat, mut remarks } =
+            machine.map_or_else(|| Ok(TestStand::unknown(path)), TestStand::read)?;
         let tap = |tap: PressureTap| match tap {
             PressureTap::Static { pipe_diameter_m } => Some(pipe_diameter_m),
             PressureTap::Total => None,
@@ -116,7 +117,7 @@ impl Registry {
         config.reference = found.map.reference;
         config.thresholds.end_mean_s = config.thresholds.steady_mean_s;
         config.method = method_of_table(measured, heat.is_some());
-        remarks.extend(why_apparent(measured, heat.is_some(), config.method));
+        remarks.extend(apparent_efficiency_remark(measured, heat.is_some(), config.method));
         let known = heat.as_ref().map(|(params, convection_ratio, origin)| KnownHeat {
             params,
             convection_ratio: *convection_ratio,
@@ -153,19 +154,21 @@ impl Registry {
     }
 }
 
-/// Why heat could not be removed, and the remedy.
-fn why_apparent(measured: &[MeasuredPoint], has_heat: bool, method: Method) -> Option<String> {
-    let without = measured.iter().filter(|point| point.tc_k.is_none()).count();
-    let why = match (method, has_heat) {
+/// The reason why heat transfer was not removed, and the remedy. `None` if it was removed.
+fn apparent_efficiency_remark(measured: &[MeasuredPoint], has_heat: bool, method: Method) -> Option<String> {
+    let without_tc = measured.iter().filter(|point| point.tc_k.is_none()).count();
+    let reason = match (method, has_heat) {
         (Method::Corrected, _) => return None,
-        (_, false) if without == 0 => {
-            "the table has the housing temperature, but the convection of the machine is not known: give its campaign or a run by `--machine`"
+        (_, false) if without_tc == 0 => {
+            "the table has the housing temperature, but the convection of the machine is unknown; give its campaign or a run as the machine"
                 .to_owned()
         }
-        _ if without == measured.len() => {
-            "the table has no housing temperature (Tc); `mapper map correct` removes the heat that the lines show".to_owned()
+        _ if without_tc == measured.len() => {
+            "the table has no housing temperature (Tc); the heat correction of maps estimates the heat from the speed lines".to_owned()
         }
-        _ => format!("{without} of {} points have no housing temperature (Tc); fill it in, or leave them out", measured.len()),
+        _ => {
+            format!("{without_tc} of {} points have no housing temperature (Tc); add it, or remove these points", measured.len())
+        }
     };
-    Some(format!("The efficiencies are apparent, heat included: {why}."))
+    Some(format!("The efficiencies are apparent, heat transfer included: {reason}."))
 }

@@ -15,7 +15,11 @@ pub fn night_report_path(history: &Path, started_ms: i64) -> PathBuf {
 ///
 /// # Errors
 /// [`SessionError::File`] if it cannot be written.
-pub fn keep_night_report(history: &Path, night: &Night, comparison: &Comparison) -> Result<(), SessionError> {
+pub fn write_night_report(
+    history: &Path,
+    night: &Night,
+    comparison: &Comparison,
+) -> Result<(), SessionError> {
     let path = night_report_path(history, night.started_ms);
     let folder = path.parent().unwrap_or(history);
     std::fs::create_dir_all(folder).map_err(SessionError::file("create", folder))?;

@@ -37,7 +37,7 @@ impl PreparedNight {
             };
             let machines: Vec<Option<Variant>> = match (&group.machines, group.drawn_machines) {
                 (Some(table), _) => Variant::read(table)?.into_iter().map(Some).collect(),
-                (None, Some(count)) => Variant::drawn(&campaign, count).into_iter().map(Some).collect(),
+                (None, Some(count)) => Variant::draw(&campaign, count).into_iter().map(Some).collect(),
                 (None, None) => vec![None],
             };
             let seeds = if group.seeds.is_empty() { vec![campaign.seed] } else { group.seeds.clone() };
@@ -47,7 +47,7 @@ impl PreparedNight {
                         let run =
                             NightlyRun::new(campaign.clone(), model.clone(), method, seed, machine.clone())?;
                         if !keys.insert(run.key.clone()) {
-                            return Err(SessionError::NightlyTwice { key: run.key.to_string() });
+                            return Err(SessionError::DuplicateNightlyRun { key: run.key.to_string() });
                         }
                         runs.push(run);
                     }
@@ -65,8 +65,8 @@ impl PreparedNight {
     /// Checks that rows made elsewhere match the runs of this night.
     ///
     /// # Errors
-    /// [`SessionError::OtherNight`] if a run is missing or belongs to another night.
-    pub fn checked(&self, rows: Vec<RunRow>) -> Result<Vec<RunRow>, SessionError> {
+    /// [`SessionError::NightlyMismatch`] if a run is missing or belongs to another night.
+    pub fn check_rows(&self, rows: Vec<RunRow>) -> Result<Vec<RunRow>, SessionError> {
         let here = self.runs.iter().map(|run| &run.key);
         if here.eq(rows.iter().map(|row| &row.key)) {
             return Ok(rows);
@@ -74,7 +74,7 @@ impl PreparedNight {
         let missing = self.runs.iter().find(|run| !rows.iter().any(|row| row.key == run.key));
         let missing =
             missing.map_or_else(|| "it has other runs".to_owned(), |run| format!("it has no {}", run.key));
-        Err(SessionError::OtherNight { lacks: missing })
+        Err(SessionError::NightlyMismatch { difference: missing })
     }
 
     /// Number of runs.
@@ -100,7 +100,7 @@ impl Session<'_> {
     /// # Errors
     /// [`SessionError::Interrupted`] if the operator stopped it, [`SessionError::File`] if the recordings cannot be stored. A failed run becomes
     /// a row with its reason.
-    pub fn night(&self, night: &PreparedNight, jobs: Option<usize>) -> Result<Vec<RunRow>, SessionError> {
+    pub fn run_night(&self, night: &PreparedNight, jobs: Option<usize>) -> Result<Vec<RunRow>, SessionError> {
         let runs = &night.runs;
         // Machines that the backend does not know are reported before any run.
         for run in runs.iter().filter(|run| run.machine.is_some()) {
@@ -122,7 +122,7 @@ impl Session<'_> {
     /// Makes one run in a new directory and deletes it afterwards, because a night of recordings may not fit on the disk.
     ///
     /// # Errors
-    /// As [`Session::night`].
+    /// As [`Session::run_night`].
     pub fn nightly_run(&self, run: &NightlyRun, directory: &Path) -> Result<RunRow, SessionError> {
         std::fs::create_dir(directory).map_err(SessionError::file("create", directory))?;
         let row = run.run(self, directory);

@@ -6,7 +6,7 @@ use mapper_recording::score::ScoredPoint;
 use std::collections::BTreeMap;
 
 /// The monitored metrics; those without a value are omitted.
-pub(crate) fn figures(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
+pub(crate) fn metrics(points: &[ScoredPoint], plan: &Plan) -> BTreeMap<Metric, f64> {
     let mean = |values: Vec<f64>| {
         let count = values.len() as f64;
         (count > 0.0).then(|| values.iter().sum::<f64>() / count)

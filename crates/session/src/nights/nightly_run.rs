@@ -1,6 +1,6 @@
 //! One run of a nightly campaign, with its files in a separate directory.
 
-use crate::nights::nightly_row::{figures, point_rows};
+use crate::nights::nightly_row::{metrics, point_rows};
 use crate::recording::files::json_text;
 use crate::recording::program::PROGRAM;
 use crate::recording::recording_file::Recorded;
@@ -45,7 +45,7 @@ impl NightlyRun {
         campaign.identification.method = method;
         campaign.seed = seed;
         if let Some(machine) = &machine {
-            machine.put_into(&mut campaign)?;
+            machine.apply_to(&mut campaign)?;
         }
         let key = RunKey {
             campaign: campaign.name.clone(),
@@ -71,7 +71,7 @@ impl NightlyRun {
             figures: BTreeMap::new(),
             points: Vec::new(),
         };
-        match self.fill(&mut row, session, directory) {
+        match self.fill_row(&mut row, session, directory) {
             Err(error) if error.kind() == ErrorKind::Interrupted => return Err(error),
             Err(error) => row.failure = Some(error.to_string()),
             Ok(()) => {}
@@ -79,14 +79,19 @@ impl NightlyRun {
         Ok(row)
     }
 
-    fn fill(&self, row: &mut RunRow, session: &Session<'_>, directory: &Path) -> Result<(), SessionError> {
+    fn fill_row(
+        &self,
+        row: &mut RunRow,
+        session: &Session<'_>,
+        directory: &Path,
+    ) -> Result<(), SessionError> {
         let plan = planning::plan(&self.campaign, &self.model)?;
         row.campaign_sha256 = plan.made_from.campaign_sha256.clone();
         row.model_sha256 = plan.made_from.model_sha256.clone();
-        match self.recorded(&plan, session, directory)? {
+        match self.record_and_read(&plan, session, directory)? {
             Ok(recorded) => {
                 let identified = session.identify(vec![recorded], &ChannelMap::native(), None)?;
-                row.figures = figures(&identified.points, &plan);
+                row.figures = metrics(&identified.points, &plan);
                 row.points = point_rows(&identified.points);
             }
             Err(stopped) => row.failure = Some(stopped),
@@ -106,7 +111,7 @@ impl NightlyRun {
         methods: &[Method],
     ) -> Result<Result<Vec<Value>, String>, SessionError> {
         let plan = planning::plan(&self.campaign, &self.model)?;
-        let recording = match self.recorded(&plan, session, directory)? {
+        let recording = match self.record_and_read(&plan, session, directory)? {
             Ok(recorded) => recorded.path,
             Err(stopped) => return Ok(Err(stopped)),
         };
@@ -119,7 +124,7 @@ impl NightlyRun {
     }
 
     /// Runs the campaign and reads the recording. The inner `Err` is the reason if a guard stopped the run.
-    fn recorded(
+    fn record_and_read(
         &self,
         plan: &Plan,
         session: &Session<'_>,

@@ -1,6 +1,6 @@
-//! Forecast of a campaign before its run: duration, and parts that will give no result.
+//! Forecast of a campaign before its run: duration, expected verdicts, and settings that will give no result.
 
-use crate::plan::needed_dwell::{needed_s, settled_time_s};
+use crate::plan::needed_dwell::{needed_dwell_s, settled_time_s};
 use crate::plan::planning::{PlanInputs, plan_of};
 use crate::plan::rehearsal::rehearse;
 use crate::plan::verdict_forecast::{advise, forecast_verdicts};
@@ -35,7 +35,7 @@ const QUICK_EFFORT: f64 = 0.05;
 
 /// Forecast of a campaign.
 #[derive(Debug)]
-pub struct Prospects {
+pub struct CampaignForecast {
     /// Number of steps; the upper bound if the grid is too large to plan here.
     pub steps: usize,
     /// Whether the number is exact.
@@ -51,22 +51,26 @@ pub struct Prospects {
 }
 
 impl Session<'_> {
-    /// Simulates the steps of the campaign, or rehearses its script, and looks for parts that will give no result.
+    /// Simulates the steps of the campaign, or rehearses its script, and looks for settings that will give no result.
     ///
     /// # Errors
     /// [`SessionError`] if the plan is missing, or the script fails.
-    pub fn prospects(&self, campaign: &Campaign, model: &Model) -> Result<Prospects, SessionError> {
+    pub fn forecast_campaign(
+        &self,
+        campaign: &Campaign,
+        model: &Model,
+    ) -> Result<CampaignForecast, SessionError> {
         let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
         let plan = match &campaign.sequence {
             None => plan_of_sample(campaign, model, every)?,
             Some(source) => rehearse(self, campaign, model, source)?.plan,
         };
         let concerns = [
-            soak(campaign, model),
-            settling(campaign, &plan),
-            probe(campaign, &plan),
-            required_error(campaign, &plan),
-            uninformative_steps(campaign, &plan),
+            soak_concern(campaign, model),
+            settling_concern(campaign, &plan),
+            probe_concern(campaign, &plan),
+            required_error_concern(campaign, &plan),
+            information_concern(campaign, &plan),
         ];
         let verdicts = forecast_verdicts(campaign, &plan);
         let advice = match verdicts {
@@ -84,7 +88,7 @@ impl Session<'_> {
             let dwell_s = plan.steps.first().map_or(0.0, |step| step.dwell_s);
             (steps, plan.warm_up_s + plan.cool_down_s + plan.surge_search_s + steps as f64 * dwell_s)
         };
-        Ok(Prospects {
+        Ok(CampaignForecast {
             steps,
             is_planned,
             duration_s: soak_s(campaign) + duration_s,
@@ -111,7 +115,7 @@ fn plan_of_sample(campaign: &Campaign, model: &Model, every: usize) -> Result<Pl
 }
 
 /// A soak too short for the housings to reach the cell temperature, from the largest difference that the zero assumes.
-fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
+fn soak_concern(campaign: &Campaign, model: &Model) -> Option<Concern> {
     let soak = campaign.zero?;
     let settings = ZeroSettings::from(soak);
     let ambient_k = campaign.boundary.ambient_temperature_k;
@@ -133,14 +137,14 @@ fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
     let longer =
         (1..).map(|i| SOAK_STEP_S * f64::from(i)).take_while(|s| *s <= LONGEST_SOAK_S).find(|s| enough(*s));
     let remedy = longer.map_or_else(
-        || "no soak of a day is long enough: oil and cell need one temperature, and the machine its true masses".to_owned(),
+        || "a soak of a day is not long enough; check that oil and cell have the same temperature, and the masses of the machine".to_owned(),
         |s| format!("soak {:.0} min or longer", s / 60.0),
     );
     Some(Concern::warning(
         &["zero", "soak"],
         format!(
-            "after {:.0} min at rest, housings that were {WARM_K} K warmer than the cell would still be {:.1} K warmer, and Tc drift by \
-             {:+.2} K/min; the zero refuses a drift of more than {:.2} K/min, and takes the remaining difference for an offset",
+            "after a soak of {:.0} min, housings that were {WARM_K} K warmer than the cell are still {:.1} K warmer, and Tc drifts by \
+             {:+.2} K/min; the zero rejects a drift of more than {:.2} K/min and mistakes the remaining difference for an offset",
             soak.duration_s / 60.0,
             tc_k(soak.duration_s) - ambient_k,
             drift_k_min(soak.duration_s),
@@ -151,7 +155,7 @@ fn soak(campaign: &Campaign, model: &Model) -> Option<Concern> {
 }
 
 /// Steps that settle too late for `window: auto`.
-fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+fn settling_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let transient = matches!(campaign.identification.method, Method::Dynamic | Method::Joint);
     let auto = campaign.identification.window == WindowRule::Auto;
     // A script evaluates its own steps.
@@ -159,18 +163,18 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         return None;
     }
     let joint = campaign.identification.method == Method::Joint;
-    let needed_s = |step: &PlanStep| needed_s(step, joint);
+    let needed_dwell_s = |step: &PlanStep| needed_dwell_s(step, joint);
     let measured = || plan.steps.iter().filter(|step| step.kind != StepKind::Repeat && step.from.is_some());
-    let late: Vec<_> = measured().filter(|step| needed_s(step) > step.dwell_s).collect();
-    let worst = late.iter().max_by(|a, b| needed_s(a).total_cmp(&needed_s(b)))?;
+    let late: Vec<_> = measured().filter(|step| needed_dwell_s(step) > step.dwell_s).collect();
+    let worst = late.iter().max_by(|a, b| needed_dwell_s(a).total_cmp(&needed_dwell_s(b)))?;
     let settles = worst.predicted.settle_s.map_or_else(
         || format!("does not settle within {:.0} s", worst.dwell_s),
-        |settle_s| format!("settles {settle_s:.0} s after its jump"),
+        |settle_s| format!("settles {settle_s:.0} s after the jump to it"),
     );
     Some(Concern::warning(
         &["timing", "dwell"],
         format!(
-            "{} of {} points would not have settled {:.0} s before the end of their dwell and be doubtful \
+            "{} of {} points will not have settled {:.0} s before the end of their dwell and will be doubtful \
              (`not_stabilised`); {} {settles}",
             late.len(),
             measured().count(),
@@ -182,44 +186,44 @@ fn settling(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
 }
 
 /// Steps with too little information on alpha_A, probe and heating/cooling ratio for any point with verdict good.
-fn uninformative_steps(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+fn information_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let joint = campaign.identification.method == Method::Joint && campaign.sequence.is_none();
     let settings = campaign.identification.joint;
     let unpredicted = joint && settings != JointSettings::all_off() && plan.figures.rms_error_eta.is_none();
     unpredicted.then(|| {
         Concern::warning(
             &["timing"],
-            "these steps contain too little information on alpha_A, probe and heating/cooling ratio: the points will be doubtful (`rests_on_declaration`)"
+            "the steps contain too little information on alpha_A, probe and heating/cooling ratio; the points will be doubtful \
+             (`rests_on_declaration`)"
                 .to_owned(),
-            "lengthen the dwell, add points, or hold what is known (`identification.joint`)".to_owned(),
+            "lengthen the dwell, add points, or fix known parameters (`identification.joint`)".to_owned(),
         )
     })
 }
 
 /// A required error that is not reached even with the longest dwell.
-fn required_error(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+fn required_error_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let Dwell::RequiredSigmaEta(required) = campaign.timing.dwell else { return None };
     let found = plan.figures.rms_error_eta?;
     (found > required).then(|| {
         Concern::warning(
             &["timing", "required_sigma_eta"],
             format!(
-                "steps of {:.0} s, the longest that are chosen, reach an expected error of {:.2} points of efficiency (rms), not the {:.2} that \
-                 are required",
+                "with the maximum dwell of {:.0} s, the expected rms error of the efficiency is {:.2} points; {:.2} points are required",
                 plan.steps.first().map_or(0.0, |step| step.dwell_s),
                 100.0 * found,
                 100.0 * required
             ),
-            "begin with a `zero`, or require less".to_owned(),
+            "add a `zero`, or accept a larger error".to_owned(),
         )
     })
 }
 
 /// A window dominated by the response of the declared T2 probe to the preceding step.
-fn probe(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
+fn probe_concern(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
     let params = &campaign.machine.params;
     let (diameter_m, pipe_m) = (params.t2_probe_diameter_m, params.compressor.outlet_diameter_m);
-    let judged = |step: &PlanStep| {
+    let probe_and_window = |step: &PlanStep| {
         let predicted = &step.predicted;
         let window_s = match campaign.identification.method {
             Method::Dynamic | Method::Joint => {
@@ -232,14 +236,14 @@ fn probe(campaign: &Campaign, plan: &Plan) -> Option<Concern> {
         (time_constant_s(diameter_m, pipe_m, predicted.flow_kg_s, predicted.t2_k), window_s, step.to)
     };
     let share = |(tau_s, window_s, _): &(f64, f64, _)| tau_s / window_s;
-    let worst = plan.steps.iter().map(judged).max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    let worst = plan.steps.iter().map(probe_and_window).max_by(|a, b| share(a).total_cmp(&share(b)))?;
     let (tau_s, window_s, at) = worst;
     (PROBE_TIME_CONSTANTS * tau_s > window_s).then(|| {
         Concern::warning(
             &["sensors", "T2", "probe_diameter"],
             format!(
-                "a probe of {:.2} mm has a time constant of {tau_s:.1} s at {at}, and {window_s:.0} s are looked at there: less than \
-                 {PROBE_TIME_CONSTANTS} time constants, so that much of it is spent on what came before",
+                "the T2 probe of {:.2} mm has a time constant of {tau_s:.1} s at {at}; the window of {window_s:.0} s is shorter than \
+                 {PROBE_TIME_CONSTANTS} time constants and dominated by the response to the previous step",
                 1e3 * diameter_m
             ),
             "lengthen `timing.dwell`, or use a thinner probe".to_owned(),

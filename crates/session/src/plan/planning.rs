@@ -2,11 +2,11 @@
 
 use crate::SessionError;
 use crate::plan::predicted_method::{Forecaster, Scope};
-use crate::plan::surge::count_surge_search;
+use crate::plan::surge::add_surge_search;
 use crate::plan::zero_forecast;
 use crate::recording::identification_config::identification;
 use mapper_campaign::Campaign;
-use mapper_core::{JointSettings, MadeFrom, Method, OperatingPoint, Plan};
+use mapper_core::{JointSettings, Method, OperatingPoint, Plan, PlanInputHashes};
 use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, PredictedMethod, made_from, make_plan, sha256_hex};
@@ -33,8 +33,8 @@ pub fn plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
 /// As [`plan`].
 pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, SessionError> {
     let mut plan = make_plan(request)?;
-    plan.remarks.extend(zero_forecast::remark(campaign));
-    count_surge_search(campaign, request.model, &mut plan);
+    plan.remarks.extend(zero_forecast::zero_remark(campaign));
+    add_surge_search(campaign, request.model, &mut plan);
     Ok(plan)
 }
 
@@ -42,7 +42,7 @@ pub fn plan_of(campaign: &Campaign, request: &PlanRequest<'_>) -> Result<Plan, S
 ///
 /// # Errors
 /// As [`plan`].
-pub(crate) fn best_order(campaign: &Campaign, model: &Model) -> Result<Vec<OperatingPoint>, SessionError> {
+pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<OperatingPoint>, SessionError> {
     let inputs = PlanInputs::of(campaign)?;
     let request = PlanRequest { method: None, bound: false, ..inputs.request(campaign, model) };
     Ok(make_plan(&request)?.steps.into_iter().map(|step| step.to).collect())
@@ -52,13 +52,13 @@ pub(crate) fn best_order(campaign: &Campaign, model: &Model) -> Result<Vec<Opera
 ///
 /// # Errors
 /// [`SessionError::Json`] if the campaign cannot be written as JSON.
-pub(crate) fn fingerprint(campaign: &Campaign, model: &Model) -> Result<MadeFrom, SessionError> {
+pub(crate) fn hash_inputs(campaign: &Campaign, model: &Model) -> Result<PlanInputHashes, SessionError> {
     let Some(script) = &campaign.sequence else {
         return Ok(made_from(&PlanInputs::of(campaign)?.request(campaign, model)));
     };
     let without_script = Campaign { sequence: None, repeats: None, ..campaign.clone() };
     let script_sha256 = Some(sha256_hex(&script.text));
-    Ok(MadeFrom { script_sha256, ..fingerprint(&without_script, model)? })
+    Ok(PlanInputHashes { script_sha256, ..hash_inputs(&without_script, model)? })
 }
 
 /// Data that a plan request borrows in addition to campaign and model.

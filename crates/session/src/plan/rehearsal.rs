@@ -1,8 +1,8 @@
 //! Rehearses a sequence script on the nominal machine, so that its errors never reach the rig.
 
-use crate::plan::planning::{fingerprint, plan};
+use crate::plan::planning::{hash_inputs, plan};
 use crate::plan::scripted_steps::ScriptedSteps;
-use crate::plan::surge::count_surge_search;
+use crate::plan::surge::add_surge_search;
 use crate::rig::drive::drive;
 use crate::{Session, SessionError};
 use mapper_campaign::Campaign;
@@ -14,7 +14,7 @@ use mapper_runner::{RunEnd, RunError, RunObserver, StepSource, StepSourceError};
 /// Objective recorded in the plan of a script.
 const OBJECTIVE: &str = "sequence";
 /// The backend of the rehearsal.
-const REHEARSED_ON: &str = "virtual_lab";
+const REHEARSAL_BACKEND: &str = "virtual_lab";
 
 /// Result of a rehearsal.
 pub struct Rehearsal {
@@ -35,12 +35,12 @@ pub fn rehearse(
     source: &SequenceSource,
 ) -> Result<Rehearsal, SessionError> {
     let base = base_plan(campaign, model)?;
-    let choice = BackendChoice { name: REHEARSED_ON.to_owned(), settings: serde_json::json!({}) };
+    let choice = BackendChoice { name: REHEARSAL_BACKEND.to_owned(), settings: serde_json::json!({}) };
     // Only the script's own steps: the sensors of a rehearsal need no zero.
     let nominal = Campaign { backend: choice, zero: None, ..campaign.clone() };
     let mut backend = session.registry.make_backend(&nominal, model)?;
-    let mut steps = Rehearsing { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
-    let end = drive(&nominal, model, &mut steps, backend.as_mut(), &mut Nobody, session.stop);
+    let mut steps = RehearsalSteps { steps: ScriptedSteps::new(campaign, model, source)?, notes: Vec::new() };
+    let end = drive(&nominal, model, &mut steps, backend.as_mut(), &mut NoObserver, session.stop);
     let failed = |error| match error {
         RunError::Source(error) => SessionError::Script(error),
         error => SessionError::Rehearsal(error),
@@ -56,21 +56,21 @@ pub fn rehearse(
     if plan.steps.is_empty() {
         return Err(SessionError::NoSteps { path: source.path.clone() });
     }
-    count_surge_search(campaign, model, &mut plan);
+    add_surge_search(campaign, model, &mut plan);
     Ok(Rehearsal { plan, notes: steps.notes })
 }
 
-struct Nobody;
+struct NoObserver;
 
-impl RunObserver for Nobody {}
+impl RunObserver for NoObserver {}
 
 /// Steps on the nominal machine; their identified points are the forecast.
-struct Rehearsing {
+struct RehearsalSteps {
     steps: ScriptedSteps,
     notes: Vec<String>,
 }
 
-impl StepSource for Rehearsing {
+impl StepSource for RehearsalSteps {
     fn inner(&self) -> Option<&dyn StepSource> {
         Some(&self.steps)
     }
@@ -112,6 +112,6 @@ fn base_plan(campaign: &Campaign, model: &Model) -> Result<Plan, SessionError> {
         surge_search: None,
         ..campaign.clone()
     };
-    let (objective, made_from) = (OBJECTIVE.to_owned(), fingerprint(campaign, model)?);
+    let (objective, made_from) = (OBJECTIVE.to_owned(), hash_inputs(campaign, model)?);
     Ok(Plan { objective, made_from, ..plan(&one, model)? })
 }

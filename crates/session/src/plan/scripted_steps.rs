@@ -1,9 +1,9 @@
 //! Runs a sequence script: passes its steps to the runner and their results to the script.
 
 use crate::SessionError;
-use crate::plan::planning::best_order;
+use crate::plan::planning::order_points;
 use crate::recording::identification_config::identification;
-use crate::rig::estimates::{keep, single_steps, two_last_steps};
+use crate::rig::estimates::{append_samples, config_for_single_steps, retain_last_two_steps};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::SequenceSource;
 use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker, step_number};
@@ -20,7 +20,7 @@ pub(crate) struct ScriptedSteps {
     cool_down_s: f64,
     /// The last two steps with their samples. Identification of the last step needs only these.
     recent: Recording,
-    now: Option<PlanStep>,
+    current_step: Option<PlanStep>,
     settling: Option<SettleWatch>,
     pub(crate) finished: Option<StepResult>,
     /// Ended steps with their actual times.
@@ -35,11 +35,11 @@ impl ScriptedSteps {
         Ok(ScriptedSteps {
             script,
             // A script gets each step immediately; the joint method identifies all steps at the end.
-            config: single_steps(identification(campaign)),
+            config: config_for_single_steps(identification(campaign)),
             warm_up_s: campaign.timing.warm_up_s,
             cool_down_s: campaign.timing.cool_down_s,
             recent: Recording::default(),
-            now: None,
+            current_step: None,
             settling: None,
             finished: None,
             done: Vec::new(),
@@ -73,18 +73,18 @@ impl StepSource for ScriptedSteps {
             Hold::Dwell => None,
             Hold::UntilSettled(rule) => Some(SettleWatch::new(rule, next.step.start_s)),
         };
-        self.now = Some(next.step.clone());
+        self.current_step = Some(next.step.clone());
         Ok(Some(next.step))
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
-        keep(&mut self.recent, batch);
+        append_samples(&mut self.recent, batch);
         self.settling.as_mut().is_some_and(|watch| watch.has_settled(batch))
     }
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        let Some(mut step) = self.now.take() else { return Ok(()) };
-        two_last_steps(&mut self.recent, marker);
+        let Some(mut step) = self.current_step.take() else { return Ok(()) };
+        retain_last_two_steps(&mut self.recent, marker);
         let identified = identify_each(&self.recent, &self.config).map_err(source_error)?.pop();
         self.finished = Some(StepResult {
             number: step_number(step.index),
@@ -102,7 +102,7 @@ impl StepSource for ScriptedSteps {
 
     /// Reports to the script that a result is missing.
     fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        let Some(step) = self.now.take() else { return Ok(()) };
+        let Some(step) = self.current_step.take() else { return Ok(()) };
         self.finished = Some(StepResult {
             number: step_number(step.index),
             target: step.to,
@@ -156,7 +156,7 @@ fn request(campaign: &Campaign, model: &Model) -> SequenceRequest {
                 return_to_first: false,
                 ..planned.clone()
             };
-            best_order(&subset, &machine).map_err(|error| error.to_string())
+            order_points(&subset, &machine).map_err(|error| error.to_string())
         }),
     }
 }

@@ -3,20 +3,20 @@
 use crate::SessionError;
 use crate::recording::files::read_at_most;
 use mapper_campaign::Campaign;
-use mapper_core::{MadeFrom, OperatingPoint, Plan, PlanStep, step_number};
+use mapper_core::{OperatingPoint, Plan, PlanInputHashes, PlanStep, step_number};
 use std::path::Path;
 
 /// Maximum size of a plan file, bytes.
-const FILE_MAX_BYTES: u64 = 32 << 20;
+const MAX_FILE_BYTES: u64 = 32 << 20;
 /// Maximum number of steps.
-const STEPS_MAX: usize = 20_000;
+const MAX_STEPS: usize = 20_000;
 /// Minimum duration of a step, s, and minimum speed of a point, rpm.
-const DWELL_MIN_S: f64 = 0.1;
-const SPEED_MIN_RPM: f64 = 1.0;
+const MIN_DWELL_S: f64 = 0.1;
+const MIN_SPEED_RPM: f64 = 1.0;
 /// Longest step, warm-up or cool-down, s: a day, as in campaigns.
-const STEP_MAX_S: f64 = 86_400.0;
+const MAX_STEP_S: f64 = 86_400.0;
 /// Longest run, s: two weeks.
-const RUN_MAX_S: f64 = 14.0 * 86_400.0;
+const MAX_RUN_S: f64 = 14.0 * 86_400.0;
 /// Relative tolerance on limits, because the plan's numbers were rounded in a file.
 const ROUNDING_RATIO: f64 = 1e-9;
 
@@ -24,22 +24,22 @@ const ROUNDING_RATIO: f64 = 1e-9;
 ///
 /// # Errors
 /// [`SessionError::StalePlan`] with the differences; [`SessionError::NotAPlan`] and [`SessionError::File`] if the file does not contain a plan;
-/// [`SessionError::WrongPlan`] if the plan violates a limit.
-pub fn stored_plan(path: &Path, now: &MadeFrom, campaign: &Campaign) -> Result<Plan, SessionError> {
-    let bytes = read_at_most(path, FILE_MAX_BYTES)?;
-    let wrong = |why: String| SessionError::WrongPlan { path: path.to_owned(), why };
+/// [`SessionError::InvalidPlan`] if the plan violates a limit.
+pub fn stored_plan(path: &Path, now: &PlanInputHashes, campaign: &Campaign) -> Result<Plan, SessionError> {
+    let bytes = read_at_most(path, MAX_FILE_BYTES)?;
+    let wrong = |why: String| SessionError::InvalidPlan { path: path.to_owned(), why };
     let stored: Plan = serde_json::from_slice(&bytes)
         .map_err(|source| SessionError::NotAPlan { path: path.to_owned(), source })?;
     let then = &stored.made_from;
     // A plan made without a rig may be run on any rig.
-    let other = |then: &Option<String>, now: &Option<String>| {
+    let differ = |then: &Option<String>, now: &Option<String>| {
         then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
     };
     let changed: Vec<&str> = [
         ("the campaign", then.campaign_sha256 != now.campaign_sha256),
         ("the nominal model", then.model_sha256 != now.model_sha256),
         ("the sequence script", then.script_sha256 != now.script_sha256),
-        ("what the rig says of itself", other(&then.rig_sha256, &now.rig_sha256)),
+        ("the description of the rig", differ(&then.rig_sha256, &now.rig_sha256)),
     ]
     .into_iter()
     .filter_map(|(what, changed)| changed.then_some(what))
@@ -47,60 +47,60 @@ pub fn stored_plan(path: &Path, now: &MadeFrom, campaign: &Campaign) -> Result<P
     if !changed.is_empty() {
         return Err(SessionError::StalePlan { path: path.to_owned(), changed });
     }
-    match violation(&stored, campaign) {
+    match find_violation(&stored, campaign) {
         None => Ok(stored),
         Some(why) => Err(wrong(why)),
     }
 }
 
 /// The first violation in a plan, in words.
-fn violation(plan: &Plan, campaign: &Campaign) -> Option<String> {
-    if plan.steps.is_empty() || plan.steps.len() > STEPS_MAX {
-        return Some(format!("it has {} steps; a plan has 1 to {STEPS_MAX}", plan.steps.len()));
+fn find_violation(plan: &Plan, campaign: &Campaign) -> Option<String> {
+    if plan.steps.is_empty() || plan.steps.len() > MAX_STEPS {
+        return Some(format!("it has {} steps; a plan has 1 to {MAX_STEPS}", plan.steps.len()));
     }
     for (what, duration_s) in [("warm-up", plan.warm_up_s), ("cool-down", plan.cool_down_s)] {
-        if !(0.0..=STEP_MAX_S).contains(&duration_s) {
-            return Some(format!("its {what} lasts {duration_s} s; at most {STEP_MAX_S} s are allowed"));
+        if !(0.0..=MAX_STEP_S).contains(&duration_s) {
+            return Some(format!("its {what} lasts {duration_s} s; at most {MAX_STEP_S} s are allowed"));
         }
     }
     let first = plan.steps.iter().enumerate().find_map(|(place, step)| {
-        let why = of_step(place, step, campaign)?;
+        let why = step_violation(place, step, campaign)?;
         Some(format!("step {} {why}", step_number(place)))
     });
     first.or_else(|| {
         let duration_s = plan.duration_s();
-        (duration_s > RUN_MAX_S)
-            .then(|| format!("it lasts {duration_s:.0} s; at most {RUN_MAX_S} s are allowed"))
+        (duration_s > MAX_RUN_S)
+            .then(|| format!("it lasts {duration_s:.0} s; at most {MAX_RUN_S} s are allowed"))
     })
 }
 
-fn of_step(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<String> {
+fn step_violation(place: usize, step: &PlanStep, campaign: &Campaign) -> Option<String> {
     if step.index != place {
-        return Some(format!("says that it is step {}", step_number(step.index)));
+        return Some(format!("has the number {}", step_number(step.index)));
     }
     let limits = &campaign.limits;
     let coldest_k = 250.0;
     let hottest_k = limits.t3_max_k.unwrap_or(1400.0);
     let openings = 0.05..=OperatingPoint::OPENING_MAX_RATIO;
     for (what, value, low, high, unit) in [
-        ("dwell", step.dwell_s, DWELL_MIN_S, STEP_MAX_S, " s"),
-        ("speed", step.to.speed_rpm, SPEED_MIN_RPM, limits.speed_max_rpm, " rpm"),
+        ("dwell", step.dwell_s, MIN_DWELL_S, MAX_STEP_S, " s"),
+        ("speed", step.to.speed_rpm, MIN_SPEED_RPM, limits.speed_max_rpm, " rpm"),
         ("valve opening", step.to.valve_opening_ratio, *openings.start(), *openings.end(), ""),
         ("P3", step.p3_pa, limits.p3_min_pa, limits.p3_max_pa, " Pa"),
         ("T3", step.t3_k, coldest_k, hottest_k, " K"),
         ("T_oil", step.oil_temperature_k, coldest_k, 450.0, " K"),
-        ("start", step.start_s, 0.0, RUN_MAX_S, " s"),
+        ("start", step.start_s, 0.0, MAX_RUN_S, " s"),
     ] {
         let (lowest, highest) = (low * (1.0 - ROUNDING_RATIO), high * (1.0 + ROUNDING_RATIO));
         if !(lowest..=highest).contains(&value) {
-            // In plain digits, 1e300 would fill the screen.
+            // Written out, 1e300 would fill the screen.
             let value = if value.abs() < 1e15 { format!("{value}") } else { format!("{value:e}") };
-            return Some(format!("asks for {what} = {value}{unit}, outside {low} to {high}{unit}"));
+            return Some(format!("has {what} = {value}{unit}, outside {low} to {high}{unit}"));
         }
     }
     let from = step.from.is_some_and(|from| {
         !(0.0..=limits.speed_max_rpm * (1.0 + ROUNDING_RATIO)).contains(&from.speed_rpm)
             || !(0.0..=OperatingPoint::OPENING_MAX_RATIO).contains(&from.valve_opening_ratio)
     });
-    from.then(|| "comes from a point beyond the limits".to_owned())
+    from.then(|| "starts from a point outside the limits".to_owned())
 }

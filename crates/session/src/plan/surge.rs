@@ -54,11 +54,12 @@ pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option
     let margin = |end: &OperatingPoint| {
         hold_near_surge(campaign, model, *end).map_or(1.0, |held| held.surge_margin_ratio)
     };
-    let looks: usize = ends.iter().map(|end| mapper_runner::surge::expected_looks(margin(end), &seek)).sum();
+    let approaches: usize =
+        ends.iter().map(|end| mapper_runner::surge::expected_looks(margin(end), &seek)).sum();
     Some(SurgeForecast {
         lines: ends.len(),
-        steps: looks + 2 * ends.len(),
-        duration_s: looks as f64 * seek.dwell_s + ends.len() as f64 * SurgeSearch::AROUND_S,
+        steps: approaches + 2 * ends.len(),
+        duration_s: approaches as f64 * seek.dwell_s + ends.len() as f64 * SurgeSearch::AROUND_S,
     })
 }
 
@@ -75,7 +76,7 @@ impl SurgeForecast {
 }
 
 /// Adds the search to a plan's duration and remarks.
-pub(crate) fn count_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
+pub(crate) fn add_surge_search(campaign: &Campaign, model: &Model, plan: &mut Plan) {
     if let Some((seek, forecast)) = campaign.surge_search.zip(surge_forecast(campaign, model, plan)) {
         plan.surge_search_s = forecast.duration_s;
         plan.figures.minutes = plan.duration_s() / 60.0;
@@ -83,8 +84,8 @@ pub(crate) fn count_surge_search(campaign: &Campaign, model: &Model, plan: &mut 
     }
 }
 
-/// The marks of the approaches of a recording.
-pub(crate) fn marks_of(
+/// Finds the surge marks in the approaches of a recording.
+pub(crate) fn find_surge_marks(
     approaches: &Recording,
     campaign: Option<&Campaign>,
     config: &IdentifyConfig,

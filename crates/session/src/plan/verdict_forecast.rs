@@ -1,7 +1,7 @@
 //! Forecast of the verdicts of a campaign before its run, and the cheapest changes that improve them.
 
 use crate::SessionError;
-use crate::plan::needed_dwell::needed_s;
+use crate::plan::needed_dwell::needed_dwell_s;
 use crate::recording::identification_config::identification;
 use crate::rig::drive::soak_s;
 use mapper_campaign::Campaign;
@@ -12,9 +12,9 @@ use mapper_core::{
 use mapper_identify::MAX_RESTING_ETA;
 use mapper_numerics::statistics::rms;
 
-/// Dwells that are tried, relative to that of the campaign. Up to four times: a campaign that needs more is another campaign.
+/// Dwells that are tried, relative to the dwell of the campaign. Longer ones would make the run impractical.
 const DWELL_RATIOS: [f64; 6] = [1.25, 1.5, 2.0, 2.5, 3.0, 4.0];
-/// Soaks that are tried, s: half an hour, in which a cold machine settles, and an hour.
+/// Soaks that are tried, s. A cold machine settles in half an hour.
 const SOAKS_S: [f64; 2] = [1800.0, 3600.0];
 /// Measured over forecast error that rests on the declaration: 0.9 to 1.3 in 13 of 14 campaigns of `benches/advice.py` with a dwell of 12
 /// to 18 s.
@@ -33,7 +33,7 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
     let informative = plan.figures.rms_error_eta.is_some();
     let is_good = |step: &PlanStep| {
         informative
-            && (settings.window != WindowRule::Auto || needed_s(step, true) <= step.dwell_s)
+            && (settings.window != WindowRule::Auto || needed_dwell_s(step, true) <= step.dwell_s)
             && step.predicted.sigma_eta.is_none_or(|sigma| sigma <= limits.sigma_eta)
     };
     // The first point is visited again at the end; the better visit goes onto the map.
@@ -46,7 +46,7 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
         }
     }
     let sigmas: Vec<f64> = plan.steps.iter().filter_map(|step| step.predicted.sigma_eta).collect();
-    // Both figures hold the errors of a machine as declared; the undeclared one also what rests on the declaration.
+    // Both figures include the errors of a machine as declared. The undeclared one also includes errors of the declaration itself.
     let resting_eta = plan.figures.rms_error_undeclared_eta.zip(rms(&sigmas));
     let resting_eta = resting_eta
         .map_or(0.0, |(undeclared, declared)| (undeclared.powi(2) - declared.powi(2)).max(0.0).sqrt());
@@ -59,8 +59,8 @@ pub(crate) fn forecast_verdicts(campaign: &Campaign, plan: &Plan) -> Option<Verd
     })
 }
 
-/// Changes of the campaign after which more points are expected to be good than `now`, the cheapest first. Of dwells and of soaks each, only
-/// the first is listed that makes all points good, or else the one that makes most points good.
+/// Changes of the campaign after which more points are expected to be good than `now`, the cheapest first. At most one dwell and one soak are
+/// listed: the first that makes all points good, otherwise the one with the most good points.
 ///
 /// # Errors
 /// That of `plan`, which plans a changed campaign.

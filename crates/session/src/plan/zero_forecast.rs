@@ -14,7 +14,7 @@ const LONGER_RATIO: f64 = 2.0;
 const WORTH_IT_RATIO: f64 = 0.3;
 
 /// The remark of a plan; `None` without a zero or without declared offsets.
-pub(crate) fn remark(campaign: &Campaign) -> Option<PlanRemark> {
+pub(crate) fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     let soak = campaign.zero?;
     let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
         let left = expected_after_zero(identification(campaign), &ZeroSettings::from(soak), soak_s).declared;
@@ -39,9 +39,9 @@ mod tests {
     use crate::shipped;
 
     #[test]
-    fn a_longer_rest_is_named_where_it_leaves_clearly_less() {
+    fn a_longer_soak_is_mentioned_if_it_reduces_an_offset_clearly() {
         let mut campaign = shipped::campaign(&[]);
-        let named = |campaign: &_| match remark(campaign) {
+        let named = |campaign: &_| match zero_remark(campaign) {
             Some(PlanRemark::OffsetsAfterSoak { soak_s, longer_offset_sigmas, .. }) => {
                 Some((soak_s, longer_offset_sigmas.into_keys().collect::<Vec<_>>()))
             }

@@ -28,15 +28,15 @@ pub fn write_file(path: &Path, bytes: &[u8], existing: Existing) -> Result<(), S
     if path.metadata().is_ok_and(|about| !about.is_file()) {
         return std::fs::write(path, bytes).map_err(SessionError::file("write", path));
     }
-    aside(path, bytes)
+    write_temporary(path, bytes)
         .and_then(|file| file.persist(path).map_err(|error| error.error))
         .map(drop)
         .map_err(SessionError::file("write", path))
 }
 
-/// Writes a file under another name in the same directory; it is removed if it does not get its own. So no half of a file ever
-/// has its name, even if the disk is full.
-fn aside(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> {
+/// Writes a file under a temporary name in the same directory, so that the final name never belongs to an incomplete file, even if the disk is
+/// full.
+fn write_temporary(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".mapper-");
@@ -52,7 +52,7 @@ fn aside(path: &Path, bytes: &[u8]) -> std::io::Result<NamedTempFile> {
 /// # Errors
 /// [`SessionError::Exists`] if it already exists, [`SessionError::File`] if it cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
-    aside(path, bytes)
+    write_temporary(path, bytes)
         .and_then(|file| file.persist_noclobber(path).map_err(|error| error.error))
         .map(drop)
         .map_err(SessionError::file("write", path))
@@ -66,7 +66,7 @@ pub fn json_text(value: &impl Serialize) -> Result<String, SessionError> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
 }
 
-/// Reads a file without holding much more than `limit_bytes` in memory, whatever size the file reports.
+/// Reads a file of at most `limit_bytes`. Memory is bounded even if the file grows or reports a wrong size.
 ///
 /// # Errors
 /// [`SessionError::File`] if it cannot be read or is too large.

@@ -11,7 +11,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 
 /// Maximum size of a journal, bytes: some hundred thousand steps.
-const READ_MAX: u64 = 16 << 20;
+const MAX_JOURNAL_BYTES: u64 = 16 << 20;
 
 /// Properties that must be unchanged to resume a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -71,7 +71,7 @@ impl Identity {
 
     /// Names of the properties that differ.
     pub fn differences(&self, now: &Identity) -> Vec<&'static str> {
-        let other = |then: &Option<String>, now: &Option<String>| {
+        let differ = |then: &Option<String>, now: &Option<String>| {
             then.as_ref().zip(now.as_ref()).is_some_and(|(then, now)| then != now)
         };
         [
@@ -80,7 +80,7 @@ impl Identity {
             ("the nominal model", self.model_sha256 != now.model_sha256),
             ("the plan", self.plan_sha256 != now.plan_sha256),
             ("the backend", self.backend != now.backend || self.settings_sha256 != now.settings_sha256),
-            ("what the rig says of itself", other(&self.rig_sha256, &now.rig_sha256)),
+            ("the description of the rig", differ(&self.rig_sha256, &now.rig_sha256)),
         ]
         .into_iter()
         .filter_map(|(what, differs)| differs.then_some(what))
@@ -116,7 +116,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a run to append, and locks it until it is dropped: a run has one runner.
+    /// Opens the journal of a run to append, and locks it until it is dropped, so that only one process resumes the run.
     ///
     /// # Errors
     /// The system's error; of kind `WouldBlock` if another runner has the journal.
@@ -132,7 +132,7 @@ impl Journal {
             Err(TryLockError::Error(error)) => return Err(error),
         }
         let mut text = Vec::new();
-        (&mut file).take(READ_MAX).read_to_end(&mut text)?;
+        (&mut file).take(MAX_JOURNAL_BYTES).read_to_end(&mut text)?;
         // Terminates a line that was torn by a crash.
         if text.last().is_some_and(|last| *last != b'\n') {
             file.write_all(b"\n")?;
@@ -173,7 +173,7 @@ pub struct JournalPart {
 /// The system's error.
 pub fn read_journal(path: &Path) -> std::io::Result<Vec<JournalPart>> {
     let mut bytes = Vec::new();
-    mapper_yaml::open_file(path)?.take(READ_MAX).read_to_end(&mut bytes)?;
+    mapper_yaml::open_file(path)?.take(MAX_JOURNAL_BYTES).read_to_end(&mut bytes)?;
     let mut parts: Vec<JournalPart> = Vec::new();
     for line in bytes.split(|byte| *byte == b'\n') {
         match (serde_json::from_slice::<Entry>(line), parts.last_mut()) {
@@ -275,8 +275,8 @@ mod tests {
             let mut writer = mapper_recording::RecordingWriter::create(&path, &header).unwrap();
             writer.write_event(&Event { t_s: 1.0, kind: recorded, message: String::new() }).unwrap();
             writer.finish().unwrap();
-            let broken_off = crate::BrokenOff::read(directory.path()).unwrap();
-            assert_eq!(broken_off.soaked(), soaked, "{recorded:?}");
+            let interrupted = crate::InterruptedRun::read(directory.path()).unwrap();
+            assert_eq!(interrupted.has_soak(), soaked, "{recorded:?}");
         }
     }
 

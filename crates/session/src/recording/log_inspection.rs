@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Contents of a log, and the channel map proposed for it.
 #[derive(Debug)]
-pub struct Inspected {
+pub struct LogInspection {
     /// The file.
     pub path: PathBuf,
     /// Name of its format.
@@ -31,7 +31,7 @@ pub fn inspect_log(
     registry: &Registry,
     path: &Path,
     options: Vec<(String, String)>,
-) -> Result<Inspected, SessionError> {
+) -> Result<LogInspection, SessionError> {
     let mut read_by = LogOptions::default();
     for (key, value) in &options {
         read_by.set(key, value)?;
@@ -40,10 +40,10 @@ pub fn inspect_log(
     let survey = survey(log.as_mut())?;
     let layout = log.layout().clone();
     let proposal = propose(&layout, &survey);
-    Ok(Inspected { path: path.to_owned(), format: format.name, layout, survey, proposal, options })
+    Ok(LogInspection { path: path.to_owned(), format: format.name, layout, survey, proposal, options })
 }
 
-impl Inspected {
+impl LogInspection {
     /// Machine-readable output; missing numbers are null.
     pub fn json(&self) -> Value {
         let columns = self.layout.columns.iter().zip(&self.survey.columns).map(|(column, data)| {

@@ -1,6 +1,6 @@
 //! A recording read from a file, with the campaign that describes the recorded machine.
 
-use crate::recording::resume::BrokenOff;
+use crate::recording::resume::InterruptedRun;
 use crate::recording::run_directory;
 use crate::{Registry, SessionError};
 use mapper_campaign::{Campaign, CampaignError};
@@ -29,15 +29,15 @@ impl Recorded {
     ///
     /// # Errors
     /// [`SessionError::Record`] if the recording cannot be read, [`SessionError::Campaign`] if the attached campaign has mistakes,
-    /// [`SessionError::Resumed`] if a run has several.
+    /// [`SessionError::SeveralRecordings`] if a run has several.
     pub fn read(
         registry: &Registry,
         path: &Path,
         map: &ChannelMap,
         given: Option<&Campaign>,
     ) -> Result<Recorded, SessionError> {
-        if broken_off(path)?.is_some() {
-            return Err(SessionError::Resumed(path.to_owned()));
+        if resumed_run(path)?.is_some() {
+            return Err(SessionError::SeveralRecordings(path.to_owned()));
         }
         let file = run_directory::recording_of(path);
         if path.is_dir() && !file.exists() {
@@ -64,16 +64,16 @@ impl Recorded {
         map: &ChannelMap,
         given: Option<&Campaign>,
     ) -> Result<Vec<Recorded>, SessionError> {
-        let Some(mut broken_off) = broken_off(path)? else {
+        let Some(mut interrupted) = resumed_run(path)? else {
             return Ok(vec![Recorded::read(registry, path, map, given)?]);
         };
-        let files = broken_off.parts.iter().map(|part| path.join(&part.recording));
+        let files = interrupted.parts.iter().map(|part| path.join(&part.recording));
         let read = files.map(|file| Recorded::read(registry, &file, map, given));
         let read = read.collect::<Result<Vec<_>, _>>()?;
         if let Some(campaign) = read.first().and_then(|first| first.campaign.as_ref()) {
-            broken_off.keep_what_goes_on(campaign)?;
+            interrupted.discard_superseded_steps(campaign)?;
         }
-        Ok(together(broken_off.parts.iter().map(|part| (part.soaked, Some(&part.saved))).zip(read)))
+        Ok(merge_parts(interrupted.parts.iter().map(|part| (part.soaked, Some(&part.saved))).zip(read)))
     }
 
     /// The contents of a file, with the surge approaches separated.
@@ -85,21 +85,21 @@ impl Recorded {
     /// Returns the campaign, or an error if the machine is unknown.
     ///
     /// # Errors
-    /// [`SessionError::MachineUnknown`] with `remedy`.
-    pub fn known(&self, remedy: &'static str) -> Result<&Campaign, SessionError> {
-        self.campaign.as_ref().ok_or(SessionError::MachineUnknown { remedy })
+    /// [`SessionError::MachineUnknown`] without a campaign.
+    pub fn require_campaign(&self) -> Result<&Campaign, SessionError> {
+        self.campaign.as_ref().ok_or(SessionError::MachineUnknown { channel_map_suffices: false })
     }
 }
 
-/// The recordings of a run, each with its valid steps: of the last, which may have been interrupted, every complete one. A part that has
-/// neither a step nor the soak adds nothing, nor does one that a simulated rig has repeated to the last bit.
-pub(crate) fn together<'a>(
+/// The recordings of a run, each with its valid steps; of the last part, every complete step is valid. Parts without a step or soak are omitted.
+/// So are parts with exactly the data of a later part, which only a simulated rig produces.
+pub(crate) fn merge_parts<'a>(
     parts: impl ExactSizeIterator<Item = ((bool, Option<&'a BTreeSet<usize>>), Recorded)>,
 ) -> Vec<Recorded> {
-    let last = parts.len().saturating_sub(1);
+    let last_part = parts.len().saturating_sub(1);
     let mut all: Vec<Recorded> = Vec::with_capacity(parts.len());
     for (place, ((soaked, saved), mut recorded)) in parts.enumerate() {
-        if let Some(saved) = saved.filter(|_| place < last) {
+        if let Some(saved) = saved.filter(|_| place < last_part) {
             let approaches = recorded.approaches.iter_mut().map(|approaches| &mut approaches.steps);
             let steps = std::iter::once(&mut recorded.read.recording.steps).chain(approaches);
             steps.for_each(|steps| steps.retain(|step| saved.contains(&step.index)));
@@ -117,12 +117,12 @@ pub(crate) fn together<'a>(
 /// The journal of a run that was resumed; `None` for anything else.
 ///
 /// # Errors
-/// [`SessionError::Resumed`] if the run has a second recording, and its journal cannot be read.
-fn broken_off(path: &Path) -> Result<Option<BrokenOff>, SessionError> {
-    match BrokenOff::read(path) {
-        Ok(broken_off) => Ok(Some(broken_off).filter(|broken_off| broken_off.parts.len() > 1)),
+/// [`SessionError::SeveralRecordings`] if the run has a second recording, and its journal cannot be read.
+fn resumed_run(path: &Path) -> Result<Option<InterruptedRun>, SessionError> {
+    match InterruptedRun::read(path) {
+        Ok(interrupted) => Ok(Some(interrupted).filter(|interrupted| interrupted.parts.len() > 1)),
         Err(_) if path.join(run_directory::further_recording(2)).exists() => {
-            Err(SessionError::Resumed(path.to_owned()))
+            Err(SessionError::SeveralRecordings(path.to_owned()))
         }
         Err(_) => Ok(None),
     }
@@ -132,7 +132,7 @@ fn broken_off(path: &Path) -> Result<Option<BrokenOff>, SessionError> {
 ///
 /// # Errors
 /// [`SessionError::SameRecording`] with both paths, regardless of the file names.
-pub(crate) fn all_differ(recorded: &[Recorded]) -> Result<(), SessionError> {
+pub(crate) fn check_all_distinct(recorded: &[Recorded]) -> Result<(), SessionError> {
     for (place, second) in recorded.iter().enumerate() {
         let series = &second.read.recording.series;
         let same = |first: &&Recorded| !series.is_empty() && first.read.recording.series == *series;
@@ -173,7 +173,7 @@ pub fn channel_map(file: &Path) -> Result<ChannelMap, SessionError> {
 ///
 /// # Errors
 /// [`OtherMachine`], by the rule of [`mapper_observe::same_machine`].
-pub(crate) fn same_machine(recorded: &Recorded, campaign: &Campaign) -> Result<(), OtherMachine> {
+pub(crate) fn check_machine(recorded: &Recorded, campaign: &Campaign) -> Result<(), OtherMachine> {
     let machine = &campaign.machine;
     mapper_observe::same_machine(&recorded.read.metadata, &machine.name, machine.serial_number.as_deref())
 }

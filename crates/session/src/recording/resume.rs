@@ -10,7 +10,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
 /// First index for steps that are repeated only to approach a missing step from its planned predecessor.
-pub(crate) const AGAIN_FROM: usize = StepMarker::AGAIN_FROM;
+pub(crate) const FIRST_REPEAT_INDEX: usize = StepMarker::FIRST_REPEAT_INDEX;
 
 /// Whether the steps of a campaign depend on measured data.
 pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
@@ -19,27 +19,27 @@ pub(crate) fn depends_on_readings(campaign: &Campaign) -> bool {
 
 /// State of an interrupted run.
 #[derive(Debug, Clone)]
-pub struct BrokenOff {
+pub struct InterruptedRun {
     /// Its directory.
     pub directory: PathBuf,
     pub(crate) parts: Vec<JournalPart>,
 }
 
-impl BrokenOff {
+impl InterruptedRun {
     /// Reads the journal of a run directory.
     ///
     /// # Errors
     /// [`SessionError::NotResumable`] if there is none.
     pub fn read(directory: &Path) -> Result<Self, SessionError> {
-        let why = |why: String| SessionError::NotResumable { run: directory.to_owned(), why };
+        let not_resumable = |why: String| SessionError::NotResumable { run: directory.to_owned(), why };
         let path = directory.join(run_directory::JOURNAL);
-        let mut parts =
-            read_journal(&path).map_err(|error| why(format!("its journal cannot be read: {error}")))?;
+        let mut parts = read_journal(&path)
+            .map_err(|error| not_resumable(format!("its journal cannot be read: {error}")))?;
         if parts.is_empty() {
-            return Err(why("its journal holds no run".to_owned()));
+            return Err(not_resumable("its journal contains no run".to_owned()));
         }
         for part in parts.iter_mut().filter(|part| part.soaked || !part.saved.is_empty()) {
-            // The recording decides: a step, or a soak, that the journal names and the recording does not hold to its end is run again.
+            // A step or soak that is in the journal but not completely in the recording is repeated.
             let (steps, events) =
                 read_marks(&directory.join(&part.recording), &ReadOptions::default()).unwrap_or_default();
             part.soaked = events.iter().any(|event| event.kind == EventKind::SoakEnded);
@@ -47,7 +47,7 @@ impl BrokenOff {
             let whole: BTreeSet<usize> = whole.collect();
             part.saved.retain(|index| whole.contains(index));
         }
-        Ok(BrokenOff { directory: directory.to_owned(), parts })
+        Ok(InterruptedRun { directory: directory.to_owned(), parts })
     }
 
     /// Removes steps that a later part repeated, and the last line of the surge search. The search depends on its preceding data and restarts
@@ -55,23 +55,26 @@ impl BrokenOff {
     ///
     /// # Errors
     /// Read errors of a recording.
-    pub(crate) fn keep_what_goes_on(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
+    pub(crate) fn discard_superseded_steps(&mut self, campaign: &Campaign) -> Result<(), SessionError> {
         if !depends_on_readings(campaign) {
             return Ok(());
         }
-        let mut first_later = AGAIN_FROM;
+        let mut first_later = FIRST_REPEAT_INDEX;
         for part in self.parts.iter_mut().rev() {
-            part.saved.retain(|index| *index < first_later || *index >= AGAIN_FROM);
+            part.saved.retain(|index| *index < first_later || *index >= FIRST_REPEAT_INDEX);
             first_later = part.saved.iter().copied().next().unwrap_or(first_later).min(first_later);
         }
-        let last =
-            self.parts.iter_mut().rev().find(|part| part.saved.iter().any(|index| *index < AGAIN_FROM));
+        let last = self
+            .parts
+            .iter_mut()
+            .rev()
+            .find(|part| part.saved.iter().any(|index| *index < FIRST_REPEAT_INDEX));
         let Some(part) = last.filter(|part| campaign.surge_search.is_some() && !part.completed) else {
             return Ok(());
         };
         let path = self.directory.join(&part.recording);
         let steps = read_steps(&path, &ReadOptions::default())?;
-        let holds = |step: &&StepMarker| step.index < AGAIN_FROM && part.saved.contains(&step.index);
+        let holds = |step: &&StepMarker| step.index < FIRST_REPEAT_INDEX && part.saved.contains(&step.index);
         let held: Vec<StepMarker> = steps.iter().filter(holds).copied().collect();
         let speed = |step: &StepMarker| step.to.map(|to| to.speed_rpm.to_bits());
         let line = held.last().and_then(speed);
@@ -87,7 +90,7 @@ impl BrokenOff {
     }
 
     /// Whether one of the recordings contains the soak.
-    pub fn soaked(&self) -> bool {
+    pub fn has_soak(&self) -> bool {
         self.parts.iter().any(|part| part.soaked)
     }
 
@@ -96,24 +99,25 @@ impl BrokenOff {
     /// # Errors
     /// [`SessionError::NotResumable`] with the differences or the reason.
     pub(crate) fn check(&self, campaign: &Campaign, plan: &Plan, now: &Identity) -> Result<(), SessionError> {
-        let why = |why: String| Err(SessionError::NotResumable { run: self.directory.clone(), why });
+        let not_resumable =
+            |why: String| Err(SessionError::NotResumable { run: self.directory.clone(), why });
         for part in &self.parts {
             let differences = part.identity.differences(now);
             if !differences.is_empty() {
-                return why(format!("{} changed since", differences.join(" and ")));
+                return not_resumable(format!("{} changed since", differences.join(" and ")));
             }
         }
-        // The page is written last: without it the disk was full, or the program was killed.
+        // The page is written last. If it is missing, the disk was full or the program was killed.
         let results = [run_directory::POINTS, run_directory::REPORT, run_directory::PAGE];
         let written = results.iter().all(|name| self.directory.join(name).exists());
-        if written && self.is_whole(campaign, plan) {
-            return why("all of its steps are there, and so are its results".to_owned());
+        if written && self.is_complete(campaign, plan) {
+            return not_resumable("all its steps and results are complete".to_owned());
         }
         Ok(())
     }
 
     /// Whether every step is recorded, so that at most the map is missing.
-    pub(crate) fn is_whole(&self, campaign: &Campaign, plan: &Plan) -> bool {
+    pub(crate) fn is_complete(&self, campaign: &Campaign, plan: &Plan) -> bool {
         if depends_on_readings(campaign) {
             // Only a completed run shows that no further step was due.
             return self.parts.last().is_some_and(|part| part.completed);
@@ -124,14 +128,14 @@ impl BrokenOff {
 
     /// One sentence on the repeated work and its reason.
     pub(crate) fn summary(&self, campaign: &Campaign, plan: &Plan, saved: &BTreeSet<usize>) -> String {
-        let soak = match (campaign.zero.is_some(), self.soaked()) {
-            (false, _) => "without a soak, as before",
-            (true, true) => "the soak is not repeated: what sensors read at rest holds for the run",
-            (true, false) => "the soak is repeated: the recording does not have it whole",
+        let soak = match (campaign.zero.is_some(), self.has_soak()) {
+            (false, _) => "the campaign has no soak",
+            (true, true) => "the recorded soak applies to the whole run and is not repeated",
+            (true, false) => "the soak is repeated, because its recording is incomplete",
         };
         format!(
-            "resumed: {} of {} steps hold; {soak}; it is unknown how far the housings have cooled, so they are warmed up again and the step before the first \
-             missing one is made once more",
+            "resumed: {} of {} steps are recorded; {soak}; the housings are warmed up again, because they may have cooled, and the step before \
+             the first missing one is repeated",
             plan.steps.iter().filter(|step| saved.contains(&step.index)).count(),
             plan.steps.len()
         )

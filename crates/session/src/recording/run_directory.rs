@@ -45,7 +45,8 @@ pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, Sess
     std::fs::create_dir_all(parent).map_err(|error| match error.kind() {
         // A file, or a link to a place that does not exist.
         ErrorKind::AlreadyExists => {
-            let why = "something else has the name of the directory for runs; remove it, or choose another directory";
+            let why =
+                "the directory for runs is a file or a broken link; remove it, or choose another directory";
             SessionError::file("create", parent)(std::io::Error::new(ErrorKind::NotADirectory, why))
         }
         _ => SessionError::file("create", parent)(error),
@@ -62,8 +63,7 @@ pub fn create(parent: &Path, campaign: &str, time: &str) -> Result<PathBuf, Sess
     Err(SessionError::TooManyRuns { parent: parent.to_owned() })
 }
 
-/// Stores a file named by the campaign under the same relative path in the run directory. A file outside the campaign's directory stays in
-/// place, or is given later with `--campaign`.
+/// Stores a file named by the campaign under the same relative path in the run directory. A file outside the campaign's directory is not copied.
 pub(crate) fn keep_copy(directory: &Path, named: &str, text: &str) -> Result<(), SessionError> {
     let named = Path::new(named);
     if !named.components().all(|part| matches!(part, Component::Normal(_))) {
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_was_made_knows_when_from_its_directory() {
+    fn the_start_time_of_a_run_is_read_from_the_name_of_its_directory() {
         let parent = tempfile::tempdir().unwrap();
         for _ in 0..2 {
             let made = create(parent.path(), "a-b", "20261124T110618Z").unwrap();

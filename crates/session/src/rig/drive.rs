@@ -1,6 +1,6 @@
-//! Starts the runner with steps, a rig and observers. No other module starts it.
+//! Starts the runner with steps, a rig and observers. No other module does, so that every run has the same guards.
 
-use crate::rig::guards::guards;
+use crate::rig::guards::make_guards;
 use mapper_campaign::Campaign;
 use mapper_core::{Backend, Channel, Clock, PlanStep, UnpacedClock};
 use mapper_physics::laws::thermocouple;
@@ -13,8 +13,8 @@ use mapper_runner::{
 };
 use std::sync::atomic::AtomicBool;
 
-/// Runs the steps on the rig, after the soak if the campaign has one. Guards and the speed loop follow the campaign; `model` is the nominal
-/// machine that tunes the loop.
+/// Runs the steps on the rig, after the soak if the campaign has one. The campaign defines guards and speed loop; `model` is the nominal
+/// machine, which tunes the loop.
 ///
 /// # Errors
 /// [`RunError`] if rig, steps or observer fail; the rig is safe then.
@@ -30,18 +30,18 @@ pub fn drive(
         clock: &mut UnpacedClock,
         each_sample: false,
         stop,
-        stop_after_step: &NEVER,
+        stop_after_step: &NEVER_SET,
         operator: None,
         read: &[],
     };
     drive_paced(campaign, model, steps, backend, observer, pace)
 }
 
-static NEVER: AtomicBool = AtomicBool::new(false);
+static NEVER_SET: AtomicBool = AtomicBool::new(false);
 
 /// Pace and stop flags of a run.
 pub struct Pace<'a> {
-    /// Waits for the rig.
+    /// Clock that the run follows.
     pub clock: &'a mut dyn Clock,
     /// Polls each sample separately. Needed if the rig runs in real time or is paced.
     pub each_sample: bool,
@@ -51,7 +51,7 @@ pub struct Pace<'a> {
     pub stop_after_step: &'a AtomicBool,
     /// Other operator requests.
     pub operator: Option<&'a Operator>,
-    /// Channels of auxiliary instruments, which must stay alive.
+    /// Channels of auxiliary instruments; a guard watches that their data arrive.
     pub read: &'a [ReadChannel],
 }
 
@@ -68,7 +68,7 @@ pub fn drive_paced(
     pace: Pace<'_>,
 ) -> Result<RunEnd, RunError> {
     let rig = backend.describe();
-    let guards = guards(campaign, &rig, pace.read);
+    let guards = make_guards(campaign, &rig, pace.read);
     let mut soaked;
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
@@ -100,38 +100,38 @@ pub fn drive_paced(
 }
 
 /// Allowed positive error of the P3 reading, in declared standard deviations.
-const READS_TOO_HIGH_SIGMAS: f64 = 4.0;
+const P3_ERROR_SIGMAS: f64 = 4.0;
 
-/// Flow in the outlet pipe with the shortest and the longest lag of the T2 probe: the speed of sound (347 m/s) at 400 kPa, and a
-/// fiftieth of it at 100 kPa, both at 300 K.
-const SONIC_KG_M2S: f64 = 4.65 * 347.0;
-const SLOW_KG_M2S: f64 = 1.16 * 347.0 / 50.0;
-const PROBE_K: f64 = 300.0;
+/// Largest and smallest mass flux in the outlet pipe, for the shortest and the longest lag of the T2 probe: the speed of sound (347 m/s) at
+/// 400 kPa, and a fiftieth of it at 100 kPa, both at 300 K.
+const MAX_MASS_FLUX_KG_M2S: f64 = 4.65 * 347.0;
+const MIN_MASS_FLUX_KG_M2S: f64 = 1.16 * 347.0 / 50.0;
+const PROBE_TEMPERATURE_K: f64 = 300.0;
 
-/// Bounds of the readings from the declared machine and sensors. A wheel that the campaign does not give excludes no reading.
+/// Bounds of plausible readings from the declared machine and sensors. Without a declared wheel diameter, speed and pressure are not bounded.
 fn reading_bounds(campaign: &Campaign) -> ReadingBounds {
     let (machine, compressor) = (&campaign.machine, &campaign.machine.params.compressor);
     let area_m2 = 0.25 * std::f64::consts::PI * compressor.outlet_diameter_m.powi(2);
-    let several = |channel| {
+    let redundant_sensors = |channel| {
         let redundant = campaign.sensors.get(&channel).and_then(|sensor| sensor.redundant.as_ref());
         redundant.map(|redundant| redundant.elements.as_slice()).unwrap_or_default()
     };
-    let tips_m = several(Channel::T2).iter().map(|one| one.probe_diameter_m);
+    let tips_m = redundant_sensors(Channel::T2).iter().map(|one| one.probe_diameter_m);
     let tips_m = tips_m.chain([machine.params.t2_probe_diameter_m]);
     let lag_s = |flux_kg_m2s: f64, tip_m: f64| {
         let flow_kg_s = flux_kg_m2s * area_m2;
-        thermocouple::time_constant_s(tip_m, compressor.outlet_diameter_m, flow_kg_s, PROBE_K)
+        thermocouple::time_constant_s(tip_m, compressor.outlet_diameter_m, flow_kg_s, PROBE_TEMPERATURE_K)
     };
     let noise_k = |channel| {
         let all = campaign.sensors.get(&channel).map(|sensor| sensor.declared);
-        let each = several(channel).iter().map(|one| one.declared);
+        let each = redundant_sensors(channel).iter().map(|one| one.declared);
         all.into_iter().chain(each).map(|one| one.noise_sigma).fold(0.0, f64::max)
     };
-    let (thinnest_m, thickest_m) =
+    let (min_tip_m, max_tip_m) =
         tips_m.fold((f64::INFINITY, 0.0_f64), |(low, high), tip_m| (tip_m.min(low), tip_m.max(high)));
     ReadingBounds {
         wheel_diameter_m: machine.wheel_is_declared.then_some(compressor.wheel_diameter_m),
-        t2_lag_s: (lag_s(SONIC_KG_M2S, thinnest_m), lag_s(SLOW_KG_M2S, thickest_m)),
+        t2_lag_s: (lag_s(MAX_MASS_FLUX_KG_M2S, min_tip_m), lag_s(MIN_MASS_FLUX_KG_M2S, max_tip_m)),
         noise_k: [Channel::T2, Channel::Tc, Channel::Tt].map(noise_k),
     }
 }
@@ -143,7 +143,7 @@ fn speed_control<'a>(campaign: &'a Campaign, model: &'a Model) -> Option<SpeedCo
     let sigma_pa = sensor.noise_sigma.hypot(sensor.offset_sigma).hypot(sensor.gain_sigma_ratio * high_pa);
     let limits = SpeedControlLimits {
         p3_min_pa: campaign.limits.p3_min_pa,
-        p3_max_pa: high_pa - READS_TOO_HIGH_SIGMAS * sigma_pa,
+        p3_max_pa: high_pa - P3_ERROR_SIGMAS * sigma_pa,
         p3_slew_max_pa_s: campaign.limits.p3_slew_max_pa_s(),
         speed_max_rpm: campaign.limits.speed_max_rpm,
     };

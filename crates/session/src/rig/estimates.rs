@@ -9,23 +9,23 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::Scope;
 
 /// Steps that may wait for identification. If the run is faster, estimates are dropped and the run is not delayed.
-const WAITING_MAX: usize = 4;
+const MAX_WAITING_STEPS: usize = 4;
 
 /// Keeps the last two steps and sends them to a separate thread, so that identification never delays the rig.
-pub(crate) struct Estimates {
+pub(crate) struct StepEstimator {
     recent: Recording,
     to_thread: SyncSender<Recording>,
 }
 
-impl Estimates {
+impl StepEstimator {
     /// Starts the thread, which ends when this value is dropped.
-    pub(crate) fn begin<'scope, 'env>(
+    pub(crate) fn start<'scope, 'env>(
         scope: &'scope Scope<'scope, 'env>,
         config: IdentifyConfig,
         on_event: OnEvent<'env>,
     ) -> Self {
-        let (to_thread, steps) = sync_channel::<Recording>(WAITING_MAX);
-        let config = single_steps(config);
+        let (to_thread, steps) = sync_channel::<Recording>(MAX_WAITING_STEPS);
+        let config = config_for_single_steps(config);
         scope.spawn(move || {
             while let Ok(recording) = steps.recv() {
                 let points = identify_each(&recording, &config).unwrap_or_default();
@@ -34,25 +34,25 @@ impl Estimates {
                 }
             }
         });
-        Estimates { recent: Recording::default(), to_thread }
+        StepEstimator { recent: Recording::default(), to_thread }
     }
 }
 
-impl RunObserver for Estimates {
+impl RunObserver for StepEstimator {
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        keep(&mut self.recent, batch);
+        append_samples(&mut self.recent, batch);
         Ok(())
     }
 
     fn on_step_end(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        two_last_steps(&mut self.recent, marker);
+        retain_last_two_steps(&mut self.recent, marker);
         let _ = self.to_thread.try_send(self.recent.clone());
         Ok(())
     }
 }
 
 /// Appends samples to a recording as a file reader would: missing readings are omitted.
-pub(crate) fn keep(recent: &mut Recording, batch: &SampleBatch) {
+pub(crate) fn append_samples(recent: &mut Recording, batch: &SampleBatch) {
     for column in &batch.columns {
         let series = recent.series.entry(column.channel).or_default();
         for (t_s, value) in batch.t_s.iter().zip(&column.values).filter(|(_, value)| value.is_finite()) {
@@ -63,7 +63,7 @@ pub(crate) fn keep(recent: &mut Recording, batch: &SampleBatch) {
 }
 
 /// Adds an ended step and drops data before the previous one. Identification of the last step needs only these two.
-pub(crate) fn two_last_steps(recent: &mut Recording, marker: &StepMarker) {
+pub(crate) fn retain_last_two_steps(recent: &mut Recording, marker: &StepMarker) {
     if recent.steps.len() > 1 {
         recent.steps.remove(0);
     }
@@ -78,7 +78,7 @@ pub(crate) fn two_last_steps(recent: &mut Recording, marker: &StepMarker) {
 }
 
 /// Settings for single steps. The standard errors exclude the assumed alpha_A, because further visits would not reduce that part.
-pub(crate) fn single_steps(config: IdentifyConfig) -> IdentifyConfig {
+pub(crate) fn config_for_single_steps(config: IdentifyConfig) -> IdentifyConfig {
     let method = match config.method {
         Method::Joint => Method::Dynamic,
         method => method,

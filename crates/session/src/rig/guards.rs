@@ -1,23 +1,20 @@
-//! Guards that end a step or a run before damage, and the drift watch on repeats.
+//! Guards that end a step or a run before damage.
 
 use crate::SessionError;
-use crate::recording::identification_config::declared;
 use mapper_campaign::Campaign;
 use mapper_core::{GuardName, RigDescription};
-use mapper_recording::ChannelMap;
 use mapper_runner::{
-    BatchWatch, DriftWatch, FirstLook, Guard, ReadChannel, ReaderWatch, RigWatch, SignalWatch, StepSource,
-    SurgeWatch,
+    BatchWatch, FirstLook, Guard, ReadChannel, ReaderWatch, RigWatch, SignalWatch, SurgeWatch,
 };
 
-/// Guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared or required guards
-/// are always included and trip without their signal.
-pub fn guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChannel]) -> Vec<Box<dyn Guard>> {
+/// Makes the guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared and
+/// required guards are always included; they trip if their signal is missing.
+pub fn make_guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChannel]) -> Vec<Box<dyn Guard>> {
     let set = campaign.guard_set();
     let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
     for spec in set.signals {
-        let wanted = campaign.guards.is_some() || rig.needs_guarded.contains(&spec.name);
-        if wanted || rig.channels.contains(&spec.channel) {
+        let required = campaign.guards.is_some() || rig.needs_guarded.contains(&spec.name);
+        if required || rig.channels.contains(&spec.channel) {
             guards.push(Box::new(SignalWatch::new(spec)));
         }
     }
@@ -35,34 +32,27 @@ pub fn guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChannel]) -
 /// Checks that every guard the rig requires is present, and that its channel is delivered.
 ///
 /// # Errors
-/// [`SessionError::Unguarded`] with all missing guards, [`SessionError::GuardBlind`] with the channels.
+/// [`SessionError::MissingGuards`] with all missing guards, [`SessionError::GuardWithoutChannel`] with the channels.
 pub fn check_guards(campaign: &Campaign, rig: &RigDescription) -> Result<(), SessionError> {
     let set = campaign.guard_set();
     let missing: Vec<GuardName> =
         rig.needs_guarded.iter().copied().filter(|name| !set.ends_on(*name)).collect();
     if !missing.is_empty() {
         let names = missing.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-        return Err(SessionError::Unguarded { backend: rig.backend.clone(), guards: names });
+        return Err(SessionError::MissingGuards { backend: rig.backend.clone(), guards: names });
     }
-    let wanted = |name: &GuardName| campaign.guards.is_some() || rig.needs_guarded.contains(name);
-    let blind = set.signals.iter().filter(|spec| wanted(&spec.name) && !rig.channels.contains(&spec.channel));
-    let blind: Vec<String> = blind.map(|spec| format!("{} (guard `{}`)", spec.channel, spec.name)).collect();
-    match blind.is_empty() {
-        true => Ok(()),
-        false => Err(SessionError::GuardBlind { backend: rig.backend.clone(), channels: blind.join(", ") }),
+    let is_required = |name: &GuardName| campaign.guards.is_some() || rig.needs_guarded.contains(name);
+    let without_channel: Vec<String> = set
+        .signals
+        .iter()
+        .filter(|spec| is_required(&spec.name) && !rig.channels.contains(&spec.channel))
+        .map(|spec| format!("{} (guard `{}`)", spec.channel, spec.name))
+        .collect();
+    if without_channel.is_empty() {
+        return Ok(());
     }
-}
-
-/// Watches the repeats of a run if the campaign defines a reaction to drift; otherwise returns the steps.
-///
-/// # Errors
-/// The steps themselves, if no watch was requested; this is not a fault.
-pub fn drift_watch<'a>(
-    campaign: &Campaign,
-    steps: &'a mut dyn StepSource,
-) -> Result<DriftWatch<'a>, &'a mut dyn StepSource> {
-    match campaign.on_drift {
-        Some(on_drift) => Ok(DriftWatch::new(steps, on_drift, declared(campaign, &ChannelMap::native()))),
-        None => Err(steps),
-    }
+    Err(SessionError::GuardWithoutChannel {
+        backend: rig.backend.clone(),
+        channels: without_channel.join(", "),
+    })
 }

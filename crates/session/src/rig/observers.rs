@@ -14,30 +14,30 @@ pub(crate) struct Recorder {
     journal: Option<Journal>,
     /// Entries whose data may not be flushed yet, with the flushed sample time at that moment, s.
     pending: Vec<(Entry, Option<f64>)>,
-    /// A second handle to the recording, to flush it to disk. Used if the rig keeps running when the computer fails.
-    through: Option<File>,
+    /// A second handle to the recording, to flush it to disk. `None` for simulated rigs, which stop with the computer.
+    sync_handle: Option<File>,
 }
 
 impl Recorder {
     pub(crate) fn new(writer: RecordingWriter) -> Self {
-        Recorder { writer, journal: None, pending: Vec::new(), through: None }
+        Recorder { writer, journal: None, pending: Vec::new(), sync_handle: None }
     }
 
-    /// Keeps a journal, and flushes everything to disk if `through` is given.
-    pub(crate) fn with_journal(self, journal: Journal, through: Option<File>) -> Self {
-        Recorder { journal: Some(journal), through, ..self }
+    /// Keeps a journal, and flushes everything to disk if `sync_handle` is given.
+    pub(crate) fn with_journal(self, journal: Journal, sync_handle: Option<File>) -> Self {
+        Recorder { journal: Some(journal), sync_handle, ..self }
     }
 
-    fn keep(&mut self, entry: Entry) {
+    fn queue_entry(&mut self, entry: Entry) {
         if self.journal.is_some() {
             self.pending.push((entry, self.writer.saved_until_s()));
         }
     }
 
-    /// Writes pending entries to the journal once their data are flushed.
-    fn journal_what_is_saved(&mut self) -> Result<(), ObserverError> {
+    /// Writes those pending entries to the journal whose data are flushed.
+    fn write_flushed_entries(&mut self) -> Result<(), ObserverError> {
         let saved_s = self.writer.saved_until_s();
-        if let Some(file) = &self.through {
+        if let Some(file) = &self.sync_handle {
             file.sync_data().map_err(ObserverError::of)?;
         }
         let Some(journal) = &mut self.journal else { return Ok(()) };
@@ -49,7 +49,7 @@ impl Recorder {
     }
 
     /// Writes the end of the run into the journal.
-    fn journal_the_end(journal: Option<Journal>, pending: Vec<(Entry, Option<f64>)>, end: RunEnding) {
+    fn write_end(journal: Option<Journal>, pending: Vec<(Entry, Option<f64>)>, end: RunEnding) {
         let Some(mut journal) = journal else { return };
         let entries = pending.into_iter().map(|(entry, _)| entry).chain([Entry::Ended(end)]);
         for entry in entries {
@@ -63,7 +63,7 @@ impl Recorder {
     /// Closes the file, and writes how the run ended into the journal.
     pub(crate) fn finish(self, end: RunEnding) -> Result<(), RecordError> {
         self.writer.finish()?;
-        Recorder::journal_the_end(self.journal, self.pending, end);
+        Recorder::write_end(self.journal, self.pending, end);
         Ok(())
     }
 }
@@ -76,13 +76,13 @@ impl RunObserver for Recorder {
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
         // This also writes the batch's own events.
         self.writer.write_batch(batch).map_err(ObserverError::of)?;
-        self.journal_what_is_saved()
+        self.write_flushed_entries()
     }
 
     fn on_event(&mut self, event: &Event) -> Result<(), ObserverError> {
         self.writer.write_event(event).map_err(ObserverError::of)?;
         if event.kind == EventKind::SoakEnded {
-            self.keep(Entry::Soaked);
+            self.queue_entry(Entry::Soaked);
         }
         Ok(())
     }
@@ -96,13 +96,13 @@ impl RunObserver for Recorder {
     }
 
     fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.keep(Entry::StepSaved(marker.index));
+        self.queue_entry(Entry::StepSaved(marker.index));
         Ok(())
     }
 }
 
 /// Forwards the runner's events as session events.
-pub(crate) struct Teller<'a> {
+pub(crate) struct EventForwarder<'a> {
     pub on_event: OnEvent<'a>,
     /// Planned steps.
     pub steps: usize,
@@ -110,7 +110,7 @@ pub(crate) struct Teller<'a> {
     pub duration_s: f64,
 }
 
-impl RunObserver for Teller<'_> {
+impl RunObserver for EventForwarder<'_> {
     fn on_start(&mut self, rig: &RigDescription) -> Result<(), ObserverError> {
         (self.on_event)(&SessionEvent::RunStarted {
             rig: rig.clone(),

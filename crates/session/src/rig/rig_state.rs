@@ -12,22 +12,22 @@ use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Maximum size of these files, bytes.
-const READ_MAX: u64 = 64 << 10;
+const MAX_FILE_BYTES: u64 = 64 << 10;
 
 /// File name prefix of the lock for a rig's address.
-const PLACE: &str = "at_";
+const ADDRESS_PREFIX: &str = "at_";
 
-/// Where an administrator may put locks and lockouts; kept over restarts and never cleaned.
-const INSTALLED: &str = "/var/lib/mapper";
+/// Directory that an administrator may create for locks and lockouts. It survives restarts and is never cleaned.
+const SYSTEM_DIRECTORY: &str = "/var/lib/mapper";
 
-/// Where every user may write, and restarts leave files alone.
-const SHARED: &str = "/var/tmp/mapper";
+/// Directory that every user may create. It survives restarts.
+const FALLBACK_DIRECTORY: &str = "/var/tmp/mapper";
 
-/// The directory for locks and lockouts that all users of a machine share, since several of them may drive one rig:
-/// `/var/lib/mapper` if there is one, `/var/tmp/mapper`, or, on systems without these, that for temporary files.
-pub fn shared_state() -> PathBuf {
-    let shared = Path::new(SHARED);
-    match Path::new(INSTALLED) {
+/// The directory for locks and lockouts. All users of a computer share it, because several of them may drive one rig. It is `/var/lib/mapper` if
+/// that exists, otherwise `/var/tmp/mapper`, or the directory for temporary files on systems without these.
+pub fn shared_state_directory() -> PathBuf {
+    let shared = Path::new(FALLBACK_DIRECTORY);
+    match Path::new(SYSTEM_DIRECTORY) {
         installed if installed.is_dir() => installed.to_owned(),
         _ if shared.parent().is_some_and(Path::is_dir) => shared.to_owned(),
         _ => std::env::temp_dir().join("mapper"),
@@ -49,20 +49,14 @@ pub struct Owner {
 
 impl std::fmt::Display for Owner {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "process {} on {} (run {}, started {})",
-            self.process,
-            self.host,
-            self.run.display(),
-            self.started
-        )
+        let Owner { process, host, run, started } = self;
+        write!(f, "process {process} on {host} (run {}, started {started})", run.display())
     }
 }
 
 /// Reason of a lockout.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Latch {
+pub struct Lockout {
     /// What happened.
     pub reason: String,
     /// Directory of the run.
@@ -95,19 +89,19 @@ pub struct RigStatus {
     /// Whether the owner is still running.
     pub in_use: bool,
     /// Lockout that prevents further runs.
-    pub latch: Option<Latch>,
+    pub latch: Option<Lockout>,
 }
 
 impl RigStates {
-    /// States in a directory, which is created on demand. Only in that of [`shared_state`] may others write: a directory that was
-    /// given may hold keys and sockets as well.
+    /// States in a directory, which is created on demand. Other users may write to it only if it is the [`shared_state_directory`]; any other
+    /// directory may also contain keys and sockets.
     pub fn new(directory: &Path) -> Self {
-        RigStates { directory: directory.to_owned(), shared: directory == shared_state() }
+        RigStates { directory: directory.to_owned(), shared: directory == shared_state_directory() }
     }
 
     fn file(&self, rig: &str, extension: &str) -> PathBuf {
-        let harmless = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
-        let name: String = rig.chars().take(100).map(harmless).collect();
+        let file_name_char = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        let name: String = rig.chars().take(100).map(file_name_char).collect();
         self.directory.join(format!("rig-{name}.{extension}"))
     }
 
@@ -118,7 +112,7 @@ impl RigStates {
         let path = self.file(rig, "lock");
         let file = open_plain(&path).or_else(|error| match error.kind() {
             ErrorKind::NotFound => match create_new(&path, self.shared) {
-                // Another runner was faster.
+                // Another runner created it in the meantime.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => open_plain(&path),
                 created => created,
             },
@@ -130,24 +124,26 @@ impl RigStates {
     /// Locks a rig. An abandoned run is not an obstacle if it is the run in `resumes`.
     ///
     /// # Errors
-    /// [`SessionError::RigInUse`], [`SessionError::RigAbandoned`] and [`SessionError::RigLatched`] with the known facts; [`SessionError::File`]
+    /// [`SessionError::RigInUse`], [`SessionError::RigAbandoned`] and [`SessionError::RigLockedOut`] with the known facts; [`SessionError::File`]
     /// for system errors.
     pub fn claim(&self, rig: &str, resumes: Option<&Path>) -> Result<Claim, SessionError> {
         let (mut lock, path) = self.open(rig)?;
-        lock_or_name_owner(rig, &mut lock, &path)?;
-        if let Some(Latch { reason, run }) = self.latch_of(rig) {
-            return Err(SessionError::RigLatched { rig: rig.to_owned(), reason, run });
+        try_lock(rig, &mut lock, &path)?;
+        if let Some(Lockout { reason, run }) = self.lockout_of(rig) {
+            return Err(SessionError::RigLockedOut { rig: rig.to_owned(), reason, run });
         }
         let owner = match read_entry::<Owner>(&mut lock) {
-            Entry::Is(owner) => Some(owner),
-            Entry::Empty => None,
-            Entry::Unreadable(why) => {
+            StoredEntry::Present(owner) => Some(owner),
+            StoredEntry::Empty => None,
+            StoredEntry::Unreadable(why) => {
                 let reason =
                     format!("the entry of its last owner cannot be read ({why}: {})", path.display());
-                return Err(SessionError::RigLatched { rig: rig.to_owned(), reason, run: PathBuf::new() });
+                return Err(SessionError::RigLockedOut { rig: rig.to_owned(), reason, run: PathBuf::new() });
             }
         };
-        if let Some(owner) = owner.filter(|owner| resumes.is_none_or(|run| !same_place(run, &owner.run))) {
+        if let Some(owner) =
+            owner.filter(|owner| resumes.is_none_or(|run| !is_same_directory(run, &owner.run)))
+        {
             return Err(SessionError::RigAbandoned {
                 rig: rig.to_owned(),
                 run: owner.run.clone(),
@@ -158,9 +154,9 @@ impl RigStates {
     }
 
     /// The lockout of a rig; one that cannot be read still locks the rig out.
-    fn latch_of(&self, rig: &str) -> Option<Latch> {
+    fn lockout_of(&self, rig: &str) -> Option<Lockout> {
         let path = self.file(rig, "latch");
-        let unreadable = |why: String| Latch {
+        let unreadable = |why: String| Lockout {
             reason: format!("its lockout cannot be read ({why}: {})", path.display()),
             run: PathBuf::new(),
         };
@@ -168,9 +164,9 @@ impl RigStates {
             Err(error) if error.kind() == ErrorKind::NotFound => None,
             Err(error) => Some(unreadable(error.to_string())),
             Ok(mut file) => Some(match read_entry(&mut file) {
-                Entry::Is(latch) => latch,
-                Entry::Empty => unreadable("it is empty".to_owned()),
-                Entry::Unreadable(why) => unreadable(why),
+                StoredEntry::Present(latch) => latch,
+                StoredEntry::Empty => unreadable("it is empty".to_owned()),
+                StoredEntry::Unreadable(why) => unreadable(why),
             }),
         }
     }
@@ -185,31 +181,31 @@ impl RigStates {
                 rig: rig.to_owned(),
                 owner: None,
                 in_use: false,
-                latch: self.latch_of(rig),
+                latch: self.lockout_of(rig),
             });
         }
         let (mut lock, _) = self.open(rig)?;
         let in_use = matches!(lock.try_lock(), Err(TryLockError::WouldBlock));
         let (owner, unreadable) = match read_entry(&mut lock) {
-            Entry::Is(owner) => (Some(owner), None),
-            // A runner that has just begun has not signed yet.
-            Entry::Empty => (None, None),
-            Entry::Unreadable(_) if in_use => (None, None),
-            Entry::Unreadable(why) => (None, Some(why)),
+            StoredEntry::Present(owner) => (Some(owner), None),
+            // A runner that has just started has not recorded its owner yet.
+            StoredEntry::Empty => (None, None),
+            StoredEntry::Unreadable(_) if in_use => (None, None),
+            StoredEntry::Unreadable(why) => (None, Some(why)),
         };
-        let latch = self.latch_of(rig).or_else(|| {
+        let latch = self.lockout_of(rig).or_else(|| {
             let reason = format!("the entry of its last owner cannot be read ({})", unreadable?);
-            Some(Latch { reason, run: PathBuf::new() })
+            Some(Lockout { reason, run: PathBuf::new() })
         });
         Ok(RigStatus { rig: rig.to_owned(), owner, in_use, latch })
     }
 
     /// All rigs used so far, by file name.
-    pub fn known(&self) -> Vec<RigStatus> {
+    pub fn list(&self) -> Vec<RigStatus> {
         let entries = std::fs::read_dir(&self.directory).into_iter().flatten().flatten();
         let name = |file: String| {
             let (name, kind) = file.strip_prefix("rig-")?.rsplit_once('.')?;
-            (matches!(kind, "lock" | "latch") && !name.starts_with(PLACE)).then(|| name.to_owned())
+            (matches!(kind, "lock" | "latch") && !name.starts_with(ADDRESS_PREFIX)).then(|| name.to_owned())
         };
         let files = entries.filter_map(|entry| entry.file_name().into_string().ok());
         let names = files.filter_map(name).collect::<BTreeSet<_>>();
@@ -217,9 +213,9 @@ impl RigStates {
     }
 
     /// Rigs that wait for acknowledgement.
-    fn in_doubt(&self) -> Vec<String> {
+    fn awaiting(&self) -> Vec<String> {
         let waits = |status: &RigStatus| status.latch.is_some() || (status.owner.is_some() && !status.in_use);
-        self.known().into_iter().filter(waits).map(|status| status.rig).collect()
+        self.list().into_iter().filter(waits).map(|status| status.rig).collect()
     }
 
     /// Acknowledges that the rig was inspected, so that the next run may begin.
@@ -232,16 +228,16 @@ impl RigStates {
         if status.owner.is_none() && status.latch.is_none() && !status.in_use {
             return Err(SessionError::NothingToAcknowledge {
                 rig: rig.to_owned(),
-                in_doubt: self.in_doubt(),
+                awaiting: self.awaiting(),
             });
         }
         if status.in_use {
             let owner = status.owner.map_or("another runner".to_owned(), |owner| owner.to_string());
             return Err(SessionError::RigInUse { rig: rig.to_owned(), owner });
         }
-        // The lock is held meanwhile, so that no run begins between the look and the removal.
+        // Holding the lock prevents a run from starting between the check and the removal.
         let (mut lock, path) = self.open(rig)?;
-        lock_or_name_owner(rig, &mut lock, &path)?;
+        try_lock(rig, &mut lock, &path)?;
         let latch = self.file(rig, "latch");
         match std::fs::remove_file(&latch) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
@@ -259,7 +255,7 @@ impl Claim {
     ///
     /// # Errors
     /// [`SessionError::File`] for system errors.
-    pub fn sign(&mut self, owner: &Owner) -> Result<(), SessionError> {
+    pub fn record_owner(&mut self, owner: &Owner) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "lock");
         let text = json_text(owner)?;
         self.write(text.as_bytes()).map_err(SessionError::file("write", &path))
@@ -276,9 +272,9 @@ impl Claim {
     ///
     /// # Errors
     /// [`SessionError::File`] for system errors.
-    pub fn latch(&self, latch: &Latch) -> Result<(), SessionError> {
+    pub fn lock_out(&self, lockout: &Lockout) -> Result<(), SessionError> {
         let path = self.states.file(&self.rig, "latch");
-        let text = json_text(latch)?;
+        let text = json_text(lockout)?;
         write_file(&path, text.as_bytes(), Existing::Replaced)
     }
 
@@ -293,19 +289,19 @@ impl Claim {
 }
 
 /// Whether two paths refer to the same directory.
-fn same_place(a: &Path, b: &Path) -> bool {
+fn is_same_directory(a: &Path, b: &Path) -> bool {
     let resolved = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     resolved(a) == resolved(b)
 }
 
 /// Locks the file of a rig.
-fn lock_or_name_owner(rig: &str, lock: &mut File, path: &Path) -> Result<(), SessionError> {
+fn try_lock(rig: &str, lock: &mut File, path: &Path) -> Result<(), SessionError> {
     match lock.try_lock() {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => {
             let owner = match read_entry::<Owner>(lock) {
-                Entry::Is(owner) => owner.to_string(),
-                Entry::Empty | Entry::Unreadable(_) => "another runner".to_owned(),
+                StoredEntry::Present(owner) => owner.to_string(),
+                StoredEntry::Empty | StoredEntry::Unreadable(_) => "another runner".to_owned(),
             };
             Err(SessionError::RigInUse { rig: rig.to_owned(), owner })
         }
@@ -313,33 +309,32 @@ fn lock_or_name_owner(rig: &str, lock: &mut File, path: &Path) -> Result<(), Ses
     }
 }
 
-/// What a file holds.
-enum Entry<T> {
+/// Content of a lock or lockout file.
+enum StoredEntry<T> {
     Empty,
-    Is(T),
+    Present(T),
     Unreadable(String),
 }
 
-fn read_entry<T: for<'de> Deserialize<'de>>(file: &mut File) -> Entry<T> {
+fn read_entry<T: for<'de> Deserialize<'de>>(file: &mut File) -> StoredEntry<T> {
     let mut text = String::new();
-    match file.rewind().and_then(|()| file.take(READ_MAX).read_to_string(&mut text)) {
-        Err(error) => Entry::Unreadable(error.to_string()),
-        Ok(_) if text.is_empty() => Entry::Empty,
-        Ok(_) => {
-            serde_json::from_str(&text).map_or_else(|error| Entry::Unreadable(error.to_string()), Entry::Is)
-        }
+    match file.rewind().and_then(|()| file.take(MAX_FILE_BYTES).read_to_string(&mut text)) {
+        Err(error) => StoredEntry::Unreadable(error.to_string()),
+        Ok(_) if text.is_empty() => StoredEntry::Empty,
+        Ok(_) => serde_json::from_str(&text)
+            .map_or_else(|error| StoredEntry::Unreadable(error.to_string()), StoredEntry::Present),
     }
 }
 
-/// Opens a file for reading and writing that is a plain file under one name: a link placed there could make a run
-/// overwrite what it points to.
+/// Opens a file for reading and writing. It must be a plain file with one name, because a link that another user placed there could make a run
+/// overwrite the file it points to.
 fn open_plain(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).write(true);
     #[cfg(unix)]
     {
         use std::os::unix::fs::OpenOptionsExt;
-        // Without waiting for the other end of a pipe.
+        // NONBLOCK: does not wait for the other end of a pipe.
         let flags = rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK;
         options.custom_flags(i32::try_from(flags.bits()).unwrap_or_default());
     }
@@ -350,12 +345,12 @@ fn open_plain(path: &Path) -> io::Result<File> {
     #[cfg(not(unix))]
     let linked = false;
     if !about.is_file() || linked {
-        return Err(io::Error::other("it is a link or no plain file; remove it"));
+        return Err(io::Error::other("it is a link or not a plain file; remove it"));
     }
     Ok(file)
 }
 
-/// Creates a file; one that is shared every user of the machine may lock.
+/// Creates a file. If it is shared, every user of the computer may lock it.
 fn create_new(path: &Path, shared: bool) -> io::Result<File> {
     let file = OpenOptions::new().read(true).write(true).create_new(true).open(path)?;
     if shared {
@@ -364,8 +359,8 @@ fn create_new(path: &Path, shared: bool) -> io::Result<File> {
     Ok(file)
 }
 
-/// Creates a directory; in one that is shared every user may create files, and remove those of others: whoever has looked at the rig
-/// may acknowledge.
+/// Creates a directory. If it is shared, every user may create files in it and remove those of others, because a user who has inspected the rig
+/// may acknowledge a lockout.
 fn make_directory(path: &Path, shared: bool) -> io::Result<()> {
     if path.is_dir() {
         return Ok(());
@@ -402,7 +397,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         let mut first = states.claim("opc.tcp://bench:4840", None).unwrap();
-        first.sign(&owner("runs/a")).unwrap();
+        first.record_owner(&owner("runs/a")).unwrap();
         let second = states.claim("opc.tcp://bench:4840", None).unwrap_err().to_string();
         assert!(second.contains("process 7 on cell-3") && second.contains("runs/a"), "{second}");
         assert!(states.claim("another", None).is_ok());
@@ -422,20 +417,18 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         let claim = states.claim("bench", None).unwrap();
-        claim.latch(&Latch { reason: "overspeed".to_owned(), run: "runs/a".into() }).unwrap();
+        claim.lock_out(&Lockout { reason: "overspeed".to_owned(), run: "runs/a".into() }).unwrap();
         claim.release().unwrap();
         for _ in 0..2 {
-            let refused = states.claim("bench", Some(Path::new("runs/a"))).unwrap_err().to_string();
-            assert!(
-                refused.contains("overspeed") && refused.contains("mapper rig acknowledge bench"),
-                "{refused}"
-            );
+            let refused = states.claim("bench", Some(Path::new("runs/a"))).unwrap_err();
+            assert!(matches!(refused, SessionError::RigLockedOut { .. }), "{refused}");
+            assert!(refused.to_string().contains("overspeed"), "{refused}");
         }
         let typo = states.acknowledge("bensh").unwrap_err().to_string();
-        assert!(typo.contains("`bensh`") && typo.contains("in doubt: bench"), "{typo}");
+        assert!(typo.contains("`bensh`") && typo.contains("these wait for one: bench"), "{typo}");
         assert_eq!(states.acknowledge("bench").unwrap().latch.unwrap().reason, "overspeed");
         let again = states.acknowledge("bench").unwrap_err().to_string();
-        assert!(again.contains("no rig is in doubt"), "{again}");
+        assert!(again.contains("no rig waits for one"), "{again}");
         assert!(states.claim("bench", None).is_ok());
     }
 
@@ -453,7 +446,7 @@ mod tests {
             states.claim("bench", None).unwrap().release().unwrap();
             std::fs::write(directory.path().join(file), bytes).unwrap();
             let refused = states.claim("bench", None).unwrap_err();
-            assert!(matches!(refused, SessionError::RigLatched { .. }), "{file}: {refused}");
+            assert!(matches!(refused, SessionError::RigLockedOut { .. }), "{file}: {refused}");
             assert!(states.status("bench").unwrap().latch.is_some(), "{file}");
             states.acknowledge("bench").unwrap();
         }
@@ -480,7 +473,7 @@ mod tests {
             let link = states.file("bench", "latch");
             if hard { std::fs::hard_link(&victim, link) } else { std::os::unix::fs::symlink(&victim, link) }
                 .unwrap();
-            claim.latch(&Latch { reason: "overspeed".to_owned(), run: "runs/a".into() }).unwrap();
+            claim.lock_out(&Lockout { reason: "overspeed".to_owned(), run: "runs/a".into() }).unwrap();
             assert_eq!(std::fs::read_to_string(&victim).unwrap(), "kept");
         }
     }
@@ -491,7 +484,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let states = RigStates::new(directory.path());
         let mut first = states.claim("bench", None).unwrap();
-        first.sign(&owner("runs/a")).unwrap();
+        first.record_owner(&owner("runs/a")).unwrap();
         drop(first);
         states.acknowledge("bench").unwrap();
         let second = states.claim("bench", None).unwrap();

@@ -9,23 +9,25 @@ use mapper_runner::{ReadChannel, Reader, RigWithInstruments};
 use std::time::Duration;
 
 /// Connection timeout of an auxiliary instrument, equal to that of a rig.
-const CONNECTS_WITHIN: Duration = Duration::from_secs(11);
-/// Number of missed samples after which an instrument counts as silent, if its data are also older than the allowed signal age.
-const MISSED: f64 = 3.0;
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(11);
+/// An instrument counts as silent after this number of missed samples, if its data are also older than the allowed signal age.
+const MAX_MISSED_SAMPLES: f64 = 3.0;
 /// Maximum signal age if no guard sets one, s.
-const USUAL_AGE_S: f64 = 3.0;
+const DEFAULT_MAX_AGE_S: f64 = 3.0;
 
 /// Why a source cannot serve as an auxiliary instrument.
 #[derive(Debug, thiserror::Error)]
 enum ReaderProblem {
     #[error(
-        "{0} can be driven, and a reader is only read: make it the `backend`, or name a driver that reads alone"
+        "{0} accepts setpoints, but an auxiliary instrument is only read; make it the `backend`, or name a driver that only reads"
     )]
     Controls(String),
-    #[error("it gives no {channel}; it gives {gives}")]
-    Lacks { channel: Channel, gives: String },
-    #[error("{channel} is given by {other} too: list the channels that are to be taken from here")]
-    Twice { channel: Channel, other: String },
+    #[error("it does not deliver {channel}; its channels are {delivers}")]
+    MissingChannel { channel: Channel, delivers: String },
+    #[error(
+        "{channel} also comes from {other}; list the channels to use from this instrument under `channels`"
+    )]
+    DuplicateChannel { channel: Channel, other: String },
 }
 
 /// The rig with its auxiliary instruments, and their channels for the guards.
@@ -50,7 +52,7 @@ impl Registry {
             return Ok(Sources { backend: rig, read: Vec::new(), exclusive: Vec::new() });
         }
         let own = rig.describe();
-        let age_s = campaign.guard_set().signals.first().map_or(USUAL_AGE_S, |guard| guard.age_s);
+        let age_s = campaign.guard_set().signals.first().map_or(DEFAULT_MAX_AGE_S, |guard| guard.age_s);
         let mut taken: Vec<(Channel, String)> =
             own.channels.iter().map(|channel| (*channel, "the rig".to_owned())).collect();
         let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
@@ -64,24 +66,24 @@ impl Registry {
                     SessionError::Reader { at: at.clone(), setting: String::new(), source: Box::new(other) }
                 }
             };
-            let backend = self.made(&choice.backend, campaign, model).map_err(wrong)?;
+            let backend = self.make_named_backend(&choice.backend, campaign, model).map_err(wrong)?;
             let rig = backend.describe();
-            let channels = wanted(choice, &rig, &mut taken)?;
-            let age_s = age_s.max(MISSED / rig.sample_rate_hz.max(1e-3));
-            let watched =
+            let channels = select_channels(choice, &rig, &mut taken)?;
+            let age_s = age_s.max(MAX_MISSED_SAMPLES / rig.sample_rate_hz.max(1e-3));
+            let as_read =
                 |channel: &Channel| ReadChannel { reader: choice.name.clone(), channel: *channel, age_s };
-            read.extend(channels.iter().map(watched));
+            read.extend(channels.iter().map(as_read));
             exclusive.extend(rig.exclusive);
             readers.push(Reader { name: choice.name.clone(), backend, channels });
         }
         let backend =
-            RigWithInstruments::new(rig, readers, CONNECTS_WITHIN).map_err(SessionError::Backend)?;
+            RigWithInstruments::new(rig, readers, CONNECT_TIMEOUT).map_err(SessionError::Backend)?;
         Ok(Sources { backend: Box::new(backend), read, exclusive })
     }
 }
 
 /// The channels to take from an auxiliary instrument.
-fn wanted(
+fn select_channels(
     choice: &ReaderChoice,
     rig: &RigDescription,
     taken: &mut Vec<(Channel, String)>,
@@ -99,21 +101,30 @@ fn wanted(
     match &choice.channels {
         Some(listed) => {
             if let Some(channel) = listed.iter().find(|channel| !rig.channels.contains(channel)) {
-                let gives =
+                let delivers =
                     rig.channels.iter().map(|channel| channel.symbol()).collect::<Vec<_>>().join(", ");
-                return wrong(below("channels"), ReaderProblem::Lacks { channel: *channel, gives });
+                return wrong(
+                    below("channels"),
+                    ReaderProblem::MissingChannel { channel: *channel, delivers },
+                );
             }
             // A listed channel replaces the rig's own.
             for channel in listed {
                 if let Some(other) = from(channel, taken).filter(|other| other != "the rig") {
-                    return wrong(below("channels"), ReaderProblem::Twice { channel: *channel, other });
+                    return wrong(
+                        below("channels"),
+                        ReaderProblem::DuplicateChannel { channel: *channel, other },
+                    );
                 }
             }
         }
         None => {
             for channel in &rig.channels {
                 if let Some(other) = from(channel, taken) {
-                    return wrong(below("backend"), ReaderProblem::Twice { channel: *channel, other });
+                    return wrong(
+                        below("backend"),
+                        ReaderProblem::DuplicateChannel { channel: *channel, other },
+                    );
                 }
             }
         }

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 
 /// Queue length: some seconds of samples. If the queue is full the run waits, so no data are lost.
-const WAITING_MAX: usize = 32;
+const MAX_WAITING_MESSAGES: usize = 32;
 
 /// Message to an observer.
 enum ObserverMessage {
@@ -21,8 +21,8 @@ enum ObserverMessage {
 
 /// The observer accepts no more messages.
 #[derive(Debug, thiserror::Error)]
-#[error("nothing is recorded any more, after an error that was reported before")]
-struct Gone;
+#[error("recording stopped after an error that was reported before")]
+struct ObserverStopped;
 
 /// Forwards messages in order to an observer on another thread until that observer fails. The next call returns its error; all later calls fail.
 pub(crate) struct ThreadedObserver<'scope, O> {
@@ -33,8 +33,8 @@ pub(crate) struct ThreadedObserver<'scope, O> {
 
 impl<'scope, O: RunObserver + Send + 'scope> ThreadedObserver<'scope, O> {
     /// Starts the thread.
-    pub(crate) fn begin<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
-        let (to_thread, messages) = sync_channel(WAITING_MAX);
+    pub(crate) fn start<'env>(scope: &'scope Scope<'scope, 'env>, mut observer: O) -> Self {
+        let (to_thread, messages) = sync_channel(MAX_WAITING_MESSAGES);
         let (fail, failed) = channel();
         let thread = scope.spawn(move || {
             // The error must be stored before the end of the thread becomes visible.
@@ -58,7 +58,7 @@ impl<O> ThreadedObserver<'_, O> {
     fn send(&mut self, message: ObserverMessage) -> Result<(), ObserverError> {
         match self.to_thread.send(message) {
             Ok(()) => Ok(()),
-            Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(Gone))),
+            Err(_) => Err(self.failed.recv().unwrap_or_else(|_| ObserverError::of(ObserverStopped))),
         }
     }
 }
@@ -100,28 +100,28 @@ impl<O> RunObserver for ThreadedObserver<'_, O> {
     }
 }
 
-/// An observer on this thread or another.
-pub(crate) enum Placed<'scope, O> {
-    /// For simulated time: a delay does no harm, and a handover to a thread would cost more than the observer's own work.
-    Here(O),
-    /// For a rig in real time.
-    ThreadedObserver(ThreadedObserver<'scope, O>),
+/// The thread on which an observer runs.
+pub(crate) enum ObserverThread<'scope, O> {
+    /// The calling thread, for simulated time: a delay does no harm, and passing messages would cost more than the observer's own work.
+    Calling(O),
+    /// A separate thread, for a rig in real time.
+    Separate(ThreadedObserver<'scope, O>),
 }
 
-impl<'scope, O: RunObserver + Send + 'scope> Placed<'scope, O> {
+impl<'scope, O: RunObserver + Send + 'scope> ObserverThread<'scope, O> {
     /// The observer, on either thread.
     pub(crate) fn observer(&mut self) -> &mut dyn RunObserver {
         match self {
-            Placed::Here(observer) => observer,
-            Placed::ThreadedObserver(aside) => aside,
+            ObserverThread::Calling(observer) => observer,
+            ObserverThread::Separate(threaded) => threaded,
         }
     }
 
     /// Same as [`ThreadedObserver::end`].
     pub(crate) fn end(self) -> (O, Result<(), ObserverError>) {
         match self {
-            Placed::Here(observer) => (observer, Ok(())),
-            Placed::ThreadedObserver(aside) => aside.end(),
+            ObserverThread::Calling(observer) => (observer, Ok(())),
+            ObserverThread::Separate(threaded) => threaded.end(),
         }
     }
 }
@@ -157,10 +157,10 @@ mod tests {
     fn all_is_seen_in_order_before_the_end() {
         let times: Vec<f64> = (0..1000).map(f64::from).collect();
         let (observer, error) = scope(|scope| {
-            let mut aside =
-                ThreadedObserver::begin(scope, Counts { times: Vec::new(), fails_at: usize::MAX });
-            times.iter().for_each(|t_s| aside.on_event(&event(*t_s)).unwrap());
-            aside.end()
+            let mut threaded =
+                ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at: usize::MAX });
+            times.iter().for_each(|t_s| threaded.on_event(&event(*t_s)).unwrap());
+            threaded.end()
         });
         assert_eq!(observer.times, times);
         error.unwrap();
@@ -171,9 +171,9 @@ mod tests {
     fn an_error_is_reported_and_nothing_after_it_passes() {
         for fails_at in [0, 1, 50, 99] {
             let (observer, errors) = scope(|scope| {
-                let mut aside = ThreadedObserver::begin(scope, Counts { times: Vec::new(), fails_at });
-                let results: Vec<_> = (0..100).map(|t_s| aside.on_event(&event(f64::from(t_s)))).collect();
-                let (observer, untold) = aside.end();
+                let mut threaded = ThreadedObserver::start(scope, Counts { times: Vec::new(), fails_at });
+                let results: Vec<_> = (0..100).map(|t_s| threaded.on_event(&event(f64::from(t_s)))).collect();
+                let (observer, untold) = threaded.end();
                 let errors =
                     results.into_iter().chain([untold]).skip_while(Result::is_ok).collect::<Vec<_>>();
                 (observer, errors)
@@ -199,10 +199,10 @@ mod tests {
         }
         let ended = std::panic::catch_unwind(|| {
             scope(|scope| {
-                let mut aside = ThreadedObserver::begin(scope, Panics);
-                let refused = (0..1000).any(|t_s| aside.on_event(&event(f64::from(t_s))).is_err());
+                let mut threaded = ThreadedObserver::start(scope, Panics);
+                let refused = (0..1000).any(|t_s| threaded.on_event(&event(f64::from(t_s))).is_err());
                 assert!(refused, "a thousand events after the observer failed");
-                aside.end().1
+                threaded.end().1
             })
         });
         assert_eq!(ended.unwrap_err().downcast_ref::<&str>(), Some(&"on purpose"));

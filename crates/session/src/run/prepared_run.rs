@@ -1,36 +1,38 @@
-//! A complete run: plan, drive the rig, record, identify, assemble, report.
+//! A complete run: makes the plan, drives the rig, records, identifies, assembles the map, and writes the report.
 
 use crate::analysis::results::{Results, RunPart};
-use crate::plan::planning::{fingerprint, nominal_model, plan};
+use crate::plan::planning::{hash_inputs, nominal_model, plan};
 use crate::plan::rehearsal::rehearse;
 use crate::plan::scripted_steps::ScriptedSteps;
 use crate::plan::stored_plan::stored_plan;
 use crate::plan::surge::hold_near_surge;
 use crate::recording::files::{json_text, write_new};
-use crate::recording::identification_config::identification;
+use crate::recording::identification_config::{declared, identification};
 use crate::recording::journal::{Entry, Identity, Journal, rig_sha256};
 use crate::recording::program::PROGRAM;
-use crate::recording::resume::{BrokenOff, MissingSteps, depends_on_readings};
+use crate::recording::resume::{InterruptedRun, MissingSteps, depends_on_readings};
 use crate::rig::drive::{Pace, drive_paced, soak_s};
-use crate::rig::estimates::Estimates;
-use crate::rig::guards::{check_guards, drift_watch};
-use crate::rig::observers::{Recorder, Teller};
+use crate::rig::estimates::StepEstimator;
+use crate::rig::guards::check_guards;
+use crate::rig::observers::{EventForwarder, Recorder};
 use crate::rig::rig_lease::RigLease;
 use crate::rig::rig_state::RigStates;
 use crate::rig::sources::Sources;
-use crate::rig::threaded_observer::{Placed, ThreadedObserver};
+use crate::rig::threaded_observer::{ObserverThread, ThreadedObserver};
 use crate::run::preflight::{check_room, check_setpoints};
 use crate::run::recording_metadata::metadata;
-use crate::run::replayed_steps::going_on;
-use crate::run::run_end::{Ended, doubt};
+use crate::run::replayed_steps::drive_resumed;
+use crate::run::run_end::{RunTermination, lockout_reason};
 use crate::{Session, SessionError, SessionEvent, recording::run_directory};
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::MapSource;
-use mapper_core::{Clock, MadeFrom, Plan, RigDescription, UnpacedClock};
+use mapper_core::{Clock, Plan, PlanInputHashes, RigDescription, UnpacedClock};
 use mapper_physics::simulation::model::Model;
-use mapper_recording::{RecordingHeader, RecordingWriter};
+use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
 use mapper_report::ending_sentence;
-use mapper_runner::{Deadlined, Deadlines, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch};
+use mapper_runner::{
+    Deadlined, Deadlines, DriftWatch, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch,
+};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -52,10 +54,10 @@ pub struct RunRequest<'a> {
     pub started_ns: u64,
     /// Start time in the name of the run directory, e.g. `20261122T101500Z`.
     pub started_name: &'a str,
-    /// Directory of the locks and lockouts of rigs; `.rigs` in `parent` by default.
+    /// Directory of the locks and lockouts of rigs; `None` for `.rigs` in `parent`.
     pub rig_states: Option<&'a Path>,
     /// The interrupted run to resume.
-    pub resume: Option<BrokenOff>,
+    pub resume: Option<InterruptedRun>,
 }
 
 impl<'a> RunRequest<'a> {
@@ -92,7 +94,7 @@ pub struct RunOutcome {
     /// Its recording.
     pub recording: PathBuf,
     /// How it ended.
-    pub end: Ended,
+    pub end: RunTermination,
     /// The results, or the reason why there are none.
     pub results: Result<Results, SessionError>,
 }
@@ -111,18 +113,20 @@ impl<'s> Session<'s> {
     /// [`SessionError`] if the plan is missing, the stored one is stale, the script fails or the backend's settings are wrong.
     pub fn prepare<'a>(&self, request: RunRequest<'a>) -> Result<PreparedRun<'a>, SessionError> {
         let (campaign, mut request) = (request.campaign, request);
-        if let Some(broken_off) = &mut request.resume {
-            broken_off.keep_what_goes_on(campaign)?;
+        if let Some(interrupted) = &mut request.resume {
+            interrupted.discard_superseded_steps(campaign)?;
         }
         self.registry.check_formats(campaign)?;
         let model = nominal_model(campaign)?;
         let sources = self.registry.make_sources(campaign, &model)?;
         let rig = sources.backend.describe();
         let rig_sha256 = Some(rig_sha256(&rig)?);
-        let kept = request.resume.as_ref().map(|broken_off| broken_off.directory.join(run_directory::PLAN));
-        let mut plan = match (request.plan.or(kept.as_deref()), &campaign.sequence) {
+        let earlier_plan =
+            request.resume.as_ref().map(|interrupted| interrupted.directory.join(run_directory::PLAN));
+        let mut plan = match (request.plan.or(earlier_plan.as_deref()), &campaign.sequence) {
             (Some(path), _) => {
-                let now = MadeFrom { rig_sha256: rig_sha256.clone(), ..fingerprint(campaign, &model)? };
+                let now =
+                    PlanInputHashes { rig_sha256: rig_sha256.clone(), ..hash_inputs(campaign, &model)? };
                 stored_plan(path, &now, campaign)?
             }
             (None, None) => plan(campaign, &model)?,
@@ -135,8 +139,8 @@ impl<'s> Session<'s> {
         };
         check_guards(campaign, &rig)?;
         check_setpoints(&plan, &rig)?;
-        if let Some(broken_off) = &request.resume {
-            broken_off.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
+        if let Some(interrupted) = &request.resume {
+            interrupted.check(campaign, &plan, &Identity::of(campaign, &plan, &rig)?)?;
         }
         Ok(PreparedRun { request, model, plan, scripted, sources })
     }
@@ -174,7 +178,7 @@ impl PreparedRun<'_> {
         self.run_paced(session, &mut UnpacedClock, false)
     }
 
-    /// Drives the rig by a clock, records, identifies, reports. `each_sample`: polls each sample separately.
+    /// Drives the rig at the pace of a clock, records, identifies, reports. With `each_sample`, each sample is polled separately.
     ///
     /// # Errors
     /// If the rig is not available or the run's files cannot be created. Failures during the run are part of its outcome.
@@ -190,14 +194,14 @@ impl PreparedRun<'_> {
             let deadlined = Deadlined::new(self.sources.backend, DEADLINES).map_err(SessionError::Backend)?;
             self.sources.backend = Box::new(deadlined);
         }
-        if let Some(whole) = self.identify_whole(session)? {
-            return Ok(whole);
+        if let Some(outcome) = self.finish_complete_run(session)? {
+            return Ok(outcome);
         }
-        let mut held = self.hold(&rig)?;
-        let (directory, plan_json) = (self.directory()?, json_text(&self.plan)?);
-        held.sign(&directory, self.request.started_name)?;
+        let mut lease = self.acquire_lease(&rig)?;
+        let (directory, plan_json) = (self.create_directory()?, json_text(&self.plan)?);
+        lease.record_owner(&directory, self.request.started_name)?;
         check_room(&directory, soak_s(campaign) + self.plan.duration_s(), &rig)?;
-        let mut parts = self.parts_before(&directory);
+        let mut parts = self.earlier_parts(&directory);
         let name = match parts.len() {
             0 => run_directory::RECORDING.to_owned(),
             before => run_directory::further_recording(before + 1),
@@ -218,8 +222,8 @@ impl PreparedRun<'_> {
             .write(&Entry::Part { identity, recording: name })
             .map_err(SessionError::file("write", &path))?;
         // A rig in real time keeps running if this computer fails, so the recording is flushed to disk.
-        let through = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
-        let recorder = Recorder::new(writer).with_journal(journal, through);
+        let sync_handle = if rig.simulated_time { None } else { std::fs::File::open(&recording).ok() };
+        let recorder = Recorder::new(writer).with_journal(journal, sync_handle);
         let read = self.sources.read.clone();
         let pace = Pace {
             clock,
@@ -229,27 +233,30 @@ impl PreparedRun<'_> {
             operator: session.operator,
             read: &read,
         };
-        let (end, finished, doubt) = self.drive_and_record(session, recorder, pace);
-        held.give_back(doubt, &directory)?;
+        let (end, finished, lockout) = self.drive_and_record(session, recorder, pace);
+        lease.release(lockout, &directory)?;
         session.send(SessionEvent::RigReleased);
-        if let Ended::Failed(error @ RunError::NotArmed(_)) = end {
-            return Err(self.never_begun(error, &directory));
+        if let RunTermination::Failed(error @ RunError::NotArmed(_)) = end {
+            return Err(self.discard_unarmed_run(error, &directory));
         }
         // A failed run has its own reason; any other run must have a complete file.
-        if !matches!(end, Ended::Failed(_) | Ended::Interrupted { .. } | Ended::Tripped { .. }) {
+        if !matches!(
+            end,
+            RunTermination::Failed(_) | RunTermination::Interrupted { .. } | RunTermination::Tripped { .. }
+        ) {
             finished?;
         }
         parts.push(RunPart { recording: recording.clone(), soaked: true, saved: None });
-        set_aside(&directory)?;
+        move_earlier_results(&directory)?;
         let executed = self.executed(&directory);
         let results = self.results(session, executed, &end, &directory, &parts);
         Ok(RunOutcome { directory, recording, end, results })
     }
 
-    /// Removes the files of a run whose rig was not armed.
-    fn never_begun(&self, error: RunError, directory: &Path) -> SessionError {
+    /// Removes the files of a run whose rig was not armed, and returns the error of the run.
+    fn discard_unarmed_run(&self, error: RunError, directory: &Path) -> SessionError {
         if self.request.resume.is_none() && !error.leaves_doubt() {
-            // A remaining directory does no harm.
+            // If this fails, an empty run directory remains, which does no harm.
             let _ = std::fs::remove_dir_all(directory);
         }
         SessionError::NotArmed(error)
@@ -259,7 +266,7 @@ impl PreparedRun<'_> {
         &self,
         session: &Session<'_>,
         executed: Result<Plan, SessionError>,
-        end: &Ended,
+        end: &RunTermination,
         directory: &Path,
         parts: &[RunPart],
     ) -> Result<Results, SessionError> {
@@ -270,34 +277,34 @@ impl PreparedRun<'_> {
     }
 
     /// Identifies a run that was interrupted after its last step. Only the map is missing, so the rig is not used.
-    fn identify_whole(&self, session: &Session<'_>) -> Result<Option<RunOutcome>, SessionError> {
-        let Some(broken_off) = &self.request.resume else { return Ok(None) };
-        if !broken_off.is_whole(self.request.campaign, &self.plan) {
+    fn finish_complete_run(&self, session: &Session<'_>) -> Result<Option<RunOutcome>, SessionError> {
+        let Some(interrupted) = &self.request.resume else { return Ok(None) };
+        if !interrupted.is_complete(self.request.campaign, &self.plan) {
             return Ok(None);
         }
-        let directory = broken_off.directory.clone();
-        let parts = self.parts_before(&directory);
+        let directory = interrupted.directory.clone();
+        let parts = self.earlier_parts(&directory);
         let recording = parts.last().map_or_else(PathBuf::new, |part| part.recording.clone());
-        let end = Ended::Completed;
-        set_aside(&directory)?;
+        let end = RunTermination::Completed;
+        move_earlier_results(&directory)?;
         let results = self.results(session, Ok(self.plan.clone()), &end, &directory, &parts);
         Ok(Some(RunOutcome { directory, recording, end, results }))
     }
 
     /// Locks the rig and its auxiliary instruments if they can have only one user.
-    fn hold(&self, rig: &RigDescription) -> Result<RigLease, SessionError> {
-        let usual = self.request.parent.join(".rigs");
-        let states = RigStates::new(self.request.rig_states.unwrap_or(&usual));
-        let resumes = self.request.resume.as_ref().map(|broken_off| broken_off.directory.as_path());
-        let place = rig.reached_at.iter().map(|place| format!("at {place}"));
-        let shared: Vec<String> = self.sources.exclusive.iter().cloned().chain(place).collect();
-        RigLease::take(&states, rig.exclusive.as_deref(), &shared, resumes)
+    fn acquire_lease(&self, rig: &RigDescription) -> Result<RigLease, SessionError> {
+        let default = self.request.parent.join(".rigs");
+        let states = RigStates::new(self.request.rig_states.unwrap_or(&default));
+        let resumes = self.request.resume.as_ref().map(|interrupted| interrupted.directory.as_path());
+        let address = rig.reached_at.iter().map(|address| format!("at {address}"));
+        let shared: Vec<String> = self.sources.exclusive.iter().cloned().chain(address).collect();
+        RigLease::acquire(&states, rig.exclusive.as_deref(), &shared, resumes)
     }
 
     /// The run directory: a new one with the inputs of the run, or that of the resumed run.
-    fn directory(&self) -> Result<PathBuf, SessionError> {
-        if let Some(broken_off) = &self.request.resume {
-            return Ok(broken_off.directory.clone());
+    fn create_directory(&self) -> Result<PathBuf, SessionError> {
+        if let Some(interrupted) = &self.request.resume {
+            return Ok(interrupted.directory.clone());
         }
         let campaign = self.request.campaign;
         let directory =
@@ -321,8 +328,8 @@ impl PreparedRun<'_> {
     }
 
     /// The earlier recordings of a resumed run.
-    fn parts_before(&self, directory: &Path) -> Vec<RunPart> {
-        let parts = self.request.resume.iter().flat_map(|broken_off| &broken_off.parts);
+    fn earlier_parts(&self, directory: &Path) -> Vec<RunPart> {
+        let parts = self.request.resume.iter().flat_map(|interrupted| &interrupted.parts);
         parts
             .map(|part| RunPart {
                 recording: directory.join(&part.recording),
@@ -337,25 +344,25 @@ impl PreparedRun<'_> {
         session: &Session<'_>,
         recorder: Recorder,
         pace: Pace<'_>,
-    ) -> (Ended, Result<(), SessionError>, Option<String>) {
+    ) -> (RunTermination, Result<(), SessionError>, Option<String>) {
         let mut planned = PlanSteps::new(&self.plan);
         let mut missing;
-        // A resumed run uses its unchanged plan, or replays its data.
+        // A resumed run uses its unchanged plan, or replays its data if later steps depend on them.
         let resumes = self.request.resume.as_ref();
         let replayed = resumes.filter(|_| depends_on_readings(self.request.campaign));
         let by_plan = resumes.filter(|_| replayed.is_none());
-        // The soak data apply to the whole run.
+        // A recorded soak applies to the whole run, so a resumed run does not repeat it.
         let without_soak;
         let mut campaign = self.request.campaign;
-        if resumes.is_some_and(BrokenOff::soaked) {
+        if resumes.is_some_and(InterruptedRun::has_soak) {
             without_soak = Campaign { zero: None, ..campaign.clone() };
             campaign = &without_soak;
         }
         let steps: &mut dyn StepSource = match (&mut self.scripted, by_plan) {
             (Some(scripted), _) => scripted,
-            (None, Some(broken_off)) => {
-                let saved = broken_off.saved();
-                let note = broken_off.summary(campaign, &self.plan, &saved);
+            (None, Some(interrupted)) => {
+                let saved = interrupted.saved();
+                let note = interrupted.summary(campaign, &self.plan, &saved);
                 missing = MissingSteps::new(&self.plan, &saved, note);
                 &mut missing
             }
@@ -370,39 +377,43 @@ impl PreparedRun<'_> {
                 &mut search
             }
         };
-        let mut teller = Teller {
+        let mut forwarder = EventForwarder {
             on_event: session.on_event,
             steps: self.plan.steps.len(),
             duration_s: soak_s(campaign) + self.plan.duration_s(),
         };
         let (model, backend) = (&self.model, self.sources.backend.as_mut());
         let (end, drifted, recorder) = std::thread::scope(|scope| {
-            let begin = || Estimates::begin(scope, identification(campaign), session.on_event);
-            let mut estimates = session.estimates.then(begin);
+            let start = || StepEstimator::start(scope, identification(campaign), session.on_event);
+            let mut estimates = session.estimates.then(start);
             let mut recorder = match pace.each_sample {
-                true => Placed::ThreadedObserver(ThreadedObserver::begin(scope, recorder)),
-                false => Placed::Here(recorder),
+                true => ObserverThread::Separate(ThreadedObserver::start(scope, recorder)),
+                false => ObserverThread::Calling(recorder),
             };
-            let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut teller];
+            let mut observers: Vec<&mut dyn RunObserver> = vec![recorder.observer(), &mut forwarder];
             observers.extend(estimates.as_mut().map(|estimates| estimates as &mut dyn RunObserver));
-            let go = |steps: &mut dyn StepSource| {
-                going_on(replayed, steps, |steps| {
+            let run_steps = |steps: &mut dyn StepSource| {
+                drive_resumed(replayed, steps, |steps| {
                     drive_paced(campaign, model, steps, backend, &mut observers, pace)
                 })
             };
-            let (end, drifted) = match drift_watch(campaign, steps) {
-                Ok(mut watch) => (go(&mut watch), watch.ended_by_drift().map(str::to_owned)),
-                Err(steps) => (go(steps), None),
+            let (end, drifted) = match campaign.on_drift {
+                Some(on_drift) => {
+                    let sensors = declared(campaign, &ChannelMap::native());
+                    let mut watch = DriftWatch::new(steps, on_drift, sensors);
+                    (run_steps(&mut watch), watch.ended_by_drift().map(str::to_owned))
+                }
+                None => (run_steps(steps), None),
             };
             let (recorder, recorded) = recorder.end();
             // A write error at the very end is reported after the run.
             let end = end.and_then(|end| recorded.map(|()| end).map_err(RunError::from));
             (end, drifted, recorder)
         });
-        let doubt = doubt(&end);
-        let end = Ended::of(end, drifted);
+        let lockout = lockout_reason(&end);
+        let end = RunTermination::from_runner(end, drifted);
         let finished = recorder.finish(end.ending()).map_err(SessionError::from);
-        (end, finished, doubt)
+        (end, finished, lockout)
     }
 
     /// The plan as executed; a script's is stored next to its forecast.
@@ -426,9 +437,8 @@ impl PreparedRun<'_> {
     }
 }
 
-/// Moves earlier results of this run, complete or partial, into a separate directory. The newest results stay at the top and nothing is
-/// overwritten.
-fn set_aside(run: &Path) -> Result<(), SessionError> {
+/// Moves earlier results of this run, complete or partial, into the subdirectory `results-N`, so that new results overwrite nothing.
+fn move_earlier_results(run: &Path) -> Result<(), SessionError> {
     let entries = std::fs::read_dir(run).map_err(SessionError::file("read", run))?;
     let results: Vec<_> = entries
         .filter_map(Result::ok)

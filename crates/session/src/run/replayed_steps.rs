@@ -1,9 +1,10 @@
-//! Resumes a run whose steps depend on measured data. The recorded data are replayed to the step source, which returns to its earlier state.
+//! Resumes a run whose steps depend on measured data, by replaying the recorded data to the step source.
 //!
-//! The source sees one continuous time over all parts. Equal calls give equal steps, and each step is checked against the recorded one.
+//! The source sees one continuous time over all parts of the run. It makes the same steps as before, because it gets the same calls; each step is
+//! compared with the recorded one.
 
 use crate::SessionError;
-use crate::recording::resume::{AGAIN_FROM, BrokenOff};
+use crate::recording::resume::{FIRST_REPEAT_INDEX, InterruptedRun};
 use mapper_core::{
     ChannelColumn, ElementColumn, Event, PlanStep, Recording, SampleBatch, Series, StepKind, StepMarker,
     step_number,
@@ -12,13 +13,13 @@ use mapper_recording::{ChannelMap, ReadOptions, read_recording};
 use mapper_runner::{RunEnd, RunError, StepSource, StepSourceError};
 
 /// Length of a replayed batch, s, as in the original polls.
-const PIECE_S: f64 = 1.0;
+const BATCH_S: f64 = 1.0;
 /// Gap between two parts of a run in the source's time, s.
-const BETWEEN_S: f64 = 1.0;
+const PART_GAP_S: f64 = 1.0;
 /// Half the time resolution of a recording, plus the rounding error of summed sample times, s.
-const ROUNDED_S: f64 = 1e-6;
+const TIME_TOLERANCE_S: f64 = 1e-6;
 /// Relative tolerance for equal targets: the resolution of a recording.
-const SAME_RATIO: f64 = 1e-9;
+const TARGET_TOLERANCE_RATIO: f64 = 1e-9;
 
 /// A step source after replay, from the first missing step on.
 struct ResumedSteps<'a> {
@@ -27,19 +28,19 @@ struct ResumedSteps<'a> {
     repeat: Option<PlanStep>,
     repeating: bool,
     /// Offset from run time to the source's time, s.
-    later_s: f64,
+    offset_s: f64,
     notes: Vec<String>,
 }
 
-/// Runs the steps; those of an interrupted run continue from its last state.
-pub(crate) fn going_on(
-    broken_off: Option<&BrokenOff>,
+/// Runs the steps with `drive`. With an interrupted run, its recorded data are replayed to the steps first.
+pub(crate) fn drive_resumed(
+    interrupted: Option<&InterruptedRun>,
     steps: &mut dyn StepSource,
     drive: impl FnOnce(&mut dyn StepSource) -> Result<RunEnd, RunError>,
 ) -> Result<RunEnd, RunError> {
-    let Some(broken_off) = broken_off else { return drive(steps) };
-    let mut goes_on = ResumedSteps::after(broken_off, steps).map_err(StepSourceError::of)?;
-    drive(&mut goes_on)
+    let Some(interrupted) = interrupted else { return drive(steps) };
+    let mut resumed = ResumedSteps::replay(interrupted, steps).map_err(StepSourceError::of)?;
+    drive(&mut resumed)
 }
 
 impl<'a> ResumedSteps<'a> {
@@ -47,40 +48,40 @@ impl<'a> ResumedSteps<'a> {
     ///
     /// # Errors
     /// [`SessionError::NotResumable`] if the source now yields another step than the recorded one; otherwise read errors.
-    fn after(broken_off: &BrokenOff, inner: &'a mut dyn StepSource) -> Result<Self, SessionError> {
-        let mut replay = Replay { inner, broken_off, later_s: 0.0, last: None, replayed_steps: 0 };
-        for part in &broken_off.parts {
-            let path = broken_off.directory.join(&part.recording);
-            let holds = |index: usize| index < AGAIN_FROM && part.saved.contains(&index);
+    fn replay(interrupted: &InterruptedRun, inner: &'a mut dyn StepSource) -> Result<Self, SessionError> {
+        let mut replay = Replay { inner, interrupted, offset_s: 0.0, last: None, replayed_steps: 0 };
+        for part in &interrupted.parts {
+            let path = interrupted.directory.join(&part.recording);
+            let holds = |index: usize| index < FIRST_REPEAT_INDEX && part.saved.contains(&index);
             if !part.saved.iter().any(|index| holds(*index)) {
                 continue;
             }
             let read = read_recording(&path, &ChannelMap::native(), &ReadOptions::default())?;
             let steps: Vec<StepMarker> =
                 read.recording.steps.iter().filter(|step| holds(step.index)).copied().collect();
-            replay.part(read.recording, &steps)?;
+            replay.replay_part(read.recording, &steps)?;
         }
-        let Replay { inner, later_s, last, replayed_steps, .. } = replay;
+        let Replay { inner, offset_s, last, replayed_steps, .. } = replay;
         // These notes are already in the recordings.
         inner.take_notes();
         let repeat = last.map(|last: PlanStep| PlanStep {
-            index: AGAIN_FROM + broken_off.parts.len(),
+            index: FIRST_REPEAT_INDEX + interrupted.parts.len(),
             kind: StepKind::Repeat,
             from: None,
             ..last
         });
         let note = format!(
-            "resumed: {} steps hold, and were replayed to the source of the steps; {}it is unknown how far the housings have cooled, so they \
-             are warmed up again{}",
+            "resumed: {} recorded steps are kept and were replayed to the source of the steps; {}the housings are warmed up again, because they \
+             may have cooled{}",
             replayed_steps,
-            if broken_off.soaked() { "the soak is not repeated; " } else { "" },
-            if repeat.is_some() { ", and the last step that holds is made once more" } else { "" },
+            if interrupted.has_soak() { "the soak is not repeated; " } else { "" },
+            if repeat.is_some() { ", and the last recorded step is repeated" } else { "" },
         );
-        Ok(ResumedSteps { inner, repeat, repeating: false, later_s, notes: vec![note] })
+        Ok(ResumedSteps { inner, repeat, repeating: false, offset_s, notes: vec![note] })
     }
 
     fn shifted(&self, marker: &StepMarker) -> StepMarker {
-        StepMarker { start_s: marker.start_s + self.later_s, end_s: marker.end_s + self.later_s, ..*marker }
+        StepMarker { start_s: marker.start_s + self.offset_s, end_s: marker.end_s + self.offset_s, ..*marker }
     }
 }
 
@@ -111,8 +112,8 @@ impl StepSource for ResumedSteps<'_> {
 
     fn on_batch(&mut self, batch: &SampleBatch) -> bool {
         let mut shifted = batch.clone();
-        shifted.t_s.iter_mut().for_each(|t_s| *t_s += self.later_s);
-        shifted.events.iter_mut().for_each(|event| event.t_s += self.later_s);
+        shifted.t_s.iter_mut().for_each(|t_s| *t_s += self.offset_s);
+        shifted.events.iter_mut().for_each(|event| event.t_s += self.offset_s);
         let ends = self.inner.on_batch(&shifted);
         ends && !self.repeating
     }
@@ -137,46 +138,44 @@ impl StepSource for ResumedSteps<'_> {
 /// A step source during replay.
 struct Replay<'a, 'b> {
     inner: &'a mut dyn StepSource,
-    broken_off: &'b BrokenOff,
-    later_s: f64,
+    interrupted: &'b InterruptedRun,
+    offset_s: f64,
     last: Option<PlanStep>,
     replayed_steps: usize,
 }
 
 impl Replay<'_, '_> {
-    fn part(&mut self, recording: Recording, steps: &[StepMarker]) -> Result<(), SessionError> {
-        let mut pieces = Pieces::new(recording, self.later_s);
+    fn replay_part(&mut self, recording: Recording, steps: &[StepMarker]) -> Result<(), SessionError> {
+        let mut batches = BatchReplay::new(recording, self.offset_s);
         for step in steps {
             let shifted = StepMarker {
-                start_s: step.start_s + self.later_s,
-                end_s: step.end_s + self.later_s,
+                start_s: step.start_s + self.offset_s,
+                end_s: step.end_s + self.offset_s,
                 ..*step
             };
             // Before the first step, the source has already handed out its step, as in the original run.
-            self.handed_out(&shifted)?;
-            pieces.replay_until(self.inner, shifted.start_s);
+            self.advance_to(&shifted)?;
+            batches.replay_until(self.inner, shifted.start_s);
             self.inner.begins(&shifted);
-            pieces.replay_until(self.inner, shifted.end_s);
-            self.inner.after_step(&shifted).map_err(|error| self.refused(error.to_string()))?;
+            batches.replay_until(self.inner, shifted.end_s);
+            self.inner.after_step(&shifted).map_err(|error| self.mismatch(error.to_string()))?;
             self.replayed_steps += 1;
         }
         if let Some(last) = steps.last() {
-            self.later_s += last.end_s + BETWEEN_S;
+            self.offset_s += last.end_s + PART_GAP_S;
         }
         Ok(())
     }
 
-    /// Makes the source hand out the recorded step. Steps that a guard skipped come before it.
-    fn handed_out(&mut self, recorded: &StepMarker) -> Result<(), SessionError> {
+    /// Advances the source to the recorded step. Steps before it were skipped by a guard, and are skipped again.
+    fn advance_to(&mut self, recorded: &StepMarker) -> Result<(), SessionError> {
         loop {
-            let next = self.inner.next_step().map_err(|error| self.refused(error.to_string()))?;
+            let next = self.inner.next_step().map_err(|error| self.mismatch(error.to_string()))?;
             let Some(next) = next else {
-                return Err(
-                    self.refused(format!("there is no step {} any more", step_number(recorded.index)))
-                );
+                return Err(self.mismatch(format!("step {} no longer exists", step_number(recorded.index))));
             };
             if next.index < recorded.index {
-                let left_out = StepMarker {
+                let skipped_step = StepMarker {
                     index: next.index,
                     kind: next.kind,
                     from: next.from,
@@ -184,11 +183,11 @@ impl Replay<'_, '_> {
                     end_s: recorded.start_s,
                     ..*recorded
                 };
-                self.inner.begins(&left_out);
-                self.inner.skipped(&left_out).map_err(|error| self.refused(error.to_string()))?;
+                self.inner.begins(&skipped_step);
+                self.inner.skipped(&skipped_step).map_err(|error| self.mismatch(error.to_string()))?;
                 continue;
             }
-            let near = |a: f64, b: f64| (a - b).abs() <= SAME_RATIO * a.abs().max(b.abs());
+            let near = |a: f64, b: f64| (a - b).abs() <= TARGET_TOLERANCE_RATIO * a.abs().max(b.abs());
             let same = next.index == recorded.index
                 && next.kind == recorded.kind
                 && recorded.to.is_some_and(|to| {
@@ -197,7 +196,7 @@ impl Replay<'_, '_> {
                 });
             if !same {
                 let to = recorded.to.unwrap_or(next.to);
-                return Err(self.refused(format!(
+                return Err(self.mismatch(format!(
                     "step {} led to {:.1} rpm at an opening of {:.4} and would now lead to {:.1} rpm at {:.4}",
                     step_number(recorded.index),
                     to.speed_rpm,
@@ -214,16 +213,16 @@ impl Replay<'_, '_> {
         }
     }
 
-    fn refused(&self, what: String) -> SessionError {
+    fn mismatch(&self, difference: String) -> SessionError {
         let why = format!(
-            "from what was recorded its steps come out otherwise: {what}; `mapper identify` makes the map of what there is"
+            "replaying the recorded data gives other steps: {difference}; identify the recorded steps instead"
         );
-        SessionError::NotResumable { run: self.broken_off.directory.clone(), why }
+        SessionError::NotResumable { run: self.interrupted.directory.clone(), why }
     }
 }
 
 /// A recording, divided into batches as in the original run.
-struct Pieces {
+struct BatchReplay {
     /// The recording in the source's time.
     recording: Recording,
     /// Times of all channels.
@@ -231,18 +230,18 @@ struct Pieces {
     /// Read position in each series.
     cursors: Vec<usize>,
     /// Number of replayed samples and events.
-    done: usize,
-    events_done: usize,
+    replayed_samples: usize,
+    replayed_events: usize,
     until_s: f64,
 }
 
-impl Pieces {
-    fn new(mut recording: Recording, later_s: f64) -> Self {
+impl BatchReplay {
+    fn new(mut recording: Recording, offset_s: f64) -> Self {
         let series = recording.series.values_mut().chain(recording.elements.values_mut());
         for t_s in series.flat_map(|series| &mut series.t_s) {
-            *t_s += later_s;
+            *t_s += offset_s;
         }
-        recording.events.iter_mut().for_each(|event| event.t_s += later_s);
+        recording.events.iter_mut().for_each(|event| event.t_s += offset_s);
         // Most channels are sampled together.
         let mut clocks: Vec<&[f64]> = Vec::new();
         for series in recording.series.values().chain(recording.elements.values()) {
@@ -254,17 +253,17 @@ impl Pieces {
         t_s.sort_by(f64::total_cmp);
         t_s.dedup();
         let cursors = vec![0; recording.series.len() + recording.elements.len()];
-        Pieces { recording, t_s, cursors, done: 0, events_done: 0, until_s: later_s }
+        BatchReplay { recording, t_s, cursors, replayed_samples: 0, replayed_events: 0, until_s: offset_s }
     }
 
     /// Replays all data up to a time, in batches of one second.
     fn replay_until(&mut self, source: &mut dyn StepSource, until_s: f64) {
         while self.until_s < until_s {
-            let piece_s = (self.until_s + PIECE_S).min(until_s);
+            let batch_end_s = (self.until_s + BATCH_S).min(until_s);
             // A recording rounds times to whole nanoseconds.
-            let end_s = piece_s + ROUNDED_S;
-            let to = self.t_s.partition_point(|t_s| *t_s <= end_s).max(self.done);
-            let t_s = self.t_s.get(self.done..to).unwrap_or_default().to_vec();
+            let end_s = batch_end_s + TIME_TOLERANCE_S;
+            let to = self.t_s.partition_point(|t_s| *t_s <= end_s).max(self.replayed_samples);
+            let t_s = self.t_s.get(self.replayed_samples..to).unwrap_or_default().to_vec();
             // Passes through each series once for all batches.
             let values = |(series, at): (&Series, &mut usize)| -> Vec<f64> {
                 let value = |t_s: &f64| {
@@ -290,10 +289,11 @@ impl Pieces {
             });
             let elements = elements.collect();
             let due = |event: &Event| event.t_s <= end_s;
-            let events_to = self.recording.events.partition_point(due).max(self.events_done);
-            let events = self.recording.events.get(self.events_done..events_to).unwrap_or_default().to_vec();
+            let events_to = self.recording.events.partition_point(due).max(self.replayed_events);
+            let events =
+                self.recording.events.get(self.replayed_events..events_to).unwrap_or_default().to_vec();
             let batch = SampleBatch {
-                first_sequence: self.done as u64,
+                first_sequence: self.replayed_samples as u64,
                 columns,
                 elements,
                 events,
@@ -302,7 +302,7 @@ impl Pieces {
             };
             // The return value is not needed: the end of the step is already recorded.
             source.on_batch(&batch);
-            (self.done, self.events_done, self.until_s) = (to, events_to, piece_s);
+            (self.replayed_samples, self.replayed_events, self.until_s) = (to, events_to, batch_end_s);
         }
     }
 }

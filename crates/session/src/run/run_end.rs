@@ -5,7 +5,7 @@ use mapper_runner::{RunEnd, RunError};
 
 /// How a run ended.
 #[derive(Debug)]
-pub enum Ended {
+pub enum RunTermination {
     /// Every step was executed.
     Completed,
     /// Drift was detected, and the campaign asks to stop in that case.
@@ -29,32 +29,34 @@ pub enum Ended {
     Failed(RunError),
 }
 
-impl Ended {
+impl RunTermination {
     /// Combines the runner's result with that of the drift watch.
-    pub(crate) fn of(end: Result<RunEnd, RunError>, drifted: Option<String>) -> Self {
+    pub(crate) fn from_runner(end: Result<RunEnd, RunError>, drifted: Option<String>) -> Self {
         match (end, drifted) {
-            (Ok(RunEnd::Completed), None) => Ended::Completed,
-            (Ok(RunEnd::Completed), Some(reason)) => Ended::Drifted { reason },
-            (Ok(RunEnd::Interrupted { t_s }), _) => Ended::Interrupted { t_s },
-            (Ok(RunEnd::Tripped(trip)), _) => Ended::Tripped { t_s: trip.t_s, reason: trip.reason },
-            (Err(error), _) => Ended::Failed(error),
+            (Ok(RunEnd::Completed), None) => RunTermination::Completed,
+            (Ok(RunEnd::Completed), Some(reason)) => RunTermination::Drifted { reason },
+            (Ok(RunEnd::Interrupted { t_s }), _) => RunTermination::Interrupted { t_s },
+            (Ok(RunEnd::Tripped(trip)), _) => RunTermination::Tripped { t_s: trip.t_s, reason: trip.reason },
+            (Err(error), _) => RunTermination::Failed(error),
         }
     }
 
     /// The same as data for files.
     pub fn ending(&self) -> RunEnding {
         match self {
-            Ended::Completed => RunEnding::Completed,
-            Ended::Drifted { reason } => RunEnding::Drifted { reason: reason.clone() },
-            Ended::Interrupted { t_s } => RunEnding::Interrupted { t_s: *t_s },
-            Ended::Tripped { t_s, reason } => RunEnding::Tripped { t_s: *t_s, reason: reason.clone() },
-            Ended::Failed(error) => RunEnding::Failed { reason: error.to_string() },
+            RunTermination::Completed => RunEnding::Completed,
+            RunTermination::Drifted { reason } => RunEnding::Drifted { reason: reason.clone() },
+            RunTermination::Interrupted { t_s } => RunEnding::Interrupted { t_s: *t_s },
+            RunTermination::Tripped { t_s, reason } => {
+                RunEnding::Tripped { t_s: *t_s, reason: reason.clone() }
+            }
+            RunTermination::Failed(error) => RunEnding::Failed { reason: error.to_string() },
         }
     }
 }
 
-/// Why the rig's state is unknown, or must be inspected before the next run.
-pub(crate) fn doubt(end: &Result<RunEnd, RunError>) -> Option<String> {
+/// Why the rig must be locked out: its state is unknown, or it must be inspected before the next run. `None` if the next run may start.
+pub(crate) fn lockout_reason(end: &Result<RunEnd, RunError>) -> Option<String> {
     match end {
         Ok(RunEnd::Tripped(trip)) if trip.reaction == Reaction::Latch => Some(trip.reason.clone()),
         Err(error) if error.leaves_doubt() => Some(error.to_string()),

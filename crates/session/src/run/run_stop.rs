@@ -17,13 +17,13 @@ pub enum Phase {
 
 /// Reaction to a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Signalled {
+pub enum SignalResponse {
     /// A stop flag for the run was set.
-    Raised,
-    /// The run continues, and the user gets a message.
-    Answered,
-    /// The process may end.
-    Ends,
+    StopRequested,
+    /// The results are still being written; the user gets a message.
+    Deferred,
+    /// The process may exit.
+    MayExit,
 }
 
 /// Stop flags of a run.
@@ -34,8 +34,8 @@ pub struct RunStop {
     /// Stop now: Ctrl-C twice, SIGTERM and other signals. Nothing ends the process before the rig is safe.
     pub now: Arc<AtomicBool>,
     phase: Arc<AtomicU8>,
-    /// Whether a signal has already arrived while results are made.
-    answered: Arc<AtomicBool>,
+    /// Whether a signal has already arrived while results are written.
+    deferred: Arc<AtomicBool>,
 }
 
 impl Default for RunStop {
@@ -44,7 +44,7 @@ impl Default for RunStop {
             after_step: Arc::default(),
             now: Arc::default(),
             phase: Arc::new(AtomicU8::new(Phase::Planning as u8)),
-            answered: Arc::default(),
+            deferred: Arc::default(),
         }
     }
 }
@@ -56,23 +56,23 @@ impl RunStop {
     }
 
     /// Whether the rig is in use, so that the process must not be suspended.
-    pub fn has_the_rig(&self) -> bool {
+    pub fn uses_rig(&self) -> bool {
         self.phase.load(Ordering::SeqCst) == Phase::Rig as u8
     }
 
     /// Handles a signal; `gentle`: the rig may finish its step first.
-    pub fn signalled(&self, gentle: bool) -> Signalled {
+    pub fn handle_signal(&self, gentle: bool) -> SignalResponse {
         let phase = self.phase.load(Ordering::SeqCst);
         if phase == Phase::Rig as u8 {
             let again = self.after_step.swap(true, Ordering::SeqCst);
             if again || !gentle {
                 self.now.store(true, Ordering::SeqCst);
             }
-            Signalled::Raised
-        } else if phase == Phase::Results as u8 && !self.answered.swap(true, Ordering::SeqCst) {
-            Signalled::Answered
+            SignalResponse::StopRequested
+        } else if phase == Phase::Results as u8 && !self.deferred.swap(true, Ordering::SeqCst) {
+            SignalResponse::Deferred
         } else {
-            Signalled::Ends
+            SignalResponse::MayExit
         }
     }
 }
@@ -85,17 +85,17 @@ mod tests {
     fn nothing_ends_the_process_while_the_rig_is_in_use() {
         for gentle in [true, false] {
             let stop = RunStop::default();
-            assert_eq!(stop.signalled(gentle), Signalled::Ends);
+            assert_eq!(stop.handle_signal(gentle), SignalResponse::MayExit);
             stop.enter(Phase::Rig);
             for again in [false, true] {
-                assert_eq!(stop.signalled(gentle), Signalled::Raised);
+                assert_eq!(stop.handle_signal(gentle), SignalResponse::StopRequested);
                 assert!(stop.after_step.load(Ordering::SeqCst));
                 assert_eq!(stop.now.load(Ordering::SeqCst), again || !gentle);
             }
             stop.enter(Phase::Results);
             assert_eq!(
-                [stop.signalled(gentle), stop.signalled(gentle)],
-                [Signalled::Answered, Signalled::Ends]
+                [stop.handle_signal(gentle), stop.handle_signal(gentle)],
+                [SignalResponse::Deferred, SignalResponse::MayExit]
             );
         }
     }

@@ -1,4 +1,4 @@
-//! What can go wrong with blind cases.
+//! Errors of blind cases.
 
 use mapper_campaign::NominalTableError;
 use mapper_physics::rig::effect::EffectError;
@@ -19,7 +19,7 @@ pub enum BlindError {
         source: std::io::Error,
     },
     /// A file does not hold what it should.
-    #[error("{} does not hold {what}: {source}", path.display())]
+    #[error("{} does not contain {what}: {source}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
@@ -49,7 +49,7 @@ pub enum BlindError {
         /// The hash it had.
         expected: String,
     },
-    /// The lab stopped, or what it gave cannot be kept.
+    /// The lab stopped, or its data cannot be stored.
     #[error("case {name}: {source}")]
     Run {
         /// The case.
@@ -78,8 +78,8 @@ pub enum BlindError {
         /// Why.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// More cases than anyone needs.
-    #[error("{cases} cases were asked for; between 1 and {most} can be made")]
+    /// Too many cases.
+    #[error("{cases} cases were requested; 1 to {most} are allowed")]
     Cases {
         /// Number asked for.
         cases: usize,

@@ -1,7 +1,7 @@
 //! The check of the gap diagnosis on withheld data: draws cases on the virtual lab, seals their causes, scores diagnoses.
 //!
-//! [`make`] writes recordings and sealed answers, [`score`](scoring::score::score) opens them. What diagnoses is not this crate's
-//! business: it sees recordings alone. The causes reserved as "outside" live here and are not part of the catalogue.
+//! [`make`] writes recordings and sealed answers, [`score`](scoring::score::score) opens them. The diagnosis itself runs separately and
+//! gets only the recordings. The causes reserved as "outside" are defined here and are not part of the catalogue.
 
 pub mod calibration;
 mod cases;

@@ -1,4 +1,4 @@
-//! What can stop the reproduction.
+//! Errors of the reproduction.
 
 use mapper_identify::{IdentifyError, StepError};
 use mapper_physics::simulation::simulate::SimulationError;
@@ -20,6 +20,6 @@ pub enum ReproduceError {
     #[error(transparent)]
     Step(#[from] StepError),
     /// A run holds no step or no sample in the window.
-    #[error("a simulated run holds nothing to identify")]
+    #[error("a simulated run has no step or no sample in the window")]
     NoStep,
 }

@@ -50,7 +50,7 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// A statement of the paper and what came out here.
+/// A statement of the paper, and the result here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Statement {
     /// What the paper states.

@@ -1,4 +1,4 @@
-//! The paper's simulated figures redone on the virtual laboratory's model, each compared with the paper's statements.
+//! Recomputes the simulated figures of the paper with the model of the virtual lab, and compares each with the statements of the paper.
 //!
 //! [`reproduce`] gives data and pictures. Nothing depends on time or machine:
 //! the same program gives the same bytes.

@@ -8,7 +8,7 @@ use mapper_numerics::statistics;
 
 /// The paper's window: 100 s from 10 s after the jump.
 pub(crate) const WINDOW: WindowRule = WindowRule::Fixed { start_s: 10.0, end_s: 110.0 };
-/// How long a run has to last for it, s.
+/// Minimum duration of a run for it, s.
 pub(crate) const RUN_S: f64 = 110.0;
 
 /// The dynamic method with an assumed alpha_A.
@@ -16,7 +16,7 @@ pub(crate) fn assuming(alpha_area_ratio: f64) -> IdentifyConfig {
     IdentifyConfig { window: WINDOW, alpha_area_ratio, ..IdentifyConfig::default() }
 }
 
-/// What was identified and what the model used.
+/// Identified and true values of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcome {
     pub(crate) jump: Jump,
@@ -32,22 +32,22 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Identified less mean model efficiency, points; `None` if the method failed.
+    /// Identified minus mean model efficiency, points; `None` if the method failed.
     pub(crate) fn eta_error_points(&self) -> Option<f64> {
         self.point.eta.map(|eta| 100.0 * (eta - self.eta_mean))
     }
 
-    /// Identified less final model efficiency, points.
+    /// Identified minus final model efficiency, points.
     pub(crate) fn eta_end_error_points(&self) -> Option<f64> {
         self.point.eta.map(|eta| 100.0 * (eta - self.eta_end))
     }
 
-    /// Identified h over the mean model h, less 1, %.
+    /// Identified h over the mean model h, minus 1, %.
     pub(crate) fn h_error_percent(&self) -> Option<f64> {
         self.point.h_w_m2k.map(|h| 100.0 * (h / self.h_mean_w_m2k - 1.0))
     }
 
-    /// Identified h over the final model h, less 1, %.
+    /// Identified h over the final model h, minus 1, %.
     pub(crate) fn h_end_error_percent(&self) -> Option<f64> {
         self.point.h_w_m2k.map(|h| 100.0 * (h / self.h_end_w_m2k - 1.0))
     }

@@ -1,4 +1,4 @@
-//! What the pictures have in common.
+//! Common parts of the pictures.
 
 use crate::reproduction::lab::JUMPS;
 use crate::reproduction::outcome::Outcome;

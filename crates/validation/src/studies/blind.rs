@@ -6,7 +6,7 @@ use crate::blind::{
 };
 use crate::studies::error::StudyError;
 use crate::studies::source::CampaignSource;
-use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
+use mapper_fleet::{Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError};
 use mapper_recording::ChannelMap;
 use mapper_session::{Recorded, Registry, Session, json_text};
 use schemars::JsonSchema;
@@ -78,7 +78,7 @@ impl Kind for Blind<'_> {
 
     fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
         let file: BlindStudy = study.read()?;
-        let (campaign, nominal) = CampaignSource::read(&study.beside(&file.campaign), self.0)?;
+        let (campaign, nominal) = CampaignSource::read(&study.sibling_path(&file.campaign), self.0)?;
         let sigma_range = file.sigmas.unwrap_or(SIGMA_RANGE);
         if !(0.0 < sigma_range[0] && sigma_range[0] <= sigma_range[1] && sigma_range[1].is_finite()) {
             let message = format!("{} to {} is not a range of lengths", sigma_range[0], sigma_range[1]);
@@ -107,7 +107,7 @@ impl Kind for Blind<'_> {
         })
     }
 
-    fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError> {
+    fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError> {
         let BlindItem { campaign, case, laboratory } = BlindItem::deserialize(payload)?;
         let campaign = campaign.campaign()?;
         let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;

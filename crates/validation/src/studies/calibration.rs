@@ -6,7 +6,7 @@ use crate::blind::{Case, StoredCase};
 use crate::studies::error::StudyError;
 use crate::studies::reliability_picture::reliability_svg;
 use crate::studies::source::CampaignSource;
-use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
+use mapper_fleet::{Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError};
 use mapper_session::{Registry, json_text};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,7 +61,7 @@ impl Kind for Calibration<'_> {
 
     fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
         let file: CalibrationStudy = study.read()?;
-        let path = study.beside(&file.campaign);
+        let path = study.sibling_path(&file.campaign);
         let (campaign, nominal) = CampaignSource::read(&path, self.0)?;
         let plan = Plan { seed: file.seed, nulls: file.nulls, others: file.cases };
         let drawn = cases(&nominal, &self.0.effects, &plan).map_err(FleetError::kind)?;
@@ -75,7 +75,7 @@ impl Kind for Calibration<'_> {
         Ok(Drafts { items, settings })
     }
 
-    fn work(&self, payload: &Value, _: At<'_>) -> Result<String, WorkError> {
+    fn work(&self, payload: &Value, _: WorkContext<'_>) -> Result<String, WorkError> {
         let CalibrationItem { campaign, case } = CalibrationItem::deserialize(payload)?;
         let campaign = campaign.campaign()?;
         let case = case.case(&self.0.effects).map_err(StudyError::Cause)?;

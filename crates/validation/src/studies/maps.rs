@@ -4,7 +4,7 @@
 use crate::studies::error::StudyError;
 use crate::studies::source::CampaignSource;
 use mapper_core::Method;
-use mapper_fleet::{At, Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkError};
+use mapper_fleet::{Draft, Drafts, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError};
 use mapper_session::{ErrorKind, NightlyRun, Registry, Session, SessionError, nominal_model};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,7 @@ impl Kind for Maps<'_> {
         let file: MapsStudy = study.read()?;
         let mut items = Vec::new();
         for path in &file.campaigns {
-            let (source, campaign) = CampaignSource::read(&study.beside(path), self.0)?;
+            let (source, campaign) = CampaignSource::read(&study.sibling_path(path), self.0)?;
             let own = campaign.identification.method;
             for seed in file.seeds.clone().unwrap_or_else(|| vec![campaign.seed]) {
                 let methods = file.methods.clone().unwrap_or_else(|| vec![own]);
@@ -73,7 +73,7 @@ impl Kind for Maps<'_> {
         Ok(Drafts { items, settings: Value::Null })
     }
 
-    fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError> {
+    fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError> {
         let MapsItem { campaign, seed, methods } = MapsItem::deserialize(payload)?;
         let campaign = campaign.campaign()?;
         let model = nominal_model(&campaign)?;

@@ -5,7 +5,9 @@ use crate::studies::program::program;
 use crate::studies::source::CampaignSource;
 use mapper_campaign::load_nightly;
 use mapper_core::Method;
-use mapper_fleet::{At, Draft, Drafts, Fleet, FleetError, Kind, Output, Results, StudyFile, WorkError};
+use mapper_fleet::{
+    Draft, Drafts, Fleet, FleetError, Kind, Output, Results, StudyFile, WorkContext, WorkError,
+};
 use mapper_history::RunRow;
 use mapper_session::{
     ErrorKind, NightlyRun, PreparedNight, Registry, Session, SessionError, Variant, json_text, nominal_model,
@@ -60,7 +62,7 @@ impl Kind for Nightly<'_> {
     }
 
     fn items(&self, study: &StudyFile) -> Result<Drafts, FleetError> {
-        let file = study.beside(&study.read::<NightlyStudy>()?.nightly);
+        let file = study.sibling_path(&study.read::<NightlyStudy>()?.nightly);
         let nightly = load_nightly(&file).map_err(FleetError::kind)?;
         let night = PreparedNight::new(&nightly).map_err(FleetError::kind)?;
         let mut sources = BTreeMap::new();
@@ -78,7 +80,7 @@ impl Kind for Nightly<'_> {
         Ok(Drafts { items, settings: json!({ "night": nightly.name }) })
     }
 
-    fn work(&self, payload: &Value, at: At<'_>) -> Result<String, WorkError> {
+    fn work(&self, payload: &Value, at: WorkContext<'_>) -> Result<String, WorkError> {
         let item = NightlyItem::deserialize(payload)?;
         let campaign = item.campaign.campaign()?;
         let model = nominal_model(&campaign)?;

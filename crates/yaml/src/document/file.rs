@@ -1,4 +1,4 @@
-//! Files from disk, never more of them than a limit.
+//! Reads files from disk up to a size limit.
 
 use crate::mistakes::finding::FindingKind;
 use crate::mistakes::findings::Findings;
@@ -10,7 +10,7 @@ use std::path::Path;
 /// Opens a plain file. A pipe or a device is not opened: reading it may hang or never end.
 ///
 /// # Errors
-/// What the system says; [`io::ErrorKind::InvalidInput`] with the remedy for anything but a file.
+/// The system's error; [`io::ErrorKind::InvalidInput`] with a remedy if it is not a file.
 pub fn open_file(path: &Path) -> io::Result<File> {
     let found = std::fs::metadata(path)?;
     let refused = |why: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, why));
@@ -26,10 +26,10 @@ fn is_descriptor(path: &Path) -> bool {
     ["/dev/stdin", "/dev/fd", "/proc/self/fd"].iter().any(|place| path.starts_with(place))
 }
 
-/// Reads a file without ever holding much more than `limit_bytes`, whatever the file claims to be.
+/// Reads a file of at most `limit_bytes`. Memory is bounded even if the file reports a wrong size.
 ///
 /// # Errors
-/// What the system says; [`io::ErrorKind::FileTooLarge`] for a file beyond the limit.
+/// The system's error; [`io::ErrorKind::FileTooLarge`] for a larger file.
 pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let file = if is_descriptor(path) { File::open(path)? } else { open_file(path)? };
@@ -46,7 +46,7 @@ pub fn read_limited(path: &Path, limit_bytes: usize) -> io::Result<Vec<u8>> {
 /// Reads a file as text.
 ///
 /// # Errors
-/// What the system says, as [`read_limited`]; inside, the one mistake of a file that is not UTF-8.
+/// As [`read_limited`]. The inner error is the mistake of a file that is not UTF-8.
 pub fn open(
     document: &'static Document,
     path: &Path,

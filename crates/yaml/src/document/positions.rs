@@ -1,8 +1,8 @@
-//! The place of every key and value of a YAML text, and the limits of what is read.
+//! Positions of all keys and values of a YAML text, and limits on its size.
 //!
-//! saphyr-parser reads the text once, event by event, so its depth is bounded here and not by the stack. serde_yaml, which
-//! gives no positions, reads the values afterwards from a text that passed. YAML that our files do not use and that would
-//! hide mistakes (anchors, aliases, merge keys, tags, several documents) is refused with its place.
+//! saphyr-parser delivers events, so that the nesting depth is limited here and not by the stack. serde_yaml gives no positions; it reads
+//! the values of a text that passed. YAML features that would hide mistakes (anchors, aliases, merge keys, tags, several documents) are
+//! rejected.
 
 use crate::document::path::Step;
 use crate::mistakes::finding::FindingKind;
@@ -19,7 +19,7 @@ const DEPTH_LIMIT: usize = 32;
 /// Maximum number of values that are read; the longest list of points a campaign's grid may have takes three each.
 const VALUE_LIMIT: usize = 100_000;
 
-/// Characters after a syntax error that libyaml may read to place it: its time grows with the square of the nesting.
+/// Number of characters after a syntax error that libyaml gets in order to locate it; its run time grows with the square of the nesting.
 const TAIL_LIMIT: usize = 1000;
 
 pub(crate) const SYNTAX_REMEDY: &str =
@@ -30,7 +30,7 @@ pub(crate) const SYNTAX_REMEDY: &str =
 pub(crate) struct Place {
     /// Byte range of the key; `None` for an item of a list.
     pub key: Option<Range<usize>>,
-    /// Byte range that a complaint about the value marks: a scalar itself, the key of a mapping or list.
+    /// Byte range that a finding about the value marks: the scalar itself, or the key of a mapping or list.
     pub value: Range<usize>,
 }
 
@@ -147,7 +147,7 @@ impl Walk<'_> {
         let known = serde_yaml::from_str::<IgnoredAny>(text.get(..end).unwrap_or_default());
         let placed = known.err().and_then(|error| {
             let place = self.source.byte_of_char(error.location()?.index());
-            // At the end it complains about the cut.
+            // At the end of the excerpt, the error is caused by the cut.
             (place < end).then(|| (place, error.to_string()))
         });
         let (at, reason) = placed.unwrap_or_else(|| (at, error.info().to_owned()));
@@ -291,7 +291,7 @@ impl Walk<'_> {
             }
         };
         self.places.list.push(place);
-        // Of two equal keys the last counts, as for serde_yaml.
+        // The last of two equal keys applies, as in serde_yaml.
         self.places.parts.insert((whole, step), index);
         Ok(index)
     }

@@ -34,7 +34,7 @@ pub fn read(source: Source) -> Result<(Tree, Notes), Findings> {
     match document.map_or(Ok(Value::Null), Value::deserialize) {
         Ok(value) => Ok((Tree { source, readable, value, places }, notes)),
         Err(error) => {
-            // Refused YAML may be the reason.
+            // A rejected YAML feature may be the cause; it has been noted already.
             if notes.is_empty() {
                 let at = error.location().map_or(0, |location| source.byte_of_char(location.index()));
                 let message = format!("this is not YAML: {error}");
@@ -80,8 +80,8 @@ impl Tree {
         self.get(steps).and_then(Value::as_object).into_iter().flatten().map(|(key, _)| key.as_str())
     }
 
-    /// The place for a complaint about a value: a scalar itself, the key of a mapping or list; its nearest parent if
-    /// the path leads nowhere.
+    /// Byte range for a finding about a value: the scalar itself, or the key of a mapping or list; the nearest parent if the path does not
+    /// exist.
     pub fn place(&self, steps: &[Step]) -> Range<usize> {
         self.places.nearest(steps).map_or(0..0, |(place, _)| place.value.clone())
     }
@@ -113,7 +113,7 @@ impl Tree {
         self.source.finding(kind, path_text(steps), place, message.into(), remedy.into())
     }
 
-    /// The text as a value of a type, once no mistakes were found.
+    /// Deserialises the text into a type. Call it only if no mistakes were found.
     ///
     /// # Errors
     /// The first value that does not fit, which the schema of the type allows.
@@ -131,7 +131,7 @@ impl Tree {
         })
     }
 
-    /// Shows asterisks in place of a value, of the same length so that all places stay valid.
+    /// Replaces a secret value by asterisks of the same length, so that all positions stay valid.
     pub fn hide(&mut self, steps: &[Step]) {
         let (place, text) = (self.place(steps), self.source.text());
         let hidden = |(at, byte): (usize, u8)| if place.contains(&at) && byte != b'\n' { b'*' } else { byte };

@@ -1,4 +1,4 @@
-//! One mistake of a file: what is wrong, where, and what would be right.
+//! One mistake of a file: what is wrong, where, and the remedy.
 
 use serde::Serialize;
 use std::ops::Range;
@@ -11,7 +11,7 @@ pub enum FindingKind {
     Syntax,
     /// YAML that our files do not use: anchors, aliases, merge keys, tags, several documents.
     Unsupported,
-    /// The file, its nesting or its grid is larger than anything sensible.
+    /// The file, its nesting or its grid is too large.
     TooLarge,
     /// A key that does not exist.
     UnknownKey,
@@ -35,9 +35,9 @@ pub enum FindingKind {
     MissingFile,
     /// A point that the machine cannot reach within the limits.
     Unreachable,
-    /// Values that no machine has, or of which nothing can come.
+    /// Values that no machine has, or that cannot give a result.
     Implausible,
-    /// Nothing that is wrong, but that is rarely meant: a warning.
+    /// A warning: valid, but rarely intended.
     Unusual,
 }
 
@@ -68,5 +68,5 @@ pub struct Finding {
     pub span: Range<usize>,
 }
 
-/// How many findings are shown; beyond that they are counted.
+/// Maximum number of findings shown; further ones are counted.
 pub(crate) const SHOWN_LIMIT: usize = 100;

@@ -2,7 +2,7 @@
 
 use crate::mistakes::finding::{Finding, SHOWN_LIMIT};
 
-/// Findings as they are collected; a hostile file must not fill the memory with them.
+/// Findings during the checks. Their number is limited, so that a hostile file cannot exhaust the memory.
 #[derive(Debug, Default)]
 pub struct Notes {
     list: Vec<Finding>,

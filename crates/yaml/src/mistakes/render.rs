@@ -44,7 +44,7 @@ impl Findings {
             out.push_str("\n\n");
         }
         let count = self.count();
-        // Warnings never occur together with mistakes: they are looked for in files without any.
+        // Warnings and mistakes never occur together: only files without mistakes are checked for warnings.
         let warnings = self.list.first().is_some_and(|finding| finding.kind.is_warning());
         let noun = match (warnings, count) {
             (false, 1) => "mistake",
@@ -87,8 +87,7 @@ impl Line {
     }
 }
 
-/// Without control characters: terminals obey them, and a file must not speak to them. Each is replaced by a character
-/// of the same length, which keeps the byte offsets.
+/// Replaces control characters, which a terminal would interpret, by characters of the same length, so that byte offsets stay valid.
 fn harmless(text: &str) -> String {
     let one = |c: char| match c {
         c if !c.is_control() || c == '\t' => c,
@@ -98,7 +97,7 @@ fn harmless(text: &str) -> String {
     text.chars().map(one).collect()
 }
 
-/// Broken into lines between words.
+/// Wraps text between words.
 fn wrapped(text: &str) -> String {
     let mut out = String::new();
     let mut width = 0;

@@ -1,6 +1,6 @@
-//! The values against the schema: every violation becomes a finding at its place.
+//! Turns every violation of the schema into a finding at its position.
 //!
-//! serde stops at the first mistake, and in untagged enums and at unknown keys it loses the place and the choices.
+//! serde would stop at the first mistake, and would lose position and choices for untagged enums and unknown keys.
 
 use crate::document::path::{Step, path_text};
 use crate::document::tree::Tree;
@@ -23,7 +23,7 @@ const UNKNOWN_KEYS_LIMIT: usize = 200;
 impl Schema {
     /// Checks everything the schema says, quantities included, and notes what is wrong.
     pub fn check(&self, tree: &Tree, notes: &mut Notes) {
-        // A refused value would be complained about a second time.
+        // A rejected value already has a finding.
         let refused = notes.list().iter().map(|finding| finding.span.start).collect();
         let mut check = Check { tree, notes, refused };
         for violation in violations(&self.value, tree.value()) {
@@ -91,7 +91,7 @@ impl Check<'_> {
     fn missing_key(&mut self, steps: &[Step], key: &str, schema: &Map<String, Value>) {
         let known = keys_of(schema);
         let is_mistyped = |there: &str| !known.contains(&there) && closest(there, &known) == Some(key);
-        // A mistyped key is one mistake, complained about as an unknown key.
+        // A mistyped key is already reported as an unknown key.
         if self.tree.keys(steps).take(UNKNOWN_KEYS_LIMIT).any(is_mistyped) {
             return;
         }
@@ -109,7 +109,7 @@ impl Check<'_> {
         self.note(steps, &complaint);
     }
 
-    /// Of several forms a value may take, complains about the one that was meant: the one of the same type.
+    /// For alternative forms, reports the violation of the form with the same type, which was probably intended.
     fn best_form(
         &mut self,
         steps: &[Step],

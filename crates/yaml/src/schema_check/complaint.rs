@@ -6,7 +6,7 @@ use crate::schema_check::rules::Rule;
 use crate::schema_check::suggestion::guess;
 use serde_json::{Map, Value};
 
-/// What is wrong with a value itself; `None` for rules about its keys and forms, which need their places.
+/// The message for a violated rule about a value itself; `None` for rules about keys and alternative forms, which need other positions.
 pub(crate) fn complain(rule: &Rule<'_>, schema: &Map<String, Value>, value: &Value) -> Option<Complaint> {
     let range = |message: String, remedy: String| Complaint { kind: FindingKind::Range, message, remedy };
     let bound = |message: &str, bound: String| {
@@ -127,7 +127,7 @@ pub(crate) fn example_of(schema: &Value) -> Option<String> {
     if let Some(example) = schema.get("examples").and_then(|list| list.get(0)) {
         return Some(example.as_str().map_or_else(|| example.to_string(), str::to_owned));
     }
-    // Of several forms the first that shows how.
+    // The first of several alternative forms that has an example.
     if let Some(forms) = schema.get("anyOf").and_then(Value::as_array) {
         return forms.iter().find_map(example_of);
     }

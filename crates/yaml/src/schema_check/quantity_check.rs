@@ -1,4 +1,4 @@
-//! A value against its kind and range, as the schema gives them.
+//! Checks a quantity against kind and range of its schema.
 
 use crate::mistakes::finding::FindingKind;
 use crate::units::{Kind, parse};

@@ -1,4 +1,4 @@
-//! A value against a JSON schema: every violation with its place.
+//! Checks a value against a JSON schema and returns every violation.
 //!
 //! The keywords are those that schemas made from our own types have; another keyword is a violation. Tests compare the
 //! verdict with that of a complete validator.
@@ -37,12 +37,12 @@ pub(crate) enum Rule<'a> {
     Repeated,
     UnknownKeys(Vec<&'a str>),
     MissingKey(&'a str),
-    /// None of several forms fits; what each of them demands in vain.
+    /// None of several alternative forms fits, with the violations of each.
     NoForm(Vec<Vec<Violation<'a>>>),
     /// More than one form fits of which one must.
     SeveralForms,
     Quantity(Complaint),
-    /// A keyword that is not checked: a fault of the program.
+    /// An unsupported keyword: a defect of the program.
     UnknownKeyword(&'a str),
 }
 
@@ -185,7 +185,7 @@ fn violated<'a>(
             (!names.contains(value)).then(|| Rule::Names(names.iter().filter_map(Value::as_str).collect()))
         }
         "const" => (argument != value).then(|| Rule::Names(argument.as_str().into_iter().collect())),
-        // Where there is a quantity, the pattern is for editors, and the parser decides.
+        // The pattern of a quantity is for editors only; the parser checks the value.
         "pattern" if !schema.contains_key("x-quantity") => {
             let pattern = regex_lite::Regex::new(argument.as_str()?).ok()?;
             value.as_str().is_some_and(|text| !pattern.is_match(text)).then_some(Rule::Pattern)
@@ -214,7 +214,7 @@ fn violated<'a>(
     }
 }
 
-/// A text that equal values share and others do not. Numbers are compared by value: 1 and 1.0 are equal.
+/// A text that is the same for equal values only. Numbers are compared by value: 1 and 1.0 are equal.
 fn key_of(item: &Value) -> String {
     match item.as_f64() {
         Some(number) => number.to_string(),

@@ -27,13 +27,13 @@ impl Schema {
 /// Quantities are strings; `x-quantity` names their kind, `x-min`, `x-max` and `x-above` their range.
 pub fn json_schema_of<T: JsonSchema>() -> Value {
     let mut settings = SchemaSettings::draft2020_12();
-    // Without `$ref` the check needs no second place to look at, and each key has its own description.
+    // Subschemas are inlined instead of `$ref`, so that each key has its own description.
     settings.inline_subschemas = true;
     settings.transforms.push(Box::new(WithoutNull));
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// A key that may be left out may still not be empty: takes `null` out of what `Option` allows.
+/// Removes `null` from optional values: a key may be omitted, but not be empty.
 #[derive(Debug, Clone)]
 struct WithoutNull;
 

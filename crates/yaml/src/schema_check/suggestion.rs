@@ -1,8 +1,8 @@
-//! What a mistyped word was meant to be.
+//! Suggestions for mistyped words.
 
-/// The candidate that a mistyped word was most likely meant to be: at most a third of its letters wrong, case aside.
+/// The candidate closest to a mistyped word, with at most a third of its letters wrong; case is ignored.
 pub fn closest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
-    // A word that long is not a slip of the finger, and the distance costs its square.
+    // A very long word is not a typing error, and the cost of the distance grows with its square.
     if word.len() > 64 {
         return None;
     }
@@ -12,7 +12,7 @@ pub fn closest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
         .map(|candidate| (strsim::osa_distance(&lower, &candidate.to_lowercase()), *candidate))
         .filter(|(distance, candidate)| {
             let length = candidate.chars().count().max(lower.chars().count());
-            // A word of which nothing is right is another word.
+            // A word with no correct letter is a different word.
             *distance <= length.div_ceil(3) && *distance < length
         })
         .min()

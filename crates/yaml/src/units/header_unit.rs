@@ -4,7 +4,7 @@ use super::kind::CUBIC_FOOT_M3;
 use super::{BARE_RATIO, Kind, Unit};
 use serde::Serialize;
 
-/// What a pressure is measured from.
+/// Reference of a pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
@@ -16,7 +16,7 @@ pub enum Reference {
     Gauge,
 }
 
-/// A unit of a header that is known.
+/// A recognised unit of a header.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeaderUnit {
     /// What it measures.
@@ -142,7 +142,7 @@ const GAUGE: &[&str] =
     &["g", "(g)", "_g", "rel", "_rel", "(rel)", "r", "ü", "(ü)", "gauge", "ue", "-g", "relativ"];
 const ABSOLUTE: &[&str] = &["a", "(a)", "_a", "abs", "_abs", "(abs)", "absolute", "absolut", "-a", "abs."];
 
-/// The unit that a header means; `None` for what is none.
+/// The unit that a header text stands for; `None` if it is not a unit.
 pub fn header_unit(text: &str) -> Option<HeaderUnit> {
     let plain: String = text.chars().filter(|c| !c.is_whitespace() && !['[', ']'].contains(c)).collect();
     let lower = plain.to_lowercase();

@@ -23,13 +23,13 @@ impl Unit {
 
     /// A value in this unit, in the unit used inside (SI; rpm for shaft speed).
     pub fn to_inside(&self, value: f64) -> f64 {
-        // Adding nothing would turn -0 into 0, and a value in the unit used inside has to stay as it is to the bit.
+        // Adding 0 would turn -0 into 0; values in the internal unit must not change at all.
         let shifted = if self.zero == 0.0 { value } else { value + self.zero };
         let scaled = shifted * self.numerator / self.denominator;
         if self.decade < 0 { scaled / 10f64.powi(-self.decade) } else { scaled * 10f64.powi(self.decade) }
     }
 
-    /// Whether both are the same unit under whatever spelling: `mbar` and `hPa` are.
+    /// Whether both units have the same size, e.g. `mbar` and `hPa`.
     pub fn converts_like(&self, other: &Unit) -> bool {
         let factors = |unit: &Unit| (unit.zero, unit.numerator, unit.denominator, unit.decade);
         factors(self) == factors(other)

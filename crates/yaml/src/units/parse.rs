@@ -40,7 +40,7 @@ pub enum UnitError {
 }
 
 impl UnitError {
-    /// What would be right.
+    /// The remedy.
     pub fn remedy(&self, kind: Kind) -> String {
         let example = kind.example();
         let units = kind.unit_list();

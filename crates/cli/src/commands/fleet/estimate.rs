@@ -1,18 +1,18 @@
-//! `mapper fleet estimate`: what a study costs, before it is run.
+//! `mapper fleet estimate`: estimated cost of a study.
 
-use crate::fleet_place::in_fleet;
+use crate::fleet_directory::with_fleet;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_report::cost_text;
 use std::path::PathBuf;
 
-/// Say what a study takes: items, processor hours, memory, disk, from a few items that are tried and stay done
+/// Estimate the cost of a study (items, processor hours, memory, disk) from a few items, whose results are kept
 #[derive(Debug, Args)]
 pub struct Estimate {
     /// Directory of the study
     pub directory: PathBuf,
-    /// Number of items that have to be done before the rest is reckoned
+    /// Number of items that must be done before the others are estimated
     #[arg(long = "try", value_name = "COUNT", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     pub tries: u16,
     /// Print one JSON object on standard output
@@ -21,10 +21,9 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Tries some, says what all cost.
     pub fn run(&self) -> Result<(), Failure> {
-        let tried = in_fleet(&self.directory, None, |fleet, kind, engine, machine| {
-            fleet.tried(kind, self.tries.into(), engine, machine)
+        let tried = with_fleet(&self.directory, None, |fleet, kind, engine, machine| {
+            fleet.estimate_cost(kind, self.tries.into(), engine, machine)
         })?;
         if self.json {
             standard_output::print_json(&tried.cost)

@@ -1,18 +1,18 @@
-//! `mapper fleet make`: a study becomes items.
+//! `mapper fleet make`: splits a study into items.
 
-use crate::fleet_place::on_this_machine;
+use crate::fleet_directory::with_machine;
 use crate::output::failure::Failure;
 use crate::output::{output_options, standard_output};
 use clap::Args;
-use mapper_fleet::{Made, kind_of, open_study};
+use mapper_fleet::{CreatedStudy, kind_of, open_study};
 use mapper_validation::studies::program;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Make the items of a study; if they exist, items come and go and results stay
+/// Make the items of a study; in an existing study, items are added and removed and results are kept
 #[derive(Debug, Args)]
 pub struct Make {
-    /// Study (YAML): its kind and what the kind needs
+    /// Study (YAML): its kind and the input of the kind
     pub study: PathBuf,
     /// Directory for items, parts and result
     #[arg(long, value_name = "DIR")]
@@ -23,14 +23,13 @@ pub struct Make {
 }
 
 impl Make {
-    /// Makes the items.
     pub fn run(&self) -> Result<(), Failure> {
-        on_this_machine(|registry, kinds, machine| {
+        with_machine(|registry, kinds, machine| {
             let study = open_study(&self.study).map_err(mapper_fleet::FleetError::from)?;
             let kind = kind_of(&study, kinds)?;
             let progress = output_options::progress();
             progress.begin("making items");
-            let made = Made::make(&study, kind, &self.out, &program(registry), machine.name);
+            let made = CreatedStudy::create(&study, kind, &self.out, &program(registry), machine.name);
             progress.clear();
             let made = made?;
             let items = made.fleet.study.items.len();
@@ -43,10 +42,10 @@ impl Make {
             let changed = if made.new == items && made.gone == 0 {
                 String::new()
             } else {
-                format!(", {} of them new; {} are gone", made.new, made.gone)
+                format!(", {} of them new; {} were removed", made.new, made.gone)
             };
             standard_output::print(&format!(
-                "{items} items in {dir}{changed}\nWhat they cost: mapper fleet estimate {dir}\n",
+                "{items} items in {dir}{changed}\nEstimate their cost: mapper fleet estimate {dir}\n",
                 dir = self.out.display()
             ))
         })

@@ -1,6 +1,6 @@
-//! `mapper fleet merge`: from parts to the result.
+//! `mapper fleet merge`: merges parts into the result.
 
-use crate::fleet_place::in_fleet;
+use crate::fleet_directory::with_fleet;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
@@ -9,12 +9,12 @@ use mapper_report::merged_text;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Merge all parts into the result that one machine would write; what is missing or failed is named
+/// Merge all parts into the result that one computer would write; missing and failed items are listed
 #[derive(Debug, Args)]
 pub struct Merge {
     /// Directory of the study
     pub directory: PathBuf,
-    /// Merge what there is, though something is missing
+    /// Merge even if items are missing or failed
     #[arg(long)]
     pub partial: bool,
     /// Print one JSON object on standard output
@@ -23,9 +23,8 @@ pub struct Merge {
 }
 
 impl Merge {
-    /// Merges.
     pub fn run(&self) -> Result<(), Failure> {
-        let merged = in_fleet(&self.directory, None, |fleet, kind, _, machine| {
+        let merged = with_fleet(&self.directory, None, |fleet, kind, _, machine| {
             fleet.merge(kind, self.partial, machine)
         })?;
         let result = merged.result.as_ref().map(|(path, _)| path);
@@ -34,10 +33,10 @@ impl Merge {
         } else {
             standard_output::print(&merged_text(&merged))?;
         }
-        if merged.status.lacking() == 0 {
+        if merged.status.unfinished() == 0 {
             return Ok(());
         }
-        let why = "items are missing or failed; `mapper fleet retry` submits them, `mapper fleet run --again` does them here";
+        let why = "items are missing or failed; submit them again with `mapper fleet retry`, or run them here with `mapper fleet run --again`";
         Err(if self.json { Failure::printed(Code::Incomplete) } else { Failure::new(Code::Incomplete, why) })
     }
 }

@@ -1,13 +1,13 @@
-//! `mapper fleet retry`: what is missing, once more.
+//! `mapper fleet retry`: submits missing and failed items again.
 
-use crate::fleet_place::in_fleet;
+use crate::fleet_directory::with_fleet;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
 use mapper_report::submission_text;
 use std::path::PathBuf;
 
-/// Submit the tasks again whose items are missing or failed, as the study was submitted before
+/// Submit tasks with missing or failed items again, with the options of the last submission
 #[derive(Debug, Args)]
 pub struct Retry {
     /// Directory of the study
@@ -18,9 +18,8 @@ pub struct Retry {
 }
 
 impl Retry {
-    /// Submits.
     pub fn run(&self) -> Result<(), Failure> {
-        let submission = in_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
+        let submission = with_fleet(&self.directory, None, |fleet, _, _, machine| fleet.retry(machine))?;
         if self.json {
             standard_output::print_json(&submission)
         } else {

@@ -1,6 +1,6 @@
-//! `mapper fleet submit`: a study on a cluster.
+//! `mapper fleet submit`: submits a study to a cluster.
 
-use crate::fleet_place::in_fleet;
+use crate::fleet_directory::with_fleet;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
@@ -9,7 +9,7 @@ use mapper_fleet::{Limits, SubmitOptions, Template};
 use mapper_report::submission_text;
 use std::path::PathBuf;
 
-/// Submit the remaining items as an array job with the merge behind it; nothing is submitted that exceeds a limit
+/// Submit the remaining items as an array job, followed by the merge, unless a limit is exceeded
 #[derive(Debug, Args)]
 pub struct Submit {
     /// Directory of the study
@@ -26,10 +26,10 @@ pub struct Submit {
     /// Cores of a task, an item on each
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     pub cpus: u16,
-    /// How long a task should last, minutes
-    #[arg(long, value_name = "MINUTES", default_value_t = 15.0, value_parser = minutes)]
+    /// Target duration of a task, minutes
+    #[arg(long, value_name = "MINUTES", default_value_t = 15.0, value_parser = parse_minutes)]
     pub task: f64,
-    /// Limit: time of a task, whole minutes [default: twice what it should take and 5 min]
+    /// Limit: time of a task, whole minutes [default: twice the estimate plus 5 min]
     #[arg(long, value_name = "MINUTES", value_parser = clap::value_parser!(u64).range(1..))]
     pub time: Option<u64>,
     /// Limit: number of tasks of the array
@@ -38,7 +38,7 @@ pub struct Submit {
     /// Limit: number of tasks at once
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..))]
     pub at_once: Option<u64>,
-    /// Limit: processor hours of all that is left
+    /// Limit: processor hours of all remaining items
     #[arg(long, value_name = "HOURS")]
     pub hours: Option<f64>,
     /// Limit: memory of a task, MB
@@ -50,11 +50,10 @@ pub struct Submit {
 }
 
 impl Submit {
-    /// Tries a few items if none is done, then submits.
     pub fn run(&self) -> Result<(), Failure> {
         let program = std::env::current_exe()
             .map_err(|error| Failure::new(Code::Failure, format!("failed to find this program: {error}")))?;
-        let submission = in_fleet(&self.directory, None, |fleet, kind, engine, machine| {
+        let submission = with_fleet(&self.directory, None, |fleet, kind, engine, machine| {
             let options = SubmitOptions {
                 template: self.template.as_deref().map_or_else(|| Ok(Template::slurm()), Template::read)?,
                 program,
@@ -69,7 +68,7 @@ impl Submit {
                     memory_mb: self.memory,
                 },
             };
-            let cost = fleet.tried(kind, TRIES, engine, machine)?.cost;
+            let cost = fleet.estimate_cost(kind, TRIAL_ITEMS, engine, machine)?.cost;
             fleet.submit(&options, &cost, machine)
         })?;
         if self.json {
@@ -80,10 +79,10 @@ impl Submit {
     }
 }
 
-/// Items that have to be done before it is known what the others cost.
-const TRIES: usize = 3;
+/// Number of finished items needed to estimate the cost of the others.
+const TRIAL_ITEMS: usize = 3;
 
-fn minutes(text: &str) -> Result<f64, String> {
+fn parse_minutes(text: &str) -> Result<f64, String> {
     let minutes: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of minutes"))?;
-    if minutes.is_finite() && minutes > 0.0 { Ok(minutes) } else { Err("it has to be above 0".to_owned()) }
+    if minutes.is_finite() && minutes > 0.0 { Ok(minutes) } else { Err("it must be above 0".to_owned()) }
 }

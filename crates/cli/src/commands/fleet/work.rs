@@ -1,20 +1,20 @@
-//! `mapper fleet work`: a share of the items.
+//! `mapper fleet work`: does a share of the items.
 
-use crate::fleet_place::in_fleet;
+use crate::fleet_directory::with_fleet;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
-use mapper_fleet::{Hash, Shard, Which};
+use mapper_fleet::{Hash, ItemSelection, Shard};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Do a share of the items, as a task of a cluster does; each leaves one part, and what is there is skipped
+/// Do a share of the items, as a task of a cluster does; finished items are skipped
 #[derive(Debug, Args)]
 pub struct Work {
     /// Directory of the study
     pub directory: PathBuf,
-    /// Share K of N, from 1; by the hash of the item alone, so that it stays when other items come and go
+    /// Share K of N, from 1; it depends only on the hash of each item, not on other items
     #[arg(long, value_name = "K/N", required_unless_present = "item", conflicts_with = "item")]
     pub shard: Option<Shard>,
     /// One item, by its hash
@@ -23,7 +23,7 @@ pub struct Work {
     /// Number of items at a time [default: all cores]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Also do those again that failed
+    /// Also repeat failed items
     #[arg(long)]
     pub again: bool,
     /// Print one JSON object on standard output
@@ -32,16 +32,15 @@ pub struct Work {
 }
 
 impl Work {
-    /// Works.
     pub fn run(&self) -> Result<(), Failure> {
         let which = match (self.item, self.shard) {
-            (Some(hash), _) => Which::Item(hash),
-            (None, Some(shard)) => Which::Shard(shard),
-            // clap asks for one of them.
-            (None, None) => Which::All,
+            (Some(hash), _) => ItemSelection::Item(hash),
+            (None, Some(shard)) => ItemSelection::Shard(shard),
+            // clap requires one of them.
+            (None, None) => ItemSelection::All,
         };
         let worked =
-            in_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
+            with_fleet(&self.directory, self.jobs.map(usize::from), |fleet, kind, engine, machine| {
                 fleet.work(kind, which, self.again, engine, machine)
             })?;
         if self.json {
@@ -51,12 +50,13 @@ impl Work {
         } else {
             let failed = worked.failed.iter().map(|(name, why)| format!("failed: {name}: {why}\n"));
             let failed: String = failed.collect();
-            standard_output::print(&format!("{failed}{} done, {} were there\n", worked.done, worked.there))?;
+            let (done, there) = (worked.done, worked.there);
+            standard_output::print(&format!("{failed}{done} done, {there} were already done\n"))?;
         }
         if worked.failed.is_empty() {
             return Ok(());
         }
-        let message = format!("{} items failed; `--again` does them again", worked.failed.len());
+        let message = format!("{} items failed; repeat them with `--again`", worked.failed.len());
         Err(if self.json {
             Failure::printed(Code::Incomplete)
         } else {

@@ -1,4 +1,4 @@
-//! `mapper gap apply`: the machine that a diagnosis found, as the virtual lab of a campaign.
+//! `mapper gap apply`: writes a campaign whose virtual lab is the diagnosed machine.
 
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
@@ -7,22 +7,21 @@ use clap::Args;
 use mapper_session::{Twin, found_in, twin_campaign, write_new};
 use std::path::PathBuf;
 
-/// Write a campaign whose virtual lab is the machine that a diagnosis found: its effects, and by how much it is off
+/// Write a campaign whose virtual lab is the diagnosed machine, with its effects and deviations
 #[derive(Debug, Args)]
 pub struct Apply {
     /// Campaign that was diagnosed (YAML)
     pub campaign: PathBuf,
     /// Diagnosis, as `mapper gap diagnose --json` prints it
     pub diagnosis: PathBuf,
-    /// New campaign file (YAML): `plan`, `run` and `nightly` take it as any other
+    /// New campaign file (YAML)
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
 }
 
 impl Apply {
-    /// Writes the campaign.
     pub fn run(&self) -> Result<(), Failure> {
-        // What is not a campaign is not changed into one.
+        // Rejects a file that is not a campaign.
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let text = mapper_campaign::read_text(&self.campaign)
             .map_err(|error| Failure::new(Code::Failure, format!("{}: {error}", self.campaign.display())))?;
@@ -32,6 +31,6 @@ impl Apply {
         let written = twin_campaign(&text, &twin, &registry::registry().effects)?;
         write_new(&self.out, written.as_bytes())?;
         mapper_campaign::load(&self.out).map_err(Failure::of_campaign)?;
-        standard_output::print(&format!("campaign with the machine as found in {}\n", self.out.display()))
+        standard_output::print(&format!("campaign with the diagnosed machine: {}\n", self.out.display()))
     }
 }

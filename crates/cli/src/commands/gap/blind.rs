@@ -7,7 +7,6 @@ use clap::Args;
 /// Check the diagnosis on data whose causes are withheld
 #[derive(Debug, Args)]
 pub struct Blind {
-    /// What to do.
     #[command(subcommand)]
     command: BlindCommand,
 }
@@ -20,7 +19,6 @@ subcommands! { BlindCommand:
 }
 
 impl Blind {
-    /// Runs the sub-command that was asked for.
     pub fn run(&self) -> Result<(), Failure> {
         self.command.run()
     }

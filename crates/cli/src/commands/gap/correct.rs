@@ -1,4 +1,4 @@
-//! `mapper gap correct`: the map of a recording without the causes that its diagnosis names.
+//! `mapper gap correct`: corrects the map of a recording for its diagnosed causes.
 
 use crate::command_line::shared_arguments::channel_map;
 use crate::commands::identify::MethodArgument;
@@ -12,14 +12,14 @@ use mapper_session::{Recorded, Session};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Diagnose a recording, identify it again without the causes found, and show the map before and after
+/// Diagnose a recording, identify it again with its causes corrected, and show the map before and after
 #[derive(Debug, Args)]
 pub struct Correct {
     /// Campaign with machine, declared uncertainties and tolerances (YAML)
     pub campaign: PathBuf,
     /// Run directory, MCAP file, or log of another program
     pub recording: PathBuf,
-    /// Leave the corrected points, map, pictures and report in this directory; existing files are not replaced
+    /// Write the corrected points, map, pictures and report to this directory; existing files are not replaced
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -37,7 +37,6 @@ pub struct Correct {
 }
 
 impl Correct {
-    /// Corrects one recording.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;

@@ -1,4 +1,4 @@
-//! `mapper gap diagnose`: where a recording leaves the nominal model, why, how far that closes the gap, what is next.
+//! `mapper gap diagnose`: diagnoses the difference between a recording and the nominal model.
 
 use crate::command_line::shared_arguments::channel_map;
 use crate::output::exit_code::Code;
@@ -18,18 +18,18 @@ use mapper_session::{Gap, Recorded, Session, SessionError, SessionEvent};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Say where a recording departs from the nominal model, which effect causes it, how far that closes the gap, what to do next
+/// Find where a recording departs from the nominal model, which effect causes it, how much that reduces the gap, and what to do next
 #[derive(Debug, Args)]
 pub struct Diagnose {
     /// Campaign with machine, declared uncertainties and tolerances (YAML)
     pub campaign: PathBuf,
-    /// Run directory, MCAP file, or log of another program; several, in order, are diagnosed each and compared
+    /// Run directory, MCAP file, or log of another program; several, in chronological order, are diagnosed separately and compared
     #[arg(value_name = "RECORDING", required_unless_present = "named")]
     pub recordings: Vec<PathBuf>,
     /// The same, by name
     #[arg(long = "recording", value_name = "FILE")]
     pub named: Vec<PathBuf>,
-    /// Recording of the same rig and steps, made while nothing was wrong: report what changed since, not what is missing in the model
+    /// Reference recording of the same rig and steps, fault-free: report changes since then, not what is missing in the model
     #[arg(long, value_name = "FILE")]
     pub healthy: Option<PathBuf>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -52,7 +52,7 @@ pub struct Diagnose {
 }
 
 impl Diagnose {
-    /// Diagnoses one recording, or several and what became of their causes.
+    /// Diagnoses one recording, or several and compares their causes.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;
@@ -63,13 +63,12 @@ impl Diagnose {
         let progress = output_options::progress();
         progress.show(&SessionEvent::Progress { done_ratio: 0.0, what: "reading".to_owned() });
         let read_run = |file: &PathBuf| Recorded::read_run(&registry, file, &map, Some(&campaign));
-        // Each part of a resumed run is a recording of its own.
+        // Each part of a resumed run is a separate recording.
         let recordings = self.recordings.iter().chain(&self.named).map(read_run);
         let recordings: Vec<Recorded> =
             recordings.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
         if (self.html.is_some() || self.laws.is_some()) && recordings.len() > 1 {
-            let message =
-                "--html and --laws are for one recording; give one with them (a resumed run has several)";
+            let message = "--html and --laws need exactly one recording (a resumed run has several)";
             return Err(Failure::new(Code::BadInput, message));
         }
         let mut gaps = Vec::with_capacity(recordings.len());

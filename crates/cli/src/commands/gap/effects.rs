@@ -11,13 +11,13 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// List the effects that a rig may have and the nominal model does not
+/// List the effects that are not in the nominal model but may exist on a rig
 #[derive(Debug, Args)]
 pub struct Effects {
     /// Also check and list a suspected effect written in rhai; may be repeated
     #[arg(long = "effect", value_name = "FILE")]
     pub effects: Vec<PathBuf>,
-    /// Print which residual source term could replace which effect on this campaign (YAML): which are distinguishable
+    /// Print how well each effect can be distinguished from a residual source term on this campaign (YAML)
     #[arg(long, value_name = "CAMPAIGN")]
     pub signatures: Option<PathBuf>,
     /// Print one JSON object on standard output
@@ -26,7 +26,6 @@ pub struct Effects {
 }
 
 impl Effects {
-    /// Lists the catalogue.
     pub fn run(&self) -> Result<(), Failure> {
         let effects = registry::registry().effects_with(&self.effects)?;
         if let Some(campaign) = &self.signatures {
@@ -84,7 +83,7 @@ impl Effects {
         let legend: Vec<String> =
             names.iter().enumerate().map(|(place, name)| format!("{:>4}  {name}", place + 1)).collect();
         standard_output::print(&format!(
-            "{table}\n% of each effect's signature (one typical step) for which a force missing in one balance could stand in:\n{}\n",
+            "{table}\n% of each effect's signature (one typical step) that a residual source term in one balance could explain:\n{}\n",
             legend.join("\n")
         ))
     }

@@ -1,4 +1,4 @@
-//! `mapper gap predict`: forecasts the next recording under seal, and says afterwards how that came out.
+//! `mapper gap predict`: makes a pre-registered forecast of the next recording, and compares it with that recording.
 
 use crate::command_line::shared_arguments::channel_map;
 use crate::output::failure::Failure;
@@ -9,7 +9,7 @@ use mapper_session::{Recorded, SealedForecast, Session, found_in};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Forecast the next recording from a diagnosis and seal the forecast; with --recording, say how it came out
+/// Forecast the next recording from a diagnosis and seal the forecast; with --recording, compare the two
 #[derive(Debug, Args)]
 pub struct Predict {
     /// Campaign of the next recording (YAML)
@@ -23,7 +23,7 @@ pub struct Predict {
     /// Run directory, MCAP file, or log of another program that the forecast is compared with
     #[arg(long, value_name = "FILE", conflicts_with = "diagnosis")]
     pub recording: Option<PathBuf>,
-    /// SHA-256 that was printed when the forecast was made; refused if the file has another
+    /// SHA-256 that was printed when the forecast was made; the file must have this hash
     #[arg(long, value_name = "HASH", requires = "recording")]
     pub seal: Option<String>,
     /// Channel map: where a recording made by another program holds the rig's channels (YAML)
@@ -38,7 +38,6 @@ pub struct Predict {
 }
 
 impl Predict {
-    /// Makes a forecast, or compares one with a recording.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let map = channel_map(self.channels.as_deref())?;

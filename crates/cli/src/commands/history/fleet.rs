@@ -1,15 +1,15 @@
-//! `mapper history fleet`: what the machines of a production have in common.
+//! `mapper history fleet`: statistics of a production.
 
-use crate::commands::history::{Chosen, opened};
+use crate::commands::history::{Chosen, open_history};
 use crate::output::failure::Failure;
 use crate::output::standard_output;
 use clap::Args;
-use mapper_history::productions;
+use mapper_history::analyse_productions;
 use mapper_report::production_text;
 use mapper_session::SessionError;
 use serde_json::json;
 
-/// Spread of a production at every point, machines that stand out, and the drift of the stand they share
+/// Show the scatter of a production at every point, outlying machines, and the drift of their test stand
 #[derive(Debug, Args)]
 pub struct Fleet {
     #[command(flatten)]
@@ -20,11 +20,10 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Fits a mixed model at every point and says what came out.
     pub fn run(&self) -> Result<(), Failure> {
         let (nights, points) =
-            opened(&self.chosen)?.points(&self.chosen.filter()).map_err(SessionError::from)?;
-        let productions = productions(&nights, &points);
+            open_history(&self.chosen)?.points(&self.chosen.filter()).map_err(SessionError::from)?;
+        let productions = analyse_productions(&nights, &points);
         if self.json {
             return standard_output::print_json(
                 &json!({"history": self.chosen.db, "productions": productions}),

@@ -1,4 +1,4 @@
-//! `mapper log inspect`: what a log holds, and the channel map that it suggests.
+//! `mapper log inspect`: shows the contents of a log and proposes a channel map.
 
 use crate::command_line::shared_arguments::key_and_value;
 use crate::output::failure::Failure;
@@ -28,7 +28,6 @@ pub struct Inspect {
 }
 
 impl Inspect {
-    /// Looks at one log.
     pub fn run(&self) -> Result<(), Failure> {
         let registry = registry::registry();
         let found = inspect_log(&registry, &self.log, self.with.clone())?;
@@ -41,7 +40,7 @@ impl Inspect {
         let mut text = log_text(found.format, &found.layout, &found.survey, &found.proposal);
         match &self.write_channels {
             Some(file) => text.push_str(&format!("\nThe channel map is in {}.\n", file.display())),
-            None => text.push_str("\nKeep it with `--write-channels FILE`.\n"),
+            None => text.push_str("\nSave it with `--write-channels FILE`.\n"),
         }
         standard_output::print(&text)
     }

@@ -7,7 +7,7 @@ use crate::{output::standard_output, registry};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Show where two maps differ, in units and against their uncertainty
+/// Show where two maps differ, in absolute terms and relative to their uncertainty
 #[derive(Debug, Args)]
 pub struct Compare {
     /// Map to compare with
@@ -33,7 +33,6 @@ pub struct Compare {
 }
 
 impl Compare {
-    /// Compares two maps.
     pub fn run(&self) -> Result<(), Failure> {
         let of_second = MapReading {
             reference: self.second_reference.clone(),

@@ -37,7 +37,6 @@ pub struct Convert {
 }
 
 impl Convert {
-    /// Reads a map and writes it again.
     pub fn run(&self) -> Result<(), Failure> {
         let to_reference = reference(self.to_reference.as_deref())?;
         let out = self.replace.map(&self.out, self.to.as_deref());

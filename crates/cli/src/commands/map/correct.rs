@@ -1,4 +1,4 @@
-//! `mapper map correct`: a hot map without the heat that it shows.
+//! `mapper map correct`: removes heat transfer from a map measured hot.
 
 use crate::command_line::shared_arguments::MapReading;
 use crate::output::failure::Failure;
@@ -7,14 +7,14 @@ use crate::{output::standard_output, registry};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Take the heat off a hot map's apparent efficiencies, as far as the map alone shows it (after Sirakov and Casey)
+/// Remove heat transfer from the apparent efficiencies of a map measured hot, using only the map (Sirakov and Casey)
 #[derive(Debug, Args)]
 pub struct Correct {
     /// Map, in any layout that `mapper map inspect` understands with apparent efficiencies
     pub map: PathBuf,
     #[command(flatten)]
     pub reading: MapReading,
-    /// Heat to the gas at the reference state in W, instead of what the map shows
+    /// Heat flow to the gas at the reference state, W, instead of the estimate from the map
     #[arg(long, value_name = "W")]
     pub heat: Option<f64>,
     #[command(flatten)]
@@ -22,7 +22,6 @@ pub struct Correct {
 }
 
 impl Correct {
-    /// Corrects a map.
     pub fn run(&self) -> Result<(), Failure> {
         let given = self.reading.description()?;
         let work = registry::registry().correct_map_file(&self.map, &given, self.heat, self.target.map())?;

@@ -1,4 +1,4 @@
-//! `mapper map fit`: all speed lines together, with the error at lines that are left out.
+//! `mapper map fit`: fits all speed lines together, and shows the error at lines left out of the fit.
 
 use crate::command_line::shared_arguments::MapReading;
 use crate::output::failure::Failure;
@@ -29,7 +29,6 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Fits a map.
     pub fn run(&self) -> Result<(), Failure> {
         let options = MapFitOptions {
             further_speeds_rpm: self.speeds.clone(),

@@ -33,7 +33,6 @@ pub struct Fmu {
 }
 
 impl Fmu {
-    /// Writes the FMU.
     pub fn run(&self) -> Result<(), Failure> {
         let (registry, existing) = (registry::registry(), self.replace.existing());
         let session = Session::new(&registry);

@@ -1,4 +1,4 @@
-//! `mapper map inspect`: how a map file is understood.
+//! `mapper map inspect`: shows how a map file is read.
 
 use crate::command_line::shared_arguments::MapReading;
 use crate::output::failure::Failure;
@@ -7,7 +7,7 @@ use crate::{output::standard_output, registry};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Show how a map file is understood: columns, units, reference state, speed lines, and what is assumed
+/// Show how a map file is read: columns, units, reference state, speed lines, and assumptions
 #[derive(Debug, Args)]
 pub struct Inspect {
     /// Map file
@@ -25,7 +25,6 @@ pub struct Inspect {
 }
 
 impl Inspect {
-    /// Reads a map and prints what was understood.
     pub fn run(&self) -> Result<(), Failure> {
         let description = self.write_description.as_deref().map(|file| (file, self.replace.existing()));
         let work =

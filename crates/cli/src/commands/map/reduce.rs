@@ -1,4 +1,4 @@
-//! `mapper map reduce`: a table of steady points becomes a map.
+//! `mapper map reduce`: reduces a table of steady points to a map.
 
 use crate::command_line::shared_arguments::MapReading;
 use crate::output::failure::Failure;
@@ -7,7 +7,7 @@ use crate::{output::standard_output, registry};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Make a map of a table of steady points: corrected, with uncertainty by source, without heat if Tc was measured
+/// Make a map from a table of steady points: corrected, with uncertainty by source, and without heat transfer if Tc was measured
 #[derive(Debug, Args)]
 pub struct Reduce {
     /// Table of N, flow, P1, T1, P2, T2, optionally Tc and humidity, in any layout of `mapper map inspect`
@@ -25,7 +25,6 @@ pub struct Reduce {
 }
 
 impl Reduce {
-    /// Reduces a table.
     pub fn run(&self) -> Result<(), Failure> {
         let (given, target) = (self.reading.description()?, &self.target);
         let budget = self.budget.as_deref().map(|file| (file, target.replace.existing()));

@@ -9,7 +9,7 @@
 
 use crate::joint::fit::solve::{Covariance, FULLY, Problem};
 use crate::joint::step_model::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
-use mapper_core::{FoundInlet, InletConvection, Origin};
+use mapper_core::{IdentifiedInlet, InletConvection, Origin};
 use mapper_numerics::statistics::{HINT_SIGMAS, mean};
 use nalgebra::DMatrix;
 
@@ -62,7 +62,7 @@ pub(crate) fn settle(problem: &mut Problem<'_>) -> Option<Option<f64>> {
 }
 
 fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
-    let declared = FoundInlet {
+    let declared = IdentifiedInlet {
         convection: convection_of(problem.shared[INLET]),
         diameter_m: problem.setting.inlet_diameter_m,
         origin: Origin::Assumed,
@@ -81,7 +81,7 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
         left = 1.0 - left;
     }
     let decided = left < DECIDED;
-    problem.inlet = Some(FoundInlet {
+    problem.inlet = Some(IdentifiedInlet {
         convection: convection_of(problem.shared[INLET]),
         origin: if decided { Origin::Fitted } else { Origin::NotIdentifiable },
         probability: 1.0 - left,

@@ -6,7 +6,7 @@ use crate::joint::step_model::model::{Course, Setting};
 use crate::joint::step_model::parameters::{
     ETA, LOCAL, LocalVector, OFFSETS, PROBE_MM2, Prior, REFINEMENTS, SHARED, SURFACE, SharedVector,
 };
-use mapper_core::FoundInlet;
+use mapper_core::IdentifiedInlet;
 use mapper_numerics::coloured_noise::WhiteningFilter;
 use mapper_numerics::least_squares::{Arrow, ArrowBlock, Damping, DampingRule, Reduced};
 use mapper_numerics::parallel;
@@ -65,7 +65,7 @@ pub(crate) struct Problem<'a> {
     /// Whether the recording is to decide which law h before the wheel follows.
     pub(crate) inlet_sought: bool,
     /// Result of that decision; `None` if it makes no difference.
-    pub(crate) inlet: Option<FoundInlet>,
+    pub(crate) inlet: Option<IdentifiedInlet>,
 }
 
 /// The normal equations and the cost at the current parameters.

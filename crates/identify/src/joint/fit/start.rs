@@ -101,7 +101,7 @@ fn rows_of(
     if !config.declared.is_empty() {
         // The fit follows changes within the step, but the point is the settled end of the step.
         let rest = window::rest(recording, step, &config.settle_bands);
-        let needed_s = WindowRule::rest_at_end_s(step.end_s - step.start_s);
+        let needed_s = WindowRule::settled_end_s(step.end_s - step.start_s);
         if let Some(rest) = rest.filter(|rest| !rest.whole && rest.settled_s < needed_s.floor()) {
             own.doubt(Warning::NotStabilised {
                 quantity: rest.slowest.to_owned(),

@@ -1,5 +1,5 @@
-//! Calibrates the diagnosis: draws cases of its own, with outside causes that the check does not use, diagnoses them, and
-//! finds the numbers that turn scores into probabilities.
+//! Calibrates the diagnosis: draws separate cases, with outside causes that the check does not use, diagnoses them, and fits the constants
+//! that convert scores into probabilities.
 
 use crate::blind::calibration::logistic::{Row, logistic};
 use crate::blind::calibration::no_cause_study::{StudyRuler, declared};
@@ -25,7 +25,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Which cases calibrate.
+/// The cases of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
     /// Seed of everything.
@@ -37,7 +37,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The command that calibrates with it on one machine.
+    /// The command line of this calibration.
     pub fn command(&self, campaign: &Path) -> String {
         format!(
             "mapper gap blind calibrate --campaign {} --seed {} --nulls {} --cases {}",
@@ -49,7 +49,7 @@ impl Plan {
     }
 }
 
-/// What one diagnosis gave, as far as the calibration needs it.
+/// The result of one diagnosis that the calibration needs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Observed {
     /// What the case is a case of.
@@ -60,7 +60,7 @@ pub struct Observed {
     pub verdict: Verdict,
     /// Length of the shortest of their signatures, sigmas.
     pub sigma: Option<f64>,
-    /// Score of nothing, prior included.
+    /// Score of the hypothesis without a cause, prior included.
     pub nothing: f64,
     /// Each candidate with its score, prior included.
     pub candidates: Vec<(BTreeSet<String>, f64)>,
@@ -71,7 +71,7 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// By how much the best cause beats nothing.
+    /// Score of the best cause minus that of no cause.
     fn margin(&self) -> f64 {
         self.candidates.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max) - self.nothing
     }
@@ -93,7 +93,7 @@ pub fn calibrate(
     let cases = cases(campaign, catalogue, plan)?;
     let diagnosis = Calibrated::new(campaign, catalogue)?;
     let observed = engine.each(&cases, |_, case| diagnosis.observe(case))?;
-    // What was not begun was stopped; what could not be diagnosed is left out.
+    // Cases that were not started mean a stop by the operator; cases that could not be diagnosed are omitted.
     let Some(observed) = observed.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
     let observed: Vec<Observed> = observed.into_iter().flatten().collect();
     Ok(Some((fit(&shipped()?, &observed, made_by), observed)))
@@ -124,7 +124,7 @@ pub fn cases(
     Ok(cases)
 }
 
-/// What every case that calibrates is diagnosed with.
+/// The settings with which every case of a calibration is diagnosed.
 pub struct Calibrated<'a> {
     campaign: &'a Campaign,
     catalogue: &'a [Arc<dyn Effect>],
@@ -226,8 +226,8 @@ pub fn fitted(observed: &[Observed], made_by: String) -> Result<Calibration, Bli
     Ok(fit(&shipped()?, observed, made_by))
 }
 
-/// The calibration that fits what was observed: all of it, weak signatures too. An outside cause that can hardly be seen is named as
-/// something of the catalogue, and a probability must state how often that happens.
+/// Fits the calibration to all observed cases, weak signatures included: a hardly visible outside cause is mistaken for an effect of the
+/// catalogue, and the probabilities must reflect how often that happens.
 pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Calibration {
     let margins = observed.iter().filter(|o| o.kind == CaseKind::None).map(Observed::margin);
     let quiet = quantile(margins, QUIET).map_or(before.threshold, |margin| margin.max(MIN_THRESHOLD));
@@ -242,19 +242,18 @@ pub fn fit(before: &Calibration, observed: &[Observed], made_by: String) -> Cali
         made_by,
         threshold: quiet,
         temperature: temperature(&inside, before.temperature),
-        // Never narrower than the fit states: a few cases do not justify more confidence.
+        // Never narrower than the standard errors of the fit, because a few cases do not justify more confidence.
         interval_factor: quantile(errors, 0.95).map_or(before.interval_factor, |z| (z / NORMAL_975).max(1.0)),
         outside: logistic(&rows).unwrap_or(before.outside),
         ..before.clone()
     }
 }
 
-/// Spread of the logarithm of the temperature that is expected around the one of before: where every case is right, the
-/// cases alone would ask for certainty.
+/// Prior standard deviation of the logarithm of the temperature around the previous one. Without it, cases that are all right would lead to
+/// certainty.
 const TEMPERATURE_SPREAD: f64 = 0.3;
 
-/// The temperature under which the truth of the cases has the largest probability, as far as they say otherwise than
-/// `before`.
+/// The temperature with the largest posterior probability of the true causes, with `before` as prior.
 fn temperature(cases: &[(&Observed, f64)], before: f64) -> f64 {
     let cost = |temperature: f64| -> f64 {
         let away = (temperature / before).ln() / TEMPERATURE_SPREAD;

@@ -3,14 +3,14 @@
 use mapper_diagnose::gap::causes::calibration::counted;
 use mapper_numerics::minimise::minimise;
 
-/// Rounds of coordinate descent at most; it needs some fifty.
+/// Maximum number of iterations of coordinate descent; about fifty are needed.
 const ROUNDS: usize = 300;
-/// Slopes that are expected, and the precision of that expectation: some ten cases outweigh it.
+/// Prior of the slopes, and its precision: about ten cases outweigh it.
 const EXPECTED: f64 = 1.0;
 const PRIOR: f64 = 0.25;
-/// Minimum slopes: more misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from
-/// noise, whatever the cases state: after a failed search, a fit with the right cause leaves a residual of thousands of
-/// sigmas, and a few such cases would teach that a gross misfit means nothing.
+/// Minimum slopes: a larger misfit never contradicts an outside cause. The slope of the smooth misfit is at least half of that from noise
+/// for any cases: a failed search with the right cause leaves a residual of thousands of sigmas, and a few such cases would otherwise make
+/// a gross misfit meaningless.
 const MIN: [f64; 3] = [0.5, 0.0, 0.0];
 
 /// A case.
@@ -18,7 +18,7 @@ const MIN: [f64; 3] = [0.5, 0.0, 0.0];
 pub(crate) struct Row {
     pub features: [f64; 3],
     pub outside: bool,
-    /// How much it counts.
+    /// Weight of the case.
     pub weight: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The ruler of the diagnosis itself, laid on a recording without causes.
+//! Measures signatures with the diagnosis itself, on a recording without causes.
 
 use crate::blind::cases::case::Case;
 use crate::blind::cases::cause::Cause;
@@ -41,7 +41,7 @@ pub(crate) struct StudyRuler {
     linearised: Linearised,
 }
 
-/// What the campaign declares.
+/// The declarations of the campaign.
 pub(crate) fn declared(campaign: &Campaign) -> Declared {
     let sensors = campaign.sensors.iter().map(|(channel, sensor)| (*channel, sensor.declared));
     Declared {

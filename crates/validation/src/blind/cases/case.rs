@@ -1,4 +1,4 @@
-//! Draws what a case has: which causes, how strong.
+//! Draws the causes of a case and their strengths.
 
 use crate::blind::cases::cause::Cause;
 use crate::blind::cases::equations::Laboratory;
@@ -39,7 +39,7 @@ pub struct Draw {
     pub outside: OutsideUse,
     /// Weakest and strongest signature of a single cause, in sigmas.
     pub sigma_range: [f64; 2],
-    /// What the cases run on.
+    /// The simulator of the cases.
     pub laboratory: Laboratory,
     /// Whether each rig is also recorded on a night without its causes.
     pub healthy: bool,
@@ -93,7 +93,7 @@ impl Draw {
                     }
                 }
                 let sigmas = ruler.lengths(&causes);
-                // A seed of its own, from the whole range, so that no two draws share noise.
+                // A separate seed from the whole range, so that no two draws have the same noise.
                 Case { name: format!("case_{index:04}"), kind, causes, sigmas, seed: random.random() }
             })
             .collect()

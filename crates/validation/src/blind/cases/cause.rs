@@ -1,4 +1,4 @@
-//! What a case has that the nominal machine has not.
+//! Causes of a case: deviations from the nominal machine.
 
 use mapper_physics::rig::effect::Effect;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Which equations make the recordings.
+//! The simulator that makes the recordings.
 
 use mapper_backends::{other_lab, virtual_lab};
 use serde::{Deserialize, Serialize};

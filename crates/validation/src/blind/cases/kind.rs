@@ -1,4 +1,4 @@
-//! What a case is a case of.
+//! Kinds of cases.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! A case as a file holds it: causes by their id.
+//! The file form of a case: causes by their id.
 
 use crate::blind::cases::case::Case;
 use crate::blind::cases::cause::Cause;

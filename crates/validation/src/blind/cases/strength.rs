@@ -1,4 +1,4 @@
-//! How strong a cause is drawn: so that its signature in the recording has a wanted length.
+//! Strength of a cause, chosen so that its signature in the recording has a given length.
 
 use crate::blind::cases::cause::Cause;
 use mapper_physics::rig::effect::{Effect, EffectParameter};
@@ -6,15 +6,15 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use std::sync::Arc;
 
-/// Measures how plainly causes show in a recording.
+/// Measures the signatures of causes in a recording.
 pub trait Ruler {
     /// Length of each cause's signature in the presence of the others, in sigmas; 0 where the rig cannot run with them.
     fn lengths(&self, causes: &[Cause]) -> Vec<f64>;
 }
 
-/// Relative distance from the wanted length that is near enough.
+/// Relative tolerance of the length.
 const NEAR_RATIO: f64 = 0.1;
-/// Maximum number of looks for a strength.
+/// Maximum number of iterations for a strength.
 const LOOKS: usize = 6;
 /// Share of the housing that an inner wall takes.
 const INNER_SHARE: std::ops::Range<f64> = 0.15..0.6;
@@ -39,7 +39,7 @@ pub(crate) fn strength(
     let parameters = &effect.info().parameters;
     if let [phi, conductance] = parameters.as_slice() {
         let phi = random.random_range(INNER_SHARE).clamp(phi.low, phi.high);
-        // The wall's own resistance 1/G is what shows: searched in its size like any strength, and never none at all.
+        // The resistance 1/G of the wall determines the signature; it is searched like any strength and never 0.
         let values = |resistance_k_w: f64| {
             vec![phi, (1.0 / resistance_k_w).clamp(conductance.low, 0.9 * conductance.high)]
         };

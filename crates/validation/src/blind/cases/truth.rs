@@ -1,4 +1,4 @@
-//! What is sealed: a case's causes, and efficiency and heat transfer at each point.
+//! The sealed answer of a case: its causes, and efficiency and heat transfer at each point.
 
 use crate::blind::cases::case::Case;
 use serde::{Deserialize, Serialize};

@@ -6,9 +6,9 @@ use std::fmt;
 /// `hits` out of `trials`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Share {
-    /// How often it happened.
+    /// Number of hits.
     pub hits: usize,
-    /// How often it could have.
+    /// Number of trials.
     pub trials: usize,
 }
 

@@ -15,7 +15,7 @@ const BINS: usize = 10;
 /// Parts of the cases: each is judged by a calibration that was fitted to the others.
 const FOLDS: usize = 5;
 
-/// Cases whose first answer was given about the same probability.
+/// Cases whose first answer has a probability in the same class.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bin {
     /// Lowest probability of the class.
@@ -43,7 +43,7 @@ pub struct Bin {
 struct Answer {
     probability: f64,
     right: bool,
-    /// How much the case counts.
+    /// Weight of the case.
     weight: f64,
 }
 
@@ -57,7 +57,7 @@ pub struct Reliability {
     /// Expected calibration error: how far the share that is right is from the mean probability of a class, on average over all
     /// cases, fraction (Naeini, Cooper and Hauskrecht 2015); `None` without cases.
     pub expected_calibration_error: Option<f64>,
-    /// How large that error is expected to be by chance alone where every probability holds.
+    /// The error expected by chance if all probabilities are correct.
     pub expected_by_chance: Option<f64>,
     /// Cases whose truth was not among the answers that have a probability.
     pub truth_not_listed: usize,
@@ -72,7 +72,7 @@ fn first_answer(case: &Observed, calibration: &Calibration) -> Option<(f64, bool
     let total: f64 = scores().map(weight).sum();
     let inside = |score: f64| (1.0 - outside) * weight(score) / total;
     let is_outside = case.kind == CaseKind::Outside;
-    // What only adds to a better cause is that cause, as the diagnosis shows it.
+    // A hypothesis that only adds effects to a better one counts as the better one, as in the diagnosis.
     let mut shown: Vec<(&BTreeSet<String>, f64)> = Vec::new();
     for (causes, score) in &case.candidates {
         match shown.iter_mut().find(|(better, _)| better.is_subset(causes)) {
@@ -179,7 +179,7 @@ fn both(before: &Calibration, observed: &[Observed]) -> [Reliability; 2] {
     ]
 }
 
-/// What came of so many diagnoses, and where the calibration is.
+/// The result of a calibration as text, with its file.
 pub fn calibrated_text(diagnoses: usize, file: &Path, reliabilities: &[Reliability]) -> String {
     let reliability = reliability_text(reliabilities);
     format!("calibration from {diagnoses} diagnoses in {}\n{reliability}", file.display())

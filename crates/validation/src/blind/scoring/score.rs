@@ -1,4 +1,4 @@
-//! Holds diagnoses against opened answers.
+//! Scores diagnoses against the opened answers.
 
 use crate::blind::cases::kind::CaseKind;
 use crate::blind::cases::truth::Truth;
@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What is read of a diagnosis; the rest of its JSON is for people.
+/// The fields of a diagnosis that are scored.
 #[derive(Debug, Clone, Default, Deserialize)]
 struct Diagnosis {
     verdict: String,
@@ -56,7 +56,7 @@ struct Gap {
     shrink: Option<f64>,
 }
 
-/// One case as it came out.
+/// The result of one case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoredCase {
     /// Its name.
@@ -81,7 +81,7 @@ pub struct ScoredCase {
 /// Ends of the classes of signature length, sigmas.
 pub(crate) const CLASSES_SIGMA: [f64; 3] = [12.0, 24.0, f64::INFINITY];
 
-/// Cases whose causes show about equally plainly.
+/// Cases with similar signature lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct SigmaClass {
     /// Shortest signature of the class, sigmas.
@@ -137,7 +137,7 @@ pub struct Score {
     pub set_size_mean: Option<f64>,
 }
 
-/// Opens the seal of `directory` and holds NAME.diagnosis.json of each case against its answer.
+/// Opens the seal of `directory` and compares NAME.diagnosis.json of each case with its answer.
 ///
 /// # Errors
 /// [`BlindError`] where the directory holds no cases or the answers have been changed. A missing or broken diagnosis is
@@ -187,7 +187,7 @@ fn kind_of(truth: &Truth) -> CaseKind {
 
 fn score_truths(truths: &[Truth], diagnosis_of: impl Fn(&str) -> Option<Diagnosis>) -> Score {
     let catalogue = catalogue();
-    // More than one place is right where neighbours share a balance.
+    // Several places are right if neighbours share a balance.
     let shows_in = |id: &str, submodel: &str| {
         catalogue.iter().any(|effect| effect.info().id == id && effect.info().shows_in(submodel))
     };

@@ -1,4 +1,4 @@
-//! A score as people read it.
+//! The text of a score.
 
 use crate::blind::scoring::interval::Share;
 use crate::blind::scoring::score::{CLASSES_SIGMA, Score, ScoredCase};

@@ -22,7 +22,7 @@ use rand_pcg::Pcg64;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// What all cases of a campaign share: its points with the P3 that the nominal model needs for them.
+/// Data that all cases of a campaign share: its points with the P3 that the nominal model needs for them.
 pub(crate) struct Schedule<'a> {
     campaign: &'a Campaign,
     nominal: &'a Model,
@@ -30,7 +30,7 @@ pub(crate) struct Schedule<'a> {
     laboratory: Laboratory,
 }
 
-/// Turns the seed of a case into that of the night on which its rig was healthy: no other draw uses it.
+/// Converts the seed of a case into the seed of its reference recording; no other draw uses it.
 const ANOTHER_NIGHT: u64 = 0x3C6E_F372_FE94_F82B;
 
 impl<'a> Schedule<'a> {
@@ -142,7 +142,7 @@ impl<'a> Schedule<'a> {
         Ok(kept.recording)
     }
 
-    /// The runner of every campaign, without guards: nothing that is drawn endangers a virtual machine.
+    /// Uses the runner of all campaigns without guards, because a virtual machine cannot be damaged.
     fn drive(&self, case: &Case, night_seed: u64, observer: &mut dyn RunObserver) -> Result<(), BlindError> {
         let runner = Runner {
             steps: &mut StepsOfCase::new(&self.steps, self.campaign.timing.warm_up_s),
@@ -150,7 +150,7 @@ impl<'a> Schedule<'a> {
             clock: &mut UnpacedClock,
             guards: Vec::new(),
             observer,
-            // What withheld causes do to the speed is part of what is to be found.
+            // No speed control: the effect of the causes on the speed is part of their signature.
             speed: None,
             stop: &AtomicBool::new(false),
         };

@@ -5,7 +5,7 @@ use mapper_core::{Recording, SampleBatch, StepMarker};
 use mapper_recording::{RecordError, RecordingWriter, StepPhase};
 use mapper_runner::{ObserverError, RunObserver};
 
-/// Writes the recording and keeps the truth at the end of each step apart: it is what the answers hold.
+/// Writes the recording, and collects the truth at the end of each step for the answers.
 pub(crate) struct ToFile {
     writer: RecordingWriter,
     last: SampleBatch,

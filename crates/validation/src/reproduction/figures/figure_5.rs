@@ -49,7 +49,7 @@ fn adiabatic(speed_rpm: f64, opening: f64) -> Option<SteadyState> {
     (model.params.compressor.external_area_m2, model.params.turbine.external_area_m2) = (0.0, 0.0);
     let mut t2_k = 350.0;
     let mut found = None;
-    // The outlet temperature depends little on what surrounds the machine: a few rounds settle it.
+    // A few iterations suffice, because the outlet temperature depends little on the surroundings.
     for _ in 0..8 {
         let boundary = BoundaryConditions {
             valve_opening_ratio: opening,

@@ -1,4 +1,4 @@
-//! Figure 7: how long, and how late, the window may be.
+//! Figure 7: duration and start of the window.
 
 use crate::reproduction::lab::Run;
 use crate::reproduction::number_text::fixed;
@@ -12,10 +12,10 @@ const DURATIONS_S: [f64; 8] = [5.0, 10.0, 25.0, 50.0, 75.0, 100.0, 150.0, 200.0]
 const OFFSETS_S: [f64; 9] = [0.0, 2.0, 5.0, 10.0, 20.0, 35.0, 50.0, 75.0, 100.0];
 const NOMINAL_OFFSET_S: f64 = 10.0;
 const NOMINAL_DURATION_S: f64 = 100.0;
-/// How long the runs have to last, s.
+/// Duration of the runs, s.
 pub(crate) const RUN_S: f64 = 210.0;
 
-/// What is drawn of an outcome.
+/// The drawn values of an outcome.
 type Value = fn(&Outcome) -> Option<f64>;
 
 struct Case {

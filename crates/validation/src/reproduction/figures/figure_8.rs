@@ -1,4 +1,4 @@
-//! Figure 8: what a wrong share of the internal area before compression costs.
+//! Figure 8: error due to a wrong share of the internal area before compression (alpha_A).
 
 use crate::reproduction::lab::{JUMPS, run_all};
 use crate::reproduction::number_text::{fixed, range};
@@ -62,7 +62,7 @@ fn own_inlet() -> Result<OwnInlet, ReproduceError> {
     })
 }
 
-/// What the paper says of figure 8 (b), for both machines.
+/// Statements of the paper on figure 8 (b), for both machines.
 fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &OwnInlet) -> [Statement; 3] {
     let span = |outcomes: &[Outcome]| extremes(outcomes.iter().map(Outcome::h_error_percent));
     let off = |outcomes: &[Outcome]| rms(outcomes.iter().map(Outcome::h_error_percent)).unwrap_or(f64::NAN);
@@ -132,7 +132,7 @@ fn on_h(right: &[Outcome], wrong: &[Outcome], nothing_before: &[Outcome], own: &
 
 /// Error of h that the paper's abstract gives for a wrong alpha_A, %.
 const SAID_PERCENT: f64 = 20.0;
-/// Growth of an error that is still called slight, ratio.
+/// Largest growth of an error that counts as slight, ratio.
 const SLIGHTLY_RATIO: f64 = 1.5;
 
 pub(crate) fn figure() -> Result<FigureResult, ReproduceError> {

@@ -58,7 +58,7 @@ impl Calibrate {
         let made_by = plan.command(&self.campaign);
         let found = calibrate(&campaign, &registry::registry().effects, &plan, made_by, &engine);
         progress.clear();
-        let stopped = || Failure::new(Code::Interrupted, "stopped; `mapper fleet` keeps what is done");
+        let stopped = || Failure::new(Code::Interrupted, "stopped; `mapper fleet` keeps finished cases");
         let (calibration, observed) = found?.ok_or_else(stopped)?;
         self.replace.write(&self.out, json_text(&calibration)?.as_bytes())?;
         if let Some(file) = &self.observed {

@@ -49,7 +49,6 @@ pub struct Make {
 }
 
 impl Make {
-    /// Draws, records and seals cases.
     pub fn run(&self) -> Result<(), Failure> {
         let campaign = mapper_campaign::load(&self.campaign).map_err(Failure::of_campaign)?;
         let outside = if self.calibration { OutsideUse::Calibration } else { OutsideUse::Check };

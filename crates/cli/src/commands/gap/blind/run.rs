@@ -41,12 +41,12 @@ impl Run {
         let report = |done, of| progress.pieces(done, of);
         let engine = Engine { jobs: self.jobs, stop: &stop, on_progress: &report };
         let names: Vec<&String> = manifest.cases.iter().filter(|name| !name.contains(['/', '\\'])).collect();
-        let threads = (cores() / engine.at_a_time(names.len())).max(1);
+        let threads = (cores() / engine.parallel_jobs(names.len())).max(1);
         let diagnosed =
             engine.each(&names, |_, name| self.diagnose(&program, name, manifest.healthy, threads));
         progress.clear();
         let diagnosed: Vec<_> = diagnosed?.into_iter().collect::<Option<_>>().ok_or_else(|| {
-            Failure::new(Code::Interrupted, "stopped by the operator; the same command goes on from there")
+            Failure::new(Code::Interrupted, "stopped by the operator; the same command continues from there")
         })?;
         let failed: Vec<String> = diagnosed.into_iter().filter_map(Result::err).collect();
         if failed.is_empty() {
@@ -60,7 +60,7 @@ impl Run {
         }
         Err(failure(format!("{} recordings were not diagnosed:\n{}", failed.len(), failed.join("\n"))))
     }
-    /// Diagnoses one case if that is not done yet; `Err` within: the message of the diagnosis.
+    /// Diagnoses one case unless its diagnosis exists. The inner `Err` is the message of a failed diagnosis.
     fn diagnose(
         &self,
         program: &Path,
@@ -85,7 +85,7 @@ impl Run {
                     .into_iter()
                     .flatten(),
             )
-            // Several at once: each keeps to its share of the cores.
+            // Several run at once, so each gets its share of the cores.
             .env("RAYON_NUM_THREADS", threads.to_string())
             .stdin(Stdio::null())
             .output()

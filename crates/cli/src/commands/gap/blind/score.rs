@@ -25,7 +25,6 @@ pub struct Score {
 }
 
 impl Score {
-    /// Opens the seal and prints the table.
     pub fn run(&self) -> Result<(), Failure> {
         let scored = score(&self.directory)?;
         if self.open {

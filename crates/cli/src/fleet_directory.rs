@@ -1,4 +1,4 @@
-//! A fleet directory opened, and what works in it: this machine.
+//! Opens fleet directories, with this computer as the worker.
 
 use crate::output::failure::Failure;
 use crate::wall_clock::SystemWall;
@@ -8,8 +8,8 @@ use mapper_fleet::{Engine, Fleet, FleetError, Kind, Machine};
 use mapper_session::Registry;
 use std::path::Path;
 
-/// Does something with every kind there is on this machine.
-pub fn on_this_machine<T>(
+/// Calls `then` with all kinds of studies and this computer.
+pub fn with_machine<T>(
     then: impl FnOnce(&Registry, &[&dyn Kind], &Machine<'_>) -> Result<T, Failure>,
 ) -> Result<T, Failure> {
     let (registry, wall) = (registry::registry(), SystemWall::new());
@@ -23,13 +23,13 @@ pub fn on_this_machine<T>(
     then(&registry, &kinds, &machine)
 }
 
-/// Does something in a fleet directory, with progress from the first second.
-pub fn in_fleet<T>(
+/// Calls `then` with an opened fleet directory, and shows progress.
+pub fn with_fleet<T>(
     directory: &Path,
     jobs: Option<usize>,
     then: impl FnOnce(&Fleet, &dyn Kind, &Engine<'_>, &Machine<'_>) -> Result<T, FleetError>,
 ) -> Result<T, Failure> {
-    on_this_machine(|registry, kinds, machine| {
+    with_machine(|registry, kinds, machine| {
         let fleet = Fleet::open(directory, &mapper_validation::studies::program(registry))?;
         let (kind, stop, progress) =
             (fleet.kind(kinds)?, interrupt::stop_flag()?, output_options::progress());
@@ -40,14 +40,14 @@ pub fn in_fleet<T>(
     })
 }
 
-/// Processor time of this thread as Linux counts it; elsewhere the clock's.
+/// Processor time of this thread on Linux; elsewhere the elapsed time.
 fn thread_s(wall: &SystemWall) -> f64 {
     let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let ns = counted.and_then(|line| line.split(' ').next()?.parse::<f64>().ok());
     ns.map_or_else(|| wall.now_s(), |ns| ns * 1e-9)
 }
 
-/// Largest memory of this process so far; only Linux says.
+/// Peak memory of this process; `None` except on Linux.
 fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -3,7 +3,7 @@
 use crate::frame::log_formats;
 use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
-use mapper_driver_host::{Driver, PATIENCE, Places};
+use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver, SearchPath};
 use mapper_effects::ScriptEffect;
 use mapper_formats::FORMATS;
 use mapper_physics::rig::effect::Effect;
@@ -28,8 +28,8 @@ pub fn registry_with_rig(rig: (String, PathBuf)) -> Registry {
 fn rig_in_python(name: &str, settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let rig = RIG.with_borrow(Clone::clone).filter(|(own, _)| own == name);
     Ok(Box::new(match rig {
-        Some((_, socket)) => Driver::at_socket(&socket, name, settings, PATIENCE)?,
-        None => Driver::find(&Places::default(), name, settings, "", "")?,
+        Some((_, socket)) => Driver::connect_socket(&socket, name, settings, DEFAULT_TIMEOUTS)?,
+        None => Driver::find(&SearchPath::default(), name, settings, "", "")?,
     }))
 }
 

@@ -17,7 +17,7 @@ fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// Nobody else's settings: a test machine, not a cluster that others reach.
+/// The settings of a private test cluster.
 fn configuration(folder: &Path) -> String {
     let host = Command::new("hostname").arg("-s").output().unwrap();
     let host = String::from_utf8(host.stdout).unwrap().trim().to_owned();
@@ -79,7 +79,7 @@ impl Cluster {
         command
     }
 
-    /// What a command of Slurm says.
+    /// Runs a Slurm command and returns its output.
     pub fn ask(&self, program: &str, arguments: &[&str]) -> String {
         let mut command = Command::new(program);
         command.args(arguments);
@@ -87,7 +87,7 @@ impl Cluster {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// Looks until it is so; what a real scheduler does takes real time.
+    /// Waits for a condition: a real scheduler needs real time.
     pub fn wait_for(&self, what: &str, is_so: impl Fn() -> bool) {
         let started = Instant::now();
         while !is_so() {

@@ -1,9 +1,9 @@
-//! A campaign that visits one jump again and again on a rig with tolerances, so that drift shows.
+//! A campaign that repeats one jump on a rig with tolerances, so that drift is visible.
 
 use crate::{CampaignFile, made_once, repository};
 use std::path::PathBuf;
 
-/// What is changed in the campaign of the gap rig.
+/// Changes to the campaign of the gap rig.
 #[derive(Debug, Clone)]
 pub struct DriftCampaign<'a> {
     /// Entries of the virtual lab's `drift:`; empty for none.

@@ -1,4 +1,4 @@
-//! What the tests of the whole share: the program as built, campaigns to run, Python to look at the results.
+//! Helpers for the tests of the whole program: the built program, campaigns to run, Python scripts that check the results.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -24,7 +24,7 @@ pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
 }
 
-/// A new directory that goes away with the returned value.
+/// A new directory that is removed with the returned value.
 pub fn scratch() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary directory can be made")
 }

@@ -1,6 +1,6 @@
-//! Runs that several tests look at: made by the first that asks, kept below the target folder for the others.
+//! Runs shared by several tests: the first test that needs one makes it, and the others read it from the target folder.
 //!
-//! Tests are processes of their own, so that nothing in memory is shared. A test of what a run does makes its own one.
+//! Each test is a process, so nothing in memory is shared. A test of the run itself makes its own run.
 
 use crate::{CampaignFile, Finished, mapper_command, only_run, repository};
 use serde_json::Value;
@@ -8,7 +8,7 @@ use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-/// A finished run: to be looked at, not to be written into.
+/// A finished run; read only.
 #[derive(Debug)]
 pub struct MadeOnce {
     /// Its directory.
@@ -31,7 +31,7 @@ pub fn made_once(campaign: &CampaignFile) -> MadeOnce {
     fs::create_dir_all(&all).unwrap();
     remove_others(&all, folder.parent().unwrap());
     fs::create_dir_all(&folder).unwrap();
-    // Who comes second waits until it is there.
+    // Other tests wait until the run is complete.
     let lock = fs::File::create(folder.join("lock")).unwrap();
     lock.lock().unwrap();
     let (runs, printed, messages) =
@@ -68,7 +68,7 @@ fn hash(of: impl FnOnce(&mut DefaultHasher)) -> String {
 /// The results of earlier programs are of no use any more.
 fn remove_others(all: &Path, ours: &Path) {
     for entry in fs::read_dir(all).unwrap().flatten().filter(|entry| entry.path() != ours) {
-        // Another test may be at it.
+        // Another test may be removing it.
         let _ = fs::remove_dir_all(entry.path());
     }
 }

@@ -1,4 +1,4 @@
-//! The program, built once, run as a user runs it.
+//! Builds the program once, and runs it as a user does.
 
 use crate::repository;
 use serde_json::Value;
@@ -60,15 +60,15 @@ pub fn build_driver(package: &str) {
 pub fn mapper_command<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(binary());
     command.args(arguments).current_dir(repository()).stdin(std::process::Stdio::null());
-    // Nothing of the developer's own settings.
+    // Ignore the developer's own settings.
     command.env_remove("NO_COLOR").env_remove("CLICOLOR_FORCE").env_remove("FORCE_COLOR");
     command
 }
 
-/// What a run of the program gave.
+/// Result of a run of the program.
 #[derive(Debug)]
 pub struct Finished {
-    /// Exit code; `None` where a signal ended it.
+    /// Exit code; `None` if a signal ended it.
     pub code: Option<i32>,
     /// Standard output.
     pub stdout: String,

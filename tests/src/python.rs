@@ -1,4 +1,4 @@
-//! Python scripts of tests/python: readers and solvers that share no code with this program.
+//! Runs the Python scripts of tests/python, which share no code with this program.
 
 use crate::repository;
 use serde_json::Value;

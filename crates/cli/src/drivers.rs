@@ -2,14 +2,14 @@
 
 use mapper_backends::BACKENDS;
 use mapper_core::{Backend, BackendError};
-use mapper_driver_host::{Driver, KNOWN, Places};
+use mapper_driver_host::{Driver, INCLUDED_DRIVERS, SearchPath};
 use serde_json::Value;
 use std::path::PathBuf;
 
 /// Locations of drivers: first those that listen at a socket, then those next to this program, then those on `PATH`.
-pub fn locations() -> Places {
+pub fn locations() -> SearchPath {
     let sockets = private_state_directory().map(|state| state.join("drivers"));
-    Places::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref(), sockets)
+    SearchPath::new(std::env::current_exe().ok().as_deref(), std::env::var_os("PATH").as_deref(), sockets)
 }
 
 /// `$MAPPER_STATE_DIR`, `$XDG_STATE_HOME/mapper` or `~/.local/state/mapper`: a directory that other users cannot write to, because a
@@ -24,7 +24,7 @@ fn private_state_directory() -> Option<PathBuf> {
 /// Starts the driver of a campaign.
 pub fn driver(name: &str, settings: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let built_in = BACKENDS.iter().map(|plugin| plugin.name).collect::<Vec<_>>().join(", ");
-    let known = KNOWN.iter().find(|(known, ..)| *known == name);
+    let known = INCLUDED_DRIVERS.iter().find(|(known, ..)| *known == name);
     let hint =
         known.map_or_else(String::new, |(.., line)| format!("; `{line}` in the source of mapper builds it"));
     Ok(Box::new(Driver::find(&locations(), name, settings, &built_in, &hint)?))

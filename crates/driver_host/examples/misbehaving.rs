@@ -1,4 +1,4 @@
-//! A driver that misbehaves on demand, for tests: it measures T2 in simulated time, and its setting `fault` selects the fault.
+//! A driver with faults, for tests: it measures T2 in simulated time. The name of the link by which it is started selects the fault.
 
 use mapper_driver_host::protocol::{Encoding, Message, VERSION, decode, encode, read_frame, write_frame};
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use std::io::{Stdout, Write, stdin, stdout};
 
 fn main() {
     let fault = std::env::args().next().unwrap_or_default();
-    // The name of the link that it was started by: it has no settings before its hello.
+    // The fault is in the file name, because a driver has no settings before its hello.
     let fault = fault.rsplit("mapper-backend-").next().unwrap_or_default().to_owned();
     let mut driver = Misbehaving { fault, out: stdout(), sequence: 0 };
     let mut stdin = stdin();

@@ -1,14 +1,14 @@
-//! A driver as a backend.
+//! A driver program as a backend.
 
 use crate::error::DriverError;
-use crate::find::{At, PREFIX, Places, file_name};
+use crate::find::{Endpoint, PREFIX, SearchPath, file_name};
 use crate::lease::Lease;
 use crate::link::Link;
-use crate::pending::{Pending, ROUNDING_S};
 use crate::protocol::{
     Code, Configure, Described, Failure, Hello, MAGIC, Message, Poll, Samples, VERSION, Welcome, batch,
-    description, rig_error, setpoints_on_the_wire,
+    description, read_error, write_setpoints,
 };
+use crate::sample_queue::{ROUNDING_S, SampleQueue};
 use crate::secrets::Secrets;
 use mapper_core::{
     Backend, BackendError, RigDescription, SampleBatch, SetpointRange, SetpointRanges, Setpoints,
@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 /// Timeouts for a driver's responses.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
+pub struct Timeouts {
     /// For the handshake.
     pub hello: Duration,
     /// For settings, description, arming and release, which may open connections.
@@ -36,7 +36,7 @@ pub struct Patience {
 }
 
 /// Values of docs/reference/protocol.md.
-pub const PATIENCE: Patience = Patience {
+pub const DEFAULT_TIMEOUTS: Timeouts = Timeouts {
     hello: Duration::from_secs(5),
     slow: Duration::from_secs(10),
     call: Duration::from_secs(2),
@@ -46,26 +46,26 @@ pub const PATIENCE: Patience = Patience {
 };
 
 /// Time for a driver to exit by itself.
-const LEAVING: Duration = Duration::from_secs(2);
+const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A rig controlled by a driver.
+/// A rig that a driver program controls.
 pub struct Driver {
     name: String,
     link: Link,
     session: Option<String>,
     /// Whether the driver knows the hold command. Older drivers hold setpoints without it.
-    knows_hold: bool,
+    supports_hold: bool,
     description: Option<RigDescription>,
     secrets: Secrets,
-    patience: Patience,
+    timeouts: Timeouts,
     /// Number of the last request.
-    asked: u64,
+    last_request: u64,
     armed: Option<Lease>,
-    /// Whether arming was requested without a later release, so that the rig's owner is unknown.
+    /// Whether arming was requested and neither refused nor followed by a release, so that this session may own the rig.
     in_doubt: bool,
-    pending: Pending,
+    queue: SampleQueue,
     /// Errors in samples since the last poll.
-    spoiled: Option<DriverError>,
+    sample_error: Option<DriverError>,
     now_s: f64,
 }
 
@@ -75,104 +75,104 @@ impl Driver {
     /// # Errors
     /// [`BackendError::Settings`] if the driver is missing, is not a driver, or refuses its settings.
     pub fn find(
-        places: &Places,
+        places: &SearchPath,
         name: &str,
         settings: &Value,
         built_in: &str,
         hint: &str,
     ) -> Result<Driver, BackendError> {
-        let wrong = |error| settings_error(name, String::new(), error);
+        let setup_error = |error| settings_error(name, String::new(), error);
         let Some(at) = places.find(name) else {
-            if let Some(program) = places.not_executable(name) {
-                return Err(wrong(DriverError::NotExecutable { program }));
+            if let Some(program) = places.find_not_executable(name) {
+                return Err(setup_error(DriverError::NotExecutable { program }));
             }
-            let looked = match places.programs.len() {
+            let searched = match places.programs.len() {
                 0 => "any directory, since PATH is empty".to_owned(),
                 _ => places.programs.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
             };
             let program = file_name(name).unwrap_or_else(|| format!("{PREFIX}<name>"));
-            return Err(wrong(DriverError::NotFound {
+            return Err(setup_error(DriverError::NotFound {
                 program,
                 built_in: built_in.to_owned(),
-                looked,
+                searched,
                 hint: hint.to_owned(),
             }));
         };
         let variable = |name: &str| std::env::var(name).ok();
         // A driver that was already running has its own environment.
-        let needed = matches!(at, At::Program(_));
+        let needed = matches!(at, Endpoint::Program(_));
         let secrets = Secrets::of(settings, &variable, needed)
             .map_err(|(path, error)| settings_error(name, path, error))?;
-        Driver::start(&at, name, settings, secrets, PATIENCE)
+        Driver::start(&at, name, settings, secrets, DEFAULT_TIMEOUTS)
     }
 
     /// Starts a driver program, without secrets.
     ///
     /// # Errors
     /// As [`Driver::find`].
-    pub fn of_program(
+    pub fn start_program(
         program: &Path,
         name: &str,
         settings: &Value,
-        patience: Patience,
+        timeouts: Timeouts,
     ) -> Result<Driver, BackendError> {
-        Driver::start(&At::Program(program.to_owned()), name, settings, Secrets::default(), patience)
+        Driver::start(&Endpoint::Program(program.to_owned()), name, settings, Secrets::default(), timeouts)
     }
 
     /// Connects to a driver that listens on a socket, without secrets.
     ///
     /// # Errors
     /// As [`Driver::find`].
-    pub fn at_socket(
+    pub fn connect_socket(
         socket: &Path,
         name: &str,
         settings: &Value,
-        patience: Patience,
+        timeouts: Timeouts,
     ) -> Result<Driver, BackendError> {
-        Driver::start(&At::Socket(socket.to_owned()), name, settings, Secrets::default(), patience)
+        Driver::start(&Endpoint::Socket(socket.to_owned()), name, settings, Secrets::default(), timeouts)
     }
 
     fn start(
-        at: &At,
+        at: &Endpoint,
         name: &str,
         settings: &Value,
         secrets: Secrets,
-        patience: Patience,
+        timeouts: Timeouts,
     ) -> Result<Driver, BackendError> {
-        let wrong = |error| settings_error(name, String::new(), error);
+        let setup_error = |error| settings_error(name, String::new(), error);
         let mut driver = Driver {
             name: name.to_owned(),
             link: match at {
-                At::Program(program) => Link::start(program),
+                Endpoint::Program(program) => Link::start(program),
                 #[cfg(unix)]
-                At::Socket(socket) => Link::connect(socket),
+                Endpoint::Socket(socket) => Link::connect(socket),
                 #[cfg(not(unix))]
-                At::Socket(socket) => Err(DriverError::Away {
+                Endpoint::Socket(socket) => Err(DriverError::NotListening {
                     socket: socket.clone(),
                     source: std::io::ErrorKind::Unsupported.into(),
                 }),
             }
-            .map_err(wrong)?,
+            .map_err(setup_error)?,
             session: None,
-            knows_hold: false,
+            supports_hold: false,
             description: None,
             secrets,
-            patience,
-            asked: 0,
+            timeouts,
+            last_request: 0,
             armed: None,
             in_doubt: false,
-            pending: Pending::default(),
-            spoiled: None,
+            queue: SampleQueue::default(),
+            sample_error: None,
             now_s: 0.0,
         };
         let version = driver.greet()?;
         let settings = Configure { settings: settings.clone() };
-        driver.ask("configure", &settings, patience.slow)?;
-        let answer = driver.ask("describe", &json!({}), patience.slow)?;
+        driver.request("configure", &settings, timeouts.slow)?;
+        let answer = driver.request("describe", &json!({}), timeouts.slow)?;
         let described: Described = serde_json::from_value(answer)
-            .map_err(|error| driver.lost(DriverError::Garbage(error.to_string())))?;
-        let rig =
-            description(&described.description, name, &version).map_err(|error| driver.lost(error.into()))?;
+            .map_err(|error| driver.lost_error(DriverError::InvalidMessage(error.to_string())))?;
+        let rig = description(&described.description, name, &version)
+            .map_err(|error| driver.lost_error(error.into()))?;
         driver.description = Some(rig);
         Ok(driver)
     }
@@ -186,22 +186,23 @@ impl Driver {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             frame_limit_bytes: crate::protocol::FRAME_LIMIT_BYTES,
         };
-        let answer = self.ask("hello", &hello, self.patience.hello)?;
+        let answer = self.request("hello", &hello, self.timeouts.hello)?;
         // Secrets are removed from the driver's text.
-        let wrong = |error| self.lost(error);
-        let welcome: Welcome = serde_json::from_value(answer)
-            .map_err(|error| wrong(DriverError::NoDriver(format!("its hello is incomplete: {error}"))))?;
+        let setup_error = |error| self.lost_error(error);
+        let welcome: Welcome = serde_json::from_value(answer).map_err(|error| {
+            setup_error(DriverError::NotADriver(format!("its hello is incomplete: {error}")))
+        })?;
         let theirs = welcome.hello;
         if theirs.magic != MAGIC {
-            return Err(wrong(DriverError::NoDriver("its hello begins with another word".to_owned())));
+            return Err(setup_error(DriverError::NotADriver("its hello has another magic word".to_owned())));
         }
         if theirs.protocol.major != VERSION.major {
-            return Err(wrong(DriverError::Version { theirs: theirs.protocol, ours: VERSION }));
+            return Err(setup_error(DriverError::Version { theirs: theirs.protocol, ours: VERSION }));
         }
         if theirs.name != self.name {
-            return Err(wrong(DriverError::Name(theirs.name)));
+            return Err(setup_error(DriverError::Name(theirs.name)));
         }
-        self.knows_hold = theirs.protocol.minor >= crate::protocol::HOLD_SINCE_MINOR;
+        self.supports_hold = theirs.protocol.minor >= crate::protocol::HOLD_SINCE_MINOR;
         self.link.limit_frames(theirs.frame_limit_bytes);
         self.session = Some(welcome.session);
         Ok(theirs.version)
@@ -219,7 +220,7 @@ impl Driver {
         self.description.as_ref().is_some_and(|rig| rig.simulated_time)
     }
 
-    fn lost(&self, error: DriverError) -> BackendError {
+    fn lost_error(&self, error: DriverError) -> BackendError {
         let source = Box::new(DriverError::Message(self.secrets.hide(&error.to_string())));
         // Before the description arrives no rig can be lost.
         match self.description {
@@ -229,48 +230,53 @@ impl Driver {
     }
 
     /// Sends a request and waits for the response. Samples that arrive earlier are kept.
-    fn ask(
+    fn request(
         &mut self,
         call: &'static str,
         params: &impl Serialize,
         within: Duration,
     ) -> Result<Value, BackendError> {
         let params = serde_json::to_value(params)
-            .map_err(|error| self.lost(DriverError::Garbage(error.to_string())))?;
-        self.asked += 1;
+            .map_err(|error| self.lost_error(DriverError::InvalidMessage(error.to_string())))?;
+        self.last_request += 1;
         let request = Message {
-            id: Some(self.asked),
+            id: Some(self.last_request),
             session: self.session.clone(),
             deadline_s: Some(within.as_secs_f64()),
             method: Some(call.to_owned()),
             params,
             ..Message::default()
         };
-        self.link.outlet().and_then(|outlet| outlet.send(&request)).map_err(|error| self.lost(error))?;
+        self.link
+            .outlet()
+            .and_then(|outlet| outlet.send(&request))
+            .map_err(|error| self.lost_error(error))?;
         if let Some(lease) = &self.armed {
-            lease.called();
+            lease.record_call();
         }
         let end = Instant::now() + within;
         loop {
             let left = end.saturating_duration_since(Instant::now());
-            let came = self.link.next(left).map_err(|error| self.lost(error))?;
-            let Some(message) = came else {
+            let incoming = self.link.receive(left).map_err(|error| self.lost_error(error))?;
+            let Some(message) = incoming else {
                 return Err(BackendError::Deadline { call, limit_s: within.as_secs_f64() });
             };
             match (message.id, message.error, message.result) {
-                (Some(id), Some(failure), _) if id == self.asked => {
+                (Some(id), Some(failure), _) if id == self.last_request => {
                     let mut message = failure.message;
                     // An earlier sample error explains more than the end of the lease.
-                    if let (Code::LeaseEnded, Some(spoiled)) = (failure.code, &self.spoiled) {
-                        message = format!("{message}; {spoiled}");
+                    if let (Code::LeaseEnded, Some(sample_error)) = (failure.code, &self.sample_error) {
+                        message = format!("{message}; {sample_error}");
                     }
                     let failure = Failure { message: self.secrets.hide(&message), ..failure };
-                    return Err(self.refused(failure, call));
+                    return Err(self.refusal_error(failure, call));
                 }
-                (Some(id), None, result) if id == self.asked => return Ok(result.unwrap_or(Value::Null)),
+                (Some(id), None, result) if id == self.last_request => {
+                    return Ok(result.unwrap_or(Value::Null));
+                }
                 // A late response to an earlier request.
                 (Some(_), ..) => {}
-                (None, ..) => self.take_note(message.method.as_deref(), message.params),
+                (None, ..) => self.process_note(message.method.as_deref(), message.params),
             }
             if left.is_zero() {
                 // A driver that sends endless messages does not count as responding.
@@ -280,8 +286,8 @@ impl Driver {
     }
 
     /// Converts a refusal to a rig error.
-    fn refused(&self, failure: Failure, call: &'static str) -> BackendError {
-        match rig_error(failure, &self.name, call, self.now_s) {
+    fn refusal_error(&self, failure: Failure, call: &'static str) -> BackendError {
+        match read_error(failure, &self.name, call, self.now_s) {
             // Before the description arrives no rig can be lost.
             BackendError::Lost { source, .. } if self.description.is_none() => {
                 BackendError::Settings { backend: self.name.clone(), path: String::new(), source }
@@ -291,13 +297,13 @@ impl Driver {
     }
 
     /// Processes samples and notes.
-    fn take_note(&mut self, method: Option<&str>, params: Value) {
-        let (Some(rig), true) = (&self.description, self.spoiled.is_none()) else { return };
+    fn process_note(&mut self, method: Option<&str>, params: Value) {
+        let (Some(rig), true) = (&self.description, self.sample_error.is_none()) else { return };
         match method {
             Some("samples") => {
                 let read = || {
                     let samples: Samples = serde_json::from_value(params)
-                        .map_err(|error| DriverError::Garbage(error.to_string()))?;
+                        .map_err(|error| DriverError::InvalidMessage(error.to_string()))?;
                     if samples.stream != "rig" {
                         return Ok(());
                     }
@@ -305,24 +311,24 @@ impl Driver {
                     for event in &mut batch.events {
                         event.message = self.secrets.hide(&event.message);
                     }
-                    Ok(self.pending.push(batch)?)
+                    Ok(self.queue.push(batch)?)
                 };
-                self.spoiled = read().err();
+                self.sample_error = read().err();
             }
             Some("lost") => {
                 let words = params.get("message").and_then(Value::as_str).unwrap_or("the rig was lost");
-                self.spoiled = Some(DriverError::Message(words.to_owned()));
+                self.sample_error = Some(DriverError::Message(words.to_owned()));
             }
             Some("note") => {
                 if let Some(words) = params.get("message").and_then(Value::as_str) {
-                    self.pending.note(self.now_s, &self.secrets.hide(words));
+                    self.queue.note(self.now_s, &self.secrets.hide(words));
                 }
             }
             _ => {}
         }
     }
 
-    fn need_armed(&self, call: &'static str) -> Result<(), BackendError> {
+    fn require_armed(&self, call: &'static str) -> Result<(), BackendError> {
         match self.armed {
             Some(_) => Ok(()),
             None => Err(BackendError::OutOfOrder { call, state: "not armed", needed: "armed" }),
@@ -330,28 +336,30 @@ impl Driver {
     }
 
     /// Waits until a rig in real time has delivered the samples due at `until_s`, or is late.
-    fn wait_for(&mut self, until_s: f64) -> Result<(), BackendError> {
+    fn wait_for_samples(&mut self, until_s: f64) -> Result<(), BackendError> {
         let sample_s = 1.0 / self.rig()?.sample_rate_hz;
         let ahead = Duration::try_from_secs_f64((until_s - self.now_s).max(0.0)).unwrap_or(Duration::MAX);
-        let late = self.patience.late + Duration::try_from_secs_f64(sample_s).unwrap_or_default();
+        let late = self.timeouts.late + Duration::try_from_secs_f64(sample_s).unwrap_or_default();
         let end = Instant::now().checked_add(ahead.saturating_add(late));
         if let Some(lease) = &self.armed {
-            lease.called();
+            lease.record_call();
         }
         // The next sample would be later than that.
-        while !self.pending.reaches(until_s - 0.999 * sample_s) && self.spoiled.is_none() {
+        while !self.queue.has_reached(until_s - 0.999 * sample_s) && self.sample_error.is_none() {
             let left = end.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
-            let Some(message) = self.link.next(left).map_err(|error| self.lost(error))? else { break };
+            let Some(message) = self.link.receive(left).map_err(|error| self.lost_error(error))? else {
+                break;
+            };
             if message.id.is_none() {
-                self.take_note(message.method.as_deref(), message.params);
+                self.process_note(message.method.as_deref(), message.params);
             }
         }
         // Processes messages that have already arrived.
-        while let Ok(Some(message)) = self.link.next(Duration::ZERO) {
+        while let Ok(Some(message)) = self.link.receive(Duration::ZERO) {
             if message.id.is_none() {
-                self.take_note(message.method.as_deref(), message.params);
+                self.process_note(message.method.as_deref(), message.params);
             }
-            if self.spoiled.is_some() {
+            if self.sample_error.is_some() {
                 break;
             }
         }
@@ -385,15 +393,15 @@ impl Backend for Driver {
             return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
         }
         self.in_doubt = true;
-        (self.pending, self.spoiled, self.now_s) = (Pending::default(), None, 0.0);
-        let answer = self.ask("arm", &json!({}), self.patience.slow);
+        (self.queue, self.sample_error, self.now_s) = (SampleQueue::default(), None, 0.0);
+        let answer = self.request("arm", &json!({}), self.timeouts.slow);
         if let Err(error) = answer {
             // After a refusal the rig stays with its earlier owner.
             self.in_doubt = matches!(error, BackendError::Deadline { .. });
             return Err(error);
         }
-        let silence = (!self.simulated()).then_some(self.patience.silence);
-        let outlet = self.link.outlet().map_err(|error| self.lost(error))?.clone();
+        let silence = (!self.simulated()).then_some(self.timeouts.silence);
+        let outlet = self.link.outlet().map_err(|error| self.lost_error(error))?.clone();
         self.armed = Some(Lease::new(outlet, self.session.clone().unwrap_or_default(), silence)?);
         Ok(())
     }
@@ -403,44 +411,44 @@ impl Backend for Driver {
         let any = SetpointRange { low: f64::MIN, high: f64::MAX };
         let all = SetpointRanges { p3_pa: any, t3_k: any, valve_opening_ratio: any, oil_temperature_k: any };
         self.rig()?.accepts.unwrap_or(all).check(setpoints)?;
-        self.need_armed("set")?;
-        self.ask("set", &setpoints_on_the_wire(setpoints), self.patience.call).map(drop)
+        self.require_armed("set")?;
+        self.request("set", &write_setpoints(setpoints), self.timeouts.call).map(drop)
     }
 
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
-        self.need_armed("poll")?;
+        self.require_armed("poll")?;
         let until_s = if until_s.is_finite() { until_s } else { self.now_s };
         if self.simulated() {
-            self.ask("poll", &Poll { until_s }, self.patience.simulation)?;
+            self.request("poll", &Poll { until_s }, self.timeouts.simulation)?;
         } else {
-            self.wait_for(until_s)?;
+            self.wait_for_samples(until_s)?;
         }
         self.now_s = self.now_s.max(until_s);
-        if let Some(error) = self.spoiled.take() {
-            return Err(self.lost(error));
+        if let Some(error) = self.sample_error.take() {
+            return Err(self.lost_error(error));
         }
         let channels = self.rig()?.channels.clone();
         // The driver's own simulated time is exact, and no sample waits for it.
         let rounding_s = if self.simulated() { 0.0 } else { ROUNDING_S };
-        Ok(self.pending.take(until_s, rounding_s, &channels))
+        Ok(self.queue.take(until_s, rounding_s, &channels))
     }
 
     fn hold(&mut self) -> Result<(), BackendError> {
-        self.need_armed("hold")?;
-        match self.knows_hold {
-            true => self.ask("hold", &json!({}), self.patience.call).map(drop),
+        self.require_armed("hold")?;
+        match self.supports_hold {
+            true => self.request("hold", &json!({}), self.timeouts.call).map(drop),
             false => Ok(()),
         }
     }
 
     fn make_safe(&mut self) -> Result<(), BackendError> {
-        self.need_armed("make_safe")?;
-        self.ask("make_safe", &json!({}), self.patience.call).map(drop)
+        self.require_armed("make_safe")?;
+        self.request("make_safe", &json!({}), self.timeouts.call).map(drop)
     }
 
     fn disarm(&mut self) -> Result<(), BackendError> {
-        self.need_armed("disarm")?;
-        self.ask("disarm", &json!({}), self.patience.slow)?;
+        self.require_armed("disarm")?;
+        self.request("disarm", &json!({}), self.timeouts.slow)?;
         (self.armed, self.in_doubt) = (None, false);
         Ok(())
     }
@@ -450,6 +458,6 @@ impl Drop for Driver {
     fn drop(&mut self) {
         // The thread of the lease also holds the pipe.
         self.armed = None;
-        self.link.close(self.in_doubt, LEAVING);
+        self.link.close(self.in_doubt, EXIT_TIMEOUT);
     }
 }

@@ -10,7 +10,7 @@ const SOCKET: &str = ".socket";
 
 /// Search locations of drivers.
 #[derive(Debug, Clone, Default)]
-pub struct Places {
+pub struct SearchPath {
     /// Program directories in search order.
     pub programs: Vec<PathBuf>,
     /// Directory of driver sockets, which take precedence over programs.
@@ -19,7 +19,7 @@ pub struct Places {
 
 /// Location of a driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum At {
+pub enum Endpoint {
     /// A program that is started for each run.
     Program(PathBuf),
     /// The socket of a driver that is already running.
@@ -32,12 +32,12 @@ pub struct DriverLocation {
     /// Name in campaigns.
     pub name: String,
     /// Its location.
-    pub at: At,
+    pub at: Endpoint,
 }
 
-impl Places {
+impl SearchPath {
     /// The directory of `program`, the directories of a `PATH` variable, and a directory of sockets.
-    pub fn new(program: Option<&Path>, path: Option<&OsStr>, sockets: Option<PathBuf>) -> Places {
+    pub fn new(program: Option<&Path>, path: Option<&OsStr>, sockets: Option<PathBuf>) -> SearchPath {
         let program_directory = program.and_then(Path::parent).map(Path::to_owned);
         let on_path = path.map(|path| std::env::split_paths(path).collect::<Vec<_>>()).unwrap_or_default();
         let mut programs: Vec<PathBuf> = Vec::new();
@@ -47,21 +47,21 @@ impl Places {
                 programs.push(place);
             }
         }
-        Places { programs, sockets: sockets.filter(|place| place.is_absolute()) }
+        SearchPath { programs, sockets: sockets.filter(|place| place.is_absolute()) }
     }
 
     /// The driver for `backend: NAME`.
-    pub fn find(&self, name: &str) -> Option<At> {
+    pub fn find(&self, name: &str) -> Option<Endpoint> {
         let file = file_name(name)?;
         let socket = self.sockets.as_ref().map(|place| place.join(format!("{name}{SOCKET}")));
-        let socket = socket.filter(|socket| is_socket(socket)).map(At::Socket);
+        let socket = socket.filter(|socket| is_socket(socket)).map(Endpoint::Socket);
         let program =
             || self.programs.iter().map(|place| place.join(&file)).find(|program| is_program(program));
-        socket.or_else(|| program().map(At::Program))
+        socket.or_else(|| program().map(Endpoint::Program))
     }
 
     /// A file with the program's name that is not executable.
-    pub(crate) fn not_executable(&self, name: &str) -> Option<PathBuf> {
+    pub(crate) fn find_not_executable(&self, name: &str) -> Option<PathBuf> {
         let file = file_name(name)?;
         self.programs.iter().map(|place| place.join(&file)).find(|program| program.is_file())
     }
@@ -74,7 +74,7 @@ impl Places {
             let file = entry.file_name();
             let Some(name) = file.to_str().and_then(|file| file.strip_suffix(SOCKET)) else { continue };
             if file_name(name).is_some() && is_socket(&entry.path()) {
-                found.push(DriverLocation { name: name.to_owned(), at: At::Socket(entry.path()) });
+                found.push(DriverLocation { name: name.to_owned(), at: Endpoint::Socket(entry.path()) });
             }
         }
         for entry in self.programs.iter().flat_map(inside) {
@@ -83,7 +83,7 @@ impl Places {
             let name = name.strip_suffix(std::env::consts::EXE_SUFFIX).unwrap_or(name);
             let there = found.iter().any(|found| found.name == name);
             if !there && file_name(name).is_some_and(|whole| *whole == *file) && is_program(&entry.path()) {
-                found.push(DriverLocation { name: name.to_owned(), at: At::Program(entry.path()) });
+                found.push(DriverLocation { name: name.to_owned(), at: Endpoint::Program(entry.path()) });
             }
         }
         found.sort_by(|a, b| a.name.cmp(&b.name));
@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_a_name_and_no_path() {
+    fn a_driver_name_is_not_a_path() {
         assert!(file_name("opc_ua2").is_some());
         for name in ["", "../x", "a/b", "A", "a.exe", "a b", "a\0", &"a".repeat(65)] {
             assert_eq!(file_name(name), None, "{name:?}");
@@ -133,9 +133,10 @@ mod tests {
     }
 
     #[test]
-    fn relative_directories_are_not_looked_in() {
+    fn relative_directories_are_not_searched() {
         let path = std::env::join_paths(["", "here", "/usr/bin", "/usr/bin"]).unwrap();
-        let places = Places::new(Some(Path::new("/opt/mapper/mapper")), Some(&path), Some("drivers".into()));
+        let places =
+            SearchPath::new(Some(Path::new("/opt/mapper/mapper")), Some(&path), Some("drivers".into()));
         assert_eq!(places.programs, [Path::new("/opt/mapper"), Path::new("/usr/bin")]);
         assert_eq!(places.sockets, None);
     }

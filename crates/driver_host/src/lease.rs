@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 
 /// A lease, renewed by a separate thread until it is dropped, as long as calls arrive.
 pub(crate) struct Lease {
-    called: Arc<Mutex<Instant>>,
+    last_call: Arc<Mutex<Instant>>,
     /// Dropped with the lease, which ends the thread.
-    _held: Sender<()>,
+    _end_thread: Sender<()>,
 }
 
 impl Lease {
@@ -39,12 +39,12 @@ impl Lease {
             .name("lease".to_owned())
             .spawn(renew)
             .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
-        Ok(Lease { called, _held: held })
+        Ok(Lease { last_call: called, _end_thread: held })
     }
 
     /// Records a call.
-    pub(crate) fn called(&self) {
-        if let Ok(mut called) = self.called.lock() {
+    pub(crate) fn record_call(&self) {
+        if let Ok(mut called) = self.last_call.lock() {
             *called = Instant::now();
         }
     }

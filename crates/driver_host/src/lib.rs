@@ -1,5 +1,9 @@
-//! Drivers as backends: separate programs, found by name, behind the interface [`Backend`](mapper_core::Backend). Whatever the driver sends, all
-//! calls have timeouts and all queues have limits. docs/reference/protocol.md defines the protocol.
+//! Runs drivers: separate programs that control a rig. A [`Driver`] starts such a program, or connects to its socket, and implements the
+//! interface [`Backend`](mapper_core::Backend) over the protocol of docs/reference/protocol.md, so that `session` uses it like a built-in
+//! backend.
+//!
+//! A driver may hang, exit or send anything: every call has a timeout, every queue a limit, and every sample is checked. [`conformance`]
+//! has the rules that every backend keeps, and a backend with faults for tests.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -7,14 +11,14 @@ pub mod conformance;
 mod driver;
 mod error;
 mod find;
-mod known;
+mod included_drivers;
 mod lease;
 mod link;
-mod pending;
 pub mod protocol;
+mod sample_queue;
 mod secrets;
 
-pub use driver::{Driver, PATIENCE, Patience};
+pub use driver::{DEFAULT_TIMEOUTS, Driver, Timeouts};
 pub use error::DriverError;
-pub use find::{At, DriverLocation, PREFIX, Places};
-pub use known::KNOWN;
+pub use find::{DriverLocation, Endpoint, PREFIX, SearchPath};
+pub use included_drivers::INCLUDED_DRIVERS;

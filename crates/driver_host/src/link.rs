@@ -13,11 +13,11 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Queue length in each direction, messages.
-const WAITING: usize = 64;
+const QUEUE_LENGTH: usize = 64;
 /// Wait for the driver's final error output after its output has ended.
-const LAST_WORDS_WITHIN: Duration = Duration::from_millis(200);
+const LAST_OUTPUT_TIMEOUT: Duration = Duration::from_millis(200);
 /// Size of the stored final error output, bytes.
-const LAST_WORDS_BYTES: usize = 2_000;
+const LAST_OUTPUT_BYTES: usize = 2_000;
 
 /// An incoming message.
 type Incoming = Result<Message, DriverError>;
@@ -26,17 +26,18 @@ type Incoming = Result<Message, DriverError>;
 #[derive(Clone)]
 pub(crate) struct Outlet {
     to_write: SyncSender<Vec<u8>>,
-    packed: Arc<AtomicBool>,
+    uses_message_pack: Arc<AtomicBool>,
 }
 
 impl Outlet {
     /// Sends without waiting.
     pub(crate) fn send(&self, message: &Message) -> Result<(), DriverError> {
-        let packed = self.packed.load(Ordering::Relaxed);
-        let encoding = if packed { Encoding::MessagePack } else { Encoding::Json };
-        let body = encode(message, encoding).map_err(|error| DriverError::Garbage(error.to_string()))?;
+        let uses_message_pack = self.uses_message_pack.load(Ordering::Relaxed);
+        let encoding = if uses_message_pack { Encoding::MessagePack } else { Encoding::Json };
+        let body =
+            encode(message, encoding).map_err(|error| DriverError::InvalidMessage(error.to_string()))?;
         self.to_write.try_send(body).map_err(|error| match error {
-            TrySendError::Full(_) => DriverError::Deaf,
+            TrySendError::Full(_) => DriverError::NotReading,
             TrySendError::Disconnected(_) => DriverError::Ended(String::new()),
         })
     }
@@ -57,9 +58,9 @@ pub(crate) struct Link {
     outlet: Option<Outlet>,
     inlet: Receiver<Incoming>,
     frame_limit: Arc<AtomicU32>,
-    last_words: Arc<Mutex<Vec<u8>>>,
+    last_output: Arc<Mutex<Vec<u8>>>,
     /// Closed by the reading thread after the last message.
-    heard: Receiver<()>,
+    stderr_closed: Receiver<()>,
 }
 
 impl Link {
@@ -75,34 +76,34 @@ impl Link {
         let (Some(stdin), Some(stdout), Some(stderr)) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
-            return Err(not_started(std::io::Error::other("it has no pipes")));
+            return Err(not_started(std::io::Error::other("the pipes were not created")));
         };
-        Link::over(stdin, stdout, Some(stderr), Peer::Program(child)).map_err(not_started)
+        Link::from_streams(stdin, stdout, Some(stderr), Peer::Program(child)).map_err(not_started)
     }
 
     /// Connects to a driver that listens on this socket.
     #[cfg(unix)]
     pub(crate) fn connect(socket: &Path) -> Result<Link, DriverError> {
-        let away = |source| DriverError::Away { socket: socket.to_owned(), source };
+        let away = |source| DriverError::NotListening { socket: socket.to_owned(), source };
         let stream = std::os::unix::net::UnixStream::connect(socket).map_err(away)?;
         let both = || stream.try_clone().map_err(away);
         let (input, output) = (HalfClosing(both()?), both()?);
-        Link::over(input, output, None::<std::io::Empty>, Peer::Socket(stream)).map_err(away)
+        Link::from_streams(input, output, None::<std::io::Empty>, Peer::Socket(stream)).map_err(away)
     }
 
-    fn over(
+    fn from_streams(
         input: impl Write + Send + 'static,
         output: impl Read + Send + 'static,
-        words_of: Option<impl Read + Send + 'static>,
+        stderr: Option<impl Read + Send + 'static>,
         peer: Peer,
     ) -> std::io::Result<Link> {
         let frame_limit = Arc::new(AtomicU32::new(crate::protocol::FIRST_FRAME_LIMIT_BYTES));
-        let (send, to_write) = sync_channel(WAITING);
-        let (to_inlet, inlet) = sync_channel(WAITING);
-        let last_words = Arc::new(Mutex::new(Vec::new()));
-        let packed = Arc::new(AtomicBool::new(false));
-        let (listens, heard) = sync_channel::<()>(1);
-        let (limit, words, its) = (frame_limit.clone(), last_words.clone(), packed.clone());
+        let (send, to_write) = sync_channel(QUEUE_LENGTH);
+        let (to_inlet, inlet) = sync_channel(QUEUE_LENGTH);
+        let last_output = Arc::new(Mutex::new(Vec::new()));
+        let uses_message_pack = Arc::new(AtomicBool::new(false));
+        let (stderr_open, stderr_closed) = sync_channel::<()>(1);
+        let (limit, words, its) = (frame_limit.clone(), last_output.clone(), uses_message_pack.clone());
         // These threads are not joined: each ends with its pipe.
         std::thread::Builder::new()
             .name("to driver".to_owned())
@@ -114,19 +115,19 @@ impl Link {
             })
             .and_then(|_| {
                 std::thread::Builder::new().name("driver's words".to_owned()).spawn(move || {
-                    if let Some(stderr) = words_of {
-                        listen(stderr, &words);
+                    if let Some(stderr) = stderr {
+                        collect_stderr(stderr, &words);
                     }
-                    drop(listens);
+                    drop(stderr_open);
                 })
             })?;
         Ok(Link {
             peer,
-            outlet: Some(Outlet { to_write: send, packed }),
+            outlet: Some(Outlet { to_write: send, uses_message_pack }),
             inlet,
             frame_limit,
-            last_words,
-            heard,
+            last_output,
+            stderr_closed,
         })
     }
 
@@ -141,22 +142,22 @@ impl Link {
     }
 
     /// The next message; `None` if none arrives in time.
-    pub(crate) fn next(&self, within: Duration) -> Result<Option<Message>, DriverError> {
+    pub(crate) fn receive(&self, within: Duration) -> Result<Option<Message>, DriverError> {
         match self.inlet.recv_timeout(within) {
             Ok(incoming) => incoming.map(Some),
             Err(RecvTimeoutError::Timeout) => Ok(None),
-            Err(RecvTimeoutError::Disconnected) => Err(DriverError::Ended(self.words())),
+            Err(RecvTimeoutError::Disconnected) => Err(DriverError::Ended(self.last_error_line())),
         }
     }
 
     /// The driver's final error output, to be appended to a sentence.
-    fn words(&self) -> String {
+    fn last_error_line(&self) -> String {
         // The output has ended, but the final error output may still be on its way.
-        let _ = self.heard.recv_timeout(LAST_WORDS_WITHIN);
-        let Ok(words) = self.last_words.lock() else { return String::new() };
+        let _ = self.stderr_closed.recv_timeout(LAST_OUTPUT_TIMEOUT);
+        let Ok(words) = self.last_output.lock() else { return String::new() };
         let text = String::from_utf8_lossy(&words);
         let line = text.lines().map(str::trim).rfind(|line| !line.is_empty());
-        line.map_or_else(String::new, |line| format!("; its last words: {line}"))
+        line.map_or_else(String::new, |line| format!("; its last error output: {line}"))
     }
 
     /// Closes the driver's input, which ends the driver or, for a socket, its session. A driver that holds a rig is left to execute its safe
@@ -219,17 +220,17 @@ fn write_all(mut stdin: impl Write, to_write: &Receiver<Vec<u8>>, limit: &Atomic
     }
 }
 
-fn read_all(mut stdout: impl Read, to_inlet: &SyncSender<Incoming>, packed: &AtomicBool) {
+fn read_all(mut stdout: impl Read, to_inlet: &SyncSender<Incoming>, uses_message_pack: &AtomicBool) {
     loop {
         let incoming = match read_frame(&mut stdout, FRAME_LIMIT_BYTES) {
             Ok(Some(body)) => {
-                packed.store(Encoding::of(&body) == Encoding::MessagePack, Ordering::Relaxed);
+                uses_message_pack.store(Encoding::of(&body) == Encoding::MessagePack, Ordering::Relaxed);
                 decode(&body)
             }
             Ok(None) => break,
             Err(error) => Err(error),
         };
-        let incoming = incoming.map_err(|error: FrameError| DriverError::Garbage(error.to_string()));
+        let incoming = incoming.map_err(|error: FrameError| DriverError::InvalidMessage(error.to_string()));
         let lost = incoming.is_err();
         // After an invalid message the start of the next frame is unknown.
         if to_inlet.send(incoming).is_err() || lost {
@@ -238,12 +239,12 @@ fn read_all(mut stdout: impl Read, to_inlet: &SyncSender<Incoming>, packed: &Ato
     }
 }
 
-fn listen(mut stderr: impl Read, words: &Mutex<Vec<u8>>) {
+fn collect_stderr(mut stderr: impl Read, words: &Mutex<Vec<u8>>) {
     let mut piece = [0; 512];
     while let Ok(bytes @ 1..) = stderr.read(&mut piece) {
         let Ok(mut words) = words.lock() else { break };
         words.extend_from_slice(&piece[..bytes]);
-        let too_many = words.len().saturating_sub(LAST_WORDS_BYTES);
+        let too_many = words.len().saturating_sub(LAST_OUTPUT_BYTES);
         words.drain(..too_many);
     }
 }

@@ -4,13 +4,13 @@ use crate::error::DriverError;
 use serde_json::Value;
 
 /// A setting is secret if its key contains one of these.
-const SECRET: [&str; 5] = ["password", "passphrase", "secret", "token", "private_key_text"];
+const SECRET_KEYS: [&str; 5] = ["password", "passphrase", "secret", "token", "private_key_text"];
 /// Replacement for a secret.
-const HIDDEN: &str = "[secret]";
+const PLACEHOLDER: &str = "[secret]";
 /// Shorter secrets are hidden only as whole words, because replacing them inside other words would remove whole sentences.
-const SHORT: usize = 6;
+const MIN_REPLACED_LENGTH: usize = 6;
 /// Maximum nesting of settings that is searched; the YAML reader allows less.
-const DEEPEST: usize = 64;
+const MAX_DEPTH: usize = 64;
 
 /// Environment values that settings refer to.
 #[derive(Default)]
@@ -27,20 +27,20 @@ impl Secrets {
         needed: bool,
     ) -> Result<Secrets, (String, DriverError)> {
         let mut secrets = Secrets::default();
-        secrets.look(settings, &mut Vec::new(), variable, needed)?;
+        secrets.collect(settings, &mut Vec::new(), variable, needed)?;
         // Longest first: otherwise a secret that is a prefix of another would leave the remainder visible.
         secrets.0.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         Ok(secrets)
     }
 
-    fn look(
+    fn collect(
         &mut self,
         value: &Value,
         path: &mut Vec<String>,
         variable: &dyn Fn(&str) -> Option<String>,
         needed: bool,
     ) -> Result<(), (String, DriverError)> {
-        if let Some(name) = environment(value) {
+        if let Some(name) = env_variable(value) {
             match variable(name) {
                 Some(secret) if !secret.is_empty() => self.0.push(secret),
                 _ if needed => return Err((path.join("."), DriverError::NotSet(name.to_owned()))),
@@ -49,10 +49,10 @@ impl Secrets {
             return Ok(());
         }
         let key = path.last().map(|key| key.to_ascii_lowercase()).unwrap_or_default();
-        if SECRET.iter().any(|secret| key.contains(secret)) && !value.is_null() {
+        if SECRET_KEYS.iter().any(|secret| key.contains(secret)) && !value.is_null() {
             return Err((path.join("."), DriverError::Secret));
         }
-        if path.len() >= DEEPEST {
+        if path.len() >= MAX_DEPTH {
             return Ok(());
         }
         let inside: Vec<(String, &Value)> = match value {
@@ -62,7 +62,7 @@ impl Secrets {
         };
         for (key, value) in inside {
             path.push(key);
-            self.look(value, path, variable, needed)?;
+            self.collect(value, path, variable, needed)?;
             path.pop();
         }
         Ok(())
@@ -70,15 +70,17 @@ impl Secrets {
 
     /// Replaces the secrets in a driver's text.
     pub(crate) fn hide(&self, text: &str) -> String {
-        self.0.iter().fold(text.to_owned(), |text, secret| match secret.chars().count() < SHORT {
-            true => without_word(&text, secret),
-            false => text.replace(secret.as_str(), HIDDEN),
+        self.0.iter().fold(text.to_owned(), |text, secret| {
+            match secret.chars().count() < MIN_REPLACED_LENGTH {
+                true => hide_word(&text, secret),
+                false => text.replace(secret.as_str(), PLACEHOLDER),
+            }
         })
     }
 }
 
 /// Replaces a word in a text.
-fn without_word(text: &str, word: &str) -> String {
+fn hide_word(text: &str, word: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut from = 0;
     for (at, found) in text.match_indices(word) {
@@ -86,7 +88,7 @@ fn without_word(text: &str, word: &str) -> String {
         let before = text[..at].chars().next_back().is_some_and(char::is_alphanumeric);
         let after = text[end..].chars().next().is_some_and(char::is_alphanumeric);
         out.push_str(&text[from..at]);
-        out.push_str(if before || after { found } else { HIDDEN });
+        out.push_str(if before || after { found } else { PLACEHOLDER });
         from = end;
     }
     out.push_str(&text[from..]);
@@ -94,7 +96,7 @@ fn without_word(text: &str, word: &str) -> String {
 }
 
 /// The variable in `{env: NAME}`.
-fn environment(value: &Value) -> Option<&str> {
+fn env_variable(value: &Value) -> Option<&str> {
     let map = value.as_object().filter(|map| map.len() == 1)?;
     map.get("env")?.as_str()
 }
@@ -105,7 +107,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn secrets_come_from_the_environment_alone_and_are_hidden() {
+    fn secrets_are_read_from_the_environment_and_hidden() {
         let variable = |name: &str| (name == "PLC").then(|| "hunter2".to_owned());
         let read = |settings: Value| Secrets::of(&settings, &variable, true);
         let secrets = read(json!({"user": "lab", "security": {"password": {"env": "PLC"}}})).ok().unwrap();

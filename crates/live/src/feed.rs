@@ -167,7 +167,7 @@ impl Feed {
                 vec![self.tick(kept)]
             }
             SessionEvent::StepEnded(marker) => {
-                let held = std::mem::replace(&mut kept.held, self.operator.holds());
+                let held = std::mem::replace(&mut kept.held, self.operator.is_holding());
                 let planned_s = self.plan.get(marker.index).filter(|_| !held).map(|step| step.dwell_s);
                 kept.overrun_s.extend(planned_s.map(|planned_s| marker.end_s - marker.start_s - planned_s));
                 Vec::new()
@@ -278,7 +278,7 @@ impl Feed {
     }
 
     fn update_operator_flags(&self, state: &mut State) {
-        state.now.holds = self.operator.holds();
+        state.now.holds = self.operator.is_holding();
         state.now.stops = self.after_step.load(Ordering::SeqCst);
     }
 

@@ -84,7 +84,7 @@ impl Live {
                         "the step is held"
                     }
                     OperatorCommand::Continue => {
-                        operator.go_on();
+                        operator.release();
                         "the step continues"
                     }
                     OperatorCommand::StopAfterStep => {
@@ -97,7 +97,7 @@ impl Live {
                         "the rig goes into its safe state now"
                     }
                 };
-                operator.say(format!("operator, on the live page: {what}"));
+                operator.add_message(format!("operator, on the live page: {what}"));
                 feed_for_commands.show_command(asked);
             }),
             connections: Arc::default(),

@@ -1,4 +1,4 @@
-//! Orders grids of any size on the nominal machine and says what that gives and takes.
+//! Benchmark of the planner: orders a grid of any size on the nominal machine, and prints gradients, bounds and time.
 //!
 //! `planner_speed POINTS [ORDER] [EFFORT] [SEED] [DWELL]`: 18 is the grid of docs/explanation/planner.md, others are rectangular grids from
 //! 50 to 150 krpm and opening 0.5 to 2.5. Prints one line: points, order, effort, seed, sum, smallest, bounds, seconds.

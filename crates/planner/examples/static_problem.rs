@@ -1,8 +1,8 @@
-//! The ordering problem without memory, for peers: fixed weights of all jumps as JSON, with the order that this program's
-//! search finds and the time it takes.
+//! The ordering problem without memory, for comparison with other solvers: writes the weights of all jumps as JSON, with the order found
+//! by this program's search and its time.
 //!
-//! `static_problem POINTS [SEED]`. The weight of a jump is what it moves the compressor housing within 10 to 110 s, in K,
-//! when the housing has settled before and has one time constant at each point, `C/(h A/(1 + NTU) + G_bearing)`.
+//! `static_problem POINTS [SEED]`. The weight of a jump is the change of the compressor housing temperature from 10 to 110 s, in K. The
+//! housing starts from its steady state and has one time constant at each point, `C/(h A/(1 + NTU) + G_bearing)`.
 
 #![allow(clippy::print_stdout, reason = "what it prints is what it is for")]
 
@@ -31,7 +31,7 @@ impl Chain for Fixed {
 
     fn settled(&self, _at: usize) {}
 
-    fn alike(&self, (): (), (): ()) -> bool {
+    fn is_indistinguishable(&self, (): (), (): ()) -> bool {
         true
     }
 }

@@ -1,8 +1,11 @@
-//! Orders the points of a campaign and says what each step is expected to give.
+//! Plans a test: orders the operating points of a campaign and predicts the result of each step.
 //!
-//! The housing does not settle within a dwell, so what a jump yields depends on what came before: an order is judged by
-//! going through it with the housing's memory, reduced to short sums while searching (`housing`), simulated in full for
-//! the plan itself (`forecast`).
+//! `session` and the command line fill a [`PlanRequest`]; [`make_plan`] turns it into a [`Plan`](mapper_core::Plan) with its steps,
+//! expected errors and an upper bound on the gradients of any other order.
+//!
+//! The housing does not settle within a dwell, so the temperature gradient of a step depends on the steps before it. The search
+//! therefore carries the housing temperatures from step to step, with a reduced model of a few products per step (`housing`). The
+//! chosen order is then simulated with the full model (`forecast`).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -15,13 +18,13 @@ mod targets;
 pub mod thermal_memory;
 mod upper_bound;
 
-pub use jumps::graph::{JumpForecast, Rejection, explain_jump, jump_graph};
+pub use jumps::graph::{JumpForecast, Rejection, build_jump_graph, explain_jump};
 pub use jumps::walk::STABLE_DRIFT_K_MIN;
 pub use method::{ForecastRow, MethodResult, MethodResults, PredictedMethod};
 pub use ordering::objective::Objective;
-pub use ordering::search::{Effort, search, search_worst};
-pub use plans::comparison::other_orders;
-pub use plans::fingerprint::{made_from, sha256_hex};
+pub use ordering::search::{Effort, search, search_min_gradient};
+pub use plans::comparison::plan_other_orders;
+pub use plans::fingerprint::{hash_inputs, sha256_hex};
 pub use plans::plan::make_plan;
 pub use plans::plan_builder::max_steps;
 pub use request::{PlanError, PlanRequest, UnreachablePoint};

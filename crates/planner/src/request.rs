@@ -1,4 +1,4 @@
-//! What a plan is made from.
+//! Input and errors of planning.
 
 use crate::method::PredictedMethod;
 use mapper_core::{Jump, Limits, OperatingPoint, Repeats, SettleBands, Timing, VisitOrder, WindowRule};
@@ -12,13 +12,13 @@ use mapper_physics::simulation::simulate::SimulationError;
 pub struct PlanRequest<'a> {
     /// Name of the campaign.
     pub campaign_name: &'a str,
-    /// The campaign as the program understood it, as text; hashed.
+    /// Canonical text of the parsed campaign; the plan stores its hash.
     pub campaign_canonical: &'a str,
     /// The nominal machine.
     pub model: &'a Model,
-    /// Nominal boundary conditions; P3 and valve are the plan's.
+    /// Nominal boundary conditions. The plan sets P3 and the valve.
     pub boundary: BoundaryConditions,
-    /// What is held at the outlet temperature of each point instead.
+    /// Boundary temperatures that follow the outlet temperature of each point.
     pub follow_outlet: FollowOutlet,
     /// The points, in listed order.
     pub points: &'a [OperatingPoint],
@@ -30,19 +30,19 @@ pub struct PlanRequest<'a> {
     pub window: WindowRule,
     /// When a point counts as settled.
     pub settle_bands: SettleBands,
-    /// What no step may leave.
+    /// Limits of every step.
     pub limits: Limits,
-    /// Repeats for drift, if any.
+    /// Repeated jumps that show drift, if any.
     pub repeats: Option<Repeats>,
-    /// Whether the first point, which no jump leads to, is visited once more at the end.
+    /// Visits the first point once more at the end, because no jump leads to it at the start.
     pub return_to_first: bool,
-    /// A jump to be made after all else, e.g. one that a gap diagnosis asks for.
+    /// An extra jump after all other steps, for example one that a gap diagnosis recommends.
     pub appended: Option<Jump>,
-    /// The identification method; without one no errors are predicted.
+    /// The identification method; `None`: no errors are predicted.
     pub method: Option<&'a dyn PredictedMethod>,
-    /// Work of the search, 1 for the usual; larger searches longer, 0 hardly at all.
+    /// Factor on the duration of the search; 1 is the default, 0 nearly skips it.
     pub effort: f64,
-    /// Whether to work out how good an order can be at all.
+    /// Whether to compute an upper bound on the gradients of any order.
     pub bound: bool,
     /// Seed of the search, passed on to simulated rigs.
     pub seed: u64,
@@ -53,14 +53,14 @@ pub struct PlanRequest<'a> {
 pub struct UnreachablePoint {
     /// The point.
     pub point: OperatingPoint,
-    /// Why, with values and units: all limits that are in its way.
+    /// All limits that it violates, with values and units.
     pub reason: String,
 }
 
-/// Why planning fails.
+/// Failure of planning.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// Points that cannot be reached, all of them.
+    /// All points that cannot be reached within the limits.
     #[error("{} of the points cannot be reached: {}", .0.len(), .0.iter().map(|point| format!("{} ({})", point.point, point.reason)).collect::<Vec<_>>().join("; "))]
     Unreachable(Vec<UnreachablePoint>),
     /// No points.
@@ -68,8 +68,8 @@ pub enum PlanError {
     NoPoints,
     /// The time budget leaves too little time at each point.
     #[error(
-        "a time budget of {:.1} min leaves {dwell_s:.0} s for each of {steps} steps, and a step needs {shortest_s:.0} s; allow {:.0} min or more, or \
-         leave points out",
+        "a time budget of {:.1} min leaves {dwell_s:.0} s for each of {steps} steps, but a step needs at least {shortest_s:.0} s; allow at \
+                 least {:.0} min or remove points",
         budget_s / 60.0,
         (needed_s / 60.0).ceil()
     )]
@@ -78,30 +78,30 @@ pub enum PlanError {
         budget_s: f64,
         /// Steps of the plan.
         steps: usize,
-        /// Time for each of them, s.
+        /// Time that the budget leaves for each step, s.
         dwell_s: f64,
-        /// Shortest dwell that is chosen, s.
+        /// Minimum dwell of a step, s.
         shortest_s: f64,
-        /// Budget for that dwell, s.
+        /// Budget that the minimum dwell needs, s.
         needed_s: f64,
     },
-    /// A dwell cannot be chosen by an error that no method predicts.
+    /// A required error was set, but no method predicts errors.
     #[error(
         "`required_sigma_eta` needs an identification method that predicts errors; set `identification.method: joint`, or give `timing.dwell`"
     )]
     NoPredictedError,
     /// No order of the points avoids jumps that are not allowed.
     #[error(
-        "no order was found that avoids every forbidden jump: {}; widen the limits or leave points out",
+                "every order that was tried contains a forbidden jump: {}; widen the limits or remove points",
         .0.join("; ")
     )]
     NoAdmissibleOrder(Vec<String>),
-    /// The forecast could not be made.
+    /// The simulation of a step failed.
     #[error("the forecast of the step to {to} failed: {source}")]
     Forecast {
         /// Destination of the step.
         to: OperatingPoint,
-        /// Why.
+        /// The simulation's error.
         source: SimulationError,
     },
 }

@@ -1,12 +1,12 @@
-//! Steady states of the points of a plan, or all that cannot be measured.
+//! Steady states of the points of a plan.
 
 use crate::request::{PlanError, PlanRequest, UnreachablePoint};
 use mapper_core::OperatingPoint;
 use mapper_physics::operating_point::reach::{clause, reach};
 use mapper_physics::simulation::steady::SteadyState;
 
-/// Steady states of `points`, or all that cannot be measured, each with all limits in its way.
-pub(crate) fn reachable(
+/// Solves the steady state of each point. The error lists every point that violates a limit, with all violated limits.
+pub(crate) fn solve_steady_states(
     request: &PlanRequest<'_>,
     points: &[OperatingPoint],
 ) -> Result<Vec<SteadyState>, PlanError> {

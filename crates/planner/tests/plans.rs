@@ -9,8 +9,8 @@ use mapper_core::{Dwell, Jump, OperatingPoint, PlanRemark, Repeats, StepKind, Vi
 use mapper_physics::simulation::model::Model;
 use mapper_planner::thermal_memory::chain::gradients_k;
 use mapper_planner::{
-    Effort, Objective, PlanError, PlanRequest, Rejection, explain_jump, jump_graph, make_plan, max_steps,
-    search, search_worst,
+    Effort, Objective, PlanError, PlanRequest, Rejection, build_jump_graph, explain_jump, make_plan,
+    max_steps, search, search_min_gradient,
 };
 
 #[test]
@@ -27,7 +27,7 @@ fn the_search_beats_the_listed_order_and_stays_below_its_bound() {
         assert!(plan.figures.sum_gradient_k <= bound.sum_gradient_k);
         assert!(plan.figures.min_gradient_k.unwrap() <= bound.min_gradient_k);
         assert!(bound.gap_percent.unwrap() >= 0.0);
-        // A fraction of what a housing thermocouple resolves.
+        // A fraction of the resolution of a housing thermocouple.
         assert!(bound.model_error_k < 0.3, "{}", bound.model_error_k);
         for point in &points {
             assert_eq!(plan.steps.iter().filter(|step| step.to == *point).count(), 1);
@@ -40,26 +40,26 @@ fn the_search_beats_the_listed_order_and_stays_below_its_bound() {
 /// Housing with one time constant per point, as in `common::SimpleHousing`: the kind of housing on which a simple
 /// annealing reached 677 K in total, or 25.6 K at minimum.
 #[test]
-fn known_figures_are_reached_on_the_simple_housing() {
+fn the_search_reaches_the_figures_of_another_annealing_on_a_simple_housing() {
     let (model, points) = (Model::nominal(), grid());
     let housing = SimpleHousing::of(&model, &points);
     let given: Vec<usize> = (0..points.len()).collect();
     let sum_of = |order: &[usize]| gradients_k(&housing, order).iter().sum::<f64>();
     let worst_of = |order: &[usize]| gradients_k(&housing, order).into_iter().fold(f64::INFINITY, f64::min);
-    // The housing is the one of these figures: its two reference orders come out as they were given, to the digits
-    // that were given: along speed lines 129 K in total and 0.4 K at minimum, a zigzag 640 K and 14.6 K.
+    // The housing reproduces the published figures of two reference orders to all their digits: along speed lines 129 K in total and
+    // 0.4 K at minimum, a zigzag 640 K and 14.6 K.
     assert!((sum_of(&given) - 129.0).abs() < 0.5 && (worst_of(&given) - 0.4).abs() < 0.06);
     let zigzag: Vec<usize> =
         (0..3).flat_map(|opening| [2, 5, 0, 4, 1, 3].map(|speed| 3 * speed + opening)).collect();
     assert!((sum_of(&zigzag) - 640.0).abs() < 2.0 && (worst_of(&zigzag) - 14.6).abs() < 0.06);
     let effort = Effort::usual(points.len(), 0.3);
     let sum_k = sum_of(&search(&housing, &given, Objective::Sum, effort, 1)[0]);
-    let worst_k = worst_of(&search_worst(&housing, &given, effort, 1));
+    let worst_k = worst_of(&search_min_gradient(&housing, &given, effort, 1));
     assert!(sum_k > 0.98 * 677.0 && worst_k > 0.98 * 25.6, "{sum_k} {worst_k}");
 }
 
 #[test]
-fn all_unreachable_points_are_named_at_once_with_all_limits() {
+fn an_error_lists_all_unreachable_points_with_all_violated_limits() {
     let (model, points) = (Model::nominal(), grid());
     let mut strict = request(&model, &points, VisitOrder::Listed);
     strict.limits.p3_max_pa = 200e3;
@@ -72,7 +72,7 @@ fn all_unreachable_points_are_named_at_once_with_all_limits() {
 }
 
 #[test]
-fn a_jump_that_is_not_allowed_says_why_and_is_avoided() {
+fn a_forbidden_jump_has_a_reason_and_is_avoided() {
     let (model, points) = (Model::nominal(), grid());
     let mut limited = request(&model, &points[..9], VisitOrder::ThermalGradient);
     let [from, to] = [(150e3, 0.5), (50e3, 0.5)]
@@ -90,7 +90,7 @@ fn a_jump_that_is_not_allowed_says_why_and_is_avoided() {
 #[test]
 fn the_graph_has_every_jump_once() {
     let (model, points) = (Model::nominal(), grid());
-    let graph = jump_graph(&request(&model, &points[..4], VisitOrder::ThermalGradient)).unwrap();
+    let graph = build_jump_graph(&request(&model, &points[..4], VisitOrder::ThermalGradient)).unwrap();
     assert_eq!((graph.node_count(), graph.edge_count()), (4, 12));
     for edge in graph.edge_indices() {
         let (from, to) = graph.edge_endpoints(edge).unwrap();
@@ -99,7 +99,7 @@ fn the_graph_has_every_jump_once() {
 }
 
 #[test]
-fn repeats_are_the_same_jump_and_leave_every_point_in() {
+fn repeats_make_the_same_jump_and_every_point_is_still_visited() {
     let (model, points) = (Model::nominal(), grid());
     let mut repeating = request(&model, &points, VisitOrder::ThermalGradient);
     repeating.effort = 0.1;
@@ -118,7 +118,7 @@ fn repeats_are_the_same_jump_and_leave_every_point_in() {
 }
 
 #[test]
-fn the_usual_repeat_is_a_jump_that_is_allowed() {
+fn the_default_repeat_is_an_allowed_jump() {
     let (model, points) = (Model::nominal(), grid());
     let mut repeating = request(&model, &points, VisitOrder::ThermalGradient);
     repeating.effort = 0.1;
@@ -161,7 +161,7 @@ fn an_appended_jump_comes_last_and_changes_nothing_before_it() {
         let (before, behind) = plan.steps.split_at(plain.steps.len());
         assert_eq!(before, plain.steps);
         let visited: Vec<OperatingPoint> = behind.iter().map(|step| step.to).collect();
-        // Where the points end at the start of the jump, it is one step.
+        // If the points end at the start of the jump, it takes one step.
         let expected = if from == last { vec![off_grid] } else { vec![from, off_grid] };
         assert_eq!(visited, expected);
         assert!(behind.iter().all(|step| step.kind == StepKind::Repeat));
@@ -170,7 +170,7 @@ fn an_appended_jump_comes_last_and_changes_nothing_before_it() {
 }
 
 #[test]
-fn few_points_are_ordered_best_and_proven_so() {
+fn the_best_order_of_few_points_is_found_and_proven() {
     let (model, points) = (Model::nominal(), grid());
     let few = [points[0], points[5], points[10], points[15], points[17]];
     for return_to_first in [false, true] {
@@ -192,8 +192,8 @@ fn few_points_are_ordered_best_and_proven_so() {
     }
 }
 
-/// The first point of a plan has no transient: it is visited once more, behind all points and repeats, and that visit
-/// counts in every figure as the point's own.
+/// The first point of a plan has no transient, so it is visited once more after all points and repeats. That visit counts in every
+/// figure as the point itself.
 #[test]
 fn the_first_point_is_visited_again_at_the_end() {
     let (model, points) = (Model::nominal(), grid());
@@ -222,20 +222,20 @@ fn the_first_point_is_visited_again_at_the_end() {
             assert!(plan.figures.sum_gradient_k <= bound.sum_gradient_k);
             assert!(plan.figures.min_gradient_k.unwrap() <= bound.min_gradient_k);
         }
-        // What a diagnosis asks for comes behind it.
+        // An appended jump comes after the return.
         let appended = Some(Jump { from: points[1], to: points[16] });
         let longer = make_plan(&PlanRequest { appended, ..returning.clone() }).unwrap();
         assert_eq!(longer.steps[..plan.steps.len()], plan.steps);
     }
-    // One point has no way back.
+    // A single point has no return.
     let alone = PlanRequest { return_to_first: true, ..request(&model, &points[..1], VisitOrder::Listed) };
     assert_eq!(make_plan(&alone).unwrap().steps.len(), 1);
 }
 
 #[test]
-fn a_way_back_that_is_not_allowed_is_left_out_and_reported() {
+fn a_forbidden_return_is_omitted_with_a_remark() {
     let (model, points) = (Model::nominal(), grid());
-    // Up one speed line: steps of 20 krpm that move the housing by 25.3 K at most, and 100 krpm back.
+    // Points at one opening: steps of 20 krpm change the housing by at most 25.3 K; the return is a jump of 100 krpm.
     let line: Vec<OperatingPoint> =
         points.iter().copied().filter(|point| point.valve_opening_ratio == 0.5).collect();
     let mut limited = request(&model, &line, VisitOrder::Listed);
@@ -257,9 +257,9 @@ fn permute(points: &mut [OperatingPoint], from: usize, visit: &mut impl FnMut(&[
     }
 }
 
-/// The dwell that fills a time budget: a second more for each step would exceed it.
+/// One more second for each step would exceed the budget.
 #[test]
-fn a_time_budget_is_filled_and_kept() {
+fn the_dwell_fills_the_time_budget_without_exceeding_it() {
     let (model, points) = (Model::nominal(), grid());
     let mut budgeted = request(&model, &points, VisitOrder::ThermalGradient);
     (budgeted.effort, budgeted.return_to_first) = (0.1, true);
@@ -279,9 +279,9 @@ fn a_time_budget_is_filled_and_kept() {
     assert!(matches!(make_plan(&budgeted), Err(PlanError::BudgetTooShort { .. })));
 }
 
-/// Conventional mapping goes along speed lines and stays until nothing drifts: by then a step has settled.
+/// Conventional mapping follows the speed lines and waits at each point for stability: every step has settled by then.
 #[test]
-fn conventional_mapping_waits_until_nothing_drifts() {
+fn conventional_mapping_waits_for_stability() {
     let (model, points) = (Model::nominal(), grid());
     let mut conventional = request(&model, &points, VisitOrder::Conventional);
     conventional.timing.dwell = Dwell::Fixed(0.0);
@@ -297,7 +297,7 @@ fn conventional_mapping_waits_until_nothing_drifts() {
 }
 
 #[test]
-fn what_cannot_be_planned_says_so() {
+fn impossible_requests_are_refused() {
     let (model, points) = (Model::nominal(), grid());
     let mut required = request(&model, &points, VisitOrder::SpeedLines);
     required.timing.dwell = Dwell::RequiredSigmaEta(0.01);

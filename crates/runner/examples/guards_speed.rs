@@ -1,4 +1,4 @@
-//! What guards cost: an hour of 19 channels at 100 Hz, asked sample by sample, and the time from a violation to the safe command.
+//! Benchmark of the guards: an hour of 19 channels at 100 Hz, polled sample by sample, and the time from a violation to the safe command.
 //!
 //! ```text
 //! cargo run --release -p mapper-runner --example guards_speed
@@ -46,7 +46,7 @@ impl Backend for Hour {
         Ok(())
     }
     fn set(&mut self, _: &Setpoints) -> Result<(), BackendError> {
-        // The first command of the way down.
+        // The first command of the run-down.
         if self.violated.is_some() {
             self.safe.get_or_insert_with(Instant::now);
         }

@@ -54,7 +54,7 @@ fn run(on_drift: OnDrift, drift: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<String>)
     let (mut speeds, mut notes, mut t_s) = (Vec::new(), Vec::new(), 0.0);
     while let Some(step) = watch.next_step().unwrap() {
         assert_eq!(step.index, speeds.len(), "indices count up");
-        assert_eq!(step.start_s, t_s, "later steps know of inserted ones");
+        assert_eq!(step.start_s, t_s, "inserted steps delay later ones");
         assert_eq!(step.from.map(|from| from.speed_rpm), speeds.last().copied());
         let times: Vec<f64> = (1..=100).map(|second| t_s + f64::from(second)).collect();
         let column = |channel, values| ChannelColumn { channel, values };
@@ -87,7 +87,7 @@ fn run(on_drift: OnDrift, drift: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<String>)
 }
 
 #[test]
-fn without_drift_nothing_is_put_in() {
+fn without_drift_no_step_is_inserted() {
     let (speeds, notes) = run(OnDrift::Hold, |_| 0.0);
     assert_eq!(speeds, SPEEDS);
     assert!(notes.is_empty(), "{notes:?}");
@@ -97,28 +97,31 @@ fn without_drift_nothing_is_put_in() {
 fn drift_is_confirmed_and_then_the_run_is_held() {
     // 1 K from 350 s on: detected at the second visit, beyond 1.96 times the declared 0.25 K.
     let (speeds, notes) = run(OnDrift::Hold, |t_s| if t_s > 350.0 { 1.0 } else { 0.0 });
-    assert_eq!(speeds, [70e3, 130e3, 90e3, 70e3, 130e3, 70e3, 130e3], "the jump again, and no further");
-    assert!(notes[0].contains("T2 by +1.0000 K") && notes[0].contains("made again"), "{notes:?}");
-    assert!(notes[1].contains("differs again") && notes[1].contains("held"), "{notes:?}");
+    assert_eq!(
+        speeds,
+        [70e3, 130e3, 90e3, 70e3, 130e3, 70e3, 130e3],
+        "the jump is repeated, then the run ends"
+    );
+    assert!(notes.len() == 2 && notes[0].contains("T2 by +1.0000 K"), "{notes:?}");
 }
 
 #[test]
-fn a_run_that_goes_on_reports_drift_once() {
+fn a_run_that_continues_reports_drift_once() {
     let (speeds, notes) = run(OnDrift::Continue, |t_s| if t_s > 350.0 { 1.0 } else { 0.0 });
     assert_eq!(speeds.len(), SPEEDS.len() + 2);
-    assert_eq!(speeds[7..], [90e3, 70e3, 130e3], "then the plan goes on where it was");
+    assert_eq!(speeds[7..], [90e3, 70e3, 130e3], "then the plan continues");
     assert_eq!(notes.len(), 2, "{notes:?}");
 }
 
 #[test]
-fn what_is_not_seen_again_stops_nothing() {
+fn unconfirmed_drift_does_not_stop_the_run() {
     let (speeds, notes) = run(OnDrift::Zero, |t_s| if (401.0..=500.0).contains(&t_s) { 1.0 } else { 0.0 });
     assert_eq!(speeds.len(), SPEEDS.len() + 2);
-    assert!(notes.last().unwrap().contains("not seen again"), "{notes:?}");
+    assert_eq!(notes.len(), 2, "suspected, then not confirmed: {notes:?}");
 }
 
 #[test]
-fn a_zero_is_asked_for_where_the_campaign_says_so() {
+fn confirmed_drift_ends_the_run_for_a_zero() {
     let (_, notes) = run(OnDrift::Zero, |t_s| 0.005 * t_s);
     assert!(notes.last().unwrap().contains("zero the sensors"), "{notes:?}");
 }

@@ -1,4 +1,4 @@
-//! Sound readings of jumps, surge and rest are good; jumps that no sensor of that lag can make are bad, for as long as they last.
+//! Plausible readings of jumps, surge and standstill stay good; jumps faster than the sensor's lag are bad while they last.
 
 use mapper_core::{Channel, ChannelColumn, Element, ElementColumn, Quality, Reaction, SampleBatch};
 use mapper_runner::{Commanded, PlausibilityWatch, ReadingBounds, Trip};
@@ -27,7 +27,7 @@ fn watch(t2_lag_s: f64) -> PlausibilityWatch {
 }
 
 /// Judges the steady point with some channels changed at each time; returns the times of the bad readings of a channel, and the trip.
-fn judged(
+fn judge_samples(
     watch: &mut PlausibilityWatch,
     seconds: f64,
     of: Channel,
@@ -55,32 +55,32 @@ fn judged(
 }
 
 #[test]
-fn a_jump_that_the_probe_cannot_make_is_bad_until_it_is_back() {
+fn an_impossible_jump_is_bad_until_the_reading_returns() {
     let at = |t2_k: f64| vec![(Channel::T2, t2_k)];
-    // A probe of 2 s behind a gas that jumps by 100 K.
+    // A probe with a lag of 2 s in a gas that jumps by 100 K.
     let follows = |t_s: f64| at(376.0 + 100.0 * (1.0 - (-(t_s - 5.0).max(0.0) / 2.0).exp()));
-    assert_eq!(judged(&mut watch(2.0), 20.0, Channel::T2, follows), (vec![], None));
-    // Interference of two samples is bad by itself, and nothing else is.
+    assert_eq!(judge_samples(&mut watch(2.0), 20.0, Channel::T2, follows), (vec![], None));
+    // An interference of two samples makes only these two bad.
     let spike = |t_s: f64| at(if (4.95..5.15).contains(&t_s) { 480.0 } else { 376.0 });
-    let (bad_s, trip) = judged(&mut watch(2.0), 20.0, Channel::T2, spike);
+    let (bad_s, trip) = judge_samples(&mut watch(2.0), 20.0, Channel::T2, spike);
     assert_eq!((bad_s.len(), trip), (2, None));
-    // A shift that stays is bad for as long as it stays, although a gas may be as hot, and ends the run.
+    // A lasting shift stays bad, although the gas may be as hot, and ends the run.
     let shift = |t_s: f64| at(if t_s < 4.95 { 376.0 } else { 440.0 });
-    let (bad_s, trip) = judged(&mut watch(2.0), 20.0, Channel::T2, shift);
+    let (bad_s, trip) = judge_samples(&mut watch(2.0), 20.0, Channel::T2, shift);
     assert_eq!(bad_s.len(), 150);
     let trip = trip.unwrap();
     assert!(trip.reaction == Reaction::Safe && (6.9..7.2).contains(&trip.t_s), "{trip:?}");
     // A probe without inertia may jump.
-    assert_eq!(judged(&mut watch(0.0), 20.0, Channel::T2, shift), (vec![], None));
+    assert_eq!(judge_samples(&mut watch(0.0), 20.0, Channel::T2, shift), (vec![], None));
     // The housing has a lag without any declaration.
     let housing = |t_s: f64| vec![(Channel::Tc, if t_s < 4.95 { 360.0 } else { 400.0 })];
-    assert!(judged(&mut watch(0.0), 20.0, Channel::Tc, housing).1.is_some());
+    assert!(judge_samples(&mut watch(0.0), 20.0, Channel::Tc, housing).1.is_some());
 }
 
-/// One of three T2 probes fails while the rig's combined reading, without it, stays right: the probe has no reading, the others keep
-/// theirs, and the run goes on with a note. Out of range, colder than isentropic compression, and faster than its lag.
+/// One of three T2 probes fails: out of range, colder than isentropic compression, or faster than its lag. The rig's combined reading
+/// stays right without it. The failed probe loses its readings, the others keep theirs, and the run continues with a note.
 #[test]
-fn one_of_several_sensors_is_judged_by_itself() {
+fn each_of_several_sensors_is_checked_separately() {
     for wrong_k in [5.0, 1e12, 330.0, 470.0] {
         let (mut watch, mut trips, mut read) = (watch(2.0), Vec::new(), [0; 3]);
         for sample in 0..100_u32 {
@@ -108,7 +108,7 @@ fn one_of_several_sensors_is_judged_by_itself() {
 }
 
 #[test]
-fn surge_jumps_and_rest_are_sound() {
+fn surge_jumps_and_standstill_are_plausible() {
     // Deep surge: flow reverses in each cycle of half a second, pressure swings by a fifth.
     let surge = |t_s: f64| {
         let swing = (2.0 * std::f64::consts::PI * 2.1 * t_s).sin();
@@ -118,8 +118,8 @@ fn surge_jumps_and_rest_are_sound() {
             (Channel::T2, 385.0 + 15.0 * swing),
         ]
     };
-    assert_eq!(judged(&mut watch(0.0), 30.0, Channel::CompressorFlow, surge), (vec![], None));
-    // From rest: no pressure ratio, and a flow meter that shows a little less than nothing.
+    assert_eq!(judge_samples(&mut watch(0.0), 30.0, Channel::CompressorFlow, surge), (vec![], None));
+    // From standstill: no pressure ratio, and a slightly negative reading of the flow meter.
     let rest = |t_s: f64| {
         let drives = t_s / 30.0;
         vec![
@@ -130,7 +130,7 @@ fn surge_jumps_and_rest_are_sound() {
             (Channel::Tc, 296.0),
         ]
     };
-    assert_eq!(judged(&mut watch(0.5), 30.0, Channel::CompressorFlow, rest), (vec![], None));
+    assert_eq!(judge_samples(&mut watch(0.5), 30.0, Channel::CompressorFlow, rest), (vec![], None));
     // The shaft drops from 110 to 50 krpm within a second; the probe, of 4 s, stays hot.
     let drop = |t_s: f64| {
         let left = (-(t_s - 5.0).max(0.0) / 0.4).exp();
@@ -141,7 +141,7 @@ fn surge_jumps_and_rest_are_sound() {
             (Channel::T2, 313.0 + 63.0 * probe),
         ]
     };
-    assert_eq!(judged(&mut watch(4.0), 30.0, Channel::T2, drop), (vec![], None));
+    assert_eq!(judge_samples(&mut watch(4.0), 30.0, Channel::T2, drop), (vec![], None));
     // And back: the probe lags behind the pressure.
     let rise = |t_s: f64| {
         let left = (-(t_s - 5.0).max(0.0) / 0.4).exp();
@@ -153,5 +153,5 @@ fn surge_jumps_and_rest_are_sound() {
             (Channel::Tc, 330.0),
         ]
     };
-    assert_eq!(judged(&mut watch(4.0), 30.0, Channel::T2, rise), (vec![], None));
+    assert_eq!(judge_samples(&mut watch(4.0), 30.0, Channel::T2, rise), (vec![], None));
 }

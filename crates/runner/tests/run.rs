@@ -204,7 +204,7 @@ fn overspeed(dwell_s: f64) -> SignalWatch {
 }
 
 #[test]
-fn a_tripped_guard_makes_the_rig_safe_and_says_so() {
+fn a_tripped_guard_makes_the_rig_safe_and_is_reported() {
     let mut notebook = Notebook::default();
     let guard = overspeed(0.2);
     let end = run(&mut notebook, vec![Box::new(guard)], &AtomicBool::new(false)).unwrap();
@@ -248,9 +248,9 @@ impl StepSource for NeverReady<'_> {
 }
 
 /// A wall clock that advances only during waits.
-struct Idle(std::cell::Cell<f64>);
+struct WaitClock(std::cell::Cell<f64>);
 
-impl Wall for &Idle {
+impl Wall for &WaitClock {
     fn now_s(&self) -> f64 {
         self.0.get()
     }
@@ -266,7 +266,7 @@ fn never_ready(stop: &AtomicBool, stops: bool) -> NeverReady<'_> {
 
 /// A step that never becomes ready does not delay the operator's stop.
 #[test]
-fn the_operator_stops_while_a_step_is_being_made() {
+fn the_operator_can_stop_while_a_step_is_computed() {
     let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
     let mut steps = never_ready(&stop, true);
     let end = Runner {
@@ -366,10 +366,10 @@ fn a_stop_does_not_wait_for_the_next_sample() {
 
 /// On a real-time rig, guards receive every sample meanwhile: the shaft stays above their limit long enough after the step.
 #[test]
-fn guards_look_while_a_step_is_being_made() {
+fn guards_check_samples_while_a_step_is_computed() {
     let (stop, mut rig, mut notebook) = (AtomicBool::new(false), Watched::new(), Notebook::default());
     let guard = overspeed(2.0);
-    let wall = Idle(std::cell::Cell::new(0.0));
+    let wall = WaitClock(std::cell::Cell::new(0.0));
     let mut steps = never_ready(&stop, false);
     let end = Runner {
         steps: &mut steps,
@@ -389,7 +389,7 @@ fn guards_look_while_a_step_is_being_made() {
 }
 
 #[test]
-fn a_recorder_that_fails_ends_the_run_with_its_own_words() {
+fn a_recorder_that_fails_ends_the_run_with_its_own_error() {
     let mut notebook = Notebook { fail_at_s: Some(15.0), ..Notebook::default() };
     let error = run(&mut notebook, Vec::new(), &AtomicBool::new(false)).unwrap_err();
     assert_eq!(error.to_string(), "the disk is full");
@@ -411,9 +411,9 @@ impl RunObserver for HoldsFirst<'_> {
     }
 
     fn on_batch(&mut self, batch: &SampleBatch) -> Result<(), ObserverError> {
-        if self.operator.holds() && batch.t_s.last().is_some_and(|t_s| *t_s >= self.until_s) {
-            self.operator.go_on();
-            self.operator.say("let go on".to_owned());
+        if self.operator.is_holding() && batch.t_s.last().is_some_and(|t_s| *t_s >= self.until_s) {
+            self.operator.release();
+            self.operator.add_message("let go on".to_owned());
         }
         self.notebook.on_batch(batch)
     }
@@ -428,7 +428,7 @@ impl RunObserver for HoldsFirst<'_> {
 }
 
 #[test]
-fn a_held_step_lasts_until_it_is_let_go_on() {
+fn a_held_step_lasts_until_its_release() {
     let (plan, operator, mut rig) = (plan(), Operator::default(), Watched::new());
     let mut holds = HoldsFirst { operator: &operator, until_s: 60.0, notebook: Notebook::default() };
     let runner = Runner {

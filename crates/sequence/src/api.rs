@@ -2,14 +2,14 @@
 
 use crate::error::throw;
 use crate::result::StepResult;
-use crate::session::{Session, Thrown, lock};
-use crate::step::Hold;
+use crate::session::{ScriptThrow, Session, lock};
+use crate::step::EndCondition;
 use mapper_core::{IdentifiedPoint, OperatingPoint};
 use mapper_yaml::units::Kind;
 use rhai::{Array, Dynamic, Engine, FLOAT, INT, ImmutableString};
 use std::sync::{Arc, Mutex};
 
-pub(crate) type Shared = Arc<Mutex<Session>>;
+pub(crate) type SharedSession = Arc<Mutex<Session>>;
 
 /// One function or property.
 pub struct Entry {
@@ -19,7 +19,7 @@ pub struct Entry {
     pub signature: &'static str,
     /// One or two sentences.
     pub doc: &'static str,
-    register: fn(&mut Engine, &Shared),
+    register: fn(&mut Engine, &SharedSession),
 }
 
 /// A point, as scripts use it.
@@ -49,12 +49,12 @@ pub fn functions() -> &'static [Entry] {
 }
 
 /// Registers all rows of [`TABLE`], and the text form of points and results.
-pub(crate) fn register(engine: &mut Engine, session: &Shared) {
+pub(crate) fn register(engine: &mut Engine, session: &SharedSession) {
     engine.register_type_with_name::<Point>("Point").register_type_with_name::<StepResult>("Result");
     engine.register_fn("==", |a: Point, b: Point| a == b).register_fn("!=", |a: Point, b: Point| a != b);
     for name in ["to_string", "to_debug"] {
         engine.register_fn(name, |point: &mut Point| point.0.to_string());
-        engine.register_fn(name, |result: &mut StepResult| shown(result));
+        engine.register_fn(name, |result: &mut StepResult| describe_result(result));
     }
     let notes = session.clone();
     engine.on_print(move |text| lock(&notes).note(text));
@@ -72,8 +72,8 @@ table! {
             engine.register_fn("grid", move || points_array(&lock(&session).request.points));
         };
         "point(speed, opening)", "A point, e.g. `point(\"110 krpm\", 0.7)`; it need not be one of the grid." => |engine, _| {
-            engine.register_fn("point", |speed: &str, opening: FLOAT| point(speed, opening));
-            engine.register_fn("point", |speed: &str, opening: INT| point(speed, opening as FLOAT));
+            engine.register_fn("point", |speed: &str, opening: FLOAT| parse_point(speed, opening));
+            engine.register_fn("point", |speed: &str, opening: INT| parse_point(speed, opening as FLOAT));
         };
         "p.speed_rpm", "Shaft speed, rpm." => |engine, _| {
             engine.register_get("speed_rpm", |point: &mut Point| point.0.speed_rpm);
@@ -89,12 +89,12 @@ table! {
         };
         "reachable(p)", "Whether a step may go to `p`: it is within all limits, and the nominal machine can hold it." => |engine, session| {
             let session = session.clone();
-            engine.register_fn("reachable", move |point: Point| lock(&session).reachable(point.0));
+            engine.register_fn("reachable", move |point: Point| lock(&session).is_reachable(point.0));
         };
         "order(points)", "The points in the order the planner gives them under the campaign's `order`." => |engine, session| {
             let session = session.clone();
-            engine.register_fn("order", move |points: Array| -> Result<Array, Thrown> {
-                let points = points_of(points)?;
+            engine.register_fn("order", move |points: Array| -> Result<Array, ScriptThrow> {
+                let points = parse_points(points)?;
                 Ok(points_array(&lock(&session).order(&points)?))
             });
         };
@@ -102,21 +102,21 @@ table! {
     "Steps" {
         "dwell(time)", "Time at each point from now on, jump included; the campaign's `timing.dwell` until then." => |engine, session| {
             let session = session.clone();
-            engine.register_fn("dwell", move |time: &str| -> Result<(), Thrown> {
+            engine.register_fn("dwell", move |time: &str| -> Result<(), ScriptThrow> {
                 lock(&session).dwell_s = quantity(Kind::Duration, time)?;
                 Ok(())
             });
         };
         "t3(temperature)", "Turbine inlet temperature of the steps that follow; the campaign's until then. Speed is held: P3 is what the nominal machine needs with it." => |engine, session| {
             let session = session.clone();
-            engine.register_fn("t3", move |temperature: &str| -> Result<(), Thrown> {
-                lock(&session).hold_t3(quantity(Kind::Temperature, temperature)?)
+            engine.register_fn("t3", move |temperature: &str| -> Result<(), ScriptThrow> {
+                lock(&session).set_t3(quantity(Kind::Temperature, temperature)?)
             });
         };
         "oil(temperature)", "Oil inlet temperature of the steps that follow; the campaign's until then." => |engine, session| {
             let session = session.clone();
-            engine.register_fn("oil", move |temperature: &str| -> Result<(), Thrown> {
-                lock(&session).hold_oil(quantity(Kind::Temperature, temperature)?)
+            engine.register_fn("oil", move |temperature: &str| -> Result<(), ScriptThrow> {
+                lock(&session).set_oil_temperature(quantity(Kind::Temperature, temperature)?)
             });
         };
         "jump(p)", "Goes to `p`, stays there, and returns the step's result. A point that was visited before counts as a repeat." => |engine, session| {
@@ -124,14 +124,14 @@ table! {
             engine.register_fn("jump", move |point: Point| {
                 let mut session = lock(&session);
                 let dwell_s = session.dwell_s;
-                session.step(point.0, dwell_s, Hold::Dwell)
+                session.step(point.0, dwell_s, EndCondition::Dwell)
             });
         };
         "jump(p, time)", "The same with its own time." => |engine, session| {
             let session = session.clone();
             engine.register_fn("jump", move |point: Point, time: &str| {
                 let dwell_s = quantity(Kind::Duration, time)?;
-                lock(&session).step(point.0, dwell_s, Hold::Dwell)
+                lock(&session).step(point.0, dwell_s, EndCondition::Dwell)
             });
         };
         "settle(p, longest)", "Goes to `p` and holds until it has settled, at most `longest`: over the last 30 s, T2 and Tc drift by less than 1 K in a minute, and speed, flow and pressure ratio stay within the campaign's `stabilisation`." => |engine, session| {
@@ -174,7 +174,7 @@ table! {
             engine.register_get("verdict", |result: &mut StepResult| ImmutableString::from(result.verdict()));
         };
         "r.warnings", "Codes of the reasons for the verdict, e.g. `small_gradient`." => |engine, _| {
-            engine.register_get("warnings", |result: &mut StepResult| warnings(result));
+            engine.register_get("warnings", |result: &mut StepResult| warning_codes(result));
         };
         "r.has_eta", "Whether there is an efficiency. The first step of a run has no jump and thus none." => |engine, _| {
             engine.register_get("has_eta", |result: &mut StepResult| result.eta().is_some());
@@ -192,19 +192,19 @@ table! {
             engine.register_get("sigma_h_w_m2k", |result: &mut StepResult| result.sigma_h_w_m2k().min(SIGMA_H_MAX_W_M2K));
         };
         "r.speed_rpm", "Measured shaft speed at the end of the step, rpm." => |engine, _| {
-            measured(engine, "speed_rpm", |point| Some(point.speed_rpm));
+            register_measurement(engine, "speed_rpm", |point| Some(point.speed_rpm));
         };
         "r.flow_kg_s", "Compressor mass flow at the end of the step, kg/s." => |engine, _| {
-            measured(engine, "flow_kg_s", |point| Some(point.flow_kg_s));
+            register_measurement(engine, "flow_kg_s", |point| Some(point.flow_kg_s));
         };
         "r.pressure_ratio", "Total pressure ratio at the end of the step." => |engine, _| {
-            measured(engine, "pressure_ratio", |point| Some(point.pressure_ratio));
+            register_measurement(engine, "pressure_ratio", |point| Some(point.pressure_ratio));
         };
         "r.dt2_k", "Change of T2 over the window, K." => |engine, _| {
-            measured(engine, "dt2_k", |point| point.dt2_k);
+            register_measurement(engine, "dt2_k", |point| point.dt2_k);
         };
         "r.dtc_k", "Change of the housing temperature over the window, K." => |engine, _| {
-            measured(engine, "dtc_k", |point| point.dtc_k);
+            register_measurement(engine, "dtc_k", |point| point.dtc_k);
         };
         "r.duration_s", "How long the step took, s." => |engine, _| {
             engine.register_get("duration_s", |result: &mut StepResult| result.end_s - result.start_s);
@@ -223,7 +223,7 @@ table! {
 }
 
 /// Registers a property of a result's point.
-fn measured(engine: &mut Engine, name: &'static str, value: fn(&IdentifiedPoint) -> Option<f64>) {
+fn register_measurement(engine: &mut Engine, name: &'static str, value: fn(&IdentifiedPoint) -> Option<f64>) {
     engine.register_get(name, move |result: &mut StepResult| {
         number(result.identified.as_ref().and_then(value).filter(|value| value.is_finite()))
     });
@@ -237,16 +237,16 @@ fn points_array(points: &[OperatingPoint]) -> Array {
     points.iter().map(|point| Dynamic::from(Point(*point))).collect()
 }
 
-fn quantity(kind: Kind, text: &str) -> Result<f64, Thrown> {
+fn quantity(kind: Kind, text: &str) -> Result<f64, ScriptThrow> {
     mapper_yaml::units::parse(kind, text).map_err(|error| throw(error.to_string(), &error.remedy(kind)))
 }
 
-fn point(speed: &str, opening: FLOAT) -> Result<Point, Thrown> {
+fn parse_point(speed: &str, opening: FLOAT) -> Result<Point, ScriptThrow> {
     let speed_rpm = quantity(Kind::Speed, speed)?;
     Ok(Point(OperatingPoint { speed_rpm, valve_opening_ratio: opening }))
 }
 
-fn points_of(array: Array) -> Result<Vec<OperatingPoint>, Thrown> {
+fn parse_points(array: Array) -> Result<Vec<OperatingPoint>, ScriptThrow> {
     let one = |item: Dynamic| {
         let kind = item.type_name();
         item.try_cast::<Point>().map(|point| point.0).ok_or_else(|| {
@@ -256,12 +256,12 @@ fn points_of(array: Array) -> Result<Vec<OperatingPoint>, Thrown> {
     array.into_iter().map(one).collect()
 }
 
-fn warnings(result: &StepResult) -> Array {
+fn warning_codes(result: &StepResult) -> Array {
     let all = result.identified.iter().flat_map(|point| &point.warnings);
     all.map(|warning| Dynamic::from(ImmutableString::from(warning.code()))).collect()
 }
 
-fn shown(result: &StepResult) -> String {
+fn describe_result(result: &StepResult) -> String {
     match result.eta() {
         Some(eta) => format!(
             "step {} at {}: eta {:.2} +/- {:.2} % ({})",

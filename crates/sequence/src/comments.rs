@@ -1,9 +1,9 @@
-//! Comments that are never closed: the language takes them for comments up to the end of the script, steps and all.
+//! Finds comments that are never closed. The language treats the whole rest of the script as a comment, so that steps would be lost.
 
 use rhai::Position;
 
 /// Start of a block comment that does not end.
-pub(crate) fn unclosed_comment(text: &str) -> Option<Position> {
+pub(crate) fn find_unclosed_comment(text: &str) -> Option<Position> {
     let bytes = text.as_bytes();
     let mut at = 0;
     while at < bytes.len() {
@@ -95,7 +95,7 @@ mod tests {
             ("let m = #{a: 1};", None),
         ] {
             let expected = at.map(|(line, column)| Position::new(line, column));
-            assert_eq!(unclosed_comment(text), expected, "{text}");
+            assert_eq!(find_unclosed_comment(text), expected, "{text}");
         }
     }
 }

@@ -9,7 +9,7 @@ const LINE_LIMIT: usize = 200;
 /// Maximum number of characters of a message: a script may throw anything.
 const MESSAGE_LIMIT: usize = 1000;
 
-/// Why a sequence cannot continue.
+/// Failure of a sequence.
 #[derive(Debug, thiserror::Error)]
 pub enum SequenceError {
     /// The script has an error, or one of its steps was refused.
@@ -20,7 +20,7 @@ pub enum SequenceError {
     Thread(#[source] std::io::Error),
     /// The script computes too long between two steps.
     #[error(
-        "the sequence script has computed for {limit_s} s since its last step and was ended; let it do less between two steps"
+        "the sequence script computed for {limit_s} s without a new step and was ended; reduce its work between two steps"
     )]
     TooSlow {
         /// Limit, s.
@@ -58,7 +58,7 @@ impl fmt::Display for ScriptError {
         let path = self.path.display();
         let Some(line) = self.line else {
             write!(f, "  --> {path}")?;
-            return self.tail(f, 2);
+            return self.write_tail(f, 2);
         };
         let column = self.column.unwrap_or(1);
         let number = line.to_string();
@@ -67,12 +67,12 @@ impl fmt::Display for ScriptError {
         writeln!(f, "{margin} |")?;
         writeln!(f, "{number} | {}", self.source_line)?;
         write!(f, "{margin} | {}^", " ".repeat(column.saturating_sub(1).min(LINE_LIMIT)))?;
-        self.tail(f, number.len())
+        self.write_tail(f, number.len())
     }
 }
 
 impl ScriptError {
-    fn tail(&self, f: &mut fmt::Formatter<'_>, margin: usize) -> fmt::Result {
+    fn write_tail(&self, f: &mut fmt::Formatter<'_>, margin: usize) -> fmt::Result {
         let margin = " ".repeat(margin);
         for line in &self.called_from {
             write!(f, "\n{margin} = called from line {line}")?;
@@ -112,12 +112,12 @@ impl ScriptError {
         Self::new(path, text, at, message, remedy)
     }
 
-    pub(crate) fn parsing(path: PathBuf, text: &str, error: &ParseError) -> Self {
+    pub(crate) fn from_parse_error(path: PathBuf, text: &str, error: &ParseError) -> Self {
         let message = format!("the sequence script cannot be read: {}", error.err_type());
         Self::new(path, text, error.position(), message, String::new())
     }
 
-    pub(crate) fn running(path: PathBuf, text: &str, error: EvalAltResult) -> Self {
+    pub(crate) fn from_run_error(path: PathBuf, text: &str, error: EvalAltResult) -> Self {
         let mut called_from = Vec::new();
         let mut error = error;
         while let EvalAltResult::ErrorInFunctionCall(_, _, inner, at) = error {
@@ -126,16 +126,16 @@ impl ScriptError {
         }
         called_from.reverse();
         let at = error.position();
-        let (message, remedy) = words(error);
-        let mut made = Self::new(path, text, at, message, remedy);
+        let (message, remedy) = message_and_remedy(error);
+        let mut script_error = Self::new(path, text, at, message, remedy);
         // A deep recursion is shown by its first and last calls.
         called_from.truncate(5);
-        made.called_from = called_from;
-        made
+        script_error.called_from = called_from;
+        script_error
     }
 }
 
-/// A refusal inside the script: it is thrown, so that the script may catch it and choose another step.
+/// The error of a refused call. A script may catch it and choose another step.
 pub(crate) fn throw(message: String, remedy: &str) -> Box<EvalAltResult> {
     let thrown = if remedy.is_empty() { message } else { format!("{message}{REMEDY_MARK}{remedy}") };
     Box::new(EvalAltResult::ErrorRuntime(thrown.into(), Position::NONE))
@@ -144,10 +144,10 @@ pub(crate) fn throw(message: String, remedy: &str) -> Box<EvalAltResult> {
 /// Separates message and remedy in the thrown text; a script that prints the text shows a line break.
 const REMEDY_MARK: char = '\n';
 
-fn words(error: EvalAltResult) -> (String, String) {
+fn message_and_remedy(error: EvalAltResult) -> (String, String) {
     use crate::sandbox::{CALL_DEPTH_LIMIT, OPERATION_LIMIT, ScriptEnd};
     match error {
-        EvalAltResult::ErrorRuntime(thrown, _) => thrown_words(thrown),
+        EvalAltResult::ErrorRuntime(thrown, _) => thrown_message_and_remedy(thrown),
         EvalAltResult::ErrorTerminated(why, _)
             if why.clone().try_cast() == Some(ScriptEnd::OutOfOperations) =>
         {
@@ -183,7 +183,7 @@ fn words(error: EvalAltResult) -> (String, String) {
     }
 }
 
-fn thrown_words(thrown: Dynamic) -> (String, String) {
+fn thrown_message_and_remedy(thrown: Dynamic) -> (String, String) {
     let text = thrown.to_string();
     match text.split_once(REMEDY_MARK) {
         Some((message, remedy)) => (message.to_owned(), remedy.to_owned()),

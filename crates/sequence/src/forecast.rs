@@ -9,19 +9,19 @@ use mapper_physics::simulation::simulate::SimulationError;
 use mapper_physics::simulation::steady::SteadyState;
 
 /// A step whose duration is within this of the planned one ends in the planned state, s: one forecast interval.
-const AS_PLANNED_S: f64 = 0.5;
+const PLANNED_TOLERANCE_S: f64 = 0.5;
 
 /// State of the nominal machine along a sequence.
-pub(crate) struct Nominal {
+pub(crate) struct NominalForecast {
     /// State at the start of the current step; `None` before the first.
     state: Option<State>,
     /// Planned duration of the current step, s, and its final state.
     planned: Option<(f64, State)>,
 }
 
-impl Nominal {
+impl NominalForecast {
     pub(crate) fn new() -> Self {
-        Nominal { state: None, planned: None }
+        NominalForecast { state: None, planned: None }
     }
 
     /// Predicts the result of a step to `target`.
@@ -50,7 +50,7 @@ impl Nominal {
         duration_s: f64,
     ) -> Result<(), SimulationError> {
         if let Some((planned_s, end)) = self.planned.take()
-            && (planned_s - duration_s).abs() < AS_PLANNED_S
+            && (planned_s - duration_s).abs() < PLANNED_TOLERANCE_S
         {
             self.state = Some(end);
         } else if let Some(state) = self.state {

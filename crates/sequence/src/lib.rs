@@ -1,13 +1,13 @@
-//! Sequences written in rhai, an alternative to the planner: a script chooses each next step from the results of the
-//! previous ones.
+//! Runs test sequences written in rhai. A user writes a script instead of using the planner; it chooses each step from the results of
+//! the previous ones.
 //!
-//! A script can only yield steps. It has no access to files, network, clock or rig. Each step is checked against the campaign's
-//! limits before it leaves the script ([`SequenceRequest`]), and the runner of the steps keeps its own guards.
-//! Operations, call depth and the size of every value are bounded, so that no script hangs or exhausts the memory.
+//! `session` starts a [`SequenceRunner`], which runs the script on its own thread and synchronises with it at each step: the script waits
+//! while a step is executed, and the caller waits while the script computes.
 //!
-//! [`SequenceRunner`] runs a script on its own thread and synchronises with it at each step. The script waits while a step
-//! is executed, and the caller waits while the script computes. One table defines the functions that a script may call, and both
-//! their registration and their documentation ([`functions`]) come from it.
+//! A script can only yield steps. It has no access to files, network, clock or rig. Each step is checked against the limits of the
+//! campaign ([`SequenceRequest`]), and the guards of the run still apply. Operations, call depth and the size of every value are limited,
+//! so a script can neither hang the program nor exhaust its memory. One table defines the functions of a script and their documentation
+//! ([`functions`]).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
@@ -30,4 +30,4 @@ pub use request::{OrderPoints, SequenceRequest};
 pub use result::StepResult;
 pub use runner::{Script, SequenceRunner};
 pub use settle::{SettleRule, SettleWatch};
-pub use step::{Hold, SequenceStep};
+pub use step::{EndCondition, SequenceStep};

@@ -24,10 +24,10 @@ const KEYWORDS: [&str; 12] = [
 const GETTER: &str = "get$";
 
 /// All callable names, with their numbers of arguments.
-type Known = BTreeMap<String, BTreeSet<usize>>;
+type FunctionTable = BTreeMap<String, BTreeSet<usize>>;
 
 /// An unknown name: position, message and remedy.
-pub(crate) struct Unknown {
+pub(crate) struct UnknownName {
     pub(crate) at: Position,
     pub(crate) message: String,
     pub(crate) remedy: String,
@@ -35,78 +35,82 @@ pub(crate) struct Unknown {
 
 /// Refuses the first call of an unknown function, a call with a wrong number of arguments, and the first unknown
 /// property.
-pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), Unknown> {
-    let mut known = Known::new();
+pub(crate) fn check(engine: &Engine, ast: &AST) -> Result<(), UnknownName> {
+    let mut functions = FunctionTable::new();
     let registered = |function: rhai::FuncInfo<'_>| {
         Some((function.metadata.name.to_string(), function.metadata.num_params))
     };
     for (name, count) in engine.collect_fn_metadata(None, registered, true) {
-        known.entry(name).or_default().insert(count);
+        functions.entry(name).or_default().insert(count);
     }
     for function in ast.iter_functions() {
-        known.entry(function.name.to_owned()).or_default().insert(function.params.len());
+        functions.entry(function.name.to_owned()).or_default().insert(function.params.len());
     }
     // A script's own maps may have any property.
-    let mut maps = false;
-    let mut wrong: Vec<(Position, String, String)> = Vec::new();
+    let mut has_maps = false;
+    let mut problems: Vec<(Position, String, String)> = Vec::new();
     let mut property = None;
     ast.walk(&mut |path: &[ASTNode<'_>]| {
         match path.last() {
             Some(ASTNode::Expr(Expr::FnCall(call, at)) | ASTNode::Stmt(Stmt::FnCall(call, at)))
                 if call.op_token.is_none() =>
             {
-                wrong.extend(unknown(&known, &call.name, call.args.len()).map(|(m, r)| (*at, m, r)));
+                problems
+                    .extend(check_call(&functions, &call.name, call.args.len()).map(|(m, r)| (*at, m, r)));
             }
             // The value before the dot is the first argument.
             Some(ASTNode::Expr(Expr::MethodCall(call, at))) => {
-                wrong.extend(unknown(&known, &call.name, call.args.len() + 1).map(|(m, r)| (*at, m, r)));
+                problems.extend(
+                    check_call(&functions, &call.name, call.args.len() + 1).map(|(m, r)| (*at, m, r)),
+                );
             }
             Some(ASTNode::Expr(Expr::Property(names, at)))
-                if property.is_none() && !known.contains_key(&format!("{GETTER}{}", names.2)) =>
+                if property.is_none() && !functions.contains_key(&format!("{GETTER}{}", names.2)) =>
             {
                 property = Some((*at, names.2.to_string()));
             }
-            Some(ASTNode::Expr(Expr::Map(..) | Expr::DynamicConstant(..))) => maps = true,
+            Some(ASTNode::Expr(Expr::Map(..) | Expr::DynamicConstant(..))) => has_maps = true,
             _ => {}
         }
         true
     });
-    if let Some((at, name)) = property.filter(|_| !maps) {
-        let getters: Vec<&str> = known.keys().filter_map(|name| name.strip_prefix(GETTER)).collect();
-        wrong.push((
+    if let Some((at, name)) = property.filter(|_| !has_maps) {
+        let getters: Vec<&str> = functions.keys().filter_map(|name| name.strip_prefix(GETTER)).collect();
+        problems.push((
             at,
             format!("nothing in a sequence script has a property `{name}`"),
-            remedy(&name, &getters),
+            remedy_for(&name, &getters),
         ));
     }
-    wrong.sort_by_key(|(at, ..)| (at.line(), at.position()));
-    match wrong.into_iter().next() {
+    problems.sort_by_key(|(at, ..)| (at.line(), at.position()));
+    match problems.into_iter().next() {
         None => Ok(()),
-        Some((at, message, remedy)) => Err(Unknown { at, message, remedy }),
+        Some((at, message, remedy)) => Err(UnknownName { at, message, remedy }),
     }
 }
 
-fn unknown(known: &Known, name: &str, count: usize) -> Option<(String, String)> {
+fn check_call(functions: &FunctionTable, name: &str, count: usize) -> Option<(String, String)> {
     if KEYWORDS.contains(&name) {
         return None;
     }
-    let Some(counts) = known.get(name) else {
-        let names: Vec<&str> = known.keys().map(String::as_str).filter(|name| !name.contains('$')).collect();
-        return Some((format!("no function `{name}` exists for sequence scripts"), remedy(name, &names)));
+    let Some(counts) = functions.get(name) else {
+        let names: Vec<&str> =
+            functions.keys().map(String::as_str).filter(|name| !name.contains('$')).collect();
+        return Some((format!("no function `{name}` exists for sequence scripts"), remedy_for(name, &names)));
     };
     if counts.contains(&count) {
         return None;
     }
     let takes: Vec<String> = counts.iter().map(ToString::to_string).collect();
     let message = format!("`{name}` is called with {count} arguments, and takes {}", takes.join(" or "));
-    Some((message, LISTED.to_owned()))
+    Some((message, SEE_REFERENCE.to_owned()))
 }
 
-const LISTED: &str = "docs/reference/sequences.md lists the functions and what they take";
+const SEE_REFERENCE: &str = "docs/reference/sequences.md lists the functions and what they take";
 
-fn remedy(name: &str, among: &[&str]) -> String {
+fn remedy_for(name: &str, among: &[&str]) -> String {
     match closest(name, among) {
-        Some(guess) => format!("did you mean `{guess}`? {LISTED}"),
-        None => LISTED.to_owned(),
+        Some(guess) => format!("did you mean `{guess}`? {SEE_REFERENCE}"),
+        None => SEE_REFERENCE.to_owned(),
     }
 }

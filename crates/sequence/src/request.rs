@@ -24,7 +24,7 @@ pub struct SequenceRequest {
     pub model: Model,
     /// Nominal boundary conditions; each step has its own P3 and valve opening.
     pub boundary: BoundaryConditions,
-    /// Temperatures that follow the compressor outlet at each point instead.
+    /// Boundary temperatures that follow the compressor outlet temperature of each point.
     pub follow_outlet: FollowOutlet,
     /// Limits of every step.
     pub limits: Limits,
@@ -32,7 +32,7 @@ pub struct SequenceRequest {
     pub order: OrderPoints,
 }
 
-/// Why a step is refused.
+/// Refusal of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Refusal {
     pub message: String,
@@ -40,7 +40,7 @@ pub(crate) struct Refusal {
 }
 
 impl SequenceRequest {
-    /// The steady state at a point, or why no step may go there.
+    /// Solves the steady state of a point, or refuses it because it violates a limit.
     pub(crate) fn check(&self, point: OperatingPoint) -> Result<SteadyState, Refusal> {
         reach(&self.model, point, &self.boundary, self.follow_outlet, &self.limits).map_err(|obstacles| {
             let (krpm, opening) = (point.speed_rpm / 1e3, point.valve_opening_ratio);

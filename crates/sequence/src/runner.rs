@@ -1,13 +1,13 @@
 //! Runs a script on its own thread and synchronises with it at each step.
 
-use crate::comments::unclosed_comment;
+use crate::comments::find_unclosed_comment;
 use crate::error::{ScriptError, SequenceError};
-use crate::names::Unknown;
+use crate::names::UnknownName;
 use crate::request::SequenceRequest;
 use crate::result::StepResult;
-use crate::sandbox::{Budget, SCRIPT_LIMIT, STACK_BYTES, engine};
+use crate::sandbox::{Budget, SCRIPT_LIMIT, STACK_BYTES, build_engine};
 use crate::session::{Session, lock};
-use crate::step::{FromScript, SequenceStep};
+use crate::step::{ScriptMessage, SequenceStep};
 use crate::{api, names};
 use rhai::{AST, Engine, EvalAltResult, Scope};
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use std::time::Duration;
 /// Duration of one wait for a script's next step; a stop is noticed within this time.
 const WAIT: Duration = Duration::from_millis(20);
 /// Maximum number of waits for one step: one minute, enough to plan the whole grid several times.
-const WAITS_MAX: u32 = 3_000;
+const MAX_WAITS: u32 = 3_000;
 
 /// A script's text, and its name in messages.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,13 +35,13 @@ pub struct Script {
 pub struct SequenceRunner {
     /// `None` once the script has ended.
     to_script: Option<SyncSender<Option<StepResult>>>,
-    from_script: Option<Receiver<FromScript>>,
+    messages: Option<Receiver<ScriptMessage>>,
     /// Whether the next step has been requested.
-    asked: bool,
+    is_requested: bool,
     /// Waits since the request.
     waits: u32,
     /// The script's answer, until it is fetched.
-    answer: Option<Result<FromScript, SequenceError>>,
+    answer: Option<Result<ScriptMessage, SequenceError>>,
     budget: Arc<Budget>,
     notes: Vec<String>,
     thread: Option<JoinHandle<()>>,
@@ -55,7 +55,7 @@ impl SequenceRunner {
     pub fn start(script: Script, request: SequenceRequest) -> Result<Self, SequenceError> {
         // A buffer of one, so that a request does not wait while the script is parsed.
         let (to_script, from_caller) = sync_channel(1);
-        let (to_caller, from_script) = sync_channel(0);
+        let (to_caller, messages) = sync_channel(0);
         let budget = Arc::new(Budget::default());
         let shared = Arc::clone(&budget);
         let thread = std::thread::Builder::new()
@@ -65,8 +65,8 @@ impl SequenceRunner {
             .map_err(SequenceError::Thread)?;
         Ok(SequenceRunner {
             to_script: Some(to_script),
-            from_script: Some(from_script),
-            asked: false,
+            messages: Some(messages),
+            is_requested: false,
             waits: 0,
             answer: None,
             budget,
@@ -77,8 +77,8 @@ impl SequenceRunner {
 
     /// Passes the result of the last step (`None` before the first) to the script and requests its next step, without waiting
     /// for it. Does nothing if a request is pending.
-    pub fn ask(&mut self, finished: Option<StepResult>) {
-        if std::mem::replace(&mut self.asked, true) {
+    pub fn request_step(&mut self, finished: Option<StepResult>) {
+        if std::mem::replace(&mut self.is_requested, true) {
             return;
         }
         self.waits = 0;
@@ -90,19 +90,19 @@ impl SequenceRunner {
     /// Whether [`next_step`](Self::next_step) will return at once; waits some milliseconds for that. To end the script, drop the
     /// runner.
     pub fn is_ready(&mut self) -> bool {
-        let Some(from_script) = self.from_script.as_ref().filter(|_| self.to_script.is_some()) else {
+        let Some(messages) = self.messages.as_ref().filter(|_| self.to_script.is_some()) else {
             return true;
         };
-        if self.answer.is_some() || !self.asked {
+        if self.answer.is_some() || !self.is_requested {
             return true;
         }
-        self.answer = match from_script.recv_timeout(WAIT) {
+        self.answer = match messages.recv_timeout(WAIT) {
             Ok(answer) => Some(Ok(answer)),
             Err(RecvTimeoutError::Disconnected) => Some(Err(SequenceError::Lost)),
-            Err(RecvTimeoutError::Timeout) if self.waits >= WAITS_MAX => {
+            Err(RecvTimeoutError::Timeout) if self.waits >= MAX_WAITS => {
                 self.budget.cancel();
                 Some(Err(SequenceError::TooSlow {
-                    limit_s: u64::from(WAITS_MAX) * WAIT.as_millis() as u64 / 1000,
+                    limit_s: u64::from(MAX_WAITS) * WAIT.as_millis() as u64 / 1000,
                 }))
             }
             Err(RecvTimeoutError::Timeout) => {
@@ -123,17 +123,17 @@ impl SequenceRunner {
         if self.to_script.is_none() {
             return Ok(None);
         }
-        self.ask(finished);
+        self.request_step(finished);
         while !self.is_ready() {}
-        self.asked = false;
+        self.is_requested = false;
         let answer = self.answer.take().unwrap_or(Err(SequenceError::Lost));
-        if !matches!(answer, Ok(FromScript::Step(..))) {
+        if !matches!(answer, Ok(ScriptMessage::Step(..))) {
             self.to_script = None;
         }
         let (outcome, notes) = match answer {
-            Ok(FromScript::Step(step, notes)) => (Ok(Some(*step)), notes),
-            Ok(FromScript::Done(notes)) => (Ok(None), notes),
-            Ok(FromScript::Failed(error, notes)) => (Err(SequenceError::Script(error)), notes),
+            Ok(ScriptMessage::Step(step, notes)) => (Ok(Some(*step)), notes),
+            Ok(ScriptMessage::Done(notes)) => (Ok(None), notes),
+            Ok(ScriptMessage::Failed(error, notes)) => (Err(SequenceError::Script(error)), notes),
             Err(error) => (Err(error), Vec::new()),
         };
         self.notes.extend(notes);
@@ -151,7 +151,7 @@ impl Drop for SequenceRunner {
         // The script ends at its next operation. Both channels are closed before the join: the thread may wait at either.
         self.budget.cancel();
         self.to_script = None;
-        self.from_script = None;
+        self.messages = None;
         if let Some(thread) = self.thread.take() {
             // A panic of the thread has been reported as `Lost`.
             let _ = thread.join();
@@ -160,14 +160,15 @@ impl Drop for SequenceRunner {
 }
 
 fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
-    let fail =
-        |error: &rhai::ParseError| Box::new(ScriptError::parsing(script.path.clone(), &script.text, error));
+    let fail = |error: &rhai::ParseError| {
+        Box::new(ScriptError::from_parse_error(script.path.clone(), &script.text, error))
+    };
     if script.text.len() > SCRIPT_LIMIT {
         let message = format!("the script has {} bytes, more than {SCRIPT_LIMIT}", script.text.len());
         let thrown = EvalAltResult::ErrorRuntime(message.into(), rhai::Position::NONE);
-        return Err(Box::new(ScriptError::running(script.path.clone(), "", thrown)));
+        return Err(Box::new(ScriptError::from_run_error(script.path.clone(), "", thrown)));
     }
-    if let Some(at) = unclosed_comment(&script.text) {
+    if let Some(at) = find_unclosed_comment(&script.text) {
         let message = "this comment is never closed: all that follows is part of it".to_owned();
         let remedy = "write `*/` where it ends".to_owned();
         return Err(Box::new(ScriptError::at(script.path.clone(), &script.text, at, message, remedy)));
@@ -177,26 +178,26 @@ fn compile(engine: &Engine, script: &Script) -> Result<AST, Box<ScriptError>> {
 
 /// Main function of a script's thread.
 fn run(script: &Script, budget: &Arc<Budget>, session: Session) {
-    let mut engine = engine(session.request.points.len(), budget);
+    let mut engine = build_engine(session.request.points.len(), budget);
     let session = Arc::new(Mutex::new(session));
     api::register(&mut engine, &session);
     let compiled = compile(&engine, script).and_then(|ast| match names::check(&engine, &ast) {
         Ok(()) => Ok(ast),
-        Err(Unknown { at, message, remedy }) => {
+        Err(UnknownName { at, message, remedy }) => {
             Err(Box::new(ScriptError::at(script.path.clone(), &script.text, at, message, remedy)))
         }
     });
-    let begun = lock(&session).wait();
-    if begun.is_err() {
+    let first_request = lock(&session).wait();
+    if first_request.is_err() {
         return;
     }
     let outcome = compiled.and_then(|ast| {
         engine
             .run_ast_with_scope(&mut Scope::new(), &ast)
-            .map_err(|error| Box::new(ScriptError::running(script.path.clone(), &script.text, *error)))
+            .map_err(|error| Box::new(ScriptError::from_run_error(script.path.clone(), &script.text, *error)))
     });
     lock(&session).end(|notes| match outcome {
-        Ok(()) => FromScript::Done(notes),
-        Err(error) => FromScript::Failed(error, notes),
+        Ok(()) => ScriptMessage::Done(notes),
+        Err(error) => ScriptMessage::Failed(error, notes),
     });
 }

@@ -30,14 +30,14 @@ pub(crate) const SCRIPT_LIMIT: usize = 256 << 10;
 /// Stack of a script's thread, bytes: room for values nested as deeply as an array is long.
 pub(crate) const STACK_BYTES: usize = 256 << 20;
 
-/// Resources that a script has used, and whether it has to end: shared by all its functions.
+/// Operations used by a script, and a flag that ends it; shared by all its functions.
 #[derive(Debug, Default)]
 pub(crate) struct Budget {
     operations: AtomicU64,
     cancelled: AtomicBool,
 }
 
-/// Why a script was ended from outside.
+/// Reason for which a script was ended from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ScriptEnd {
     /// It used up its operations.
@@ -53,7 +53,7 @@ impl Budget {
     }
 
     /// Counts one operation.
-    fn operation(&self) -> Option<ScriptEnd> {
+    fn count_operation(&self) -> Option<ScriptEnd> {
         if self.cancelled.load(Ordering::Relaxed) {
             return Some(ScriptEnd::Cancelled);
         }
@@ -63,7 +63,7 @@ impl Budget {
 }
 
 /// An engine with arithmetic, strings, arrays and maps only: no modules, no `eval`, no clock, no `sleep`.
-pub(crate) fn engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
+pub(crate) fn build_engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
     let mut engine = Engine::new_raw();
     ArithmeticPackage::new().register_into_engine(&mut engine);
     LogicPackage::new().register_into_engine(&mut engine);
@@ -92,7 +92,7 @@ pub(crate) fn engine(grid_points: usize, budget: &Arc<Budget>) -> Engine {
     });
     // The engine counts the operations of each closure call separately, so they are added up here.
     let budget = Arc::clone(budget);
-    engine.on_progress(move |_| budget.operation().map(Dynamic::from));
+    engine.on_progress(move |_| budget.count_operation().map(Dynamic::from));
     engine
         .set_max_call_levels(CALL_DEPTH_LIMIT)
         .set_max_expr_depths(EXPRESSION_DEPTH_LIMIT, EXPRESSION_DEPTH_LIMIT)

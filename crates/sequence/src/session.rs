@@ -1,17 +1,17 @@
 //! The implementation of the functions that a script calls.
 
 use crate::error::throw;
-use crate::forecast::Nominal;
+use crate::forecast::NominalForecast;
 use crate::request::{Refusal, SequenceRequest};
 use crate::result::StepResult;
 use crate::settle::SettleRule;
-use crate::step::{FromScript, Hold, SequenceStep};
+use crate::step::{EndCondition, ScriptMessage, SequenceStep};
 use mapper_core::{OperatingPoint, PlanStep, StepKind};
 use rhai::{EvalAltResult, Position};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-pub(crate) type Thrown = Box<EvalAltResult>;
+pub(crate) type ScriptThrow = Box<EvalAltResult>;
 
 /// Maximum number of steps of a sequence.
 const STEP_LIMIT: usize = 2_000;
@@ -22,7 +22,7 @@ const DURATION_LIMIT_S: f64 = 3.0 * 86_400.0;
 /// Maximum number of checked points without a step to them, plus an allowance for each point of the grid. Each check takes
 /// the time of some thousand operations.
 const CHECK_LIMIT: usize = 2_000;
-const CHECKS_OF_POINT: usize = 10;
+const CHECKS_PER_POINT: usize = 10;
 /// Maximum number of points in one call of the planner (at least the grid); twice as many in total.
 const ORDER_LIMIT: usize = 100;
 /// Maximum number of notes, and of characters in each.
@@ -35,43 +35,43 @@ pub(crate) struct Session {
     /// Dwell time of the following points, s.
     pub dwell_s: f64,
     pub results: Vec<StepResult>,
-    nominal: Nominal,
+    nominal: NominalForecast,
     checks: usize,
     /// Points passed to the planner so far.
-    ordered: usize,
+    ordered_points: usize,
     notes: Vec<String>,
-    noted: usize,
-    to_caller: SyncSender<FromScript>,
+    note_count: usize,
+    to_caller: SyncSender<ScriptMessage>,
     from_caller: Receiver<Option<StepResult>>,
 }
 
 impl Session {
     pub fn new(
         request: SequenceRequest,
-        to_caller: SyncSender<FromScript>,
+        to_caller: SyncSender<ScriptMessage>,
         from_caller: Receiver<Option<StepResult>>,
     ) -> Self {
         Session {
             dwell_s: request.timing.dwell.fixed_or_usual_s(),
             request,
             results: Vec::new(),
-            nominal: Nominal::new(),
+            nominal: NominalForecast::new(),
             checks: 0,
-            ordered: 0,
+            ordered_points: 0,
             notes: Vec::new(),
-            noted: 0,
+            note_count: 0,
             to_caller,
             from_caller,
         }
     }
 
     /// Waits until the caller asks for the next step.
-    pub fn wait(&mut self) -> Result<Option<StepResult>, Thrown> {
-        self.from_caller.recv().map_err(|_| stopped())
+    pub fn wait(&mut self) -> Result<Option<StepResult>, ScriptThrow> {
+        self.from_caller.recv().map_err(|_| stop_error())
     }
 
-    /// Reports how the script ended, unless the caller is gone.
-    pub fn end(&mut self, end: impl FnOnce(Vec<String>) -> FromScript) {
+    /// Sends the result of the script to the caller, if it still exists.
+    pub fn end(&mut self, end: impl FnOnce(Vec<String>) -> ScriptMessage) {
         let message = end(std::mem::take(&mut self.notes));
         let _ = self.to_caller.send(message);
     }
@@ -82,23 +82,23 @@ impl Session {
     }
 
     pub fn note(&mut self, text: &str) {
-        self.noted += 1;
-        if self.noted < NOTE_LIMIT {
+        self.note_count += 1;
+        if self.note_count < NOTE_LIMIT {
             let harmless = |c: char| if c.is_control() { ' ' } else { c };
             self.notes.push(text.chars().take(NOTE_LENGTH_LIMIT).map(harmless).collect());
-        } else if self.noted == NOTE_LIMIT {
+        } else if self.note_count == NOTE_LIMIT {
             self.notes.push(format!("the script has made {NOTE_LIMIT} notes; further ones are left out"));
         }
     }
 
     fn check_limit(&self) -> usize {
-        CHECK_LIMIT + CHECKS_OF_POINT * self.request.points.len()
+        CHECK_LIMIT + CHECKS_PER_POINT * self.request.points.len()
     }
 
     fn check(
         &mut self,
         point: OperatingPoint,
-    ) -> Result<mapper_physics::simulation::steady::SteadyState, Thrown> {
+    ) -> Result<mapper_physics::simulation::steady::SteadyState, ScriptThrow> {
         let limit = self.check_limit();
         if self.checks >= limit {
             let message = format!("the script has checked {limit} points without going there");
@@ -109,7 +109,7 @@ impl Session {
     }
 
     /// Whether a step may go to this point.
-    pub fn reachable(&mut self, point: OperatingPoint) -> Result<bool, Thrown> {
+    pub fn is_reachable(&mut self, point: OperatingPoint) -> Result<bool, ScriptThrow> {
         if self.checks >= self.check_limit() {
             self.check(point)?;
         }
@@ -117,7 +117,7 @@ impl Session {
     }
 
     /// The planner's order of a set of points.
-    pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, Thrown> {
+    pub fn order(&mut self, points: &[OperatingPoint]) -> Result<Vec<OperatingPoint>, ScriptThrow> {
         // The search time grows faster than the number of points: a set larger than the grid is refused.
         let largest = ORDER_LIMIT.max(self.request.points.len());
         if points.len() > largest {
@@ -126,8 +126,8 @@ impl Session {
             return Err(throw(message, "order the grid, or a part of it"));
         }
         let limit = 2 * largest;
-        self.ordered += points.len();
-        if self.ordered > limit {
+        self.ordered_points += points.len();
+        if self.ordered_points > limit {
             let message = format!("the planner has been asked to order more than {limit} points in total");
             return Err(throw(message, "order a set once and keep the result"));
         }
@@ -139,7 +139,7 @@ impl Session {
     }
 
     /// The result of a step, by its number from 1.
-    pub fn result(&self, number: i64) -> Result<StepResult, Thrown> {
+    pub fn result(&self, number: i64) -> Result<StepResult, ScriptThrow> {
         let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
         index.and_then(|index| self.results.get(index)).cloned().ok_or_else(|| {
             let message = format!("no result of step {number}: {} have been run", self.results.len());
@@ -148,30 +148,35 @@ impl Session {
     }
 
     /// Sets the turbine inlet temperature of the following steps, K.
-    pub fn hold_t3(&mut self, t3_k: f64) -> Result<(), Thrown> {
+    pub fn set_t3(&mut self, t3_k: f64) -> Result<(), ScriptThrow> {
         if self.request.follow_outlet.turbine_inlet {
-            return Err(follows("turbine inlet temperature"));
+            return Err(outlet_follows_error("turbine inlet temperature"));
         }
         if let Some(limit_k) = self.request.limits.t3_max_k.filter(|limit_k| t3_k > *limit_k) {
             let message =
                 format!("a turbine inlet temperature of {t3_k:.2} K is above the limit of {limit_k:.2} K");
             return Err(throw(message, "stay below `limits.turbine_inlet_temperature`"));
         }
-        self.request.boundary.t3_k = plausible("turbine inlet temperature", t3_k)?;
+        self.request.boundary.t3_k = check_temperature("turbine inlet temperature", t3_k)?;
         Ok(())
     }
 
     /// Sets the oil inlet temperature of the following steps, K.
-    pub fn hold_oil(&mut self, oil_k: f64) -> Result<(), Thrown> {
+    pub fn set_oil_temperature(&mut self, oil_k: f64) -> Result<(), ScriptThrow> {
         if self.request.follow_outlet.oil {
-            return Err(follows("oil temperature"));
+            return Err(outlet_follows_error("oil temperature"));
         }
-        self.request.boundary.oil_temperature_k = plausible("oil temperature", oil_k)?;
+        self.request.boundary.oil_temperature_k = check_temperature("oil temperature", oil_k)?;
         Ok(())
     }
 
     /// Goes to a point and returns when the step has been executed.
-    pub fn step(&mut self, to: OperatingPoint, dwell_s: f64, hold: Hold) -> Result<StepResult, Thrown> {
+    pub fn step(
+        &mut self,
+        to: OperatingPoint,
+        dwell_s: f64,
+        end: EndCondition,
+    ) -> Result<StepResult, ScriptThrow> {
         let (index, start_s) = (self.results.len(), self.now_s());
         if index >= STEP_LIMIT {
             return Err(throw(format!("a sequence may have {STEP_LIMIT} steps"), "end the sequence earlier"));
@@ -203,9 +208,9 @@ impl Session {
             predicted,
         };
         let notes = std::mem::take(&mut self.notes);
-        let step = Box::new(SequenceStep { step, hold });
-        self.to_caller.send(FromScript::Step(step, notes)).map_err(|_| stopped())?;
-        let result = self.wait()?.ok_or_else(stopped)?;
+        let step = Box::new(SequenceStep { step, end });
+        self.to_caller.send(ScriptMessage::Step(step, notes)).map_err(|_| stop_error())?;
+        let result = self.wait()?.ok_or_else(stop_error)?;
         let duration_s = result.end_s - result.start_s;
         self.nominal.finish(&self.request, &target.boundary, duration_s).map_err(fail)?;
         self.checks = self.checks.saturating_sub(1);
@@ -214,7 +219,7 @@ impl Session {
     }
 
     /// Repeats a step by the same jump.
-    pub fn repeat(&mut self, number: i64) -> Result<StepResult, Thrown> {
+    pub fn repeat(&mut self, number: i64) -> Result<StepResult, ScriptThrow> {
         let before = self.result(number)?;
         let Some(from) = before.from else {
             let message = format!("step {number} has no jump that could be repeated: the run began there");
@@ -222,9 +227,9 @@ impl Session {
         };
         let now = self.results.last().map(|result| result.target);
         if now.is_none_or(|now| !now.is_same_place(&from)) {
-            self.step(from, self.dwell_s, Hold::Dwell)?;
+            self.step(from, self.dwell_s, EndCondition::Dwell)?;
         }
-        self.step(before.target, before.end_s - before.start_s, Hold::Dwell)
+        self.step(before.target, before.end_s - before.start_s, EndCondition::Dwell)
     }
 
     /// Stays at a point until it has settled.
@@ -233,16 +238,16 @@ impl Session {
         to: OperatingPoint,
         max_s: f64,
         rate_max_k_s: f64,
-    ) -> Result<StepResult, Thrown> {
+    ) -> Result<StepResult, ScriptThrow> {
         let rule = SettleRule { rate_max_k_s, bands: self.request.settle_bands };
-        self.step(to, max_s, Hold::UntilSettled(rule))
+        self.step(to, max_s, EndCondition::UntilSettled(rule))
     }
 }
 
 /// Temperature range of the model, K; the limits of a rig are checked before the run.
 const PLAUSIBLE_K: std::ops::RangeInclusive<f64> = 250.0..=1400.0;
 
-fn plausible(what: &str, value_k: f64) -> Result<f64, Thrown> {
+fn check_temperature(what: &str, value_k: f64) -> Result<f64, ScriptThrow> {
     if PLAUSIBLE_K.contains(&value_k) {
         return Ok(value_k);
     }
@@ -250,13 +255,13 @@ fn plausible(what: &str, value_k: f64) -> Result<f64, Thrown> {
     Err(throw(message, "give a temperature such as \"70 degC\""))
 }
 
-fn follows(what: &str) -> Thrown {
+fn outlet_follows_error(what: &str) -> ScriptThrow {
     let message = format!("the {what} follows the compressor's outlet in this campaign");
     throw(message, "take it out of `boundary.follow_outlet`")
 }
 
-/// Ends the script because the caller is gone; the script cannot catch this.
-fn stopped() -> Thrown {
+/// The error that ends the script when its caller no longer exists. The script cannot catch it.
+fn stop_error() -> ScriptThrow {
     Box::new(EvalAltResult::ErrorTerminated(().into(), Position::NONE))
 }
 

@@ -6,7 +6,7 @@ use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_co
 use std::collections::VecDeque;
 
 /// Time over which drifts are judged, s.
-const SPAN_S: f64 = 30.0;
+const WINDOW_S: f64 = 30.0;
 /// Maximum number of stored samples; a rig with a higher sampling rate is judged over a shorter time.
 const SAMPLE_LIMIT: usize = 100_000;
 
@@ -53,24 +53,24 @@ impl SettleWatch {
         }
         let Some(now_s) = self.samples.back().map(|row| row[0]) else { return false };
         while self.samples.len() > SAMPLE_LIMIT
-            || self.samples.front().is_some_and(|row| row[0] < now_s - SPAN_S)
+            || self.samples.front().is_some_and(|row| row[0] < now_s - WINDOW_S)
         {
             self.samples.pop_front();
         }
-        if now_s - self.start_s < SPAN_S || self.samples.len() < 3 {
+        if now_s - self.start_s < WINDOW_S || self.samples.len() < 3 {
             return false;
         }
         let slow = |column: usize| self.slope(column).map(|slope| slope.abs() <= self.rule.rate_max_k_s);
-        slow(1) == Some(true) && slow(2) != Some(false) && self.operating_point_has_settled(now_s)
+        slow(1) == Some(true) && slow(2) != Some(false) && self.is_operating_point_settled(now_s)
     }
 
     /// Whether speed, flow and pressure ratio have settled at the start of the span.
-    fn operating_point_has_settled(&self, now_s: f64) -> bool {
+    fn is_operating_point_settled(&self, now_s: f64) -> bool {
         type Signal = fn(&[f64; COLUMNS]) -> f64;
         let signals =
             with_bands::<Signal>(|row| row[3], |row| row[4], |row| row[6] / row[5], &self.rule.bands);
         signals.into_iter().all(|(_, signal, allowed_ratio)| {
-            let backwards = self.blocks(now_s, signal);
+            let backwards = self.block_medians(now_s, signal);
             let known = backwards.iter().any(|value| value.is_finite());
             let spread = noise_spread(&backwards);
             let count = backwards.len();
@@ -79,8 +79,8 @@ impl SettleWatch {
     }
 
     /// Medians over blocks counted backwards from `now_s`; NaN where a block has no value.
-    fn blocks(&self, now_s: f64, signal: fn(&[f64; COLUMNS]) -> f64) -> Vec<f64> {
-        let count = (SPAN_S / BLOCK_S) as usize;
+    fn block_medians(&self, now_s: f64, signal: fn(&[f64; COLUMNS]) -> f64) -> Vec<f64> {
+        let count = (WINDOW_S / BLOCK_S) as usize;
         let mut blocks: Vec<Vec<f64>> = vec![Vec::new(); count];
         for row in &self.samples {
             let block = (((now_s - row[0]) / BLOCK_S) as usize).min(count - 1);
@@ -126,7 +126,7 @@ mod tests {
     /// A step response of 10 K with 60 s settles to 1 K/min when 10/60 exp(-t/60) = 1/60, at 138 s. Judged over the last 30 s,
     /// it settles between a few seconds and half this time later.
     #[test]
-    fn an_exponential_settles_when_its_slope_says_so() {
+    fn an_exponential_settles_when_its_slope_is_small_enough() {
         let mut watch = new_watch();
         let settled = (0..600).find(|second| {
             watch.has_settled(&batch(f64::from(*second), |t| 400.0 - 10.0 * (-t / 60.0).exp()))

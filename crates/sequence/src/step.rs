@@ -1,4 +1,4 @@
-//! Data that a script passes on at each step.
+//! The steps that a script requests, and the messages of its thread.
 
 use crate::error::ScriptError;
 use crate::settle::SettleRule;
@@ -6,7 +6,7 @@ use mapper_core::PlanStep;
 
 /// End condition of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hold {
+pub enum EndCondition {
     /// After the step's duration.
     Dwell,
     /// When it has settled, after the step's duration at the latest.
@@ -19,12 +19,12 @@ pub struct SequenceStep {
     /// The step; its `dwell_s` is its maximum duration.
     pub step: PlanStep,
     /// Condition for an earlier end.
-    pub hold: Hold,
+    pub end: EndCondition,
 }
 
 /// A message from the script's thread, with the notes since the last one.
 #[derive(Debug)]
-pub(crate) enum FromScript {
+pub(crate) enum ScriptMessage {
     Step(Box<SequenceStep>, Vec<String>),
     Done(Vec<String>),
     Failed(Box<ScriptError>, Vec<String>),

@@ -8,7 +8,8 @@ use mapper_core::{
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
 use mapper_sequence::{
-    Hold, Script, ScriptError, SequenceError, SequenceRequest, SequenceRunner, SequenceStep, StepResult,
+    EndCondition, Script, ScriptError, SequenceError, SequenceRequest, SequenceRunner, SequenceStep,
+    StepResult,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -141,7 +142,7 @@ fn a_script_yields_its_steps_in_order_and_sees_their_results() {
     use StepKind::{Point, Repeat};
     assert_eq!(kinds, [Point, Point, Repeat, Repeat, Point]);
     assert_eq!(steps[1].step.from, Some(steps[0].step.to));
-    assert!(matches!(steps[4].hold, Hold::UntilSettled(_)) && steps[3].hold == Hold::Dwell);
+    assert!(matches!(steps[4].end, EndCondition::UntilSettled(_)) && steps[3].end == EndCondition::Dwell);
     assert_eq!(notes, ["false true 0.51 0.53 5 2"]);
 }
 
@@ -403,7 +404,7 @@ fn a_script_that_computes_ends_when_it_is_dropped() {
         "jump(grid()[0]); let a = []; a.pad(4000, 0); a.sort(|x, y| { loop { } });",
     ] {
         let mut runner = start(text);
-        runner.ask(None);
+        runner.request_step(None);
         // Whether it has come to its loop or not: both end.
         runner.is_ready();
         drop(runner);
@@ -416,7 +417,7 @@ fn a_step_that_is_asked_for_is_given_once() {
     let mut runner = start("for point in grid() { jump(point); }");
     let (mut steps, mut finished) = (0, None);
     loop {
-        runner.ask(finished.take());
+        runner.request_step(finished.take());
         while !runner.is_ready() {}
         assert!(runner.is_ready());
         let Some(step) = runner.next_step(None).unwrap() else { break };

@@ -8,7 +8,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{Dwell, Plan, Timing, VisitOrder};
 use mapper_formats::FORMATS;
 use mapper_identify::MAX_RESTING_ETA;
-use mapper_planner::other_orders;
+use mapper_planner::plan_other_orders;
 use mapper_session::{PlanInputs, Registry, RunRequest, Session, nominal_model, plan, plan_of};
 
 const GRID: [(&str, &str); 3] = [
@@ -114,7 +114,7 @@ fn a_plan_is_compared_with_the_other_orders() {
     let inputs = PlanInputs::of(&campaign).unwrap();
     let request = inputs.request(&campaign, &model);
     let plan = plan_of(&campaign, &request).unwrap();
-    let others = other_orders(&request, &plan).unwrap();
+    let others = plan_other_orders(&request, &plan).unwrap();
     let names: Vec<&str> = others.iter().map(|other| other.objective.as_str()).collect();
     assert_eq!(names, ["min_gradient", "speed_lines", "listed", "conventional"]);
     for other in &others[..3] {

@@ -1,5 +1,5 @@
-//! Backends included in `mapper`, one module each. To add one, write its module with a constant `PLUGIN`, and its line
-//! below.
+//! The backends that are built into `mapper`, one module each: simulated gas stands and the replay of recordings. The command line
+//! passes the list [`BACKENDS`] to `session`. To add a backend, write a module with a constant `PLUGIN`, and add its line below.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 

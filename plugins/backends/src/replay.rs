@@ -1,4 +1,4 @@
-//! Plays a recording back as a rig.
+//! Replays a recording as a rig.
 
 use crate::setpoint_limits;
 use mapper_core::{
@@ -16,11 +16,11 @@ pub const NAME: &str = "replay";
 /// Replay as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin = BackendPlugin {
     name: NAME,
-    summary: "plays a recording back: {recording: FILE, channels: MAP.yaml}, the latter for a log of another program",
+    summary: "replays a recording: {recording: FILE, channels: MAP.yaml}; `channels` for a log of another program",
     make,
 };
 
-/// Why a recording cannot be played further.
+/// A recording that cannot be replayed any further.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The settings name no file.
@@ -34,7 +34,7 @@ pub enum ReplayError {
     ChannelMap(#[from] ChannelMapError),
     /// A poll beyond the end of the recording.
     #[error("the recording being replayed has ended")]
-    Over,
+    Ended,
 }
 
 fn make(_: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
@@ -56,11 +56,11 @@ fn make(_: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>
 /// and three decimals.
 const SETPOINT_TOLERANCE_RATIO: f64 = 1e-4;
 
-/// Plays a [`Recording`] back. Recorded commands cannot be changed: setpoints are accepted and compared with
-/// the recorded commands, and a difference becomes a note among the events.
+/// Replays a [`Recording`]. Its commands cannot change: setpoints are accepted and compared with the recorded commands, and differences
+/// are noted as events.
 ///
-/// There is a sample at every time of a measurement. A command holds between its own samples; any other
-/// channel is NaN without a sample. The end of the recording is the loss of the rig.
+/// The replay has a sample at every recorded time. Commands hold between their samples; any other channel is NaN without a sample. The end
+/// of the recording is reported as the loss of the rig.
 #[derive(Debug)]
 pub struct ReplayBackend {
     t_s: Vec<f64>,
@@ -93,13 +93,17 @@ impl ReplayBackend {
             .series
             .iter()
             .map(|(channel, series)| {
-                let values = if measured(channel) { at_own_times(series, &t_s) } else { held(series, &t_s) };
+                let values = if measured(channel) {
+                    values_at_samples(series, &t_s)
+                } else {
+                    hold_values(series, &t_s)
+                };
                 ChannelColumn { channel: *channel, values }
             })
             .collect();
         let element = |(element, series): (&Element, &Series)| ElementColumn {
             element: *element,
-            values: at_own_times(series, &t_s),
+            values: values_at_samples(series, &t_s),
         };
         let elements = recording.elements.iter().map(element).collect();
         let mut events = recording.events.clone();
@@ -121,7 +125,7 @@ impl ReplayBackend {
         self.t_s.last().copied()
     }
 
-    fn need_armed(&self, call: &'static str) -> Result<(), BackendError> {
+    fn require_armed(&self, call: &'static str) -> Result<(), BackendError> {
         if self.armed {
             Ok(())
         } else {
@@ -130,7 +134,7 @@ impl ReplayBackend {
     }
 
     /// Notes on setpoints that differ from the recorded commands at a sample.
-    fn compare(&self, setpoints: &Setpoints, sample: usize) -> Vec<Event> {
+    fn note_differences(&self, setpoints: &Setpoints, sample: usize) -> Vec<Event> {
         let Some(t_s) = self.t_s.get(sample).copied() else { return Vec::new() };
         let commands = [
             (Channel::P3Command, setpoints.p3_pa),
@@ -183,17 +187,17 @@ impl Backend for ReplayBackend {
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
         setpoint_limits::ACCEPTED.check(setpoints)?;
-        self.need_armed("set")?;
+        self.require_armed("set")?;
         self.pending = Some(*setpoints);
         Ok(())
     }
 
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
-        self.need_armed("poll")?;
+        self.require_armed("poll")?;
         let start = self.samples_played;
         let end = start.max(self.t_s.partition_point(|t| *t <= until_s));
         if start == end && self.end_s().is_none_or(|end_s| until_s > end_s) {
-            let source = Box::new(ReplayError::Over);
+            let source = Box::new(ReplayError::Ended);
             return Err(BackendError::Lost { t_s: self.end_s().unwrap_or(0.0), source });
         }
         let events_end = self.events_played.max(self.events.partition_point(|event| event.t_s <= until_s));
@@ -203,7 +207,7 @@ impl Backend for ReplayBackend {
                 self.pending.take().filter(|setpoints| setpoints.mode == RigMode::Running)
         {
             // Setpoints apply from the last poll on, so the first sample after it shows them.
-            events.extend(self.compare(&setpoints, start));
+            events.extend(self.note_differences(&setpoints, start));
             events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         }
         (self.samples_played, self.events_played) = (end, events_end);
@@ -233,22 +237,22 @@ impl Backend for ReplayBackend {
     }
 
     fn hold(&mut self) -> Result<(), BackendError> {
-        self.need_armed("hold")
+        self.require_armed("hold")
     }
 
     fn make_safe(&mut self) -> Result<(), BackendError> {
-        self.need_armed("make_safe")
+        self.require_armed("make_safe")
     }
 
     fn disarm(&mut self) -> Result<(), BackendError> {
-        self.need_armed("disarm")?;
+        self.require_armed("disarm")?;
         self.armed = false;
         Ok(())
     }
 }
 
 /// Values at these times, NaN if the series has no sample. Both are strictly increasing.
-fn at_own_times(series: &Series, t_s: &[f64]) -> Vec<f64> {
+fn values_at_samples(series: &Series, t_s: &[f64]) -> Vec<f64> {
     let mut own = series.t_s.iter().zip(&series.values).peekable();
     t_s.iter()
         .map(|t| {
@@ -258,7 +262,7 @@ fn at_own_times(series: &Series, t_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn held(series: &Series, t_s: &[f64]) -> Vec<f64> {
+fn hold_values(series: &Series, t_s: &[f64]) -> Vec<f64> {
     t_s.iter().map(|t| series.held(*t).unwrap_or(f64::NAN)).collect()
 }
 
@@ -298,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn replaying_gives_the_recorded_samples_however_often_it_is_polled() {
+    fn a_replay_returns_the_recorded_samples_for_any_polls() {
         let recording = recording();
         for polls_s in [vec![9.0], vec![0.95, 0.96, 1.3, 2.9], (0..31).map(|i| f64::from(i) / 10.0).collect()]
         {
@@ -338,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn setpoints_unlike_the_recorded_ones_are_noted() {
+    fn setpoints_that_differ_from_the_recorded_ones_are_noted() {
         let mut rig = ReplayBackend::new(&recording());
         rig.arm().unwrap();
         rig.set(&setpoints(1.5e5)).unwrap();

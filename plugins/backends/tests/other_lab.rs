@@ -1,7 +1,7 @@
 //! The lab with other equations: its limit is the lumped model, and its energy balance closes.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_backends::other_lab::{OtherStructure, turn_into};
+use mapper_backends::other_lab::{OtherStructure, apply_structure};
 use mapper_backends::virtual_lab::{LabSettings, Structure, VirtualLab};
 use mapper_core::{Backend, CHANNELS, Channel, RigMode, SampleBatch, Setpoints};
 use mapper_physics::machine::params::BoundaryConditions;
@@ -27,7 +27,7 @@ fn setpoints(speed_rpm: f64) -> Setpoints {
 fn recorded(structure: Option<OtherStructure>) -> SampleBatch {
     let mut settings = LabSettings::ideal(Model::nominal(), BoundaryConditions::default());
     if let Some(structure) = structure {
-        turn_into(&mut settings, structure);
+        apply_structure(&mut settings, structure);
     }
     let mut lab = VirtualLab::new(settings);
     lab.arm().unwrap();

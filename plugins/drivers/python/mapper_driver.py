@@ -103,7 +103,7 @@ def check(setpoints, accepts):
         value, (low, high) = setpoints.get(key), accepts[key]
         if not isinstance(value, (int, float)) or not low <= value <= high:
             number = value if isinstance(value, (int, float)) and value == value and abs(value) < 1e300 else None
-            raise Refused("setpoint_out_of_range", f"{key} is {value}; the rig takes {low} to {high}",
+            raise Refused("setpoint_out_of_range", f"{key} is {value}; the rig accepts {low} to {high}",
                           setpoint=key, value=number, low=low, high=high)
 
 
@@ -121,7 +121,7 @@ class Server:
         return self.leaving and self.armed is None
 
     def begin(self, now_s):
-        """Arming may take seconds: time and lease begin with the first message or tick after it."""
+        """Starts time and lease at the first message or tick after arming, which may take seconds."""
         if self.armed and self.armed.pop("fresh", False):
             self.armed["at_s"], self.armed["lease_s"] = now_s, now_s + LEASE_S
 
@@ -137,7 +137,7 @@ class Server:
             if method != "hello" and not self.greeted:
                 raise Refused("out_of_order", "hello comes first")
             if method != "hello" and not known:
-                raise Refused("refused", "the session is another one")
+                raise Refused("refused", "the message belongs to another session")
             call = getattr(self, "on_" + str(method), None)
             if call is None:
                 raise Refused("unknown_method", f"unknown method `{method}`")
@@ -149,27 +149,27 @@ class Server:
 
     def on_hello(self, params, _):
         if params.get("magic") != MAGIC or params.get("protocol", {}).get("major") != VERSION["major"]:
-            raise Refused("refused", f"this driver speaks version {VERSION['major']}.{VERSION['minor']} of the protocol {MAGIC}")
+            raise Refused("refused", f"this driver uses version {VERSION['major']}.{VERSION['minor']} of the protocol {MAGIC}")
         self.greeted = True
         return {"magic": MAGIC, "protocol": VERSION, "name": self.name, "version": self.version,
                 "frame_limit_bytes": FRAME_LIMIT_BYTES, "session": self.session}
 
     def on_configure(self, params, _):
         if self.rig:
-            raise Refused("out_of_order", "the settings have come already")
+            raise Refused("out_of_order", "the settings were already sent")
         self.rig = self.open_rig(params.get("settings"))
         self.about = self.rig.describe()
         return {}
 
     def on_describe(self, _, __):
         if not self.rig:
-            raise Refused("out_of_order", "the settings have not come")
+            raise Refused("out_of_order", "no settings were sent; send `configure` first")
         text = json.dumps(self.about, sort_keys=True).encode()
         return {"description": self.about, "identity": hashlib.sha256(text).hexdigest()}
 
     def on_arm(self, _, now_s):
         if not self.rig or self.armed:
-            raise Refused("out_of_order", "the rig is armed" if self.armed else "the settings have not come")
+            raise Refused("out_of_order", "the rig is armed" if self.armed else "no settings were sent; send `configure` first")
         self.rig.arm()
         self.armed = {"fresh": True, "at_s": now_s, "setpoints": None, "ticks": 0, "sequence": 0, "polled_s": 0.0, "lease_s": now_s + LEASE_S,
                       "descent": None, "ended": False}
@@ -183,7 +183,7 @@ class Server:
     def on_set(self, params, _):
         armed = self.held()
         if armed["ended"]:
-            raise Refused("lease_ended", "the lease had ended and the rig was made safe; disarm it and arm it again")
+            raise Refused("lease_ended", "the lease has ended and the rig was made safe; disarm it and arm it again")
         if self.about["accepts"]:
             check(params, self.about["accepts"])
         self.rig.set(params)
@@ -193,7 +193,7 @@ class Server:
     def on_hold(self, _, __):
         armed = self.held()
         if armed["ended"]:
-            raise Refused("lease_ended", "the lease had ended and the rig was made safe; disarm it and arm it again")
+            raise Refused("lease_ended", "the lease has ended and the rig was made safe; disarm it and arm it again")
         if not armed["setpoints"]:
             raise Refused("out_of_order", "no setpoints to hold: none were set since arming or since it was made safe")
         self.rig.hold()
@@ -202,7 +202,7 @@ class Server:
     def on_poll(self, params, _):
         armed, until_s = self.held(), params.get("until_s")
         if not self.about["simulated_time"]:
-            raise Refused("unknown_method", "this rig is in real time: its samples come by themselves")
+            raise Refused("unknown_method", "this rig runs in real time and sends its samples unrequested")
         if not isinstance(until_s, (int, float)) or not abs(until_s) <= LATEST_S:
             raise Refused("params", f"until_s is not a number, or beyond {LATEST_S} s")
         self.measure(until_s)
@@ -264,7 +264,7 @@ class Server:
         if not armed:
             return None
         if now_s >= armed["lease_s"] and not armed["ended"]:
-            self.say("nothing was heard for the time of the lease; the rig flies its safe trajectory")
+            self.say("no message arrived during the lease; the rig executes its safe trajectory")
             self.begin_descent(now_s)
         next_s = max(0.0, armed["lease_s"] - now_s) if not armed["ended"] else 1.0
         # A rig that does not confirm its safe state is not polled, so that the watchdog on the driver acts.
@@ -386,7 +386,7 @@ def serve(name, version, open_rig):
     elif len(sys.argv) == 3 and sys.argv[1] == "--socket":
         serve_at(sys.argv[2], name, version, open_rig, news)
     else:
-        sys.exit(f"{os.path.basename(sys.argv[0])} is a driver: `mapper` starts it by itself, without arguments; or --socket PATH, where hosts come to it")
+        sys.exit(f"{os.path.basename(sys.argv[0])} is a driver: `mapper` starts it without arguments; with --socket PATH it serves the hosts that connect to this socket")
 
 
 def serve_at(path, name, version, open_rig, news):
@@ -437,10 +437,10 @@ def listen_at(path):
     listener = socket.socket(socket.AF_UNIX)
     if os.path.lexists(path):
         if not stat.S_ISSOCK(os.lstat(path).st_mode):
-            raise OSError("there is a file that is not a socket")
+            raise OSError("the file exists and is not a socket")
         with socket.socket(socket.AF_UNIX) as probe:
             if probe.connect_ex(path) == 0:
-                raise OSError("another driver listens there")
+                raise OSError("another driver listens on this socket")
         os.unlink(path)
     listener.bind(path)
     os.chmod(path, 0o600)
@@ -461,7 +461,7 @@ def turn_away(host):
         host.settimeout(1.0)
         with host, host.makefile("rb") as stdin:
             identity = json.loads(read_frame(stdin) or b"null")["id"]
-            words = "this driver serves another host, or its rig is still being made safe; wait until that is over"
+            words = "this driver serves another host, or is still making its rig safe; try again later"
             body = json.dumps({"id": identity, "error": {"code": "refused", "message": words}}).encode()
             host.sendall(struct.pack(">I", len(body)) + body)
     except (OSError, ValueError, TypeError, KeyError, RecursionError):

@@ -1,4 +1,4 @@
-//! Which files of a crate name each other, and the circles among them.
+//! Dependencies between the files of a crate, and the circles among them.
 
 use super::files::Package;
 use super::parsed::{Module, ModulePath, read_crate};

@@ -11,7 +11,7 @@ pub(super) type ModulePath = Vec<String>;
 
 /// A `use` of one name, or of all names of a module.
 pub(super) struct Import {
-    /// The name it has here; `None` for a glob.
+    /// Its local name; `None` for a glob.
     pub alias: Option<String>,
     /// What is written.
     pub target: Vec<String>,

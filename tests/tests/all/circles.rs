@@ -1,4 +1,4 @@
-//! No circle inside a crate nor between crates: what is below can be read, moved and tested without what is above.
+//! No circular dependencies inside a crate or between crates: a lower module can be read, moved and tested without the upper ones.
 
 use cargo_metadata::{DependencyKind, MetadataCommand};
 use mapper_tests::tree::{circles, packages};
@@ -11,7 +11,7 @@ use petgraph::graphmap::DiGraphMap;
 const KNOWN: &[(&str, &[&str])] = &[];
 
 #[test]
-fn no_files_of_a_crate_need_each_other() {
+fn modules_of_a_crate_have_no_circular_dependencies() {
     let packages = packages();
     assert!(packages.len() > 15, "only {} packages were found", packages.len());
     let mut found = Vec::new();
@@ -39,9 +39,9 @@ fn no_files_of_a_crate_need_each_other() {
     }
 }
 
-/// Tests included, which Cargo would let pass.
+/// Dependencies of tests count too, which Cargo itself does not check.
 #[test]
-fn no_crates_need_each_other() {
+fn crates_have_no_circular_dependencies() {
     let manifest = mapper_tests::repository().join("Cargo.toml");
     let metadata = MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap();
     let mut packages = DiGraphMap::<&str, ()>::new();
@@ -57,9 +57,9 @@ fn no_crates_need_each_other() {
     assert!(circles.is_empty(), "{circles:?}");
 }
 
-/// What a crate does to the rule is seen: by `use`, by path, through a re-export, in a macro; not in tests.
+/// Violations by `use`, by path, through a re-export and in a macro are detected; those in tests are ignored.
 #[test]
-fn circles_are_seen() {
+fn circular_dependencies_are_detected() {
     let directory = mapper_tests::scratch();
     let files = [
         ("lib.rs", "mod a; mod b; mod c; mod d; mod e; mod f; pub use a::A; use f::F; pub struct Root(F);"),

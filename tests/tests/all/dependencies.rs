@@ -1,4 +1,4 @@
-//! Dependencies point down only.
+//! Dependencies between packages only point down the layers.
 
 use cargo_metadata::{DependencyKind, MetadataCommand, Package};
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-core",      &[]),
     ("mapper-chart",     &["core"]),
     ("mapper-numerics",  &[]),
-    // Work in many pieces; knows nothing of what the pieces are.
+    // Work in many pieces, independent of its content.
     ("mapper-fleet",     &["numerics", "yaml"]),
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-fmu",       &["core", "physics"]),
@@ -28,39 +28,39 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-identify",  &["core", "inference", "numerics", "physics", "observe"]),
     ("mapper-diagnose",  &["core", "numerics", "physics", "observe", "inference", "identify"]),
     ("mapper-history",   &["numerics"]),
-    // Plug-ins never see each other.
+    // Plug-ins do not depend on each other.
     // A backend may read recordings: replay does.
     ("mapper-backends",  &["core", "numerics", "physics", "recording", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "maps"]),
     ("mapper-log-formats", &["recording"]),
-    // Words, pages and pictures made from data.
+    // Text, pages and pictures, made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "maps", "diagnose", "history", "recording", "sequence", "fleet"]),
-    // The application: everything between arguments and words. Plug-ins are handed in.
+    // The application as a library. The caller passes the plug-ins.
     ("mapper-session",   &["core", "chart", "physics", "campaign", "planner", "runner", "sequence", "recording", "observe", "identify", "diagnose", "history", "maps", "report", "numerics", "fleet", "fmu", "yaml"]),
-    // What a browser sees while a run goes on.
+    // The live page of a run.
     ("mapper-live",      &["core", "campaign", "recording", "report", "session"]),
     // Blind cases on the virtual lab, calibrations, the figures of the paper; above the application, like the program.
     ("mapper-validation", &["core", "chart", "numerics", "physics", "campaign", "runner", "recording", "observe", "identify", "diagnose", "history", "report", "session", "backends", "effects", "fleet"]),
-    // The program names the plug-ins; nothing sees the program.
+    // The program lists the plug-ins; no package depends on the program.
     ("mapper-cli",       &["core", "physics", "campaign", "driver-host", "planner", "recording", "observe", "identify", "diagnose", "history", "maps", "log-formats", "report", "session", "live", "backends", "effects", "formats", "fleet", "validation"]),
     ("mapper-python",    &["core", "physics", "campaign", "recording", "maps", "log-formats", "session", "driver-host", "backends", "effects", "formats"]),
-    // Drivers are programs of their own: what they share, and whatever each needs for its rig.
+    // Drivers are separate programs: their common parts, and the libraries of each rig.
     ("mapper-driver",    &["core", "driver-host"]),
     ("mapper-backend-lab", &["core", "campaign", "session", "backends", "effects", "driver"]),
-    // What drivers behind a controller share.
+    // Common part of drivers for controllers.
     ("mapper-controller", &["core", "yaml"]),
     ("mapper-backend-ak", &["core", "yaml", "driver"]),
     ("mapper-backend-modbus", &["core", "yaml", "driver", "controller"]),
     ("mapper-backend-opcua", &["core", "yaml", "driver", "controller"]),
-    // A stand to rehearse on: no driver, but what drivers talk to; the telegrams of AK are written down once.
+    // A simulated stand, with which drivers communicate; it shares the AK telegrams with the driver.
     ("mapper-lab-server", &["core", "campaign", "session", "backends", "effects", "backend-ak"]),
-    // Tests run the program and read its files; chores know nothing of it.
+    // Tests run the program and read its files; maintenance commands are independent of it.
     ("mapper-tests",     &["core", "recording"]),
     ("xtask",            &[]),
 ];
 
-/// Tests may use more than what they test, but what works from recordings alone is tested from recordings alone.
+/// Tests may use more packages than the tested one, but packages that only need recordings are tested with recordings only.
 const NEVER_IN_TESTS: &[(&str, &[&str])] = &[
     ("mapper-observe", &["mapper-backends", "mapper-effects", "mapper-cli"]),
     ("mapper-identify", &["mapper-backends", "mapper-effects", "mapper-cli"]),
@@ -82,7 +82,7 @@ const RESTRICTED: &[(&str, &[&str], &str)] = &[
     ),
 ];
 
-/// One edge: who uses whom, and whether in tests alone.
+/// One dependency, and whether only tests use it.
 #[derive(Clone, Copy)]
 struct Edge<'a> {
     from: &'a str,
@@ -90,7 +90,7 @@ struct Edge<'a> {
     in_tests_alone: bool,
 }
 
-/// What is wrong with an edge; `None` for a right one.
+/// The violated rule of a dependency; `None` if it is allowed.
 fn complaint(edge: Edge<'_>) -> Option<String> {
     let Edge { from, to, in_tests_alone } = edge;
     if let Some((_, users, why)) = RESTRICTED.iter().find(|(name, ..)| *name == to) {
@@ -143,7 +143,7 @@ fn dependencies_point_down_only() {
 }
 
 #[test]
-fn every_package_has_its_row() {
+fn every_package_is_in_the_table() {
     let packages = workspace_packages();
     assert!(packages.len() > 10, "only {} packages were found", packages.len());
     for package in &packages {
@@ -153,7 +153,7 @@ fn every_package_has_its_row() {
 }
 
 #[test]
-fn the_table_itself_has_no_circle() {
+fn the_table_has_no_circular_dependencies() {
     let allowed: BTreeMap<&str, &[&str]> = ALLOWED
         .iter()
         .map(|(name, others)| (name.strip_prefix("mapper-").unwrap_or(name), *others))
@@ -170,7 +170,7 @@ fn the_table_itself_has_no_circle() {
 }
 
 #[test]
-fn wrong_edges_are_seen_and_named() {
+fn forbidden_dependencies_are_reported() {
     let edge = |from, to, in_tests_alone| complaint(Edge { from, to, in_tests_alone });
     let upward = edge("mapper-core", "mapper-physics", false).unwrap();
     assert!(upward.contains("mapper-core -> mapper-physics") && upward.contains("point down"), "{upward}");

@@ -1,4 +1,4 @@
-//! Pages of the documentation: links, commands, campaigns and codes in them, and their length.
+//! Checks the documentation: links, commands, campaigns, warning codes, and length.
 
 use mapper_tests::{mapper_in, repository, scratch};
 use std::collections::BTreeSet;
@@ -125,7 +125,7 @@ fn every_page_is_in_the_table_of_contents() {
 
 /// Files that sources, messages and scripts name.
 #[test]
-fn every_page_that_a_source_names_exists() {
+fn every_page_referenced_in_the_sources_exists() {
     let root = repository();
     let mut named = BTreeSet::new();
     for folder in ["benches", "campaigns", "crates", "examples", "plugins", "python", "tests", "xtask"] {
@@ -160,7 +160,7 @@ fn words(text: &str) -> usize {
 }
 
 #[test]
-fn the_documentation_can_be_read_in_an_afternoon() {
+fn the_documentation_keeps_its_word_limit() {
     let docs = repository().join("docs");
     let mut total = 0;
     for page in pages() {
@@ -231,14 +231,14 @@ fn every_command_in_the_pages_and_its_options_exist() {
     assert!(count > 40, "{count} options were found");
 }
 
-/// The same campaign with a part of a page in place of its own keys of that name.
+/// The campaign with keys replaced by those of a page.
 fn with_part(campaign: &str, part: &str) -> String {
     let key = |line: &str| {
         let start = line.chars().next().is_some_and(char::is_alphabetic);
         start.then(|| line.split(':').next().unwrap().to_owned())
     };
     let replaced: Vec<String> = part.lines().filter_map(key).collect();
-    // Of sensors a page shows some; the others stay.
+    // A page shows only some sensors; the others are kept.
     let kept = |line: &&str| {
         !part.lines().any(|new| new.starts_with("  ") && new.split(':').next() == line.split(':').next())
     };
@@ -303,7 +303,7 @@ fn the_campaigns_in_the_pages_pass_their_check() {
     assert!(count >= 8, "{count} campaigns were found");
 }
 
-/// The table of the README is that of the validation.
+/// The README has the same table as the validation page.
 #[test]
 fn the_readme_has_the_measured_errors() {
     let root = repository();
@@ -328,7 +328,7 @@ fn the_readme_has_the_measured_errors() {
 
 /// Paths in the tables of the structure and of what to add where.
 #[test]
-fn every_file_that_the_architecture_names_exists() {
+fn every_file_in_architecture_md_exists() {
     let text = std::fs::read_to_string(repository().join("ARCHITECTURE.md")).unwrap();
     let quoted = text.split('`').skip(1).step_by(2);
     let paths: Vec<_> =

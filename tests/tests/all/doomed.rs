@@ -9,9 +9,9 @@ fn short(more: &[(&str, &str)]) -> CampaignFile {
     CampaignFile::shipped_with(&replacements)
 }
 
-/// A warning appears on standard error with its line and a caret; the campaign is none the worse for it.
+/// A warning appears on standard error with its line and a caret; the campaign can still be run.
 #[test]
-fn what_will_come_to_little_is_a_warning() {
+fn check_warns_of_a_campaign_with_few_good_points() {
     for (old, new, at, message) in [
         ("soak: 30 min", "soak: 5 min", "5 min", "after a soak of 5 min, housings that were 3 K warmer"),
         (
@@ -36,7 +36,7 @@ fn what_will_come_to_little_is_a_warning() {
     }
 }
 
-/// The same of a campaign whose steps a script makes; `shipped_campaign.rs` has the one that is planned.
+/// The same for a campaign with a script; `shipped_campaign.rs` has the planned one.
 #[test]
 fn check_and_plan_report_the_same_time() {
     let campaign = "campaigns/turbo_a_adiabatic.yaml";

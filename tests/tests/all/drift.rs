@@ -1,4 +1,4 @@
-//! Drift planted in the virtual lab, found by `mapper drift` in what was recorded.
+//! `mapper drift` finds drifts of the virtual lab in its recordings.
 
 use mapper_tests::{DriftCampaign, mapper};
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ fn is_found(report: &Value, verdict: &str, cause: &str, (course, size): (&str, f
 }
 
 #[test]
-fn planted_drifts_are_found_and_none_is_none() {
+fn planted_drifts_are_detected_without_false_alarms() {
     let judge = |drift_key: &str, seed: u32| {
         drift(&[&DriftCampaign { drift: drift_key, seed, ..DriftCampaign::default() }.recording()])
     };
@@ -45,11 +45,11 @@ fn planted_drifts_are_found_and_none_is_none() {
 }
 
 #[test]
-fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
+fn drift_compares_several_nights_and_refuses_another_machine() {
     let night = |seed, drift, replaced: &[(&str, &str)]| {
         DriftCampaign { drift, seed, replaced, ..DriftCampaign::default() }.recording()
     };
-    // A rig is one from night to night, its noise is not: offsets and tolerances are left out, the seed differs.
+    // The rig is the same every night, its noise is not: no offsets or tolerances are drawn, and the seed differs.
     let same_rig: &[(&str, &str)] =
         &[("    weather: wandering\n", "    weather: wandering\n    offsets: none\n")];
     let first = night(31, "", same_rig);
@@ -64,10 +64,10 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
         report["reason"]
     );
     assert_eq!(report["groups"][0]["visits"].as_array().unwrap().len(), 12);
-    // The first night alone has nothing.
+    // The first night has no drift.
     assert_eq!(drift(&[&first])["verdict"], "none");
 
-    // The seed is not part of the machine: it is the weather of the night.
+    // The seed is not part of the machine; it sets the noise of a night.
     let another_seed = night(32, "", same_rig);
     let two = drift(&[&first, &another_seed]);
     assert!(!two["reason"].as_str().unwrap().starts_with("No verdict"), "{}", two["reason"]);
@@ -89,7 +89,7 @@ fn nights_of_one_campaign_are_judged_together_and_another_machine_is_refused() {
     }
 }
 
-/// An ordinary drift is not an effect, and the diagnosis says that it was there.
+/// The diagnosis reports a drift as such, not as an effect.
 #[test]
 fn the_gap_diagnosis_looks_for_drift_first() {
     let campaign = DriftCampaign {

@@ -1,4 +1,4 @@
-//! Recordings that cannot show whether anything drifted: a clear reason and no verdict, whatever is wrong with them.
+//! Recordings that cannot show drift give a reason and no verdict.
 
 use mapper_core::{Channel, ChannelColumn, Recording, SampleBatch};
 use mapper_recording::{
@@ -8,7 +8,7 @@ use mapper_tests::{DriftCampaign, Finished, mapper, scratch};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Writes a recording as read, as one that knows neither campaign nor plan.
+/// Writes a recording without campaign and plan.
 fn write(recording: &Recording, path: &Path) {
     let header = RecordingHeader {
         library: "another program".to_owned(),
@@ -65,7 +65,7 @@ struct Case<'a> {
 }
 
 #[test]
-fn what_cannot_be_judged_gets_a_clear_word_and_no_verdict() {
+fn recordings_without_comparable_repeats_get_a_reason_and_no_verdict() {
     let scratch = scratch();
     // The fault-free one of `drift.rs`.
     let campaign = DriftCampaign { seed: 21, ..DriftCampaign::default() };
@@ -94,7 +94,7 @@ fn what_cannot_be_judged_gets_a_clear_word_and_no_verdict() {
             change: &|recording| keep(recording, |t_s| !(1000.0..1040.0).contains(&t_s)),
             word: "gap",
         },
-        // Up to the second visit nothing is made twice.
+        // Before the second visit, no jump is repeated.
         Case { name: "none", change: &until(repeats[1] - 1), word: "no repeats" },
         Case { name: "one", change: &until(repeats[1] + 1), word: "one repeat" },
         Case {
@@ -135,7 +135,7 @@ fn what_cannot_be_judged_gets_a_clear_word_and_no_verdict() {
         let reason = reason(&path, &file.path);
         assert!(reason.contains(case.word), "{}: {reason}", case.name);
     }
-    // As it was, it can be judged, whoever wrote it.
+    // The unchanged recording has a verdict.
     let path = scratch.path().join("whole.mcap");
     write(&whole, &path);
     let report = ask(&path, &file.path).exits(0).json();

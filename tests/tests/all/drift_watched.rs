@@ -21,7 +21,7 @@ fn run(campaign: &CampaignFile, out: &Path, more: &[&str]) -> Finished {
 }
 
 #[test]
-fn a_run_whose_repeats_differ_does_as_the_campaign_says() {
+fn a_run_with_drift_follows_the_setting_of_the_campaign() {
     let scratch = scratch();
     let steps = |on_drift: &str, drift: &str, code: i32| {
         let campaign = campaign(&format!("drift: {{on_drift: {on_drift}}}\n"), drift);
@@ -30,19 +30,19 @@ fn a_run_whose_repeats_differ_does_as_the_campaign_says() {
         (result["points"].as_array().unwrap().len(), result["failure"]["message"].clone())
     };
     let (quiet, _) = steps("hold", "", 0);
-    // The step is finished, the jump made again, two steps more.
+    // The step is finished and the jump is repeated, which takes two more steps.
     let (went_on, _) = steps("continue", STEP, 0);
     assert_eq!(went_on, quiet + 2);
     let (held, why) = steps("hold", STEP, 5);
     assert!(held < quiet, "{held} steps of {quiet}");
-    // Both end at the same step, and give another advice.
+    // Both end at the same step, with different advice.
     let (zero, advice) = steps("zero", STEP, 5);
     assert_eq!(zero, held);
     assert!(why.is_string() && advice.is_string() && why != advice, "{why} {advice}");
 }
 
 #[test]
-fn the_soak_stands_in_plan_and_dry_run() {
+fn plan_and_dry_run_show_the_soak() {
     let scratch = scratch();
     let minutes = |text: &str| {
         let line = text.lines().find(|line| line.starts_with("rig time")).unwrap_or_else(|| panic!("{text}"));

@@ -1,4 +1,4 @@
-//! Rigs behind drivers: programs of their own that speak docs/reference/protocol.md.
+//! Rigs with drivers: separate programs with the protocol of docs/reference/protocol.md.
 #![cfg(unix)]
 
 use crate::interrupted::Running;
@@ -59,7 +59,7 @@ fn check(name: &str, campaign: &CampaignFile) {
     assert_eq!(finished.exits(0).stdout.lines().count(), 13);
 }
 
-/// One word of the campaign is another; the lab is the same, and so is every point to the last digit.
+/// The campaign differs only in its backend: the points are identical to the last digit.
 #[test]
 fn the_lab_behind_its_driver_gives_the_points_of_the_lab() {
     let built_in = short("  virtual_lab: {}");
@@ -69,9 +69,9 @@ fn the_lab_behind_its_driver_gives_the_points_of_the_lab() {
     assert_eq!(found["points"], expected["points"]);
 }
 
-/// Nothing in the campaign says where a driver is: one that listens below the state of its user comes before the program.
+/// The campaign does not contain the location of the driver: a socket in the user's state directory takes precedence over a program.
 #[test]
-fn a_driver_at_a_socket_is_found_by_its_place_and_gives_the_points_of_the_lab() {
+fn a_driver_at_a_socket_is_found_and_gives_the_points_of_the_lab() {
     build_drivers();
     let states = mapper_tests::scratch();
     let socket = states.path().join("drivers/lab.socket");
@@ -151,16 +151,16 @@ fn a_model_keeps_every_rule_and_gives_the_points_of_its_rig() {
     }
 }
 
-/// The helper in Python, held by a clock of its own: lease, way down, tries again, limits, bytes that are nothing, a pipe that is full.
+/// The Python helper with a simulated clock: lease, run-down, retries, limits, invalid bytes, a full pipe.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
-fn the_helper_in_python_keeps_what_the_protocol_promises() {
+fn the_python_helper_follows_the_protocol() {
     let held = mapper_tests::python("driver_rules.py", [""; 0]);
     assert_eq!(held["held"].as_array().unwrap().len(), 14, "{held}");
 }
 
 #[test]
-fn drivers_are_listed_with_where_they_are_or_the_line_that_builds_them() {
+fn drivers_are_listed_with_their_location_or_build_command() {
     let list = done(with_drivers(&["backend", "list", "--json"].map(AsRef::as_ref))).exits(0).json();
     let of = |name: &str| {
         let all = list["backends"].as_array().unwrap();
@@ -181,7 +181,7 @@ fn drivers_are_listed_with_where_they_are_or_the_line_that_builds_them() {
 }
 
 #[test]
-fn a_driver_that_is_not_there_and_a_secret_in_a_campaign_are_mistakes_at_their_places() {
+fn a_missing_driver_and_a_secret_are_reported_at_their_lines() {
     for (backend, words, never) in [
         ("  no_such_rig: {x: 1}", "mapper-backend-no_such_rig", "\u{0}"),
         ("  lab: {campaign: x.yaml, password: hunter2}", "{env: NAME}", "hunter2"),
@@ -211,11 +211,11 @@ fn commands(file: &Path, reached: impl Fn(&str) -> bool) -> (String, Duration) {
 }
 
 /// A run on the lab in real time, with its gas on.
-fn flying() -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
-    flying_at("10 Hz")
+fn running_lab() -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
+    running_lab_at("10 Hz")
 }
 
-fn flying_at(rate: &str) -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
+fn running_lab_at(rate: &str) -> (Running, CampaignFile, CampaignFile, std::path::PathBuf) {
     build_drivers();
     let built_in = short(&format!("  virtual_lab: {{sample_rate: {rate}}}"));
     let file = built_in.directory().join("commands.txt");
@@ -225,8 +225,8 @@ fn flying_at(rate: &str) -> (Running, CampaignFile, CampaignFile, std::path::Pat
     (running, campaign, built_in, file)
 }
 
-/// The way: the heater off with the first word, P3 down, then the air.
-fn flew_its_way(text: &str) {
+/// The run-down: heater off with the first command, P3 lowered, then the air cut.
+fn assert_run_down(text: &str) {
     let way: Vec<&str> = text.lines().skip_while(|line| !line.contains("T3 293 K")).collect();
     let steps = way.iter().take_while(|line| line.contains("T3 293 K")).count();
     assert!(steps > 2, "P3 goes down at its slew: {text}");
@@ -236,29 +236,29 @@ fn flew_its_way(text: &str) {
 /// No host is left to command the rig. The driver does, at once: 2.5 s is what docs/reference/safety.md promises.
 #[test]
 fn a_runner_that_is_killed_leaves_a_driver_that_makes_the_rig_safe() {
-    let (running, _campaign, _built_in, file) = flying();
+    let (running, _campaign, _built_in, file) = running_lab();
     running.kill();
     let (_, began) = commands(&file, |text| text.contains("T3 293 K"));
     assert!(began < Duration::from_millis(2500), "{began:?}");
     let (text, _) = commands(&file, |text| text.contains("disarm"));
-    flew_its_way(&text);
+    assert_run_down(&text);
 }
 
-/// A runner that hangs holds its pipes open: the lease ends.
+/// A runner that hangs keeps its pipes open, so only the lease can end the run.
 #[test]
-fn a_runner_that_stands_still_loses_its_lease() {
-    let (running, _campaign, _built_in, file) = flying();
+fn a_suspended_runner_loses_its_lease() {
+    let (running, _campaign, _built_in, file) = running_lab();
     running.signal("STOP");
     let (text, _) = commands(&file, |text| text.contains("make safe"));
-    flew_its_way(&text);
+    assert_run_down(&text);
     running.kill();
     commands(&file, |text| text.contains("disarm"));
 }
 
-/// It goes on when more has been dropped than pipe and queue hold: the run is over, the rig safe, and the recording says why.
+/// The runner resumes after samples were dropped: the run has ended, the rig is safe, and the recording has the reason.
 #[test]
-fn a_runner_that_stood_still_records_what_it_missed() {
-    let (running, campaign, _built_in, file) = flying_at("500 Hz");
+fn a_resumed_runner_records_the_samples_that_it_missed() {
+    let (running, campaign, _built_in, file) = running_lab_at("500 Hz");
     running.signal("STOP");
     commands(&file, |text| text.contains("make safe"));
     running.signal("CONT");
@@ -330,7 +330,7 @@ impl Drop for Server {
 /// A controller that cannot be reached: reported as that, twice alike. Nothing moved, so no latch waits for an operator, and no empty
 /// run is left.
 #[test]
-fn a_rig_that_is_never_reached_leaves_neither_latch_nor_run() {
+fn an_unreachable_rig_leaves_neither_a_lock_nor_a_run() {
     mapper_tests::build_driver("mapper-backend-modbus");
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let campaign = of_the_guide("modbus", &[(":5020 ", &format!(":{port} "))]);
@@ -368,7 +368,7 @@ fn a_rig_behind_modbus_keeps_every_rule() {
     server.end();
 }
 
-/// The same over OPC UA, signed and encrypted, as a user who trusts a server; the password is in nothing that is written.
+/// The same over OPC UA, signed and encrypted, with a pinned certificate; the password appears in no file.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_rig_behind_opcua_keeps_every_rule() {

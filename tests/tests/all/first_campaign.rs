@@ -9,7 +9,7 @@ fn init(directory: &Path, further: &[&str]) -> Finished {
 
 /// The first campaign of a machine runs on the virtual lab, and at least 80 % of its points are good.
 #[test]
-fn a_wheel_is_enough_for_a_map() {
+fn a_wheel_diameter_is_sufficient_for_a_first_map() {
     for wheel in ["35mm", "60mm", "90mm"] {
         let scratch = scratch();
         init(scratch.path(), &["--wheel", wheel]).exits(0);
@@ -25,7 +25,7 @@ fn a_wheel_is_enough_for_a_map() {
 /// Verdicts come out as `check` forecasts them, before and after its advice to soak. Shares of good points may differ by 15 %: some of the
 /// standard errors are near their limit, and steps that repeat a point count among the measured ones.
 #[test]
-fn the_forecast_of_verdicts_comes_true() {
+fn the_forecast_verdicts_match_a_run() {
     let scratch = scratch();
     init(scratch.path(), &["--wheel", "60mm"]).exits(0);
     let path = scratch.path().join("own.yaml");
@@ -73,7 +73,7 @@ fn every_template_passes_its_check_and_nothing_is_overwritten() {
 
 /// A map in lb/min that claims kg/s, and a limit in the wrong unit, are one mistake each.
 #[test]
-fn a_wrong_unit_is_one_mistake() {
+fn a_wrong_unit_is_reported_once() {
     let scratch = scratch();
     init(scratch.path(), &["--wheel", "60mm"]).exits(0);
     let (campaign, map) = (scratch.path().join("own.yaml"), scratch.path().join("own_map.csv"));
@@ -115,7 +115,7 @@ fn a_suppliers_map_is_converted() {
     }
 }
 
-/// A file of another command is one mistake, too.
+/// A file for another command is also reported once.
 #[test]
 fn a_nightly_file_is_named_as_such() {
     let file = mapper_tests::repository().join("campaigns/nightly.yaml");

@@ -1,4 +1,4 @@
-//! Fleets from outside: the same result as one machine's, and words for what is wrong.
+//! Fleets give the result of a single machine, and report errors.
 
 use mapper_tests::{mapper, mapper_command, repository, scratch};
 use serde_json::Value;
@@ -81,7 +81,7 @@ echo "merge shell-2"
 
 #[test]
 #[cfg(unix)]
-fn a_template_hands_a_study_to_another_queue() {
+fn a_template_submits_a_study_to_another_queue() {
     let scratch = scratch();
     let folder = scratch.path().canonicalize().unwrap();
     let study = write_study(&folder, 3);
@@ -109,7 +109,7 @@ fn a_template_hands_a_study_to_another_queue() {
 
 /// A calibration of a few cases of four points: in pieces it is that of one machine, and it says whether its probabilities hold.
 #[test]
-fn a_calibration_in_pieces_is_one_machines_and_judges_its_probabilities() {
+fn a_sharded_calibration_equals_a_single_one_and_scores_its_probabilities() {
     let scratch = scratch();
     let folder = scratch.path();
     let shipped = std::fs::read_to_string(repository().join("campaigns/gap_rig.yaml")).unwrap();
@@ -150,7 +150,7 @@ fn a_calibration_in_pieces_is_one_machines_and_judges_its_probabilities() {
 }
 
 #[test]
-fn an_item_that_fails_says_why_and_is_done_again() {
+fn a_failed_item_is_reported_and_retried() {
     let scratch = scratch();
     let study = write_study(scratch.path(), 1);
     let directory = scratch.path().join("fleet");

@@ -39,7 +39,7 @@ fn workers(directory: &Path) -> Vec<String> {
 
 #[test]
 #[cfg_attr(not(with_slurm), ignore = "runs Slurm as root: run `cargo xtask test` as root")]
-fn killed_and_failed_items_are_named_and_a_retry_finishes() {
+fn killed_and_failed_items_are_reported_and_retried() {
     let scratch = scratch();
     let folder = scratch.path().canonicalize().unwrap();
     let study = write_study(&folder, 12);

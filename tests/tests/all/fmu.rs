@@ -1,4 +1,4 @@
-//! The machine as an FMU, in the hands of FMPy.
+//! The machine as an FMU, run by FMPy.
 
 use mapper_tests::{CampaignFile, SHIPPED, SHORT_GRID, made_once, mapper, python, repository, scratch};
 use serde_json::Value;
@@ -46,7 +46,7 @@ fn fmpy_replays_the_reference_transients() {
 /// those of the points, and h is the law's.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn an_identified_machine_gives_its_points_back() {
+fn an_identified_machine_reproduces_its_points() {
     let scratch = scratch();
     let run = made_once(&CampaignFile::shipped_with(&[])).run;
     let file = scratch.path().join("identified.fmu");
@@ -93,16 +93,16 @@ fn an_identified_machine_gives_its_points_back() {
 }
 
 #[test]
-fn what_is_no_machine_is_refused_in_words() {
+fn invalid_machines_are_refused_with_a_reason() {
     let scratch = scratch();
     let out = scratch.path().join("x.fmu");
-    // Four points are not a map of a machine.
+    // Four points are too few for a map.
     let run = made_once(&CampaignFile::shipped_with(SHORT_GRID)).run;
     let refused = fmu(&run, &out, &[]).exits(3);
     assert!(refused.stderr.contains("an FMU needs a map of the whole machine"), "{}", refused.stderr);
     assert!(!out.exists());
     let nominal = repository().join(SHIPPED);
-    // A compiler that is not there.
+    // A missing compiler.
     let mut command = mapper_tests::mapper_command(["map", "fmu", SHIPPED, "--compile", "--out"]);
     command.arg(&out).current_dir(repository()).env("CC", "no-such-compiler");
     let refused = mapper_tests::Finished::from(command.output().unwrap()).exits(3);

@@ -17,7 +17,7 @@ exit $code
 
 #[test]
 #[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
-fn a_full_disk_is_reported_and_what_was_flushed_can_be_read() {
+fn a_full_disk_is_reported_and_the_flushed_data_are_readable() {
     // Without the rest at the start, which alone would fill the disk.
     let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
     let campaign = CampaignFile::shipped_with(&replacements);
@@ -49,7 +49,7 @@ fn a_full_disk_is_reported_and_what_was_flushed_can_be_read() {
 /// A disk that is full only when the page is written: the table is shown, the run is whole, and the command in the message finishes it.
 #[test]
 #[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
-fn a_disk_that_is_full_at_the_page_costs_the_page_alone() {
+fn a_disk_that_fills_up_at_the_page_loses_only_the_page() {
     let replacements: Vec<_> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
     let campaign = CampaignFile::shipped_with(&replacements);
     let runs = campaign.runs();
@@ -82,7 +82,7 @@ fn a_disk_that_is_full_at_the_page_costs_the_page_alone() {
     assert!(!run.join("report.html").exists(), "half a page under its name");
     mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(0);
     assert!(run.join("report.html").exists());
-    // Once more there is nothing to do.
+    // A second merge has nothing to do.
     mapper(["run".as_ref(), "--resume".as_ref(), run.as_os_str()]).exits(4);
 }
 
@@ -99,7 +99,7 @@ exit $code
 /// one machine.
 #[test]
 #[cfg_attr(not(with_tmpfs), ignore = "mounts a small tmpfs: run `cargo xtask test` as root")]
-fn a_full_disk_costs_a_fleet_one_task() {
+fn a_full_disk_fails_one_task_of_a_fleet() {
     let scratch = scratch();
     let folder = scratch.path();
     let study = write_study(folder, 3);

@@ -1,4 +1,4 @@
-//! What a new user asks first.
+//! Help, exit codes and schema.
 
 use mapper_tests::{SHIPPED, mapper};
 
@@ -14,7 +14,7 @@ fn commands(help: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_command_explains_itself() {
+fn every_command_has_help() {
     let top = mapper(["--help"]).exits(0);
     let commands = commands(&top.stdout);
     for expected in
@@ -36,7 +36,7 @@ fn the_exit_codes_are_listed() {
     let listed: Vec<i32> =
         codes.lines().filter_map(|line| line.split_whitespace().next()?.parse().ok()).collect();
     assert_eq!(listed, [0, 1, 2, 3, 4, 5, 6, 7, 8, 130]);
-    // Wrong arguments are the one code that needs nothing else.
+    // Wrong arguments need no campaign.
     mapper(["plan", "--no-such-option", SHIPPED]).exits(2);
 }
 

@@ -19,11 +19,11 @@ const LONG: &[(&str, &str)] = &[
 ];
 /// About fifty minutes of the rig's time, two steps of ten minutes.
 const SOME_STEPS_BYTES: u64 = 13_500_000;
-/// Without any news of the recording for so long the test gives up: a run writes each second of its own clock, thousands of
+/// The test fails if the recording does not grow for this time: a run writes each second of its own clock, thousands of
 /// which take a second.
 const LONGEST_SILENCE: Duration = Duration::from_secs(120);
 
-/// A run that is killed where the test ends before it does.
+/// A run that is killed when the test ends first.
 pub(crate) struct Running {
     child: Option<Child>,
     runs: PathBuf,
@@ -129,7 +129,7 @@ fn killed_run() -> (CampaignFile, PathBuf) {
 }
 
 #[test]
-fn what_a_killed_run_has_recorded_can_be_read_and_identified() {
+fn the_recording_of_a_killed_run_is_readable_and_identified() {
     let (_campaign, recording) = killed_run();
     let report = read(&recording);
     let finished_steps = report.recording.steps.len();
@@ -144,7 +144,7 @@ fn what_a_killed_run_has_recorded_can_be_read_and_identified() {
     assert_eq!(points.len(), finished_steps);
     assert!(points[1]["eta"].is_f64(), "{}", points[1]);
     assert!(!result["recording_warnings"].as_array().unwrap().is_empty(), "the cut is not mentioned");
-    // By others too.
+    // Independent readers can read it too.
     if cfg!(with_python) {
         let seen = python("read_recording.py", [&recording]);
         assert_eq!(seen["complete"], false);
@@ -154,7 +154,7 @@ fn what_a_killed_run_has_recorded_can_be_read_and_identified() {
 }
 
 #[test]
-fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
+fn an_interrupt_makes_the_rig_safe_and_keeps_the_finished_steps() {
     let campaign = CampaignFile::shipped_with(LONG);
     let mut running = Running::start(&campaign);
     let recording = running.recorded(SOME_STEPS_BYTES);
@@ -179,7 +179,7 @@ fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
         .recording
         .events
         .iter()
-        .position(|event| event.message.starts_with("asked to stop: the run ends with this step, in "));
+        .position(|event| event.kind == EventKind::Note && event.message.contains("Ctrl-C"));
     assert!(asked.is_some() && asked < place("interrupted"), "{:#?}", report.recording.events);
     let (interrupted, safe) = (place("interrupted"), place("safe_state"));
     assert!(interrupted.is_some() && safe.is_some(), "{events:?}");
@@ -188,7 +188,7 @@ fn one_interrupt_makes_the_rig_safe_and_keeps_what_is_done() {
 
 /// A T2 sensor that reads 400 K too much is above its limit from the first samples on, while the machine rests.
 #[test]
-fn a_guard_that_trips_before_the_first_step_says_so() {
+fn a_guard_trip_before_the_first_step_is_recorded() {
     let campaign =
         CampaignFile::shipped_with(&[("  virtual_lab: {}", "  virtual_lab: {offset_of: {T2: 400 K}}")]);
     let arguments = ["run".as_ref(), campaign.path.as_os_str(), "--json".as_ref()];

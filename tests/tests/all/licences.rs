@@ -81,7 +81,7 @@ fn every_dependency_has_a_licence_that_is_allowed() {
 }
 
 #[test]
-fn expressions_are_read_as_spdx_has_them() {
+fn licence_expressions_follow_spdx() {
     let allowed: BTreeSet<String> =
         ["MIT", "Zlib", "Apache-2.0 WITH LLVM-exception"].map(str::to_owned).into();
     for (expression, may) in [
@@ -121,9 +121,9 @@ fn tree(metadata: &Metadata, root: &str) -> BTreeSet<PackageId> {
     seen
 }
 
-/// What a driver needs for its protocol stays in the driver.
+/// The libraries of a driver's protocol are not in the program.
 #[test]
-fn drivers_bring_nothing_into_the_program() {
+fn drivers_add_no_dependencies_to_the_program() {
     let metadata = metadata(false);
     let program = tree(&metadata, "mapper-cli");
     assert!(program.len() > 100, "{}", program.len());

@@ -1,4 +1,4 @@
-//! Logs of other programs, written by those programs' own libraries: looked into, mapped, identified.
+//! Logs of other programs, written with their own libraries, are inspected, mapped and identified.
 
 use mapper_tests::{CampaignFile, Finished, made_once, mapper, python, repository, scratch};
 use serde_json::Value;
@@ -69,7 +69,7 @@ fn proposed(log: &Path, name: &str) -> PathBuf {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn every_format_leads_to_the_same_points_to_the_last_digit() {
+fn every_log_format_gives_identical_points() {
     let run = Run::new();
     // The same groups as in the MDF file, hence the same channel map.
     let (mdf, _) = run.log("mdf4", "log.mf4");
@@ -119,7 +119,7 @@ fn every_format_leads_to_the_same_points_to_the_last_digit() {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_log_in_the_manner_of_a_test_stand_becomes_points_with_two_commands() {
+fn a_test_stand_log_becomes_points_with_two_commands() {
     let run = Run::new();
     let (log, written) = run.log("stand", "stand.txt");
     let channels = proposed(&log, "channels.yaml");
@@ -154,7 +154,7 @@ fn a_log_in_the_manner_of_a_test_stand_becomes_points_with_two_commands() {
     }
     assert!(found.iter().filter(|point| point["eta"].is_number()).count() >= 3);
 
-    // And leaves a map that is read again, although the valve was not recorded.
+    // The map is readable, although the valve was not recorded.
     let out = run.file("map");
     let given = ["identify".as_ref(), log.as_os_str(), "--channels".as_ref(), channels.as_os_str()];
     let campaign = ["--campaign".as_ref(), run.campaign.path.as_os_str(), "--out".as_ref(), out.as_os_str()];
@@ -195,7 +195,7 @@ fn small_log() -> String {
 }
 
 #[test]
-fn the_proposed_channel_map_loads_as_it_stands_and_replaces_no_file() {
+fn the_proposed_channel_map_loads_unchanged_and_replaces_no_file() {
     let (_directory, log) = written(&small_log(), "log.csv");
     let channels = proposed(&log, "channels.yaml");
     let text = std::fs::read_to_string(&channels).unwrap();
@@ -219,7 +219,7 @@ fn the_proposed_channel_map_loads_as_it_stands_and_replaces_no_file() {
 }
 
 #[test]
-fn all_mistakes_of_a_channel_map_for_a_log_come_at_once_with_their_places() {
+fn all_mistakes_of_a_channel_map_are_reported_with_their_positions() {
     let (_directory, log) = written(&small_log(), "log.csv");
     let channels = log.with_file_name("channels.yaml");
     let identify = |text: &str| {
@@ -254,7 +254,7 @@ fn all_mistakes_of_a_channel_map_for_a_log_come_at_once_with_their_places() {
     {
         assert!(units.contains(expected), "`{expected}` in\n{units}");
     }
-    // What the header contradicts needs no reading.
+    // A header that contradicts the map is refused before the data are read.
     let header = identify("channels:\n  N: {field: n_TC}\n  P1: {field: p1, unit: mbar}\n");
     assert!(header.contains("write `gauge: true`") && header.contains(":3:"), "{header}");
 }

@@ -30,7 +30,7 @@ fn a_map_without_reference_is_refused_and_nothing_is_written() {
 }
 
 #[test]
-fn a_chain_of_formats_and_reference_states_comes_back_to_the_same_numbers() {
+fn a_chain_of_conversions_returns_the_original_numbers() {
     let scratch = scratch();
     let file = |name: &str| scratch.path().join(name);
     convert(&sample(), &file("a.json"), "SAE");
@@ -66,7 +66,7 @@ fn points(line: &Value) -> Vec<Value> {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn tables_for_simulation_programs_are_read_by_others_as_they_were_meant() {
+fn independent_readers_read_the_tables_for_simulation_programs() {
     let scratch = scratch();
     let file = |name: &str| scratch.path().join(name);
     convert(&sample(), &file("map.json"), "SAE");
@@ -106,7 +106,7 @@ fn tables_for_simulation_programs_are_read_by_others_as_they_were_meant() {
 }
 
 #[test]
-fn a_map_differs_from_itself_nowhere() {
+fn a_map_equals_itself() {
     let scratch = scratch();
     let picture = scratch.path().join("difference.svg");
     let (map, option) = (sample(), OsStr::new("--reference"));
@@ -165,7 +165,7 @@ fn a_run_gives_the_turbine_that_the_rig_has_and_its_pictures() {
 
 /// A hot map as a user has it: corrected as one with words about it, into a file that says so, and refused where it holds no heat.
 #[test]
-fn a_hot_map_is_corrected_in_words_and_in_a_file() {
+fn a_hot_map_is_corrected_in_the_report_and_in_a_file() {
     let scratch = scratch();
     let out = scratch.path().join("corrected.json");
     let correct = |map: &Path, further: &[&str]| {
@@ -217,7 +217,7 @@ fn a_table_with_a_row_of_units_and_decimal_commas_is_the_same_map() {
     for (a, b) in first.iter().zip(&second) {
         for key in ["flow_corrected_kg_s", "pressure_ratio", "eta"] {
             let (a, b) = (a[key].as_f64().unwrap(), b[key].as_f64().unwrap());
-            // Through another unit and back: some roundings.
+            // Conversion to another unit and back, with rounding errors.
             assert!((a / b - 1.0).abs() < 1e-12, "{key} {a} {b}");
         }
     }

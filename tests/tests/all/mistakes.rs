@@ -1,8 +1,8 @@
-//! A mistyped campaign: everything that is wrong with it, in one go, and nothing done.
+//! A mistyped campaign: all mistakes are reported at once, and nothing is run.
 
 use mapper_tests::{CampaignFile, mapper};
 
-/// Mistakes as they are typed, and what has to be pointed at.
+/// Mistakes, and the text that the caret has to mark.
 const MISTAKES: &[(&str, &str, &str)] = &[
     ("T_oil: {noise: 0.2 K, offset: 0.5 K}", "T_oil: {noise: 0.2, offset: 0.5 K}", "0.2"),
     ("1.4, 2.0, 2.5]", "1.4, 2.0, 9.5]", "9.5"),
@@ -18,7 +18,7 @@ fn mistyped() -> CampaignFile {
 
 /// Every mistake is in `message` with its line number, the line, and a caret under what is wrong.
 #[track_caller]
-fn all_are_shown(campaign: &CampaignFile, message: &str) {
+fn assert_all_mistakes_are_shown(campaign: &CampaignFile, message: &str) {
     let lines: Vec<&str> = message.lines().collect();
     for (_, wrong, at) in MISTAKES {
         let number = campaign.line_of(wrong);
@@ -48,7 +48,7 @@ fn a_mistyped_campaign_is_not_run_and_all_its_mistakes_are_shown() {
         out.as_os_str(),
     ]);
     let finished = finished.exits(3);
-    all_are_shown(&campaign, &finished.stderr);
+    assert_all_mistakes_are_shown(&campaign, &finished.stderr);
     let report = finished.json();
     assert_eq!(
         (report["code"].as_u64(), report["findings"].as_array().map(Vec::len)),
@@ -62,13 +62,13 @@ fn check_and_plan_show_the_same_mistakes() {
     let campaign = mistyped();
     for command in ["check", "plan"] {
         let finished = mapper([command.as_ref(), campaign.path.as_os_str()]).exits(3);
-        all_are_shown(&campaign, &finished.stderr);
+        assert_all_mistakes_are_shown(&campaign, &finished.stderr);
         assert_eq!(finished.stdout, "", "{command}");
     }
 }
 
 #[test]
-fn a_file_that_is_not_there_is_named() {
+fn a_missing_file_is_reported_with_its_name() {
     for command in ["check", "plan", "run"] {
         let finished = mapper([command, "no/such/campaign.yaml"]).exits(1);
         assert!(finished.stderr.contains("no/such/campaign.yaml"), "{}", finished.stderr);
@@ -78,7 +78,7 @@ fn a_file_that_is_not_there_is_named() {
 }
 
 #[test]
-fn a_file_that_is_no_recording_is_refused() {
+fn a_file_that_is_not_a_recording_is_refused() {
     let campaign = CampaignFile::shipped_with(&[]);
     let finished = mapper(["identify".as_ref(), campaign.path.as_os_str()]).exits(6);
     assert!(finished.stderr.contains("neither an MCAP recording nor a log"), "{}", finished.stderr);

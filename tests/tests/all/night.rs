@@ -1,4 +1,4 @@
-//! A rig that is left alone: it trips by itself, its runner is killed, two want it, a user hands it a plan of his own.
+//! Unattended rigs: a rig trip, a killed runner, two runners for one rig, a plan from an unknown author.
 #![cfg(unix)]
 
 use crate::interrupted::Running;
@@ -42,7 +42,7 @@ fn kinds(recording: &Path) -> Vec<EventKind> {
 /// The lab cuts its own air at 120 krpm on the way to 125 krpm: the run ends there instead of recording a standing shaft, and a
 /// rig that can be had but once stays latched until an operator confirms that it was inspected.
 #[test]
-fn a_rig_that_trips_by_itself_ends_the_run_and_is_latched() {
+fn a_rig_trip_ends_the_run_and_locks_the_rig() {
     let campaign = short(&[("  virtual_lab: {}", "  virtual_lab: {trip_speed: 120 krpm, rig: bench}")]);
     let finished = done(run_of(&campaign, &[])).exits(5);
     assert!(finished.stderr.contains("the rig has tripped by itself"), "{}", finished.stderr);
@@ -70,14 +70,14 @@ fn a_rig_that_trips_by_itself_ends_the_run_and_is_latched() {
     assert!(again.stderr.contains("the rig has tripped by itself"), "{}", again.stderr);
 }
 
-/// A rig says what it must have guarded; a campaign whose guard would only take notes is refused before anything is touched.
+/// A rig declares its required guards; a campaign in which such a guard only notes is refused before the rig is touched.
 #[test]
 fn a_rig_without_its_guards_is_refused() {
     let campaign = short(&[("seed: 1 ", "guards: {overspeed: {reaction: note}}\nseed: 1 ")]);
     let refused = done(run_of(&campaign, &[])).exits(5);
     assert!(refused.stderr.contains("`overspeed`"), "{}", refused.stderr);
     assert!(!campaign.runs().exists());
-    // Looser than the limit, it is a mistake at its place.
+    // A guard above the limit is a mistake with its position.
     let campaign = short(&[("seed: 1 ", "guards: {overspeed: {above: 200 krpm}}\nseed: 1 ")]);
     let wrong = done(run_of(&campaign, &[])).exits(3);
     assert!(wrong.stderr.contains("never looser") && wrong.stderr.contains('^'), "{}", wrong.stderr);
@@ -92,7 +92,7 @@ fn soaking(campaign: &CampaignFile) -> (Running, PathBuf) {
 }
 
 #[test]
-fn two_runners_on_one_rig_and_one_that_was_killed_with_it() {
+fn a_rig_accepts_one_runner_and_is_locked_after_a_kill() {
     let campaign = short(&[("  virtual_lab: {}", "  virtual_lab: {rig: bench}")]);
     let (first, recording) = soaking(&campaign);
     let second = done(run_of(&campaign, &[])).exits(5);
@@ -143,7 +143,7 @@ fn killed_at(campaign: &CampaignFile, bytes: u64) -> PathBuf {
 /// Killed at several places of its steps and resumed, a run has each point once, and each as the uninterrupted run has it:
 /// within four of its standard errors, since warm-up and lead-in draw other noise.
 #[test]
-fn a_killed_run_goes_on_and_has_each_point_once() {
+fn a_killed_run_is_resumed_with_each_point_once() {
     let campaign = || {
         let slow: Vec<_> = BY_ITSELF.iter().copied().chain([("dwell: 120 s ", "dwell: 300 s ")]).collect();
         short(&slow)
@@ -179,7 +179,7 @@ fn a_killed_run_goes_on_and_has_each_point_once() {
     }
 }
 
-/// Recordings that hold the same readings are one, whatever their files are called.
+/// Recordings with equal readings are duplicates, whatever their file names.
 #[test]
 fn a_recording_that_is_given_twice_is_refused() {
     let campaign = short(&[]);
@@ -204,7 +204,7 @@ fn another_campaign_is_not_resumed() {
     assert!(!with_states(&campaign, &arguments).output().unwrap().status.success());
 }
 
-/// A plan is a file from an unknown author: what no plan may ask for is refused at once, and nothing is touched.
+/// A plan is a file from an unknown author: forbidden contents are refused before the rig is touched.
 #[test]
 fn hostile_plans_are_refused() {
     let campaign = short(&[]);

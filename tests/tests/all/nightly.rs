@@ -1,4 +1,4 @@
-//! The nightly run from outside: quiet where nothing changed, an exit code of its own where something did.
+//! The nightly run: no message without a change, and an own exit code after one.
 
 use mapper_tests::{Finished, mapper, mapper_command, repository, scratch};
 use std::path::Path;
@@ -45,7 +45,7 @@ fn night(folder: &Path, more: &[&str]) -> Finished {
 }
 
 #[test]
-fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
+fn nights_report_a_change_of_the_model_and_nothing_before_it() {
     let scratch = scratch();
     let folder = scratch.path();
     write_nightly(folder, AS_SHIPPED);
@@ -99,7 +99,7 @@ fn nights_are_quiet_until_the_model_changes_and_then_say_what_moved() {
 
 /// 0.2 points of 70 %: truth moves as well, so that no error against it shows anything.
 #[test]
-fn a_fifth_of_a_point_of_efficiency_is_caught_the_next_night_and_named() {
+fn an_efficiency_change_of_0_2_points_is_reported_the_next_night() {
     let scratch = scratch();
     let folder = scratch.path();
     write_nightly(folder, AS_SHIPPED);
@@ -118,10 +118,10 @@ fn a_fifth_of_a_point_of_efficiency_is_caught_the_next_night_and_named() {
     assert!(moved.stdout.contains("at 6 of 6 points"), "{}", moved.stdout);
 }
 
-/// Killed at any moment: the history is as it was, or has the night as a whole.
+/// After a kill at any moment, the history has the complete night or none of it.
 #[cfg(unix)]
 #[test]
-fn a_night_that_is_killed_leaves_the_history_whole() {
+fn a_killed_night_leaves_the_history_intact() {
     let scratch = scratch();
     let folder = scratch.path();
     write_nightly(folder, AS_SHIPPED);
@@ -203,7 +203,7 @@ fn mistakes_are_reported_before_anything_runs() {
 }
 
 #[test]
-fn the_shipped_nightly_and_its_installation_name_files_that_are_there() {
+fn the_shipped_nightly_files_refer_to_existing_files() {
     let nightly = repository().join("campaigns/nightly.yaml");
     let text = std::fs::read_to_string(&nightly).unwrap();
     for campaign in text.lines().filter_map(|line| line.trim().strip_prefix("- campaign: ")) {
@@ -218,7 +218,7 @@ fn the_shipped_nightly_and_its_installation_name_files_that_are_there() {
     for named in ["examples/nightly/mapper-nightly.timer", "examples/nightly/mapper-nightly.service"] {
         assert!(service.contains(named) && repository().join(named).is_file(), "{named}");
     }
-    units_are_what_systemd_understands(&folder);
+    assert_systemd_accepts_the_units(&folder);
     // What workflow and service start exists.
     for text in [service, read("nightly.yml")] {
         assert!(text.contains("mapper nightly campaigns/nightly.yaml"), "{text}");
@@ -226,7 +226,7 @@ fn the_shipped_nightly_and_its_installation_name_files_that_are_there() {
 }
 
 /// If systemd is there to ask: the units as installed, but for the program, which need not be built for release.
-fn units_are_what_systemd_understands(folder: &Path) {
+fn assert_systemd_accepts_the_units(folder: &Path) {
     let scratch = scratch();
     for unit in ["mapper-nightly.service", "mapper-nightly.timer"] {
         let text = std::fs::read_to_string(folder.join(unit)).unwrap();

@@ -83,7 +83,7 @@ fn a_diagnosis_opens_in_a_browser_with_all_its_pictures() {
         assert!(dom.contains(&format!("<h2>{heading}")), "{heading}");
     }
     assert!(dom.contains("<ol><li>"), "a cause that is named leads to actions");
-    // It needs nothing but itself.
+    // The page loads no other file.
     assert!(!dom.contains("src=\"http") && !dom.contains("href=\"http"));
 }
 
@@ -110,7 +110,7 @@ fn run_of_nine_points() -> std::path::PathBuf {
     not(all(with_chromium, with_python)),
     ignore = "needs Chromium and Python: run `cargo xtask test`"
 )]
-fn the_page_of_a_run_is_read_as_people_do() {
+fn the_page_of_a_run_works_in_a_browser() {
     let run = run_of_nine_points();
     let page = run.join("report.html");
     let text = std::fs::read_to_string(&page).unwrap();
@@ -141,7 +141,7 @@ fn the_page_of_a_run_is_read_as_people_do() {
     };
     let pictures = pictures("report");
     let seen = python("browse_report.py", [chromium.as_ref(), page.as_os_str(), pictures.as_os_str()]);
-    // No request went out, the console is empty, and the page is accessible.
+    // The page makes no request, the console is empty, and the page is accessible.
     assert_eq!(seen["requests"], serde_json::json!([]));
     assert_eq!(seen["console"], serde_json::json!([]));
     assert_eq!(seen["serious"], serde_json::json!([]));
@@ -190,7 +190,7 @@ fn the_page_of_a_run_is_read_as_people_do() {
     not(all(with_chromium, with_python)),
     ignore = "needs Chromium and Python: run `cargo xtask test`"
 )]
-fn a_run_is_looked_at_and_stopped_through_its_live_page() {
+fn the_live_page_shows_and_stops_a_run() {
     let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
         panic!("needs Chromium: run `cargo xtask test`")
     };
@@ -238,7 +238,7 @@ fn a_run_is_looked_at_and_stopped_through_its_live_page() {
 }
 
 #[test]
-fn a_machine_without_a_browser_keeps_the_page_and_names_the_remedy() {
+fn without_a_browser_the_page_is_kept_and_a_remedy_is_printed() {
     let (run, folder) = (run_of_nine_points(), scratch());
     let out = folder.path().join("page.html");
     let mut report = mapper_command(["report", "--pdf", "-o"]);
@@ -267,7 +267,7 @@ fn a_page_is_printed_by_the_browser_on_the_path() {
 }
 
 #[test]
-fn another_run_is_drawn_beside_the_first_and_nothing_is_overwritten() {
+fn a_page_compares_two_runs_and_overwrites_nothing() {
     let run = run_of_nine_points();
     let folder = scratch();
     let out = folder.path().join("both.html");
@@ -288,7 +288,7 @@ fn another_run_is_drawn_beside_the_first_and_nothing_is_overwritten() {
     not(all(with_chromium, with_python)),
     ignore = "needs Chromium and Python: run `cargo xtask test`"
 )]
-fn a_run_is_looked_at_over_tls_from_another_address() {
+fn the_live_page_is_served_over_tls_to_another_address() {
     let Some(chromium) = option_env!("MAPPER_TEST_CHROMIUM") else {
         panic!("needs Chromium: run `cargo xtask test`")
     };
@@ -314,7 +314,7 @@ fn a_run_is_looked_at_over_tls_from_another_address() {
             "{what}: {message}"
         );
     }
-    // In clear there is one loud warning; over TLS there is none.
+    // Without TLS there is a warning, with TLS there is none.
     let clear = seen["printed_in_clear"].as_str().unwrap();
     assert_eq!(clear.matches("WITHOUT encryption").count(), 1, "{clear}");
     assert!(
@@ -338,7 +338,7 @@ fn a_run_is_looked_at_over_tls_from_another_address() {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
-fn a_viewer_sees_what_is_recorded_and_a_slow_one_slows_nothing() {
+fn an_observer_receives_the_recorded_values_and_never_delays_the_run() {
     // The stream is behind a feature that `cargo xtask test` builds with.
     if !mapper(["run", "--help"]).exits(0).stdout.contains("--foxglove") {
         return;

@@ -1,4 +1,4 @@
-//! Output whose reader goes away, and output that is not a terminal.
+//! Output into a pipe: its reader may close it, and it is not a terminal.
 
 use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, mapper_command};
 use std::io::{BufRead, BufReader};
@@ -10,7 +10,7 @@ fn campaign() -> CampaignFile {
 }
 
 #[test]
-fn a_reader_that_goes_away_is_no_error() {
+fn a_closed_pipe_is_not_an_error() {
     let campaign = campaign();
     let file = campaign.path.to_str().unwrap();
     let commands: [&[&str]; 4] = [&["plan", file], &["plan", file, "--json"], &["schema"], &["check", file]];

@@ -1,4 +1,4 @@
-//! What a plan says comes true on the virtual lab, whatever it was ordered by.
+//! The forecasts of a plan agree with runs on the virtual lab, for every order.
 
 use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper};
 use serde_json::Value;
@@ -72,9 +72,9 @@ fn every_order_passes_the_guards_and_moves_t2_as_forecast() {
     }
 }
 
-/// Each order is the best by its own figure, and each way to choose the dwell keeps what it is given.
+/// Each order is the best by its own figure, and each kind of dwell keeps its requirement.
 #[test]
-fn orders_and_dwells_do_what_they_are_for() {
+fn orders_and_dwells_improve_what_they_are_chosen_for() {
     let [total, least, lines] =
         ["thermal_gradient", "min_gradient", "speed_lines"].map(|order| plan(&campaign(order, &[])));
     let figure = |plan: &Value, name: &str| number(&plan["figures"][name]);
@@ -96,7 +96,7 @@ fn orders_and_dwells_do_what_they_are_for() {
 /// standard deviation of 32 is itself known to 12.7 %; three of that, in addition to 4 % by which the prediction may be off: over 300
 /// seeds the ratios were 0.95 and 0.95, which are known to 4 % themselves.
 #[test]
-fn predicted_errors_are_the_scatter_of_seeded_runs() {
+fn predicted_errors_match_the_scatter_of_seeded_runs() {
     let small: &[(&str, &str)] = &[("openings: [0.7, 1.4]", "openings: [1.0]")];
     let text = |seed: usize| {
         let mut campaign = campaign("listed", &[]).text;

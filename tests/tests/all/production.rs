@@ -1,4 +1,4 @@
-//! Many machines of one kind: run one by one in a night, and looked at together afterwards.
+//! A production series: machines are run one after the other and evaluated together.
 
 use mapper_tests::{mapper, mapper_in, python, repository, scratch};
 use serde_json::Value;
@@ -75,9 +75,9 @@ fn impossible_machines_are_reported_before_anything_runs() {
     assert!(both.contains("keep `machines` or `drawn_machines`"), "{both}");
 }
 
-/// A drawn machine is itself in every night, whatever the seed of the noise.
+/// A drawn machine is the same every night, whatever the seed of the noise.
 #[test]
-fn drawn_machines_stay_themselves() {
+fn a_drawn_machine_is_the_same_in_every_run() {
     let scratch = scratch();
     write(scratch.path(), "drawn_machines: 3");
     let night = mapper_in(scratch.path(), ["nightly", "nightly.yaml", "--json"]).exits(0).json();
@@ -96,7 +96,7 @@ fn drawn_machines_stay_themselves() {
     assert!((first - again).abs() < 0.2 * (first - other).abs(), "{first} {again} {other}");
 }
 
-/// Against statsmodels' restricted maximum likelihood on the same history, outliers left out.
+/// Compared with the restricted maximum likelihood of statsmodels on the same history without outliers.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_production_is_fitted_as_statsmodels_fits_it() {

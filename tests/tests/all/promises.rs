@@ -14,7 +14,7 @@ struct Promise {
     shown_by: (&'static [&'static str], &'static str),
 }
 
-/// Stands for a campaign whose rig is unknown.
+/// Placeholder for a campaign with an unknown backend.
 const ELSEWHERE: &str = "ELSEWHERE";
 
 const PROMISES: &[Promise] = &[
@@ -54,7 +54,7 @@ fn git<'a>(directory: &Path, arguments: impl IntoIterator<Item = &'a std::ffi::O
 }
 
 #[test]
-fn what_is_promised_is_one_file_and_one_line() {
+fn each_promised_extension_needs_one_file_and_one_line() {
     for Promise { patch, .. } in PROMISES {
         let changes = changes(&repository().join("tests/promises").join(patch));
         let (new, old): (Vec<_>, Vec<_>) =
@@ -160,7 +160,7 @@ fn target() -> PathBuf {
 }
 
 #[test]
-fn what_is_promised_is_built_and_seen() {
+fn the_promised_extensions_compile_and_are_listed() {
     let tree = patched_tree();
     let programs = target().join("promises/programs");
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));

@@ -1,4 +1,4 @@
-//! Channels from several sources: the lab is driven, and something else is read in addition.
+//! Channels from several sources: the lab is controlled, and auxiliary instruments are read.
 #![cfg(unix)]
 
 use mapper_core::{Channel, EventKind, Quality};
@@ -32,7 +32,7 @@ fn read(run: &Path) -> ReadReport {
 
 /// T2 comes from a recording that is played along with the lab: its samples to the bit, in the lab's own steps, and all of it is identified.
 #[test]
-fn a_channel_that_is_read_elsewhere_stands_in_the_recording_and_in_the_points() {
+fn a_channel_of_an_instrument_is_in_the_recording_and_the_points() {
     let first = with_readers("  none: {backend: {replay: {}}}\n", &[]);
     // Without the reader, on another seed.
     let plain = CampaignFile::shipped_with(
@@ -63,9 +63,9 @@ fn a_channel_that_is_read_elsewhere_stands_in_the_recording_and_in_the_points() 
     );
 }
 
-/// Each at its place, before anything is touched.
+/// Each mistake is reported with its position before the rig is touched.
 #[test]
-fn mistakes_of_readers_are_reported_at_their_place() {
+fn mistakes_in_readers_are_reported_with_their_lines() {
     let other = CampaignFile::shipped_with(&SHORT_GRID.iter().chain(BY_ITSELF).copied().collect::<Vec<_>>());
     let recording = made_once(&other).run.join("recording.mcap");
     let replay = format!("{{replay: {{recording: {}}}}}", recording.display());
@@ -113,7 +113,7 @@ fn instrument(answers: usize) -> String {
 /// The driver of an instrument as it ships, along with the lab in real time: its readings have their own rate and arrive in the recording. One
 /// that falls silent is noted where nothing needs it, and ends the run where it does.
 #[test]
-fn an_instrument_is_read_along_with_the_lab_in_real_time() {
+fn an_instrument_is_read_together_with_the_lab_in_real_time() {
     build_driver("mapper-backend-ak");
     let short = [
         ("warm_up: 60 s ", "warm_up: 1 s "),

@@ -1,4 +1,4 @@
-//! What a run records: the same bytes for the same seed, one directory a run, readable by others.
+//! Recordings: equal bytes for equal seeds, one directory per run, readable by independent programs.
 
 use mapper_core::{CHANNELS, Group};
 use mapper_recording::{ChannelMap, ReadOptions, read_recording};
@@ -43,7 +43,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
 }
 
 #[test]
-fn runs_at_the_same_time_go_to_directories_of_their_own() {
+fn simultaneous_runs_have_separate_directories() {
     let scratch = scratch();
     let campaign = CampaignFile::shipped_with(SHORT_GRID);
     let out = scratch.path();
@@ -132,7 +132,7 @@ fn an_independent_reader_sees_the_same_values() {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn without_truth_identification_finds_the_same() {
+fn identification_does_not_read_the_truth() {
     let scratch = scratch();
     let recording = recording_of(&made_once(&CampaignFile::shipped_with(SHORT_GRID)).result);
     let stripped = scratch.path().join("stripped.mcap");
@@ -271,7 +271,7 @@ fn table_of_turbo_a() -> String {
 
 /// The run directory keeps what its campaign names, so that it can be moved and identified again.
 #[test]
-fn a_run_with_a_map_of_its_own_is_identified_from_its_directory() {
+fn a_run_with_its_own_map_is_identified_from_its_directory() {
     let map = ("map: closed_form", "map: {file: maps/mine.csv, reference: SAE}");
     let replacements: Vec<_> = SHORT_GRID.iter().copied().chain([map]).collect();
     let campaign = CampaignFile::shipped_with(&replacements);

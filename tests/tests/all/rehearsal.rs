@@ -65,7 +65,7 @@ fn checked(name: &str, campaign: &CampaignFile, state: &Path, password: &str) ->
     done(command)
 }
 
-/// Thirteen rules, all kept, by a user with a state of his own.
+/// All thirteen rules are kept, with a separate state directory.
 fn keeps_every_rule(name: &str, campaign: &CampaignFile, state: &Path) {
     let finished = checked(name, campaign, state, PASSWORD);
     assert!(!finished.stdout.contains("BROKEN"), "{}", finished.stdout);
@@ -82,7 +82,7 @@ fn trust(endpoint: &str, state: &Path) {
 /// asyncua, which shares no code with it, reads, writes, is refused, and sees the interlocks.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_program_of_others_drives_the_lab_over_opcua() {
+fn an_independent_client_controls_the_lab_over_opcua() {
     let scratch = scratch();
     let lab = Lab::start(&["opcua"], Some(("lab", "hunter2")), scratch.path());
     let seen = python("opcua_client.py", [lab.places[0].as_ref(), scratch.path().as_os_str()]);
@@ -114,7 +114,7 @@ fn a_program_of_others_drives_the_lab_over_opcua() {
 /// A rig that cannot be armed is not judged: a server that is off, a wrong password (more often than the server has sessions), an order of words
 /// that is wrong, a unit that is not there. One sentence gives the reason, and no rule is reported as kept.
 #[test]
-fn a_rig_that_cannot_be_armed_is_not_judged() {
+fn a_rig_that_cannot_be_armed_is_not_checked() {
     let scratch = scratch();
     let lab = Lab::start(&["modbus", "opcua"], Some((USER, PASSWORD)), scratch.path());
     let [modbus, opcua] = &lab.places[..] else { panic!("{:?}", lab.places) };
@@ -128,7 +128,7 @@ fn a_rig_that_cannot_be_armed_is_not_judged() {
             assert!(finished.stderr.contains(reason), "{reason}: {}", finished.stderr);
         }
     };
-    // It says what it expects, and not the secrets themselves.
+    // The message states the expected variables, not the secrets.
     assert!(lab.notes[0].contains("`unit: 255` (or 0), no other"), "{:?}", lab.notes);
     assert!(
         lab.notes[1].contains("for the user in $PLC_USER with the password in $PLC_PASSWORD"),
@@ -143,15 +143,14 @@ fn a_rig_that_cannot_be_armed_is_not_judged() {
         )
     };
     let wrong_words = of_modbus("words: big ", "words: little ");
-    let fits = "With `words: big` and `bytes: big` every channel could be";
     not_judged(
         "modbus",
         &wrong_words,
         PASSWORD,
-        &["are wrong at `read.", " reads ", " from register ", fits],
+        &["at `read.", " reads ", " from register ", "`words: big` and `bytes: big`"],
     );
     let no_unit = of_modbus("unit: 255", "unit: 7");
-    not_judged("modbus", &no_unit, PASSWORD, &["it has no unit 7; look at `unit`"]);
+    not_judged("modbus", &no_unit, PASSWORD, &["no unit 7", "`unit`"]);
     let off = of_the_guide("modbus", &[("127.0.0.1:5020 ", "127.0.0.1:9 ")]);
     not_judged("modbus", &off, PASSWORD, &["127.0.0.1:9: Connection refused"]);
     trust(opcua, scratch.path());
@@ -159,7 +158,7 @@ fn a_rig_that_cannot_be_armed_is_not_judged() {
         of_the_guide("opcua", &[("opc.tcp://127.0.0.1:4840", opcua), ("timeout: 300 ms", "timeout: 800 ms")]);
     // The server has 20 sessions: the last ones would hear of those.
     for _ in 0..22 {
-        not_judged("opcua", &campaign, "wrong", &["does not let this program in", "user and password"]);
+        not_judged("opcua", &campaign, "wrong", &["refuses the login", "user and password"]);
     }
 
     // A campaign of another backend.
@@ -167,7 +166,7 @@ fn a_rig_that_cannot_be_armed_is_not_judged() {
     assert!(finished.stderr.contains("this campaign names `opcua`, not `modbus`"), "{}", finished.stderr);
 }
 
-/// One stand behind three servers at once, with the settings of the guide.
+/// One stand with three servers at once, with the settings of the guide.
 #[test]
 #[cfg_attr(not(with_python), ignore = "takes minutes: run `cargo xtask test`")]
 fn the_lab_behind_its_servers_keeps_every_rule() {
@@ -202,7 +201,7 @@ fn asked(stream: &mut TcpStream, question: &[u8]) -> String {
 
 /// No program of others speaks AK: questions as manuals print them, byte by byte, and what no instrument would send.
 #[test]
-fn the_lab_answers_as_manuals_print_it() {
+fn the_lab_answers_ak_telegrams_like_the_manuals() {
     let scratch = scratch();
     let lab = Lab::start(&["ak"], None, scratch.path());
     let mut stream = TcpStream::connect(&lab.places[0]).unwrap();
@@ -221,7 +220,7 @@ fn the_lab_answers_as_manuals_print_it() {
 }
 
 #[test]
-fn a_lab_server_says_what_is_missing_and_serves_no_one_else_unasked() {
+fn a_lab_server_reports_missing_options_and_refuses_public_addresses() {
     build_driver("mapper-lab-server");
     let run = |arguments: &[&str], password: Option<&str>| {
         let mut command = Command::new(program("mapper-lab-server"));
@@ -278,7 +277,7 @@ fn holds(bytes: &[u8], word: &str) -> bool {
 /// name nor password is in anything that was written or printed, and the token only in the line that announces it.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn secrets_stand_nowhere() {
+fn secrets_appear_in_no_file_or_output() {
     build_driver("mapper-backend-opcua");
     let scratch = scratch();
     let (pki, state) = (scratch.path().join("pki"), scratch.path().join("state"));
@@ -325,7 +324,7 @@ fn secrets_stand_nowhere() {
     let refused = start("wrong-one", &other_state, &["--json"]).wait_with_output().unwrap();
     assert!(!refused.status.success());
     let refused = [refused.stdout, refused.stderr].concat();
-    assert!(holds(&refused, "does not let this program in"), "{}", String::from_utf8_lossy(&refused));
+    assert!(holds(&refused, "refuses the login"), "{}", String::from_utf8_lossy(&refused));
     server.end();
 
     std::fs::write(&sent, [page, words.into_bytes(), refused].concat()).unwrap();
@@ -355,7 +354,7 @@ fn secrets_stand_nowhere() {
 
 /// A rig that says something else of itself than when the plan was made is another rig.
 #[test]
-fn a_plan_of_a_rig_that_has_changed_since_is_refused() {
+fn a_plan_for_a_changed_rig_is_refused() {
     mapper_tests::build_drivers();
     let built_in = short("  virtual_lab: {}");
     let other = short("  virtual_lab: {sample_rate: 20 Hz}");
@@ -404,7 +403,7 @@ fn called(program_name: &str, arguments: &[&str]) -> mapper_tests::Finished {
 
 /// A driver that is started by hand prints what it is.
 #[test]
-fn a_driver_that_is_started_by_hand_says_what_it_is() {
+fn a_driver_started_by_hand_prints_its_help() {
     for name in ["modbus", "opcua", "ak", "lab"] {
         let file = format!("mapper-backend-{name}");
         build_driver(&file);
@@ -421,7 +420,7 @@ fn a_driver_that_is_started_by_hand_says_what_it_is() {
 
 /// A mistake in one channel of many is reported at that channel, with its line.
 #[test]
-fn a_mistake_below_read_names_its_channel_and_its_line() {
+fn a_mistake_below_read_is_reported_with_channel_and_line() {
     for (driver, old, new, at, words) in [
         (
             "opcua",

@@ -23,7 +23,7 @@ fn points(run: &Path) -> Vec<Value> {
 
 /// Killed at two places of its recording and gone on with, the run has each point once, each as the uninterrupted run has it:
 /// within the width of its interval, since warm-up and lead-in draw other noise.
-fn goes_on(what: &str, campaign: impl Fn() -> CampaignFile) {
+fn assert_resumed(what: &str, campaign: impl Fn() -> CampaignFile) {
     let whole = campaign();
     let runs = whole.runs();
     let arguments = ["run".as_ref(), whole.path.as_os_str(), "--out".as_ref(), runs.as_os_str()];
@@ -52,8 +52,8 @@ fn goes_on(what: &str, campaign: impl Fn() -> CampaignFile) {
 }
 
 #[test]
-fn a_killed_script_goes_on_where_it_stood() {
-    goes_on("sequence", || {
+fn a_killed_script_is_resumed_at_its_step() {
+    assert_resumed("sequence", || {
         let replaced = ("seed: 1 ", "sequence: steps/along.rhai\nseed: 1 ");
         let campaign = short(&BY_ITSELF.iter().copied().chain([replaced]).collect::<Vec<_>>());
         let folder = campaign.directory().join("steps");
@@ -67,20 +67,20 @@ fn a_killed_script_goes_on_where_it_stood() {
 }
 
 #[test]
-fn a_killed_watch_over_repeats_goes_on_where_it_stood() {
+fn a_killed_drift_watch_is_resumed_at_its_step() {
     let drift = ("repeats: off\n", "repeats: {every: 3}\ndrift: {on_drift: continue}\n");
-    goes_on("drift", || short(&BY_ITSELF.iter().copied().chain([drift]).collect::<Vec<_>>()));
+    assert_resumed("drift", || short(&BY_ITSELF.iter().copied().chain([drift]).collect::<Vec<_>>()));
 }
 
 #[test]
-fn a_killed_search_for_surge_begins_its_line_again() {
+fn a_killed_surge_search_restarts_its_line() {
     let search = ("seed: 1 ", "surge_search: {}\nseed: 1 ");
-    goes_on("surge_search", || short(&BY_ITSELF.iter().copied().chain([search]).collect::<Vec<_>>()));
+    assert_resumed("surge_search", || short(&BY_ITSELF.iter().copied().chain([search]).collect::<Vec<_>>()));
 }
 
 /// A journal that names steps as recorded which the recording does not hold: the recording decides, and they are run.
 #[test]
-fn what_the_journal_alone_says_is_run_again() {
+fn a_step_without_flushed_samples_is_run_again() {
     let campaign = || short(BY_ITSELF);
     let whole = campaign();
     let runs = whole.runs();
@@ -116,7 +116,7 @@ fn what_the_journal_alone_says_is_run_again() {
 
 /// A run that is going on has one runner.
 #[test]
-fn a_run_that_goes_on_is_not_resumed() {
+fn a_run_in_progress_is_not_resumed() {
     let campaign = CampaignFile::shipped_with(&[("dwell: 40 s ", "dwell: 10 min ")]);
     let mut running = Running::start_with(&campaign, &[]);
     let recording = running.recorded(1 << 20);

@@ -29,7 +29,7 @@ fn run(campaign: &CampaignFile, out: &Path) -> Value {
 const FOUR: &str = "{noise: 0.1 K, offset: 0.25 K, count: 4}";
 
 #[test]
-fn a_faulty_thermocouple_is_named_and_left_out_by_every_way_to_the_points() {
+fn every_command_detects_and_excludes_a_faulty_thermocouple() {
     let scratch = scratch();
     let campaign = campaign(FOUR, "{faults: [{channel: T2, element: 3, offset: 2 K}]}");
     let checked = mapper(["check".as_ref(), campaign.path.as_os_str()]).exits(0);
@@ -61,7 +61,7 @@ fn bias(result: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn four_thermocouples_leave_less_of_the_interval_than_one_and_a_single_one_in_a_list_is_a_single_one() {
+fn four_thermocouples_give_a_narrower_interval_than_one() {
     let scratch = scratch();
     let in_directory = |sensors: &str, name: &str| {
         let campaign = campaign(sensors, "{}");

@@ -57,7 +57,7 @@ fn every_example_is_planned_and_run() {
 
 /// The script receives for each step what identification later finds in the whole recording.
 #[test]
-fn a_script_sees_what_the_recording_gives() {
+fn a_script_receives_the_results_of_the_recording() {
     let script = "for p in grid() { jump(p); }\nfor r in results() { note(`eta ${r.step} ${r.eta}`); }\n";
     let campaign = scripted(script, BY_ITSELF);
     let result = run_into(&campaign.path, &campaign.runs()).exits(0).json();
@@ -88,7 +88,7 @@ fn same_seed_same_bytes() {
 }
 
 #[test]
-fn what_fails_in_the_rehearsal_never_touches_the_rig() {
+fn a_script_that_fails_its_rehearsal_does_not_touch_the_rig() {
     let script =
         "for p in grid() {\n    let r = jump(p);\n    if elapsed_s() > 400.0 { throw \"enough\"; }\n}\n";
     let campaign = scripted(script, &[]);
@@ -103,7 +103,7 @@ fn what_fails_in_the_rehearsal_never_touches_the_rig() {
 
 /// The lab's T2 probe is off by 30 K, which the nominal machine of the rehearsal knows nothing of.
 #[test]
-fn a_script_that_throws_in_mid_run_leaves_a_safe_rig_and_the_recording() {
+fn a_script_error_during_a_run_leaves_a_safe_rig_and_the_recording() {
     let script = "for p in grid() {\n    let r = jump(p);\n    if r.has_eta && r.eta < 0.55 { throw \"too low\"; }\n}\n";
     let campaign = scripted(script, &[("virtual_lab: {}", "virtual_lab: {offset_of: {T2: 30 K}}")]);
     let failed = run_into(&campaign.path, &campaign.runs()).exits(3);
@@ -135,7 +135,7 @@ fn a_script_that_throws_in_mid_run_leaves_a_safe_rig_and_the_recording() {
 
 /// The lab's T2 probe reads 220 K too high: at the fast points beyond the limit that the guard watches.
 #[test]
-fn guards_watch_a_script_as_they_watch_a_plan() {
+fn guards_apply_to_scripts() {
     let campaign = scripted(
         "for p in grid() { jump(p); }",
         &[("virtual_lab: {}", "virtual_lab: {offset_of: {T2: 220 K}}")],

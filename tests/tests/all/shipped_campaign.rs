@@ -45,17 +45,17 @@ fn the_shipped_campaign_gives_a_map() {
         result["points"].as_array().unwrap().iter().filter(|point| point["kind"] == kind).cloned().collect()
     };
     let (points, repeats, again) = (of_kind("point"), of_kind("repeat"), of_kind("return"));
-    points_are_a_map(&points);
+    assert_points_are_a_map(&points);
     // The first point, which no jump leads to, once more at the end.
     let [again] = again.as_slice() else { panic!("{} steps lead back to the first point", again.len()) };
     assert_eq!(again["target"], points[0]["target"]);
-    repeats_show_drift_and_stay_out_of_the_map(&result, &points, &repeats);
+    assert_repeats_show_drift_and_are_not_in_the_map(&result, &points, &repeats);
 }
 
 /// One jump, made at least twice where the campaign says nothing else. The virtual lab does not drift: what changes from
 /// the first to the last is noise (4 standard errors: once in 16 000 seeds) and the housing that comes from elsewhere,
 /// which moves what the method makes of a moving flow by some tenths of a point.
-fn repeats_show_drift_and_stay_out_of_the_map(result: &Value, points: &[Value], repeats: &[Value]) {
+fn assert_repeats_show_drift_and_are_not_in_the_map(result: &Value, points: &[Value], repeats: &[Value]) {
     assert!(repeats.len() >= 2, "{} repeats", repeats.len());
     let jumps = result["repeats"].as_array().unwrap();
     assert!(!jumps.is_empty());
@@ -81,7 +81,7 @@ fn repeats_show_drift_and_stay_out_of_the_map(result: &Value, points: &[Value], 
     assert!(!result["repeats"].as_array().unwrap().is_empty());
 }
 
-fn points_are_a_map(points: &[Value]) {
+fn assert_points_are_a_map(points: &[Value]) {
     assert!(points.len() >= 30, "{} points", points.len());
     for point in points {
         for key in POINT_KEYS {
@@ -101,12 +101,12 @@ fn points_are_a_map(points: &[Value]) {
     let lines: BTreeSet<i64> =
         points.iter().map(|point| point["target"]["speed_rpm"].as_f64().unwrap() as i64).collect();
     assert!(lines.len() >= 6, "speed lines {lines:?}");
-    good_points_are_right(points);
-    each_line_goes_from_surge_to_choke(points, &lines);
+    assert_good_points_match_the_truth(points);
+    assert_lines_go_from_surge_to_choke(points, &lines);
 }
 
 /// The points that the program vouches for are enough for a map.
-fn good_points_are_right(points: &[Value]) {
+fn assert_good_points_match_the_truth(points: &[Value]) {
     let good = points.iter().filter(|point| point["verdict"] == "good").count();
     assert!(good >= 30, "{good} of {} points are good", points.len());
 }
@@ -114,7 +114,7 @@ fn good_points_are_right(points: &[Value]) {
 /// The points of a run share the offsets of their sensors: their 95 % intervals hold together or miss together. Four seeds
 /// are four draws; that two and more of them miss at most of their points happens once in seventy.
 #[test]
-fn intervals_of_good_points_hold_over_seeds() {
+fn intervals_of_good_points_cover_the_truth_over_seeds() {
     let (mut good, mut right) = (0, 0);
     for seed in 1..=4 {
         let campaign = CampaignFile::shipped_with(&[("seed: 1 ", &format!("seed: {seed} "))]);
@@ -129,7 +129,7 @@ fn intervals_of_good_points_hold_over_seeds() {
 }
 
 /// Wider open means more flow at less pressure; by MODEL.md's map, choke has at least 1.7 times the flow of surge.
-fn each_line_goes_from_surge_to_choke(points: &[Value], lines: &BTreeSet<i64>) {
+fn assert_lines_go_from_surge_to_choke(points: &[Value], lines: &BTreeSet<i64>) {
     for line in lines {
         let mut of_line: Vec<[f64; 3]> = points
             .iter()
@@ -160,7 +160,7 @@ fn identification_of_the_run_directory_gives_the_points_of_the_run() {
 
 /// One time, however it is asked for: soak, warm-up, repeats and the way back included. The plan is the one that the run made.
 #[test]
-fn check_reports_the_time_of_the_plan_and_has_nothing_to_warn_of() {
+fn check_reports_the_time_of_the_plan_without_warnings() {
     let checked = mapper(["check", SHIPPED, "--json"]).exits(0).json();
     let plan = std::fs::read_to_string(shipped().run.join("plan.json")).unwrap();
     // A stored plan begins behind the soak, which is the campaign's.

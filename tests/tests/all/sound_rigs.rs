@@ -3,7 +3,7 @@
 use mapper_tests::{CampaignFile, made_once, mapper, repository};
 use std::path::Path;
 
-fn nothing_is_wrong_with(campaign: &str) {
+fn assert_no_finding(campaign: &str) {
     let shipped = repository().join("campaigns").join(campaign).with_extension("yaml");
     let file = CampaignFile::of(std::fs::read_to_string(shipped).unwrap());
     let recording = made_once(&file).result["recording"].as_str().unwrap().to_owned();
@@ -13,21 +13,21 @@ fn nothing_is_wrong_with(campaign: &str) {
 }
 
 #[test]
-fn nothing_is_wrong_with_grid18() {
-    nothing_is_wrong_with("grid18");
+fn a_fault_free_grid18_has_no_finding() {
+    assert_no_finding("grid18");
 }
 
 #[test]
-fn nothing_is_wrong_with_gap_rig() {
-    nothing_is_wrong_with("gap_rig");
+fn a_fault_free_gap_rig_has_no_finding() {
+    assert_no_finding("gap_rig");
 }
 
 #[test]
-fn nothing_is_wrong_with_turbo_a() {
-    nothing_is_wrong_with("turbo_a");
+fn a_fault_free_turbo_a_has_no_finding() {
+    assert_no_finding("turbo_a");
 }
 
 #[test]
-fn nothing_is_wrong_with_turbo_a_lines() {
-    nothing_is_wrong_with("turbo_a_lines");
+fn a_fault_free_turbo_a_lines_has_no_finding() {
+    assert_no_finding("turbo_a_lines");
 }

@@ -43,7 +43,7 @@ fn rust_files(directory: &Path, found: &mut Vec<PathBuf>) {
 }
 
 #[test]
-fn words_stay_in_their_places() {
+fn each_output_is_written_in_one_place() {
     let root = mapper_tests::repository();
     let mut files = Vec::new();
     for folder in ["crates", "plugins", "tests", "xtask", "examples"] {

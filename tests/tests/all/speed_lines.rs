@@ -1,4 +1,4 @@
-//! Points as they are asked for, at the speed they are asked for: corrected speed lines, and speeds that are held.
+//! Corrected speed lines, and closed-loop control of the speed.
 
 use mapper_tests::{CampaignFile, Finished, SHORT_GRID, mapper, scratch};
 use serde_json::Value;
@@ -16,7 +16,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn the_shipped_lines_are_shown_and_measured_where_they_are_asked_for() {
+fn the_shipped_speed_lines_are_shown_and_measured_at_their_speeds() {
     let checked = mapper(["check", LINES, "--json"]).exits(0).json();
     let lines = checked["lines"].as_array().unwrap();
     let speeds: Vec<f64> = lines.iter().map(|line| number(&line["speed_corrected_rpm"])).collect();
@@ -43,7 +43,7 @@ fn the_shipped_lines_are_shown_and_measured_where_they_are_asked_for() {
     }
 }
 
-/// A turbine 10 % worse that may not have the pressure it needs: the points say which speed they have instead.
+/// With a turbine that is 10 % worse and limited P3, the points have the reached speed.
 #[test]
 fn a_speed_that_cannot_be_reached_is_reported_with_its_point() {
     let mut replacements = SHORT_GRID.to_vec();
@@ -70,7 +70,7 @@ fn a_speed_that_cannot_be_reached_is_reported_with_its_point() {
 
 /// A replayed rig gives the same speeds, and the loop asks for the same pressures: none of them is reported to differ.
 #[test]
-fn a_replayed_run_asks_for_what_was_commanded() {
+fn a_replayed_run_uses_the_recorded_commands() {
     let lab = "virtual_lab: {effects: {turbine_efficiency: 0.9}}";
     let mut replacements = SHORT_GRID.to_vec();
     replacements.extend([

@@ -1,4 +1,4 @@
-//! One number names a step, from 1, in everything that people and programs read of a run.
+//! Every output of a run uses the same step numbers, from 1.
 
 use mapper_recording::{ReadOptions, read_steps};
 use mapper_tests::{BY_ITSELF, CampaignFile, SHORT_GRID, mapper, only_run};
@@ -27,7 +27,7 @@ fn in_tables(report: &str) -> Vec<u64> {
 }
 
 #[test]
-fn all_files_of_a_run_number_its_steps_alike() {
+fn all_files_of_a_run_use_the_same_step_numbers() {
     let changes: Vec<(&str, &str)> = SHORT_GRID.iter().chain(BY_ITSELF).copied().collect();
     let campaign = CampaignFile::shipped_with(&changes);
     let path = campaign.path.as_os_str();

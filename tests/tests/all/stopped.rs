@@ -1,4 +1,4 @@
-//! A run that is stopped by an operator, or made ready and then not run as it was made.
+//! Runs that an operator stops, and plans that no longer match their campaign.
 #![cfg(unix)]
 
 use crate::interrupted::Running;
@@ -17,7 +17,7 @@ fn read(recording: &Path) -> ReadReport {
 
 /// Once at the end of the step, which is whole then; twice now, in the middle of one. At thirty times the clock a step takes four seconds.
 #[test]
-fn ctrl_c_ends_the_run_with_its_step_and_a_second_one_at_once() {
+fn ctrl_c_ends_the_run_after_its_step_and_a_second_one_at_once() {
     for times in [1, 2] {
         let campaign = short();
         let mut running = Running::start_with(&campaign, &["--pace", "30"]);
@@ -40,7 +40,7 @@ fn ctrl_c_ends_the_run_with_its_step_and_a_second_one_at_once() {
 
 /// While it plans a run has touched nothing, and any signal ends it; no directory is left behind.
 #[test]
-fn a_signal_while_planning_ends_the_run_and_touches_nothing() {
+fn a_signal_while_planning_ends_the_run_before_it_touches_the_rig() {
     for signal in ["INT", "TERM", "HUP"] {
         // Some seconds of planning.
         let speeds: Vec<String> = (0..60).map(|k| format!("{} krpm", 50 + k)).collect();
@@ -62,9 +62,9 @@ fn a_signal_while_planning_ends_the_run_and_touches_nothing() {
     }
 }
 
-/// A plan belongs to the campaign that it was made from.
+/// A plan is only valid for its campaign.
 #[test]
-fn a_campaign_that_was_edited_after_its_plan_was_made_is_not_run_by_it() {
+fn a_plan_of_an_edited_campaign_is_refused() {
     let campaign = short();
     let plan = campaign.directory().join("plan.json");
     mapper(["plan".as_ref(), campaign.path.as_os_str(), "--out".as_ref(), plan.as_os_str()]).exits(0);

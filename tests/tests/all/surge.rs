@@ -1,4 +1,4 @@
-//! Surge, sought from the campaign's key to the marks of the map.
+//! The surge search, from the campaign's key to the marks of the map.
 
 use mapper_tests::{CampaignFile, mapper, scratch};
 use serde_json::Value;
@@ -59,7 +59,7 @@ fn surge_is_found_on_every_line_without_surging_and_again_from_the_recording() {
 }
 
 #[test]
-fn the_points_know_nothing_of_the_search() {
+fn the_surge_search_does_not_change_the_points() {
     let scratch = scratch();
     let with = run("surge_search: {}\n", "", 1, &scratch.path().join("with"));
     let without = run("", "", 1, &scratch.path().join("without"));
@@ -67,9 +67,9 @@ fn the_points_know_nothing_of_the_search() {
     assert!(without.get("surge").is_none());
 }
 
-/// Without anything that comes before it, surge can only be met.
+/// Without a precursor, only surge itself can be detected.
 #[test]
-fn surge_without_warning_opens_the_valve_and_is_reported() {
+fn surge_without_precursor_opens_the_valve_and_is_reported() {
     let scratch = scratch();
     let result = run("surge_search: {}\n", "surge_precursor: {size: 0 %}", 1, scratch.path());
     let surge = &result["surge"];

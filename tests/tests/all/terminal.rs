@@ -1,10 +1,10 @@
-//! The output for people and programs while a run goes on, when it is done, and when it fails.
+//! Output for users and programs during a run, at its end, and after a failure.
 
 use mapper_tests::{BY_ITSELF, CampaignFile, SHIPPED, SHORT_GRID, mapper, mapper_command, only_run, scratch};
 use serde_json::Value;
 
 #[test]
-fn a_run_into_a_pipe_says_a_line_per_step_and_ends_in_eighty_columns() {
+fn a_run_into_a_pipe_prints_a_line_per_step_within_80_columns() {
     let campaign = CampaignFile::shipped_with(&[SHORT_GRID, BY_ITSELF].concat());
     let run = |more: &[&str]| {
         let out = scratch();
@@ -34,7 +34,7 @@ fn a_run_into_a_pipe_says_a_line_per_step_and_ends_in_eighty_columns() {
 }
 
 #[test]
-fn a_failure_is_one_object_too() {
+fn a_failure_is_one_json_object() {
     let failed = |arguments: &[&str], code: i32| {
         let finished = mapper(arguments.iter().chain(&["--json"])).exits(code);
         let value = finished.json();
@@ -55,9 +55,9 @@ fn a_failure_is_one_object_too() {
     failed(&["run", SHIPPED, "--live=nowhere"], 3);
 }
 
-/// Whatever fails: one object on standard output, its code that of the process.
+/// Every failure prints one object on standard output, with the exit code of the process.
 #[test]
-fn failures_of_every_kind_are_reported_alike() {
+fn failures_of_every_kind_have_the_same_form() {
     let folder = scratch();
     let file = |name: &str, text: &[u8]| {
         let path = folder.path().join(name);
@@ -107,7 +107,7 @@ fn failures_of_every_kind_are_reported_alike() {
 /// On a terminal, which `script` makes, mistakes are coloured unless the user switches colour off; `--color` outranks `NO_COLOR`.
 #[test]
 #[cfg(target_os = "linux")]
-fn colour_is_there_where_it_is_wanted() {
+fn colour_follows_the_terminal_and_the_options() {
     let campaign = CampaignFile::shipped_with(&[("seed: 1 ", "sed: 1 ")]);
     let coloured = |when: &str, no_color: bool| {
         let program = mapper_command(["check", campaign.path.to_str().unwrap(), "--color", when]);
@@ -130,7 +130,7 @@ fn colour_is_there_where_it_is_wanted() {
 }
 
 #[test]
-fn a_file_that_is_there_is_named_and_replaced_only_by_force() {
+fn an_existing_file_is_replaced_only_with_force() {
     let folder = scratch();
     let file = folder.path().join("plan.json");
     let plan = |more: &[&str]| {

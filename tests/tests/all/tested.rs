@@ -23,7 +23,7 @@ fn first_with<'a>(wanted: fn(&str) -> bool, files: &[&'a PathBuf]) -> Option<&'a
 }
 
 #[test]
-fn what_is_left_out_of_the_tests_has_none() {
+fn targets_without_tests_have_no_test() {
     let manifest = mapper_tests::repository().join("Cargo.toml");
     let metadata = MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap();
     let mut left_out = 0;
@@ -35,7 +35,7 @@ fn what_is_left_out_of_the_tests_has_none() {
         let programs: Vec<&Path> = of_kind(TargetKind::Bin).map(|one| one.src_path.as_std_path()).collect();
         let (programs, library): (Vec<&PathBuf>, Vec<&PathBuf>) =
             sources.files.iter().partition(|file| programs.contains(&file.as_path()));
-        // A program without a library has all files to itself.
+        // Without a library, all files belong to the program.
         let has_library = of_kind(TargetKind::Lib).next().is_some();
         let of_programs = if has_library { programs } else { sources.files.iter().collect() };
         for (kind, files) in [(TargetKind::Lib, &library), (TargetKind::Bin, &of_programs)] {
@@ -54,7 +54,7 @@ fn what_is_left_out_of_the_tests_has_none() {
 
 /// With `autotests = false` Cargo takes no file in `tests` for a program: a file that `all.rs` does not declare would never run.
 #[test]
-fn every_test_file_is_in_the_one_program_of_its_crate() {
+fn every_test_file_is_in_the_test_program_of_its_crate() {
     let manifest = mapper_tests::repository().join("Cargo.toml");
     let metadata = MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap();
     let mut joined = 0;

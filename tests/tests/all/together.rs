@@ -1,4 +1,4 @@
-//! Recordings identified afterwards: what `run` leaves, and several as one map.
+//! Identification of finished recordings, single ones and several as one map.
 
 use mapper_tests::{CampaignFile, Finished, SHORT_GRID, made_once, mapper, scratch};
 use serde_json::Value;
@@ -26,7 +26,7 @@ fn points(json: &Value) -> &Vec<Value> {
 }
 
 #[test]
-fn a_recording_identified_again_leaves_what_its_run_has_left() {
+fn a_recording_identified_again_gives_the_files_of_its_run() {
     let (run, scratch) = (run(&CampaignFile::shipped_with(SHORT_GRID)), scratch());
     let out = scratch.path().join("again");
     identify(&[&run], &["--out", out.to_str().unwrap()]).exits(0);
@@ -37,7 +37,7 @@ fn a_recording_identified_again_leaves_what_its_run_has_left() {
     let report = |folder: &Path| std::fs::read_to_string(folder.join("report.md")).unwrap();
     let points_of = |text: &str| text.split("## Points").nth(1).unwrap().to_owned();
     assert_eq!(points_of(&report(&out)), points_of(&report(&run)));
-    // What is there is never replaced.
+    // Existing files are never replaced.
     let refused = identify(&[&run], &["--out", out.to_str().unwrap()]).exits(1);
     assert!(refused.stderr.contains("points.json"), "{}", refused.stderr);
 }
@@ -98,7 +98,7 @@ fn two_recordings_make_one_map() {
 }
 
 #[test]
-fn recordings_of_other_machines_are_no_one_map() {
+fn recordings_of_different_machines_are_refused() {
     let one = CampaignFile::shipped_with(SHORT_GRID);
     let rebuilt = ("  serial_number: TA-0001\n", "  serial_number: TA-0002\n");
     let other = CampaignFile::shipped_with(&SHORT_GRID.iter().copied().chain([rebuilt]).collect::<Vec<_>>());

@@ -1,4 +1,4 @@
-//! The tutorials in docs: every command in them, in their order.
+//! Runs every command of the tutorials in docs, in their order.
 
 use crate::pages::FOUR_POINTS;
 use mapper_tests::{CampaignFile, made_once, mapper_in, only_run, python, repository, scratch};
@@ -79,7 +79,7 @@ fn run_of_a_day(folder: &Path, day: &str, seed: usize) {
 
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python: run `cargo xtask test`")]
-fn every_command_of_the_tutorials_does_what_it_says() {
+fn every_command_of_the_tutorials_runs() {
     let (scratch, root) = (scratch(), repository());
     let folder = scratch.path();
     for name in ["campaigns", "examples"] {

@@ -1,4 +1,4 @@
-//! A log in which nothing rests, measured on an engine.
+//! A transient log, measured on an engine.
 
 use mapper_tests::{Finished, mapper, repository, scratch};
 
@@ -13,7 +13,7 @@ fn transient(more: &[&str]) -> Finished {
 /// An independent fit of the same rows leaves 0.1 K, and with an ideal adiabatic probe 15.5 K on the brake. What is left here is
 /// beyond what was expected, and the program says so.
 #[test]
-fn an_engine_is_fitted_and_what_it_does_not_explain_is_reported() {
+fn an_engine_is_fitted_and_its_residual_is_reported() {
     let scratch = scratch();
     let out = scratch.path().join("out");
     let given = ["--fit-until", "13.2 s", "--json", "--out", out.to_str().unwrap()];
@@ -34,7 +34,7 @@ fn an_engine_is_fitted_and_what_it_does_not_explain_is_reported() {
 /// The first 13.2 s against the campaign's machine: a slow probe is among what is open, phases were held out, what cannot be asked is
 /// listed; and no turbine side without its temperatures.
 #[test]
-fn an_engine_is_asked_why() {
+fn the_cause_of_an_engine_deviation_is_diagnosed() {
     let why = &transient(&["--fit-until", "13.2 s", "--json"]).exits(0).json()["why"];
     let causes = why["causes"].as_array().unwrap();
     let open = why["open"].as_u64().unwrap() as usize;

@@ -1,9 +1,9 @@
-//! The words of CONTRIBUTING.md: plain ones, as an engineer of the field writes them.
+//! Counts words that CONTRIBUTING.md forbids.
 
 use mapper_tests::repository;
 use std::path::Path;
 
-/// Words that hide what is meant; each is split here, so that this list is not counted.
+/// The forbidden words; each is split, so that this list is not counted.
 const HIDDEN: [(&str, &str); 12] = [
     ("to", "ld"),
     ("sa", "id"),
@@ -19,7 +19,7 @@ const HIDDEN: [(&str, &str); 12] = [
     ("forete", "ll"),
 ];
 
-/// Two in a thousand lines: some stand in wire formats and generated texts.
+/// Limit per thousand lines: wire formats and generated texts contain some.
 const IN_A_THOUSAND_LINES: usize = 2;
 
 #[test]

@@ -1,4 +1,4 @@
-//! The isothermal zero from the campaign's key to the points.
+//! The isothermal zero, from the campaign's key to the points.
 
 use mapper_tests::{CampaignFile, mapper, scratch};
 use serde_json::Value;
@@ -17,7 +17,7 @@ fn run(zero: &str, seed: u32, out: &Path) -> Value {
         ("m_c:   {noise: 1.5e-4 kg/s, gain: 0.5 %}", "m_c:   {noise: 1.5e-4 kg/s}"),
         ("zero: {soak: 30 min, evenness: 0.01 K, pressure_evenness: 1 Pa}\n", ""),
         ("method: joint ", "joint: {alpha_area: fixed, probe: fixed, direction: fixed}\n  method: joint "),
-        // The same steps with a zero and without.
+        // The same steps with and without a zero.
         ("seed: 1 ", &seed),
     ]);
     let arguments =
@@ -40,7 +40,7 @@ fn slowest(result: &Value) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn a_soak_takes_the_offsets_off_the_slowest_points() {
+fn a_soak_removes_the_offsets_from_the_slowest_points() {
     let scratch = scratch();
     let (mut without, mut with) = (Vec::new(), Vec::new());
     for seed in 1..=3 {
@@ -71,7 +71,7 @@ fn a_soak_takes_the_offsets_off_the_slowest_points() {
 
 /// The oil needs half an hour to come down to the cell's temperature.
 #[test]
-fn a_soak_that_is_too_short_is_refused_and_the_declared_offsets_stand() {
+fn a_soak_that_is_too_short_is_refused_and_the_declared_offsets_apply() {
     let scratch = scratch();
     let result = run("zero: {soak: 5 min}\n", 1, scratch.path());
     let refused = result["zero"]["refused"].as_str().unwrap();

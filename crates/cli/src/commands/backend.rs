@@ -5,8 +5,8 @@ use crate::output::failure::Failure;
 use crate::{drivers, output::standard_output, registry, rig_states};
 use clap::{Args, Subcommand};
 use mapper_core::{RigMode, Setpoints};
-use mapper_driver_host::conformance::{Candidate, judge};
-use mapper_driver_host::{At, DriverLocation, KNOWN};
+use mapper_driver_host::conformance::{Candidate, check_rules};
+use mapper_driver_host::{DriverLocation, Endpoint, INCLUDED_DRIVERS};
 use mapper_session::{RigStates, nominal_model};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -46,14 +46,17 @@ impl Backend {
     fn list(&self) -> Result<(), Failure> {
         let found = drivers::locations().all();
         let driver = |found: &DriverLocation| {
-            let known = KNOWN.iter().find(|(name, ..)| *name == found.name);
+            let known = INCLUDED_DRIVERS.iter().find(|(name, ..)| *name == found.name);
             let summary = known.map_or("driver", |(_, summary, _)| summary);
             match &found.at {
-                At::Program(program) => json!({"name": found.name, "summary": summary, "program": program}),
-                At::Socket(socket) => json!({"name": found.name, "summary": summary, "socket": socket}),
+                Endpoint::Program(program) => {
+                    json!({"name": found.name, "summary": summary, "program": program})
+                }
+                Endpoint::Socket(socket) => json!({"name": found.name, "summary": summary, "socket": socket}),
             }
         };
-        let absent = KNOWN.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
+        let absent =
+            INCLUDED_DRIVERS.iter().filter(|(name, ..)| !found.iter().any(|found| found.name == *name));
         let built_in = registry::registry().backends;
         let all: Vec<Value> = built_in
             .iter()
@@ -89,7 +92,7 @@ impl Backend {
             // Built-in backends need no settings. A driver needs at least an address, and the settings of another backend do not contain
             // it.
             if !registry.backends.iter().any(|plugin| plugin.name == name) {
-                let is_known = KNOWN.iter().any(|(known, ..)| *known == name);
+                let is_known = INCLUDED_DRIVERS.iter().any(|(known, ..)| *known == name);
                 let words = match is_known || drivers::locations().find(name).is_some() {
                     false => format!("there is no backend `{name}`; `mapper backend list` shows all"),
                     true => format!(
@@ -125,8 +128,8 @@ impl Backend {
             valve_opening_ratio: 1.0,
             oil_temperature_k: campaign.boundary.oil_temperature_k,
         };
-        let candidate = Candidate { name, make: &make, setpoints, lasts_s: None };
-        let found = judge(&candidate);
+        let candidate = Candidate { name, make: &make, setpoints, duration_s: None };
+        let found = check_rules(&candidate);
         if let Some(claim) = claim {
             claim.release()?;
         }

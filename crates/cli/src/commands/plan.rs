@@ -10,7 +10,7 @@ use mapper_campaign::campaign::SequenceSource;
 use mapper_campaign::units::{Kind, parse};
 use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::simulation::model::Model;
-use mapper_planner::{PlanRequest, make_plan, other_orders};
+use mapper_planner::{PlanRequest, make_plan, plan_other_orders};
 use mapper_report::{
     comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text, with_messages,
 };
@@ -87,7 +87,7 @@ impl Plan {
         let request = PlanRequest { effort: self.effort.unwrap_or(request.effort), appended, ..request };
         let plan = plan_of(&campaign, &request)?;
         let others = match self.compare {
-            true => Some(other_orders(&request, &plan).map_err(SessionError::from)?),
+            true => Some(plan_other_orders(&request, &plan).map_err(SessionError::from)?),
             false => None,
         };
         self.store(&plan)?;

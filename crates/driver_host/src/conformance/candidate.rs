@@ -3,7 +3,7 @@
 use mapper_core::{Backend, BackendError, SampleBatch, Setpoints};
 
 /// Success, or the finding of a rule.
-pub type Checked = Result<(), String>;
+pub type CheckResult = Result<(), String>;
 
 /// Creates and drives the backend under test.
 pub struct Candidate<'a> {
@@ -13,8 +13,8 @@ pub struct Candidate<'a> {
     pub make: &'a dyn Fn() -> Result<Box<dyn Backend>, BackendError>,
     /// Setpoints that the backend can follow.
     pub setpoints: Setpoints,
-    /// Run time after which the backend has no more samples, s; `None` for a rig without end.
-    pub lasts_s: Option<f64>,
+    /// Run time at which its data end, s; `None` for a rig that runs without limit.
+    pub duration_s: Option<f64>,
 }
 
 impl Candidate<'_> {
@@ -22,7 +22,7 @@ impl Candidate<'_> {
     ///
     /// # Errors
     /// The backend's error message.
-    pub fn new_one(&self) -> Result<Box<dyn Backend>, String> {
+    pub fn create(&self) -> Result<Box<dyn Backend>, String> {
         (self.make)().map_err(|error| error.to_string())
     }
 
@@ -30,25 +30,25 @@ impl Candidate<'_> {
     ///
     /// # Errors
     /// The backend's error message.
-    pub fn running(&self) -> Result<Box<dyn Backend>, String> {
-        let mut rig = self.new_one()?;
-        fine("arm", rig.arm())?;
-        fine("set", rig.set(&self.setpoints))?;
+    pub fn create_running(&self) -> Result<Box<dyn Backend>, String> {
+        let mut rig = self.create()?;
+        require_success("arm", rig.arm())?;
+        require_success("set", rig.set(&self.setpoints))?;
         Ok(rig)
     }
 }
 
 /// Requires success.
-pub(crate) fn fine<T>(call: &str, answer: Result<T, BackendError>) -> Result<T, String> {
+pub(crate) fn require_success<T>(call: &str, answer: Result<T, BackendError>) -> Result<T, String> {
     answer.map_err(|error| format!("`{call}` failed: {error}"))
 }
 
 /// Requires a refusal because the call is out of order in the life cycle.
-pub(crate) fn out_of_order<T>(call: &str, answer: Result<T, BackendError>) -> Checked {
+pub(crate) fn require_out_of_order<T>(call: &str, answer: Result<T, BackendError>) -> CheckResult {
     match answer {
         Err(BackendError::OutOfOrder { .. }) => Ok(()),
-        Err(error) => Err(format!("`{call}` out of its place gave another error: {error}")),
-        Ok(_) => Err(format!("`{call}` out of its place was not refused")),
+        Err(error) => Err(format!("`{call}` in the wrong state returned another error: {error}")),
+        Ok(_) => Err(format!("`{call}` in the wrong state was not refused")),
     }
 }
 

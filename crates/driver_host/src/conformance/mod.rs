@@ -1,11 +1,10 @@
-//! The conformance kit of the interface [`Backend`](mapper_core::Backend). Its rules are checks that every backend must pass
-//! ([`RULES`], `mapper backend check NAME`). A backend with faults on demand ([`Misbehaving`]) tests software that drives a rig
-//! against every fault.
+//! The conformance kit of the interface [`Backend`](mapper_core::Backend): rules that every backend must keep ([`RULES`],
+//! `mapper backend check NAME`), and a backend with faults on demand ([`FaultyBackend`]) to test programs that control a rig.
 
 mod candidate;
-mod misbehaving;
+mod faulty_backend;
 mod rules;
 
-pub use candidate::{Candidate, Checked};
-pub use misbehaving::{Fault, Misbehaving};
-pub use rules::{NotArmed, RULES, Rule, judge};
+pub use candidate::{Candidate, CheckResult};
+pub use faulty_backend::{Fault, FaultyBackend};
+pub use rules::{NotArmed, RULES, Rule, check_rules};

@@ -1,4 +1,4 @@
-//! Messages in the words of the core, and back.
+//! Conversion between messages and the types of the core.
 
 use crate::protocol::message::{ChannelDescription, Description, Mode, Ranges, SafeWay, Setpoints};
 use mapper_core::{
@@ -7,17 +7,17 @@ use mapper_core::{
 };
 use std::collections::BTreeSet;
 
-/// Most samples per second that a rig may have, Hz.
-const FASTEST_HZ: f64 = 100_000.0;
+/// Maximum sample rate of a rig, Hz.
+const MAX_RATE_HZ: f64 = 100_000.0;
 
-/// A statement of a driver that cannot be right.
+/// Invalid or inconsistent data from a driver.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Unusable {
+pub enum InvalidData {
     /// A channel that the program does not have.
-    #[error("it describes a channel that is not known: {0}")]
+    #[error("it describes an unknown channel: {0}")]
     Channel(#[from] UnknownChannel),
     /// A channel in another unit.
-    #[error("it gives {channel} in {unit}; {channel} is in {right}")]
+    #[error("it sends {channel} in {unit}; the unit of {channel} is {right}")]
     Unit {
         /// The channel.
         channel: Channel,
@@ -26,16 +26,16 @@ pub enum Unusable {
         /// The unit of the channel.
         right: &'static str,
     },
-    /// A channel, twice.
-    #[error("it gives {0} twice")]
-    Twice(String),
+    /// A repeated channel.
+    #[error("it sends {0} twice")]
+    Duplicate(String),
     /// A guard that the program does not have.
-    #[error("it needs a guard `{0}`, which is not known; this program may be older than the driver")]
+    #[error("it requires an unknown guard `{0}`; this program may be older than the driver")]
     Guard(String),
-    /// A number that is not possible.
-    #[error("its {name} is {value} {unit}")]
+    /// An impossible number.
+    #[error("its {name} is {value} {unit}, which is impossible")]
     Number {
-        /// What.
+        /// The quantity.
         name: &'static str,
         /// Value.
         value: f64,
@@ -44,7 +44,7 @@ pub enum Unusable {
     },
     /// Columns of different lengths.
     #[error("{name} has {length} values for {count} samples")]
-    Torn {
+    ColumnLength {
         /// The column.
         name: String,
         /// Its length.
@@ -52,7 +52,7 @@ pub enum Unusable {
         /// Number of samples.
         count: usize,
     },
-    /// Times that do not go forward.
+    /// Times that do not increase.
     #[error("a sample at {t_s} s after one at {before_s} s")]
     Time {
         /// The time before, s.
@@ -60,15 +60,15 @@ pub enum Unusable {
         /// The time, s.
         t_s: f64,
     },
-    /// Samples that are missing, or come again.
-    #[error("sample {expected} was expected and sample {found} came{}", missing(*expected, *found))]
+    /// Missing or repeated samples.
+    #[error("expected sample {expected}, received sample {found}{}", missing(*expected, *found))]
     Sequence {
         /// Number of the next sample.
         expected: u64,
-        /// What came.
+        /// Number of the received sample.
         found: u64,
     },
-    /// More than were requested.
+    /// More samples than the queue holds.
     #[error("it sends more samples than were requested")]
     TooMany,
 }
@@ -80,34 +80,34 @@ fn missing(expected: u64, found: u64) -> String {
     }
 }
 
-/// The description of a rig by its driver. `backend` and `version`: of its hello.
+/// Reads a driver's description of its rig. `backend` and `version` are those of its hello.
 ///
 /// # Errors
-/// [`Unusable`] for what this program does not know or no rig can have.
-pub fn description(wire: &Description, backend: &str, version: &str) -> Result<RigDescription, Unusable> {
+/// [`InvalidData`] for unknown channels or guards, and for impossible numbers.
+pub fn description(wire: &Description, backend: &str, version: &str) -> Result<RigDescription, InvalidData> {
     let mut channels = Vec::new();
     for described in &wire.channels {
         let channel: Channel = described.name.parse()?;
         let right = channel.unit();
         if described.unit != right {
-            return Err(Unusable::Unit { channel, unit: described.unit.clone(), right });
+            return Err(InvalidData::Unit { channel, unit: described.unit.clone(), right });
         }
         channels.push(channel);
     }
     let different: BTreeSet<_> = channels.iter().collect();
     if different.len() < channels.len() {
-        return Err(Unusable::Twice("a channel".to_owned()));
+        return Err(InvalidData::Duplicate("a channel".to_owned()));
     }
-    number("sample rate", wire.sample_rate_hz, "Hz", f64::MIN_POSITIVE..=FASTEST_HZ)?;
+    number("sample rate", wire.sample_rate_hz, "Hz", f64::MIN_POSITIVE..=MAX_RATE_HZ)?;
     let safe = &wire.safe;
-    number("time for its way into the safe state", safe.within_s, "s", f64::MIN_POSITIVE..=600.0)?;
-    number("valve opening on that way", safe.valve_opening_ratio, "", 0.0..=10.0)?;
+    number("duration of the safe shutdown", safe.within_s, "s", f64::MIN_POSITIVE..=600.0)?;
+    number("valve opening during the safe shutdown", safe.valve_opening_ratio, "", 0.0..=10.0)?;
     if let Some(slew_pa_s) = safe.p3_slew_pa_s {
-        number("slew of P3 on that way", slew_pa_s, "Pa/s", f64::MIN_POSITIVE..=1e9)?;
+        number("slew of P3 during the safe shutdown", slew_pa_s, "Pa/s", f64::MIN_POSITIVE..=1e9)?;
     }
     let guard = |name: &String| {
         let known = serde_json::from_value::<GuardName>(serde_json::Value::String(name.clone()));
-        known.map_err(|_| Unusable::Guard(name.clone()))
+        known.map_err(|_| InvalidData::Guard(name.clone()))
     };
     Ok(RigDescription {
         backend: backend.to_owned(),
@@ -133,8 +133,8 @@ fn number(
     value: f64,
     unit: &'static str,
     range: std::ops::RangeInclusive<f64>,
-) -> Result<(), Unusable> {
-    if range.contains(&value) { Ok(()) } else { Err(Unusable::Number { name, value, unit }) }
+) -> Result<(), InvalidData> {
+    if range.contains(&value) { Ok(()) } else { Err(InvalidData::Number { name, value, unit }) }
 }
 
 fn ranges(wire: &Ranges) -> SetpointRanges {
@@ -147,8 +147,8 @@ fn ranges(wire: &Ranges) -> SetpointRanges {
     }
 }
 
-/// The description of a rig, as a driver sends it.
-pub fn description_on_the_wire(rig: &RigDescription) -> Description {
+/// Writes the description of a rig as a driver sends it.
+pub fn write_description(rig: &RigDescription) -> Description {
     let channel = |channel: &Channel| ChannelDescription {
         name: channel.to_string(),
         unit: channel.unit().to_owned(),
@@ -177,8 +177,8 @@ pub fn description_on_the_wire(rig: &RigDescription) -> Description {
     }
 }
 
-/// Setpoints as a host sends them.
-pub fn setpoints_on_the_wire(setpoints: &mapper_core::Setpoints) -> Setpoints {
+/// Writes setpoints as a host sends them.
+pub fn write_setpoints(setpoints: &mapper_core::Setpoints) -> Setpoints {
     Setpoints {
         mode: match setpoints.mode {
             RigMode::Standstill => Mode::Standstill,
@@ -191,7 +191,7 @@ pub fn setpoints_on_the_wire(setpoints: &mapper_core::Setpoints) -> Setpoints {
     }
 }
 
-/// Setpoints as a driver gets them.
+/// Reads setpoints as a driver receives them.
 pub fn setpoints(wire: &Setpoints) -> mapper_core::Setpoints {
     mapper_core::Setpoints {
         mode: match wire.mode {

@@ -1,4 +1,4 @@
-//! Errors of a rig as refusals, and back.
+//! Conversion between errors of a rig and refusals.
 
 use crate::protocol::message::{Code, Failure};
 use mapper_core::BackendError;
@@ -8,7 +8,7 @@ use mapper_core::BackendError;
 #[error("{0}")]
 struct ReportedError(String);
 
-/// Key in `set`, name for people, unit.
+/// Key in `set`, display name, unit.
 const SETPOINTS: [(&str, &str, &str); 4] = [
     ("p3_pa", "P3", "Pa"),
     ("t3_k", "T3", "K"),
@@ -16,8 +16,8 @@ const SETPOINTS: [(&str, &str, &str); 4] = [
     ("oil_temperature_k", "T_oil", "K"),
 ];
 
-/// An error of a rig as a driver sends it.
-pub fn error_on_the_wire(error: &BackendError) -> Failure {
+/// Writes an error of a rig as a driver sends it.
+pub fn write_error(error: &BackendError) -> Failure {
     let failure = |code| Failure::new(code, error.to_string());
     match error {
         BackendError::OutOfOrder { .. } => failure(Code::OutOfOrder),
@@ -45,15 +45,15 @@ pub fn error_on_the_wire(error: &BackendError) -> Failure {
     }
 }
 
-/// A refusal as the error of a rig. `backend`: name of the driver; `call`: what was asked for; `now_s`: run time, s.
-pub fn rig_error(failure: Failure, backend: &str, call: &'static str, now_s: f64) -> BackendError {
+/// Reads a refusal as the error of a rig. `backend`: name of the driver; `call`: the refused call; `now_s`: run time, s.
+pub fn read_error(failure: Failure, backend: &str, call: &'static str, now_s: f64) -> BackendError {
     let t_s = failure.t_s.filter(|t_s| t_s.is_finite()).unwrap_or(now_s);
     let key = failure.setpoint.as_deref();
     let which = SETPOINTS.iter().find(|(name, ..)| Some(*name) == key);
     let source = Box::new(ReportedError(failure.message));
     match (failure.code, which) {
         (Code::OutOfOrder, _) => {
-            let (state, needed) = ("in another state", "where its driver accepts the call");
+            let (state, needed) = ("in another state", "in a state in which its driver accepts the call");
             BackendError::OutOfOrder { call, state, needed }
         }
         (Code::SetpointOutOfRange, Some((_, quantity, unit))) => BackendError::SetpointOutOfRange {

@@ -1,30 +1,30 @@
-//! Frames: four bytes of length, most significant first, and a message as MessagePack or JSON; the first byte shows which.
+//! Frames: a length of four bytes, most significant first, and a message in MessagePack or JSON, which its first byte distinguishes.
 
 use crate::protocol::message::Message;
 use serde::Deserialize;
 use std::io::{Read, Write};
 
-/// Deepest nesting of a message: settings are the deepest part, and a deeper one could exhaust the stack.
-const DEEPEST: usize = 64;
+/// Maximum nesting of a message, so that it cannot exhaust the stack. Settings are the most deeply nested part.
+const MAX_DEPTH: usize = 64;
 
-/// How a message is written.
+/// Encoding of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Encoding {
     /// MessagePack, maps with names.
     #[default]
     MessagePack,
-    /// JSON, for eyes and for languages that bring nothing else.
+    /// JSON, for debugging and for languages without MessagePack.
     Json,
 }
 
 impl Encoding {
-    /// By the first byte of a message: `{` in JSON; in MessagePack that byte is a number, which no message is.
+    /// Detects the encoding by the first byte: `{` means JSON. In MessagePack this byte would be a number, which is not a message.
     pub fn of(body: &[u8]) -> Encoding {
         if body.first() == Some(&b'{') { Encoding::Json } else { Encoding::MessagePack }
     }
 }
 
-/// Why a frame or its content cannot be read.
+/// A frame that cannot be read, or its content.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
     /// Its declared length exceeds the limit.
@@ -32,12 +32,12 @@ pub enum FrameError {
     TooLarge {
         /// Its length, bytes.
         bytes: u64,
-        /// What may be sent, bytes.
+        /// Maximum length, bytes.
         limit: u32,
     },
     /// It is text.
     #[error(
-        "text that begins with `{begins}` where frames belong: standard output is for frames alone, and words for people go to standard error"
+        "text that begins with `{begins}` instead of a frame: write only frames to standard output, and text to standard error"
     )]
     Text {
         /// Its first letters.
@@ -48,10 +48,10 @@ pub enum FrameError {
     Empty,
     /// The stream ended inside it.
     #[error("the stream ended after {got} of {wanted} bytes of a frame")]
-    Cut {
-        /// Bytes that came.
+    Truncated {
+        /// Bytes received.
         got: usize,
-        /// Bytes that should have come.
+        /// Bytes expected.
         wanted: usize,
     },
     /// It is not a message.
@@ -62,21 +62,21 @@ pub enum FrameError {
     Stream(#[from] std::io::Error),
 }
 
-/// The next frame; `None` where the stream ends between two.
+/// Reads the next frame; `None` if the stream ends between two frames. Allocates at most `limit_bytes`, whatever length is declared.
 ///
 /// # Errors
-/// [`FrameError`]; the stream is of no further use then. No more than `limit_bytes` are kept, whatever length the frame declares.
+/// [`FrameError`]; the stream cannot be read any further then.
 pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec<u8>>, FrameError> {
     let mut length = Vec::with_capacity(4);
     stream.take(4).read_to_end(&mut length)?;
     let length: [u8; 4] = match length.len() {
         0 => return Ok(None),
-        got => length.try_into().map_err(|_| FrameError::Cut { got, wanted: 4 })?,
+        got => length.try_into().map_err(|_| FrameError::Truncated { got, wanted: 4 })?,
     };
     let bytes = u32::from_be_bytes(length);
     match bytes {
         0 => return Err(FrameError::Empty),
-        // Letters would be a length of half a gigabyte and more.
+        // Letters, read as a length, are at least half a gigabyte.
         _ if bytes > limit_bytes
             && length.iter().all(|byte| matches!(byte, b' '..=b'~' | b'\n' | b'\r' | b'\t')) =>
         {
@@ -91,7 +91,7 @@ pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec
     let (mut body, wanted) = (Vec::new(), bytes as usize);
     stream.take(bytes.into()).read_to_end(&mut body)?;
     if body.len() < wanted {
-        return Err(FrameError::Cut { got: body.len(), wanted });
+        return Err(FrameError::Truncated { got: body.len(), wanted });
     }
     Ok(Some(body))
 }
@@ -99,7 +99,7 @@ pub fn read_frame(stream: &mut impl Read, limit_bytes: u32) -> Result<Option<Vec
 /// Writes one frame and flushes it.
 ///
 /// # Errors
-/// [`FrameError::TooLarge`], and what the stream says.
+/// [`FrameError::TooLarge`], and errors of the stream.
 pub fn write_frame(stream: &mut impl Write, body: &[u8], limit_bytes: u32) -> Result<(), FrameError> {
     let length = u32::try_from(body.len()).ok().filter(|length| *length <= limit_bytes);
     let Some(length) = length else {
@@ -110,10 +110,10 @@ pub fn write_frame(stream: &mut impl Write, body: &[u8], limit_bytes: u32) -> Re
     Ok(stream.flush()?)
 }
 
-/// The body of a frame.
+/// Encodes the body of a frame.
 ///
 /// # Errors
-/// [`FrameError::Content`] where it cannot be written, which no message of this crate causes.
+/// [`FrameError::Content`] if it cannot be written; no message of this crate causes this.
 pub fn encode(message: &Message, encoding: Encoding) -> Result<Vec<u8>, FrameError> {
     match encoding {
         Encoding::Json => serde_json::to_vec(message).map_err(|error| FrameError::Content(error.to_string())),
@@ -123,7 +123,7 @@ pub fn encode(message: &Message, encoding: Encoding) -> Result<Vec<u8>, FrameErr
     }
 }
 
-/// The message in the body of a frame. Fields that are not known are ignored.
+/// Decodes the message in the body of a frame. Unknown fields are ignored.
 ///
 /// # Errors
 /// [`FrameError::Content`].
@@ -134,7 +134,7 @@ pub fn decode(body: &[u8]) -> Result<Message, FrameError> {
         }
         Encoding::MessagePack => {
             let mut reader = rmp_serde::Deserializer::from_read_ref(body);
-            reader.set_max_depth(DEEPEST);
+            reader.set_max_depth(MAX_DEPTH);
             Message::deserialize(&mut reader).map_err(|error| FrameError::Content(error.to_string()))
         }
     }
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn both_encodings_give_back_what_was_written() {
+    fn both_encodings_return_the_written_message() {
         for encoding in [Encoding::Json, Encoding::MessagePack] {
             let body = encode(&message(), encoding).unwrap();
             assert_eq!(Encoding::of(&body), encoding);
@@ -167,7 +167,7 @@ mod tests {
 
     /// One key whose value is nested deeper than any stack.
     #[test]
-    fn what_is_nested_without_end_is_refused() {
+    fn deeply_nested_messages_are_refused() {
         for depth in [1_000, 100_000] {
             let json = format!("{{\"params\":{}{}}}", "[".repeat(depth), "]".repeat(depth));
             assert!(decode(json.as_bytes()).is_err(), "{depth}");
@@ -183,25 +183,28 @@ mod tests {
     }
 
     #[test]
-    fn lengths_are_believed_only_as_far_as_they_are_allowed() {
+    fn invalid_lengths_are_refused() {
         let mut bytes = u32::MAX.to_be_bytes().to_vec();
         bytes.extend(b"{}");
         assert!(matches!(read_frame(&mut &bytes[..], 100), Err(FrameError::TooLarge { limit: 100, .. })));
         assert!(matches!(read_frame(&mut &[0u8, 0, 0, 0][..], 100), Err(FrameError::Empty)));
         assert!(matches!(
             read_frame(&mut &[0u8, 0, 0, 9, b'{'][..], 100),
-            Err(FrameError::Cut { got: 1, wanted: 9 })
+            Err(FrameError::Truncated { got: 1, wanted: 9 })
         ));
-        assert!(matches!(read_frame(&mut &[0u8, 0][..], 100), Err(FrameError::Cut { got: 2, wanted: 4 })));
+        assert!(matches!(
+            read_frame(&mut &[0u8, 0][..], 100),
+            Err(FrameError::Truncated { got: 2, wanted: 4 })
+        ));
         assert!(read_frame(&mut &[][..], 100).unwrap().is_none());
         assert!(write_frame(&mut Vec::new(), &[b'{'; 101], 100).is_err());
         let text = read_frame(&mut &b"\nWelcome!"[..], 1 << 20).unwrap_err().to_string();
-        assert!(text.contains("begins with `\\nWel`") && text.contains("standard error"), "{text}");
+        assert!(text.contains("`\\nWel`"), "{text}");
     }
 
     proptest! {
         #[test]
-        fn frames_come_back_whole_however_many(bodies in prop::collection::vec(prop::collection::vec(any::<u8>(), 1..50), 0..8)) {
+        fn any_number_of_frames_is_read_back(bodies in prop::collection::vec(prop::collection::vec(any::<u8>(), 1..50), 0..8)) {
             let mut stream = Vec::new();
             for body in &bodies {
                 write_frame(&mut stream, body, 50).unwrap();

@@ -7,25 +7,25 @@ use serde_json::Value;
 /// One message: a request (`id` and `method`), its answer (`id` and `result` or `error`), or a note (`method` alone).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Message {
-    /// Number of a request and of its answer, counted up by who asks.
+    /// Number of a request and of its answer; the sender of requests counts it up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u64>,
-    /// The session, as the driver named it in its hello; in every message of the host after that.
+    /// The session, as named in the driver's hello; required in every later message of the host.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub session: Option<String>,
     /// Time after which the host no longer waits for the answer, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deadline_s: Option<f64>,
-    /// What is asked for or noted.
+    /// Name of the request or note.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<String>,
-    /// What it is about.
+    /// Parameters of the request or note.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     pub params: Value,
-    /// A good answer.
+    /// Result of a successful request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub result: Option<Value>,
-    /// A refusal.
+    /// Error of a refused request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<Failure>,
 }
@@ -46,7 +46,7 @@ impl Message {
     }
 }
 
-/// Why a request was refused.
+/// Error of a refused request.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Failure {
     /// Kind of the failure.
@@ -56,19 +56,19 @@ pub struct Failure {
     /// `settings`: key path below the driver's settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
-    /// `setpoint_out_of_range`: which setpoint, by its key in `set`.
+    /// `setpoint_out_of_range`: key of the setpoint in `set`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub setpoint: Option<String>,
-    /// `setpoint_out_of_range`: what was asked for, SI.
+    /// `setpoint_out_of_range`: requested value, SI.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// `setpoint_out_of_range`: lowest that is accepted, SI.
+    /// `setpoint_out_of_range`: lowest accepted value, SI.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
-    /// `setpoint_out_of_range`: highest that is accepted, SI.
+    /// `setpoint_out_of_range`: highest accepted value, SI.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub high: Option<f64>,
-    /// `lost` and `simulation`: run time at which it happened, s.
+    /// `lost` and `simulation`: run time of the failure, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub t_s: Option<f64>,
 }
@@ -93,23 +93,23 @@ impl Failure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Code {
-    /// The request does not fit the state of the rig.
+    /// The request is not allowed in the state of the rig.
     OutOfOrder,
-    /// A setpoint outside of what the rig can do; nothing was changed.
+    /// A setpoint is outside the range of the rig; nothing was changed.
     SetpointOutOfRange,
     /// The settings are wrong.
     Settings,
-    /// A simulation could not go on.
+    /// A simulation failed.
     Simulation,
-    /// The rig went away.
+    /// The rig was lost.
     Lost,
     /// The driver has no such method.
     UnknownMethod,
-    /// The parameters are not those of the method.
+    /// The parameters are invalid for the method.
     Params,
-    /// The version of the protocol, or the session, is another.
+    /// Wrong version of the protocol, or wrong session.
     Refused,
-    /// The lease had ended: the rig has been made safe; disarm and arm again.
+    /// The lease has ended and the rig was made safe; disarm and arm again.
     LeaseEnded,
     /// Anything else.
     #[serde(other)]
@@ -119,9 +119,9 @@ pub enum Code {
 /// A version of the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Version {
-    /// Another one is refused.
+    /// A different major version is refused.
     pub major: u32,
-    /// A higher one has more fields, which are ignored.
+    /// A higher minor version has additional fields, which are ignored.
     pub minor: u32,
 }
 
@@ -136,24 +136,24 @@ pub struct Hello {
     pub name: String,
     /// Version of the program.
     pub version: String,
-    /// Largest frame that it takes, bytes.
+    /// Largest frame that it accepts, bytes.
     pub frame_limit_bytes: u32,
 }
 
 /// Answer to `hello`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Welcome {
-    /// The driver's own hello: its name is the name that campaigns write.
+    /// The driver's own hello; its name is the name in campaigns.
     #[serde(flatten)]
     pub hello: Hello,
     /// Name of this session: any text that no other session of this driver has had.
     pub session: String,
 }
 
-/// `configure`: what the campaign writes below the driver's name. The rig is not touched.
+/// `configure`: the settings below the driver's name in the campaign. The rig is not touched.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Configure {
-    /// The settings; `null` where the campaign has none. A secret is `{env: NAME}`, the name of an environment variable.
+    /// The settings; `null` if the campaign has none. A secret is `{env: NAME}`, the name of an environment variable.
     #[serde(default)]
     pub settings: Value,
 }
@@ -163,26 +163,26 @@ pub struct Configure {
 pub struct Described {
     /// The rig.
     pub description: Description,
-    /// Any text that changes with the description; the helpers take SHA-256.
+    /// Any text that changes with the description; the helper libraries use SHA-256.
     pub identity: String,
 }
 
-/// What a rig says of itself.
+/// Description of a rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Description {
-    /// What it measures.
+    /// Measured channels.
     pub channels: Vec<ChannelDescription>,
     /// Samples per second, Hz, > 0.
     pub sample_rate_hz: f64,
-    /// Whether time is simulated: samples come on `poll` then, else by themselves.
+    /// Whether time is simulated: samples are then sent on `poll`, otherwise unrequested.
     pub simulated_time: bool,
     /// Whether setpoints have an effect.
     #[serde(default = "yes")]
     pub controls: bool,
-    /// Name of the one rig that this is; no two runs may have it at once.
+    /// Unique name of the rig; two runs cannot use it at the same time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exclusive: Option<String>,
-    /// Its address, e.g. host and port of its controller; no two runs may be there at once, whatever they call the rig.
+    /// Its address, e.g. host and port of its controller; two runs cannot use it at the same time, whatever name they give the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reached_at: Option<String>,
     /// Guards that the run must have, by their keys in campaigns.
@@ -191,7 +191,7 @@ pub struct Description {
     /// Setpoints that it accepts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accepts: Option<Ranges>,
-    /// Its way into the safe state.
+    /// Its safe shutdown.
     pub safe: SafeWay,
 }
 
@@ -206,7 +206,7 @@ pub struct ChannelDescription {
     pub name: String,
     /// Unit: the one of the channel, in SI, e.g. `K`.
     pub unit: String,
-    /// How many sensors measure it; 1 if absent.
+    /// Number of sensors that measure it; 1 if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensors: Option<usize>,
 }
@@ -224,15 +224,15 @@ pub struct Ranges {
     pub oil_temperature_k: (f64, f64),
 }
 
-/// The way into the safe state: valve open and heater off at once, P3 down at a slew, air off.
+/// The safe shutdown: the valve opens and the heater is switched off at once, P3 is lowered at a limited rate, then the air is cut.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SafeWay {
-    /// How fast P3 is taken down, Pa/s; `null`: the air is cut at once.
+    /// Rate at which P3 is lowered, Pa/s; `null`: the air is cut at once.
     #[serde(default)]
     pub p3_slew_pa_s: Option<f64>,
-    /// Opening of the valve on the way, ratio.
+    /// Opening of the valve during the shutdown, ratio.
     pub valve_opening_ratio: f64,
-    /// Longest time of the way, s.
+    /// Maximum duration of the shutdown, s.
     pub within_s: f64,
 }
 
@@ -261,21 +261,21 @@ pub struct Setpoints {
     pub oil_temperature_k: f64,
 }
 
-/// `poll`: lets simulated time go on. The samples come as notes before the answer.
+/// `poll`: advances simulated time. The samples are sent as notes before the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Poll {
-    /// Until this time since arming, s.
+    /// Time since arming to which it advances, s.
     pub until_s: f64,
 }
 
 /// Answer to `poll`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LastSample {
-    /// Sequence number of the next sample: how many have been sent since arming.
+    /// Sequence number of the next sample, that is the number of samples since arming.
     pub next_sequence: u64,
 }
 
-/// `note`: a remark of the driver for people.
+/// `note`: a remark of the driver for the user.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Note {
     /// One sentence.

@@ -1,6 +1,6 @@
-//! Samples in columns, and how they become a batch.
+//! Conversion between samples in columns and batches.
 
-use crate::protocol::convert::Unusable;
+use crate::protocol::convert::InvalidData;
 use mapper_core::{
     Channel, ChannelColumn, Element, ElementColumn, Event, EventKind, Provenance, Quality, SampleBatch,
     TruthColumn,
@@ -8,7 +8,7 @@ use mapper_core::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Bytes that a value takes at most as JSON, its comma included.
+/// Maximum size of a value in JSON, its comma included, bytes.
 const BYTES_PER_VALUE: usize = 26;
 
 /// `samples`: samples of one stream, in order and without gap.
@@ -18,17 +18,17 @@ pub struct Samples {
     pub stream: String,
     /// Number of the first sample since arming.
     pub sequence: u64,
-    /// When each sample arrived at the driver, s since arming on a clock that never goes back; strictly increasing.
+    /// Time at which each sample arrived at the driver, s since arming, from a monotonic clock; strictly increasing.
     pub t_s: Vec<f64>,
     /// Values of each channel, as long as `t_s`.
     pub columns: Vec<Column>,
     /// Each sensor of the channels that have several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub elements: Vec<ElementSamples>,
-    /// What only a simulator knows.
+    /// True values of a simulator.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub truth: Vec<TruthSamples>,
-    /// What happened.
+    /// Events.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub events: Vec<Happened>,
 }
@@ -40,7 +40,7 @@ pub struct Column {
     pub channel: String,
     /// SI; `null` without a reading.
     pub values: Vec<Option<f64>>,
-    /// When the source took each reading, s since arming; when it arrived if absent.
+    /// Time of each reading at its source, s since arming; the time of arrival if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source_t_s: Option<Vec<f64>>,
     /// `good`, `uncertain` or `bad` of each reading; good if absent.
@@ -57,37 +57,37 @@ pub struct ElementSamples {
     pub values: Vec<Option<f64>>,
 }
 
-/// Values that only a simulator knows.
+/// True values of a simulator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TruthSamples {
     /// Name with its unit suffix.
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// Values; `null` where there is none.
+    /// Values; `null` without a value.
     pub values: Vec<Option<f64>>,
 }
 
-/// Something that happened.
+/// An event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Happened {
     /// Run time, s.
     pub t_s: f64,
-    /// Kind, e.g. `rig_tripped`; one that is not known becomes a note.
+    /// Kind, e.g. `rig_tripped`; an unknown kind is recorded as a note.
     pub kind: String,
     /// One sentence with values and units.
     pub message: String,
 }
 
-fn filled(values: Vec<Option<f64>>) -> Vec<f64> {
+fn values_or_nan(values: Vec<Option<f64>>) -> Vec<f64> {
     values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect()
 }
 
-fn of_number(value: f64) -> Option<f64> {
+fn finite_value(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-fn quality(word: &str) -> Quality {
+fn parse_quality(word: &str) -> Quality {
     match word {
         "good" => Quality::Good,
         "uncertain" => Quality::Uncertain,
@@ -96,7 +96,7 @@ fn quality(word: &str) -> Quality {
     }
 }
 
-fn word(quality: Quality) -> String {
+fn quality_name(quality: Quality) -> String {
     match quality {
         Quality::Good => "good",
         Quality::Uncertain => "uncertain",
@@ -105,53 +105,57 @@ fn word(quality: Quality) -> String {
     .to_owned()
 }
 
-/// Samples of a driver as a batch; channels that are not described are left out.
+/// Converts samples of a driver to a batch. Channels that are not described are ignored.
 ///
 /// # Errors
-/// [`Unusable`] where columns differ in length, or times do not go forward.
-pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Unusable> {
+/// [`InvalidData`] if columns differ in length, or times do not increase.
+pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, InvalidData> {
     let count = samples.t_s.len();
-    let right = |name: &str, length: usize| match length == count {
+    let check_length = |name: &str, length: usize| match length == count {
         true => Ok(()),
-        false => Err(Unusable::Torn { name: name.to_owned(), length, count }),
+        false => Err(InvalidData::ColumnLength { name: name.to_owned(), length, count }),
     };
     if let Some(t_s) = samples.t_s.iter().find(|t_s| !t_s.is_finite()) {
-        return Err(Unusable::Time { before_s: *t_s, t_s: *t_s });
+        return Err(InvalidData::Time { before_s: *t_s, t_s: *t_s });
     }
     if let Some(pair) = samples.t_s.windows(2).find(|pair| pair[1] <= pair[0]) {
-        return Err(Unusable::Time { before_s: pair[0], t_s: pair[1] });
+        return Err(InvalidData::Time { before_s: pair[0], t_s: pair[1] });
     }
     let (mut columns, mut provenance) = (Vec::<ChannelColumn>::new(), Vec::new());
     for column in samples.columns {
-        right(&column.channel, column.values.len())?;
+        check_length(&column.channel, column.values.len())?;
         let Ok(channel) = column.channel.parse::<Channel>() else { continue };
         if !described.contains(&channel) {
             continue;
         }
         if columns.iter().any(|there| there.channel == channel) {
-            return Err(Unusable::Twice(column.channel));
+            return Err(InvalidData::Duplicate(column.channel));
         }
         if column.source_t_s.is_some() || column.quality.is_some() {
             let source_t_s = column.source_t_s.unwrap_or_else(|| samples.t_s.clone());
             let good = || vec![Quality::Good; count];
-            let of_words = |words: Vec<String>| words.iter().map(|word| quality(word)).collect();
+            let of_words = |words: Vec<String>| words.iter().map(|word| parse_quality(word)).collect();
             let quality: Vec<Quality> = column.quality.map_or_else(good, of_words);
-            right(&column.channel, source_t_s.len())?;
-            right(&column.channel, quality.len())?;
+            check_length(&column.channel, source_t_s.len())?;
+            check_length(&column.channel, quality.len())?;
             provenance.push(Provenance { channel, source_t_s, quality });
         }
-        columns.push(ChannelColumn { channel, values: filled(column.values) });
+        columns.push(ChannelColumn { channel, values: values_or_nan(column.values) });
     }
     let mut elements = Vec::new();
     for column in samples.elements {
-        right(&column.element, column.values.len())?;
+        check_length(&column.element, column.values.len())?;
         let Ok(element) = Element::try_from(column.element) else { continue };
-        elements.push(ElementColumn { element, values: filled(column.values) });
+        elements.push(ElementColumn { element, values: values_or_nan(column.values) });
     }
     let mut truth = Vec::new();
     for column in samples.truth {
-        right(&column.name, column.values.len())?;
-        truth.push(TruthColumn { name: column.name, unit: column.unit, values: filled(column.values) });
+        check_length(&column.name, column.values.len())?;
+        truth.push(TruthColumn {
+            name: column.name,
+            unit: column.unit,
+            values: values_or_nan(column.values),
+        });
     }
     let kind =
         |word: String| serde_json::from_value(serde_json::Value::String(word)).unwrap_or(EventKind::Note);
@@ -167,20 +171,20 @@ pub fn batch(samples: Samples, described: &[Channel]) -> Result<SampleBatch, Unu
     })
 }
 
-/// A batch in pieces that fit into frames of this size. Nothing for an empty batch.
-pub fn pieces(batch: &SampleBatch, frame_limit_bytes: u32) -> Vec<Samples> {
-    // Source time and quality are two values more.
+/// Splits a batch into messages that fit into frames of this size. An empty batch gives none.
+pub fn split_batch(batch: &SampleBatch, frame_limit_bytes: u32) -> Vec<Samples> {
+    // Source time and quality are two additional values.
     let width =
         1 + batch.columns.len() + batch.elements.len() + batch.truth.len() + 2 * batch.provenance.len();
-    let most = (frame_limit_bytes as usize / 2 / (width * BYTES_PER_VALUE)).max(1);
+    let max_samples = (frame_limit_bytes as usize / 2 / (width * BYTES_PER_VALUE)).max(1);
     let count = batch.t_s.len();
-    let mut starts: Vec<usize> = (0..count).step_by(most).collect();
+    let mut starts: Vec<usize> = (0..count).step_by(max_samples).collect();
     if starts.is_empty() && !batch.events.is_empty() {
         starts.push(0);
     }
-    let mut pieces: Vec<Samples> =
-        starts.into_iter().map(|start| piece(batch, start, count.min(start + most))).collect();
-    if let Some(last) = pieces.last_mut() {
+    let mut split_batch: Vec<Samples> =
+        starts.into_iter().map(|start| cut_batch(batch, start, count.min(start + max_samples))).collect();
+    if let Some(last) = split_batch.last_mut() {
         let kind = |kind: EventKind| serde_json::to_value(kind).ok()?.as_str().map(str::to_owned);
         let happened = |event: &Event| Happened {
             t_s: event.t_s,
@@ -189,13 +193,14 @@ pub fn pieces(batch: &SampleBatch, frame_limit_bytes: u32) -> Vec<Samples> {
         };
         last.events = batch.events.iter().map(happened).collect();
     }
-    pieces
+    split_batch
 }
 
-fn piece(batch: &SampleBatch, start: usize, end: usize) -> Samples {
+fn cut_batch(batch: &SampleBatch, start: usize, end: usize) -> Samples {
     let cut = |values: &[f64]| values.get(start..end).unwrap_or_default().to_vec();
-    let numbers =
-        |values: &[f64]| values.get(start..end).unwrap_or_default().iter().map(|v| of_number(*v)).collect();
+    let numbers = |values: &[f64]| {
+        values.get(start..end).unwrap_or_default().iter().map(|v| finite_value(*v)).collect()
+    };
     let column = |column: &ChannelColumn| {
         let from = batch.provenance_of(column.channel);
         Column {
@@ -203,7 +208,12 @@ fn piece(batch: &SampleBatch, start: usize, end: usize) -> Samples {
             values: numbers(&column.values),
             source_t_s: from.map(|from| cut(&from.source_t_s)),
             quality: from.map(|from| {
-                from.quality.get(start..end).unwrap_or_default().iter().map(|one| word(*one)).collect()
+                from.quality
+                    .get(start..end)
+                    .unwrap_or_default()
+                    .iter()
+                    .map(|one| quality_name(*one))
+                    .collect()
             }),
         }
     };
@@ -236,13 +246,13 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// In however many pieces a batch travels: together they are the batch, and each fits its frame in both encodings.
+        /// The messages of a split batch together contain the batch, and each fits its frame in both encodings.
         #[test]
-        fn pieces_are_the_batch(
+        fn split_batches_contain_the_whole_batch(
             values in prop::collection::vec(prop::option::of(-1e6..1e6f64), 0..200), limit in 2_000u32..20_000,
         ) {
             let t_s: Vec<f64> = (0..values.len()).map(|i| i as f64 / 10.0).collect();
-            let column = filled(values);
+            let column = values_or_nan(values);
             let whole = SampleBatch {
                 first_sequence: 40,
                 columns: vec![ChannelColumn { channel: Channel::T2, values: column.clone() }],
@@ -256,7 +266,7 @@ mod tests {
                 ..SampleBatch::default()
             };
             let (mut next, mut values, mut sources) = (40, Vec::new(), Vec::new());
-            let sent = pieces(&whole, limit);
+            let sent = split_batch(&whole, limit);
             prop_assert!(!sent.is_empty());
             for piece in sent {
                 let note = crate::protocol::Message::note("samples", serde_json::to_value(&piece).unwrap());
@@ -280,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_together_is_refused() {
+    fn inconsistent_samples_are_refused() {
         let good = || Samples {
             t_s: vec![0.0, 0.1],
             columns: vec![Column {
@@ -297,12 +307,15 @@ mod tests {
             batch(samples, &[Channel::T2])
         };
         assert!(read(&|_| ()).unwrap().columns[0].values[1].is_nan());
-        assert!(matches!(read(&|s| s.t_s.reverse()), Err(Unusable::Time { .. })));
-        assert!(matches!(read(&|s| s.t_s[1] = f64::NAN), Err(Unusable::Time { .. })));
-        assert!(matches!(read(&|s| s.columns[0].values.clear()), Err(Unusable::Torn { .. })));
-        assert!(matches!(read(&|s| s.columns[0].quality = Some(vec![])), Err(Unusable::Torn { .. })));
-        assert!(matches!(read(&|s| s.columns.push(s.columns[0].clone())), Err(Unusable::Twice(_))));
-        // What is not known is left out.
+        assert!(matches!(read(&|s| s.t_s.reverse()), Err(InvalidData::Time { .. })));
+        assert!(matches!(read(&|s| s.t_s[1] = f64::NAN), Err(InvalidData::Time { .. })));
+        assert!(matches!(read(&|s| s.columns[0].values.clear()), Err(InvalidData::ColumnLength { .. })));
+        assert!(matches!(
+            read(&|s| s.columns[0].quality = Some(vec![])),
+            Err(InvalidData::ColumnLength { .. })
+        ));
+        assert!(matches!(read(&|s| s.columns.push(s.columns[0].clone())), Err(InvalidData::Duplicate(_))));
+        // Unknown channels are ignored.
         assert!(read(&|s| s.columns[0].channel = "T9".to_owned()).unwrap().columns.is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! The JSON schema of all messages, made from the types that read and write them.
+//! The JSON schema of all messages, generated from the types that read and write them.
 
 use crate::protocol::{
     Configure, Described, Failure, Hello, LastSample, Message, Note, Poll, Samples, Setpoints, Welcome,
@@ -6,7 +6,7 @@ use crate::protocol::{
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
-/// The schema: `Message` is what a frame holds, the others what `params` and `result` hold, by method.
+/// The schema: `Message` describes the content of a frame, the others describe `params` and `result` of each method.
 pub fn schema() -> Value {
     let mut generator = SchemaSettings::draft2020_12().into_generator();
     let message = generator.subschema_for::<Message>();
@@ -40,7 +40,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    /// What a driver's author checks his messages with, and what they look like: method, part of the message, one that is right.
+    /// Valid examples of messages: method, part of the message, content.
     fn examples() -> [(&'static str, &'static str, Value); 9] {
         let hello = json!({
             "magic": "mapper-backend", "protocol": {"major": 1, "minor": 1}, "name": "x", "version": "1", "frame_limit_bytes": 65536,
@@ -83,7 +83,7 @@ mod tests {
         ]
     }
 
-    /// As this crate reads it, with what it makes of it in the words of the runner.
+    /// Reads a message and converts it to the types of the core, as this crate does.
     fn read(method: &str, part: &str, value: Value) -> Result<(), serde_json::Error> {
         match (method, part) {
             ("hello", "params") => serde_json::from_value::<Hello>(value).map(drop),
@@ -101,7 +101,7 @@ mod tests {
                 let _ = crate::protocol::batch(samples, &[mapper_core::Channel::T2]);
             }),
             _ => serde_json::from_value::<Failure>(value)
-                .map(|failure| drop(crate::protocol::rig_error(failure, "x", "set", 0.0))),
+                .map(|failure| drop(crate::protocol::read_error(failure, "x", "set", 0.0))),
         }
     }
 
@@ -115,7 +115,7 @@ mod tests {
         examples().into_iter().map(of).collect()
     }
 
-    /// All places of a value, its own first.
+    /// Lists the paths of a value and of everything inside it.
     fn places(value: &Value, here: &str, all: &mut Vec<String>) {
         all.push(here.to_owned());
         let inside: Vec<(String, &Value)> = match value {
@@ -128,7 +128,7 @@ mod tests {
         inside.into_iter().for_each(|(key, value)| places(value, &format!("{here}/{key}"), all));
     }
 
-    /// A number with a fraction, since 1.0 is a whole number to a schema and none to a reader.
+    /// An arbitrary value. Numbers have a fraction, because a schema accepts 1.0 as an integer and the reader does not.
     fn thing() -> impl Strategy<Value = Value> {
         prop_oneof![
             Just(Value::Null),
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_right_fits_the_schema_and_is_read() {
+    fn valid_messages_match_the_schema_and_are_read() {
         let validators = validators();
         for (method, part, value) in examples() {
             assert!(validators[&(method, part)].is_valid(&value), "{method} {part}");
@@ -151,9 +151,9 @@ mod tests {
     }
 
     proptest! {
-        /// Right messages with up to four places changed or taken away: nothing panics, and what the schema lets through is read.
+        /// Valid messages with up to four values changed or removed: nothing panics, and a message that matches the schema is read.
         #[test]
-        fn what_the_schema_lets_through_is_read(
+        fn messages_that_match_the_schema_are_read(
             which in 0usize..9, changes in prop::collection::vec((any::<prop::sample::Index>(), prop::option::of(thing())), 0..4),
         ) {
             thread_local! { static VALIDATORS: BTreeMap<(&'static str, &'static str), jsonschema::Validator> = validators(); }
@@ -178,10 +178,10 @@ mod tests {
         }
     }
 
-    /// What is committed for authors of drivers is what this crate reads and writes. To make it again:
+    /// The committed schema, which authors of drivers use, matches the types. To generate it again:
     /// `MAPPER_WRITE_SCHEMA=1 cargo test -p mapper-driver-host the_committed_schema`.
     #[test]
-    fn the_committed_schema_is_that_of_the_types() {
+    fn the_committed_schema_matches_the_types() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("../../docs/reference/protocol.schema.json");
         let made = format!("{}\n", serde_json::to_string_pretty(&super::schema()).unwrap());
@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(
             std::fs::read_to_string(&file).unwrap(),
             made,
-            "make docs/reference/protocol.schema.json again"
+            "generate docs/reference/protocol.schema.json again"
         );
     }
 }

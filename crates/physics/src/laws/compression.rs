@@ -290,7 +290,7 @@ mod tests {
             prop_assert!((gas.t2_prime_k / gas.t1_prime_k).ln() >= ln_pr_kappa - 1e-14);
         }
 
-        /// The gas loses after the wheel what the metal gains.
+        /// After the wheel, the heat that the gas loses equals the heat that the metal gains.
         #[test]
         fn heat_is_conserved(inputs in inputs()) {
             let gas = compress(&inputs, None);

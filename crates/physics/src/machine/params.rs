@@ -77,7 +77,7 @@ pub struct CompressorParams {
     pub recirculation_ratio: f64,
     /// Water in the air of the compressor side, kg per kg of dry air, >= 0; 0.
     pub humidity_kg_kg: f64,
-    /// Definition of the map's efficiency, and of every efficiency of this model; the paper's if it is left out.
+    /// Definition of the map's efficiency and of every efficiency of this model; by default that of the paper.
     #[serde(default = "paper")]
     pub efficiency: EfficiencyDefinition,
     /// Fraction phi of the housing's heat capacity that touches the gas and has its own temperature, 0..1; 0 is one node.

@@ -26,7 +26,7 @@ pub struct State {
 }
 
 impl State {
-    /// A state with probe and inner wall in equilibrium with what they touch: the probe at `gas_k`, the wall at `tc_k`.
+    /// A state in which the probe has the temperature of the gas, `gas_k`, and the inner wall that of the housing, `tc_k`.
     pub fn new(shaft_speed_rad_s: f64, p2_pa: f64, tc_k: f64, tt_k: f64, gas_k: f64) -> Self {
         State {
             shaft_speed_rad_s,

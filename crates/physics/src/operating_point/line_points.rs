@@ -92,7 +92,7 @@ pub enum LineError {
     TooManyPoints {
         /// Requested spacing, kg/s.
         spacing_kg_s: f64,
-        /// Points it would give.
+        /// Number of points with this spacing.
         count: f64,
         /// Flow from end to end, kg/s.
         range_kg_s: f64,

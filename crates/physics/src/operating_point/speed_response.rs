@@ -10,7 +10,7 @@ use crate::simulation::model::{Model, rad_s_of_rpm};
 use crate::simulation::steady::{SteadyError, hold_speed};
 use mapper_core::SpeedResponse;
 
-/// Relative step of the differences: far above the tolerance of steady states, far below any curvature.
+/// Relative step of the finite differences: much larger than the tolerance of steady states, much smaller than any curvature.
 const STEP_RATIO: f64 = 1e-3;
 
 /// The response at `speed_rpm` under `boundary`, whose `p3_pa` is ignored. `None` if the machine has no steady state there,

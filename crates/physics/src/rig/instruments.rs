@@ -91,7 +91,7 @@ impl ChannelFollower {
         ChannelFollower { path, last: None }
     }
 
-    /// Continues as a sensor on another path from here on.
+    /// Switches to another signal path and keeps the current output.
     pub fn turn_to(&mut self, path: ChannelPath) {
         self.path = path;
     }

@@ -55,7 +55,7 @@ pub enum SimulationError {
     Boundary {
         /// Time, s.
         t_s: f64,
-        /// What is wrong with them.
+        /// The violated limit.
         source: BoundaryError,
     },
     /// The integration failed.
@@ -63,7 +63,7 @@ pub enum SimulationError {
     Integration(#[from] IntegrationError),
 }
 
-/// A machine in motion: advance it as far and as often as needed.
+/// A running machine, which can be advanced step by step.
 #[derive(Debug, Clone)]
 pub struct Simulator {
     model: Model,
@@ -325,7 +325,7 @@ impl<const N: usize, I: Inputs> OdeSystem<N> for ModelSystem<'_, I> {
         if self.constant {
             return None;
         }
-        // One-sided, forwards: there may be a kink behind. Inputs are linear or exponential over far longer times.
+        // A forward difference, because there may be a kink at the start. Inputs are linear or exponential over much longer times.
         let ahead_s = 1e-6;
         let moved = self.rates(t_s + ahead_s, y);
         Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))

@@ -1,11 +1,10 @@
-//! The jump graph: points, and between them every jump with what it is expected to give and what forbids it.
+//! Jumps between points: expected result of each, and the limits that forbid it.
 //!
-//! An edge takes a simulation. A plan therefore checks the jumps it makes, from the states it makes them in, and takes
-//! those that are not allowed out of the search; the whole graph, with its `n (n - 1)` simulations, is made only when it
-//! is asked for.
+//! An edge of the graph costs one simulation. A plan therefore simulates only its own jumps and forbids the rejected ones in the
+//! next search. The complete graph, with its `n (n - 1)` simulations, is built only on request.
 
 use crate::request::{PlanError, PlanRequest};
-use crate::targets::reachable;
+use crate::targets::solve_steady_states;
 use crate::thermal_memory::forecast::{Forecast, forecast};
 use mapper_core::{OperatingPoint, Predicted, SURGE_ALLOWED_S, readable, temperature};
 use mapper_physics::simulation::steady::SteadyState;
@@ -14,10 +13,10 @@ use petgraph::graph::DiGraph;
 /// Why a jump is not allowed.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Rejection {
-    /// Too long beyond the surge line.
+    /// The compressor stays beyond the surge line for too long.
     #[error("it stays {longest_s:.1} s beyond the surge line; {allowed_s:.1} s are allowed")]
     Surge {
-        /// Longest stretch, s.
+        /// Longest period, s.
         longest_s: f64,
         /// Allowed, s.
         allowed_s: f64,
@@ -25,7 +24,7 @@ pub enum Rejection {
     /// The shaft overshoots its limit.
     #[error("the shaft reaches {}; its limit is {}", readable(*.highest_rpm, "rpm"), readable(*.limit_rpm, "rpm"))]
     Overspeed {
-        /// Highest speed on the way, rpm.
+        /// Highest speed during the jump, rpm.
         highest_rpm: f64,
         /// Limit, rpm.
         limit_rpm: f64,
@@ -33,7 +32,7 @@ pub enum Rejection {
     /// The outlet gets too hot.
     #[error("T2 reaches {}; its limit is {}", temperature(*.highest_k), temperature(*.limit_k))]
     OutletTemperature {
-        /// Highest on the way, K.
+        /// Highest temperature during the jump, K.
         highest_k: f64,
         /// Limit, K.
         limit_k: f64,
@@ -46,8 +45,10 @@ pub enum Rejection {
         /// Limit, K.
         limit_k: f64,
     },
-    /// The housing would move too far.
-    #[error("the housing moves by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K")]
+    /// The housing temperature changes too much.
+    #[error(
+        "the housing temperature changes by {gradient_k:.1} K in the window; its limit is {limit_k:.1} K"
+    )]
     HousingGradient {
         /// Change in the window, K.
         gradient_k: f64,
@@ -55,7 +56,7 @@ pub enum Rejection {
         limit_k: f64,
     },
     /// The rig cannot change P3 before the window begins.
-    #[error("P3 takes {needed_s:.1} s to its new value; the window begins after {available_s:.1} s")]
+    #[error("P3 takes {needed_s:.1} s to reach its new value; the window begins after {available_s:.1} s")]
     Slew {
         /// Time P3 takes, s.
         needed_s: f64,
@@ -64,31 +65,31 @@ pub enum Rejection {
     },
 }
 
-/// An edge: what a jump from the steady state of one point to another is expected to do.
+/// An edge: the forecast of a jump from the steady state of one point to another point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JumpForecast {
     /// Start of the jump.
     pub from: OperatingPoint,
     /// Destination of the jump.
     pub to: OperatingPoint,
-    /// What it is expected to give.
+    /// Expected result.
     pub predicted: Predicted,
-    /// Longest stretch beyond the surge line, s.
+    /// Longest period beyond the surge line, s.
     pub longest_surge_s: f64,
-    /// Highest shaft speed on the way, rpm.
+    /// Highest shaft speed during the jump, rpm.
     pub highest_speed_rpm: f64,
-    /// Highest outlet temperature on the way, K.
+    /// Highest outlet temperature during the jump, K.
     pub highest_t2_k: f64,
     /// Turbine inlet total pressure that the jump commands, Pa.
     pub p3_pa: f64,
     /// Change of the turbine inlet pressure, Pa (signed).
     pub p3_change_pa: f64,
-    /// All that forbids it; empty for an admissible jump.
+    /// All limits that it violates; empty for an allowed jump.
     pub rejections: Vec<Rejection>,
 }
 
-/// All that forbids a step that was forecast.
-pub(crate) fn rejections(
+/// Lists all limits that a forecast step violates.
+pub(crate) fn find_rejections(
     request: &PlanRequest<'_>,
     forecast: &Forecast,
     p3_change_pa: f64,
@@ -126,7 +127,7 @@ pub(crate) fn rejections(
     found
 }
 
-pub(crate) fn jump(
+pub(crate) fn forecast_jump(
     request: &PlanRequest<'_>,
     (from, start): (OperatingPoint, &SteadyState),
     (to, target): (OperatingPoint, &SteadyState),
@@ -144,40 +145,42 @@ pub(crate) fn jump(
         highest_t2_k: forecast.highest_t2_k,
         p3_pa: target.boundary.p3_pa,
         p3_change_pa,
-        rejections: rejections(request, &forecast, p3_change_pa, target.boundary.t3_k, dwell_s),
+        rejections: find_rejections(request, &forecast, p3_change_pa, target.boundary.t3_k, dwell_s),
     })
 }
 
-/// One edge: what the jump from the steady state of `from` gives, and what forbids it.
+/// Forecasts the jump from the steady state of `from`, and lists the limits that it violates.
 ///
 /// # Errors
-/// [`PlanError`] where one of the points cannot be reached, or the simulation fails.
+/// [`PlanError`] if one of the points cannot be reached, or the simulation fails.
 pub fn explain_jump(
     request: &PlanRequest<'_>,
     from: OperatingPoint,
     to: OperatingPoint,
 ) -> Result<JumpForecast, PlanError> {
-    let targets = reachable(request, &[from, to])?;
+    let targets = solve_steady_states(request, &[from, to])?;
     match targets.as_slice() {
-        [start, target] => jump(request, (from, start), (to, target)),
+        [start, target] => forecast_jump(request, (from, start), (to, target)),
         _ => Err(PlanError::NoPoints),
     }
 }
 
-/// Nodes: points in listed order. Edges: all jumps, those that are not allowed with their reasons.
+/// Builds the graph of all jumps, forbidden ones included. Nodes are the points in listed order.
 ///
-/// One simulation an edge: meant for tens of points.
+/// Each edge costs one simulation: use it for tens of points.
 ///
 /// # Errors
 /// As [`explain_jump`].
-pub fn jump_graph(request: &PlanRequest<'_>) -> Result<DiGraph<OperatingPoint, JumpForecast>, PlanError> {
-    let targets = reachable(request, request.points)?;
+pub fn build_jump_graph(
+    request: &PlanRequest<'_>,
+) -> Result<DiGraph<OperatingPoint, JumpForecast>, PlanError> {
+    let targets = solve_steady_states(request, request.points)?;
     let mut graph = DiGraph::with_capacity(targets.len(), targets.len() * targets.len());
     let nodes: Vec<_> = request.points.iter().map(|point| graph.add_node(*point)).collect();
     for (i, start) in targets.iter().enumerate() {
         for (j, target) in targets.iter().enumerate() {
             if i != j {
-                let edge = jump(request, (request.points[i], start), (request.points[j], target))?;
+                let edge = forecast_jump(request, (request.points[i], start), (request.points[j], target))?;
                 graph.add_edge(nodes[i], nodes[j], edge);
             }
         }

@@ -1,42 +1,33 @@
 //! The visits of a plan: its points in order, the repeats of one jump for drift, the return to the first point, an appended jump.
 
-use crate::jumps::graph::jump;
-use crate::ordering::objective::{NOT_ALLOWED, Objective};
+use crate::jumps::graph::forecast_jump;
+use crate::ordering::objective::{FORBIDDEN_PENALTY, Objective};
 use crate::request::{PlanError, PlanRequest};
-use crate::thermal_memory::chain::{Chain, way_back};
+use crate::thermal_memory::chain::{Chain, RepeatedJump, return_jump};
 use mapper_core::{Jump, OperatingPoint, Repeats, StepKind};
 use mapper_physics::simulation::steady::SteadyState;
 
-/// Jumps that are looked at for one that may be repeated; each takes a simulation.
-const LOOKED_AT: usize = 24;
+/// Maximum number of jumps that are simulated to find one for repeats.
+const MAX_SIMULATED_JUMPS: usize = 24;
 
-/// Up to this many points a repeat may go anywhere where no place near its own is allowed.
-const FEW_POINTS: usize = 200;
+/// Up to this many points, a repeat may move anywhere in the order if no position near its own is allowed.
+const MAX_POINTS_FREE_REPEATS: usize = 200;
 
-/// A visit of the plan.
+/// One visit of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Visit {
     pub(crate) index: usize,
     pub(crate) kind: StepKind,
 }
 
-/// The repeated jump among the points of a chain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct RepeatedJump {
-    pub(crate) from: usize,
-    pub(crate) to: usize,
-    /// How often it is made.
-    pub(crate) count: usize,
-}
-
-/// How often a jump is repeated among so many points: at both ends, and in between at the spacing or closer.
+/// Number of repeats among so many points: one at each end, and others in between, at most the requested spacing apart.
 pub(crate) fn repeat_count(repeats: Repeats, points: usize) -> usize {
     (points.div_ceil(repeats.every_steps.max(1)) + 1).max(repeats.at_least).min(points.max(1))
 }
 
-/// Jumps that suit for repeats, best first, those alone that are allowed: far in speed at an opening in the middle, up
-/// to the faster point, where the efficiency is sure.
-pub(crate) fn usual_jumps(
+/// Lists allowed jumps that suit repeats, best first: a large rise in speed at a middle opening, which moves the housing far and ends
+/// at high speed, where the efficiency is most certain.
+pub(crate) fn propose_repeated_jumps(
     request: &PlanRequest<'_>,
     targets: &[SteadyState],
 ) -> Result<Vec<Jump>, PlanError> {
@@ -44,15 +35,15 @@ pub(crate) fn usual_jumps(
     let mut openings: Vec<f64> = points.iter().map(|point| point.valve_opening_ratio).collect();
     openings.sort_by(f64::total_cmp);
     let Some(&middle) = openings.get(openings.len() / 2) else { return Ok(Vec::new()) };
-    // Of each opening the slowest and the faster ones; a pair of openings where no opening has two speeds.
+    // Jumps at one opening, from the slowest point. If no opening has two speeds, jumps between openings.
     let mut found: Vec<(usize, usize)> = Vec::new();
     openings.dedup();
     for opening in &openings {
         let of_opening = |i: &usize| points[*i].valve_opening_ratio == *opening;
-        found.extend(from_slowest(points, (0..points.len()).filter(of_opening).collect()));
+        found.extend(jumps_from_slowest(points, (0..points.len()).filter(of_opening).collect()));
     }
     if found.is_empty() {
-        found = from_slowest(points, (0..points.len()).collect());
+        found = jumps_from_slowest(points, (0..points.len()).collect());
     }
     let off_middle = |i: usize| (points[i].valve_opening_ratio - middle).abs();
     found.sort_by(|a, b| {
@@ -60,8 +51,8 @@ pub(crate) fn usual_jumps(
         by_opening.then(points[b.1].speed_rpm.total_cmp(&points[a.1].speed_rpm)).then(a.cmp(b))
     });
     let mut allowed = Vec::new();
-    for (from, to) in found.into_iter().take(LOOKED_AT) {
-        let made = jump(request, (points[from], &targets[from]), (points[to], &targets[to]))?;
+    for (from, to) in found.into_iter().take(MAX_SIMULATED_JUMPS) {
+        let made = forecast_jump(request, (points[from], &targets[from]), (points[to], &targets[to]))?;
         if made.rejections.is_empty() {
             allowed.push(Jump { from: made.from, to: made.to });
         }
@@ -69,34 +60,36 @@ pub(crate) fn usual_jumps(
     Ok(allowed)
 }
 
-/// From the slowest of some points to each faster one.
-fn from_slowest(points: &[OperatingPoint], of: Vec<usize>) -> Vec<(usize, usize)> {
+/// Lists the jumps from the slowest of some points to each faster one.
+fn jumps_from_slowest(points: &[OperatingPoint], of: Vec<usize>) -> Vec<(usize, usize)> {
     let by_speed = |a: &usize, b: &usize| points[*a].speed_rpm.total_cmp(&points[*b].speed_rpm);
     let Some(slowest) = of.iter().copied().min_by(by_speed) else { return Vec::new() };
     let faster = |to: &usize| points[*to].speed_rpm > points[slowest].speed_rpm;
     of.into_iter().filter(faster).map(|to| (slowest, to)).collect()
 }
 
-/// An order without repeats.
-pub(crate) fn plain(order: &[usize]) -> Vec<Visit> {
+/// The visits of an order without repeats.
+pub(crate) fn visits_of_points(order: &[usize]) -> Vec<Visit> {
     order.iter().map(|&index| Visit { index, kind: StepKind::Point }).collect()
 }
 
-/// The order with the jump put in. Each repeat may move by a quarter of the spacing to where it adds fewer steps (none
-/// but itself, where the order passes by its start), and among those to where the points lose least.
-pub(crate) fn with_repeats<C: Chain>(
+/// Inserts the repeats of a jump into an order.
+///
+/// Each repeat may move by a quarter of the spacing to a position where it adds one step instead of two, because the order visits its
+/// start anyway. Among equal positions, the one that costs the points the least gradient wins.
+pub(crate) fn insert_repeats<C: Chain>(
     chain: &C,
     order: &[usize],
     jump: RepeatedJump,
     objective: Objective,
 ) -> Vec<Visit> {
-    let mut visits = plain(order);
+    let mut visits = visits_of_points(order);
     let (points, count) = (order.len(), jump.count);
     let spacing = points as f64 / (count.max(2) - 1) as f64;
     let slack = (spacing / 4.0).floor() as usize;
     let mut inserted = 0;
     for repeat in 0..count {
-        // Counted in points of the order; at least one step comes before.
+        // Position in points of the order, behind at least one step.
         let ideal = ((repeat as f64 * spacing).round() as usize).clamp(1, points);
         let before = value(chain, &visits, objective);
         let best_of = |places: std::ops::RangeInclusive<usize>| {
@@ -107,18 +100,18 @@ pub(crate) fn with_repeats<C: Chain>(
                 .filter(free)
                 .map(|place| {
                     let at = place + inserted;
-                    let trial = put(&visits, at, jump);
+                    let trial = insert_repeat(&visits, at, jump);
                     let value = value(chain, &trial, objective);
-                    // What is allowed first, then fewer steps.
-                    let barred = value < before - 0.5 * NOT_ALLOWED;
-                    ((barred, trial.len()), -value, place.abs_diff(ideal), trial)
+                    // Allowed positions first, then fewer steps.
+                    let is_forbidden = value < before - 0.5 * FORBIDDEN_PENALTY;
+                    ((is_forbidden, trial.len()), -value, place.abs_diff(ideal), trial)
                 })
                 .min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)))
         };
         let near = best_of(ideal.saturating_sub(slack).max(1)..=(ideal + slack).min(points));
         let best = match near {
-            // Farther off rather than not at all; behind the repeats before, which keep their order.
-            Some(((true, _), ..)) if points <= FEW_POINTS => best_of(1..=points),
+            // A distant position is better than a forbidden one.
+            Some(((true, _), ..)) if points <= MAX_POINTS_FREE_REPEATS => best_of(1..=points),
             near => near,
         };
         if let Some((.., trial)) = best {
@@ -129,8 +122,8 @@ pub(crate) fn with_repeats<C: Chain>(
     visits
 }
 
-/// The first point once more behind all visits, unless they end there; whether it was put there.
-pub(crate) fn put_return(visits: &mut Vec<Visit>) -> bool {
+/// Appends a visit of the first point, unless the visits already end there. Returns whether it was appended.
+pub(crate) fn append_return(visits: &mut Vec<Visit>) -> bool {
     match visits.as_slice() {
         [first, .., last] if first.index != last.index => {
             let index = first.index;
@@ -141,8 +134,8 @@ pub(crate) fn put_return(visits: &mut Vec<Visit>) -> bool {
     }
 }
 
-/// A jump behind all visits; one step less where they end at its start.
-pub(crate) fn append(visits: &mut Vec<Visit>, from: usize, to: usize) {
+/// Appends a jump: its two steps, or one if the visits end at its start.
+pub(crate) fn append_jump(visits: &mut Vec<Visit>, from: usize, to: usize) {
     for index in [from, to] {
         if visits.last().is_none_or(|visit| visit.index != index) {
             visits.push(Visit { index, kind: StepKind::Repeat });
@@ -150,7 +143,7 @@ pub(crate) fn append(visits: &mut Vec<Visit>, from: usize, to: usize) {
     }
 }
 
-fn put(visits: &[Visit], at: usize, jump: RepeatedJump) -> Vec<Visit> {
+fn insert_repeat(visits: &[Visit], at: usize, jump: RepeatedJump) -> Vec<Visit> {
     let mut longer = visits[..at].to_vec();
     if longer.last().is_none_or(|visit| visit.index != jump.from) {
         longer.push(Visit { index: jump.from, kind: StepKind::Repeat });
@@ -160,12 +153,12 @@ fn put(visits: &[Visit], at: usize, jump: RepeatedJump) -> Vec<Visit> {
     longer
 }
 
-/// Value of the points; the repeats themselves do not count, but for what is not allowed.
+/// Value of the visits that measure points. Repeats count only if they are forbidden.
 pub(crate) fn value<C: Chain>(chain: &C, visits: &[Visit], objective: Objective) -> f64 {
     let Some(first) = visits.first() else { return 0.0 };
     let (mut state, mut sum) = (chain.first(first.index), 0.0);
     let order: Vec<usize> = visits.iter().map(|visit| visit.index).collect();
-    let back = way_back(chain, &order).filter(|(last, first)| last != first);
+    let back = return_jump(chain, &order).filter(|(last, first)| last != first);
     let jumps = visits.windows(2).map(|pair| (pair[0].index, pair[1].index, pair[1].kind));
     for (from, to, kind) in jumps.chain(back.map(|(last, first)| (last, first, StepKind::Return))) {
         let (gradient_k, next) = chain.step(from, to, state);

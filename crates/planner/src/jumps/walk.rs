@@ -1,37 +1,37 @@
-//! The steps of an order in full, simulated one after the other.
+//! Simulates the steps of an order one after the other, with the full model.
 
-use crate::jumps::graph::rejections;
+use crate::jumps::graph::find_rejections;
 use crate::jumps::visits::Visit;
 use crate::request::{PlanError, PlanRequest};
-use crate::thermal_memory::forecast::{Forecast, Resting, errors_together, forecast};
+use crate::thermal_memory::forecast::{Forecast, ParameterError, add_joint_errors, forecast};
 use mapper_core::{OperatingPoint, PlanStep, VisitOrder};
 use mapper_physics::operating_point::forecast::{hold, warmed_up};
 use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::steady::SteadyState;
 
-/// Drift of T2 and of the housing below which conventional mapping takes its reading, K/min: a fifth of the 0.5 K/min that a settled
-/// point may have (`steady`), since noise makes some readings pass too early (`campaigns/stabilised.rhai`).
+/// Drift of T2 and of the housing below which conventional mapping takes its reading, K/min: a fifth of the 0.5 K/min allowed for a
+/// settled point (`steady`), because noise lets some readings pass too early (`campaigns/stabilised.rhai`).
 pub const STABLE_DRIFT_K_MIN: f64 = 0.1;
-/// Interval at which conventional mapping looks at the drift, s.
-const LOOK_S: f64 = 10.0;
-/// Longest wait of conventional mapping at a point, s: an hour, four times what Burke et al. state.
-const LONGEST_WAIT_S: f64 = 3600.0;
+/// Interval over which conventional mapping measures the drift, s.
+const DRIFT_INTERVAL_S: f64 = 10.0;
+/// Maximum wait of conventional mapping at a point, s: an hour, four times the longest that Burke et al. state.
+const MAX_WAIT_S: f64 = 3600.0;
 
-/// A jump of a plan that is not allowed.
-pub(crate) struct Forbidden {
+/// A forbidden jump of an order, with the violated limits.
+pub(crate) struct ForbiddenJump {
     pub(crate) from: usize,
     pub(crate) to: usize,
     pub(crate) reasons: String,
 }
 
-/// The steps, and the jumps among them that are not allowed.
+/// The simulated steps, and the forbidden jumps among them.
 pub(crate) struct Walk {
     pub(crate) steps: Vec<PlanStep>,
-    pub(crate) forbidden: Vec<Forbidden>,
-    pub(crate) resting: Option<Resting>,
+    pub(crate) forbidden: Vec<ForbiddenJump>,
+    pub(crate) parameter_error: Option<ParameterError>,
 }
 
-/// Simulates the visits to `points` (with their steady states), `dwell_s` each, and predicts the errors of all of them.
+/// Simulates the visits, `dwell_s` each, and predicts their errors. `targets`: the steady states of `points`.
 pub(crate) fn walk(
     request: &PlanRequest<'_>,
     points: &[OperatingPoint],
@@ -59,10 +59,10 @@ pub(crate) fn walk(
             let made = forecast(request, state, &target.boundary, dwell_s, now.is_some()).map_err(fail)?;
             if let Some((_, from)) = now {
                 let p3_change_pa = target.boundary.p3_pa - targets[from].boundary.p3_pa;
-                let reasons = rejections(request, &made, p3_change_pa, target.boundary.t3_k, dwell_s);
+                let reasons = find_rejections(request, &made, p3_change_pa, target.boundary.t3_k, dwell_s);
                 if !reasons.is_empty() {
                     let reasons = reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and ");
-                    forbidden.push(Forbidden { from, to: visit.index, reasons });
+                    forbidden.push(ForbiddenJump { from, to: visit.index, reasons });
                 }
             }
             made
@@ -84,8 +84,9 @@ pub(crate) fn walk(
         rows.push(of_step);
     }
     let predicted = steps.iter_mut().map(|step| &mut step.predicted);
-    let resting = if forbidden.is_empty() { errors_together(request, &rows, predicted) } else { None };
-    Ok(Walk { steps, forbidden, resting })
+    let parameter_error =
+        if forbidden.is_empty() { add_joint_errors(request, &rows, predicted) } else { None };
+    Ok(Walk { steps, forbidden, parameter_error })
 }
 
 /// Time until T2 and the housing drift by less than [`STABLE_DRIFT_K_MIN`], s.
@@ -98,15 +99,15 @@ fn stable_after_s(
     let prepared = request.model.prepare(&target.boundary);
     let reading = |state: &State| (prepared.evaluate(state).t2_probe_k, state.tc_k);
     let (mut state, mut waited_s) = (start, 0.0);
-    while waited_s < LONGEST_WAIT_S {
+    while waited_s < MAX_WAIT_S {
         let (t2_k, tc_k) = reading(&state);
-        state = hold(request.model, state, &target.boundary, LOOK_S)
+        state = hold(request.model, state, &target.boundary, DRIFT_INTERVAL_S)
             .map_err(|source| PlanError::Forecast { to, source })?;
-        waited_s += LOOK_S;
+        waited_s += DRIFT_INTERVAL_S;
         let now = reading(&state);
-        let drift_k_min = 60.0 / LOOK_S * (now.0 - t2_k).abs().max((now.1 - tc_k).abs());
-        // The first look is at the jump itself.
-        if waited_s > LOOK_S && drift_k_min < STABLE_DRIFT_K_MIN {
+        let drift_k_min = 60.0 / DRIFT_INTERVAL_S * (now.0 - t2_k).abs().max((now.1 - tc_k).abs());
+        // The first interval contains the jump itself.
+        if waited_s > DRIFT_INTERVAL_S && drift_k_min < STABLE_DRIFT_K_MIN {
             break;
         }
     }

@@ -1,21 +1,20 @@
 //! Promising successors of a point.
 //!
-//! A nearly best assignment of successors, as if the housing settled at each point, prices points. The value of a jump beyond
-//! the prices of both ends shows how well it fits into a good order; its value alone would always name the same few
-//! extreme points.
+//! An assignment of successors gives each point a price, as if the housing settled at each point. The value of a jump minus the prices
+//! of both ends shows how well the jump fits into a good order. The value alone would always select the same few extreme points.
 
 use crate::ordering::objective::Objective;
 use crate::thermal_memory::chain::Chain;
-use crate::upper_bound::auction::prices;
+use crate::upper_bound::auction::run_auction;
 use mapper_numerics::statistics::nearest_rank;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 
-/// Successors that are kept of each point.
-const KEPT: usize = 10;
-/// Above this many points no candidates are kept: the table of weights grows with the square.
+/// Number of successors of each point.
+const MAX_SUCCESSORS: usize = 10;
+/// Above this many points there are no candidates, because the table of weights grows with the square.
 pub(crate) const MAX_POINTS: usize = 4000;
-/// A jump that is not allowed is at worst this many times the usual: the assignment needs finite weights.
+/// Lower limit of a weight: the assignment needs finite weights for forbidden jumps.
 const MIN_VALUE: f64 = -1e9;
 
 /// The best successors of each point of a chain.
@@ -24,7 +23,7 @@ pub(crate) struct Candidates {
 }
 
 impl Candidates {
-    pub(crate) fn of<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Self {
+    pub(crate) fn new<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Self {
         let n = given.len();
         let mut successors = vec![Vec::new(); chain.len()];
         if !(4..=MAX_POINTS).contains(&n) {
@@ -44,15 +43,15 @@ impl Candidates {
         let size = |share| nearest_rank(&sizes, share).unwrap_or(0.0);
         let (smallest, largest) = (size(0.02), size(0.98));
         let spread = (largest - smallest).max(1e-9);
-        let prices = prices(n, &weight, (0.2 * spread, 2e-3 * spread));
+        let prices = run_auction(n, &weight, (0.2 * spread, 2e-3 * spread));
         for (i, &from) in given.iter().enumerate() {
             let mut rated: Vec<(f64, usize)> = (0..n)
                 .filter(|j| *j != i)
                 .map(|j| (prices.profit[i] + prices.price[j] - weight[n * i + j], given[j]))
                 .collect();
-            if rated.len() > KEPT {
-                rated.select_nth_unstable_by(KEPT, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                rated.truncate(KEPT);
+            if rated.len() > MAX_SUCCESSORS {
+                rated.select_nth_unstable_by(MAX_SUCCESSORS, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                rated.truncate(MAX_SUCCESSORS);
             }
             rated.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             successors[from] = rated.into_iter().map(|(_, to)| to).collect();
@@ -60,7 +59,7 @@ impl Candidates {
         Candidates { successors }
     }
 
-    /// A successor of `from`; `None` without candidates.
+    /// Draws a successor of `from`; `None` without candidates.
     pub(crate) fn draw(&self, from: usize, random: &mut Pcg64Mcg) -> Option<usize> {
         let successors = &self.successors[from];
         (!successors.is_empty()).then(|| successors[random.random_range(0..successors.len())])

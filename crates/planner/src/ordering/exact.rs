@@ -1,101 +1,101 @@
-//! The best order of few points, by branch and bound under thermal memory.
+//! Finds the best order of few points and proves it, by branch and bound under thermal memory.
 
-use crate::thermal_memory::chain::{Chain, way_back};
-use crate::upper_bound::bound::Optimistic;
+use crate::thermal_memory::chain::{Chain, return_jump};
+use crate::upper_bound::bound::GradientBounds;
 
 /// Outcome of a branch and bound.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Proof {
-    /// The best order that was found; at least the given one.
+    /// The best order found; never worse than the given one.
     pub(crate) order: Vec<usize>,
     /// Whether no order is better by more than the tolerance.
     pub(crate) proven: bool,
 }
 
-/// Which figure is proven.
+/// The figure to maximise: the sum of the gradients, or the smallest gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Figure {
     Sum,
-    Worst,
+    Minimum,
 }
 
-/// Improves `given` or proves that no order of its points beats it by more than `tolerance_ratio`, within `nodes` partial
+/// Improves `given`, or proves that no order of its points is better by more than `tolerance_ratio`. Visits at most `nodes` partial
 /// orders.
 pub(crate) fn branch_and_bound<C: Chain>(
     chain: &C,
     given: &[usize],
-    optimistic: &Optimistic<'_>,
+    gradient_bounds: &GradientBounds<'_>,
     figure: Figure,
     tolerance_ratio: f64,
     nodes: u64,
 ) -> Proof {
     let n = given.len();
-    // The most that any jump to a point can give.
-    let best_into: Vec<f64> = (0..n)
-        .map(|j| (0..n).filter(|i| *i != j).map(|i| optimistic.weight_k(i, j)).fold(0.0, f64::max))
+    // Largest gradient of any jump to each point.
+    let max_gradient_into_k: Vec<f64> = (0..n)
+        .map(|j| (0..n).filter(|i| *i != j).map(|i| gradient_bounds.weight_k(i, j)).fold(0.0, f64::max))
         .collect();
-    let mut walk = Walk {
+    let mut search = BranchAndBound {
         chain,
         points: given,
-        optimistic,
-        best_into,
+        gradient_bounds,
+        max_gradient_into_k,
         figure,
         keep_ratio: 1.0 + tolerance_ratio,
-        left: nodes,
-        best: value_of(chain, given, figure),
+        nodes_left: nodes,
+        best: figure_of(chain, given, figure),
         best_order: given.to_vec(),
         path: Vec::with_capacity(n),
         used: vec![false; n],
     };
     for (first, &point) in given.iter().enumerate() {
-        let so_far = if figure == Figure::Sum { 0.0 } else { f64::INFINITY };
-        walk.enter(first, chain.first(point), so_far);
+        let partial_k = if figure == Figure::Sum { 0.0 } else { f64::INFINITY };
+        search.extend(first, chain.first(point), partial_k);
     }
-    Proof { proven: walk.left > 0, order: walk.best_order }
+    Proof { proven: search.nodes_left > 0, order: search.best_order }
 }
 
-fn value_of<C: Chain>(chain: &C, order: &[usize], figure: Figure) -> f64 {
+fn figure_of<C: Chain>(chain: &C, order: &[usize], figure: Figure) -> f64 {
     let gradients = crate::thermal_memory::chain::gradients_k(chain, order);
-    let barred = order.windows(2).any(|pair| !chain.admissible(pair[0], pair[1]))
-        || way_back(chain, order).is_some_and(|(last, first)| !chain.admissible(last, first))
+    let is_forbidden = order.windows(2).any(|pair| !chain.admissible(pair[0], pair[1]))
+        || return_jump(chain, order).is_some_and(|(last, first)| !chain.admissible(last, first))
         || gradients.iter().any(|gradient_k| *gradient_k > chain.gradient_max_k());
     match figure {
-        _ if barred => f64::NEG_INFINITY,
+        _ if is_forbidden => f64::NEG_INFINITY,
         Figure::Sum => gradients.iter().sum(),
-        Figure::Worst => gradients.iter().copied().fold(f64::INFINITY, f64::min),
+        Figure::Minimum => gradients.iter().copied().fold(f64::INFINITY, f64::min),
     }
 }
 
-struct Walk<'a, C: Chain> {
+struct BranchAndBound<'a, C: Chain> {
     chain: &'a C,
     points: &'a [usize],
-    optimistic: &'a Optimistic<'a>,
-    best_into: Vec<f64>,
+    gradient_bounds: &'a GradientBounds<'a>,
+    max_gradient_into_k: Vec<f64>,
     figure: Figure,
     keep_ratio: f64,
-    left: u64,
+    nodes_left: u64,
     best: f64,
     best_order: Vec<usize>,
     path: Vec<usize>,
     used: Vec<bool>,
 }
 
-impl<C: Chain> Walk<'_, C> {
-    fn enter(&mut self, place: usize, state: C::State, so_far: f64) {
-        if self.left == 0 {
+impl<C: Chain> BranchAndBound<'_, C> {
+    fn extend(&mut self, place: usize, state: C::State, partial_k: f64) {
+        if self.nodes_left == 0 {
             return;
         }
-        self.left -= 1;
+        self.nodes_left -= 1;
         self.path.push(place);
         self.used[place] = true;
         if self.path.len() == self.points.len() {
             let order: Vec<usize> = self.path.iter().map(|place| self.points[*place]).collect();
-            let whole = self.with_way_back(&order, state, so_far);
-            if whole > self.best {
-                self.best = whole;
+            let complete_k = self.add_return_jump(&order, state, partial_k);
+            if complete_k > self.best {
+                self.best = complete_k;
                 self.best_order = order;
             }
-        } else if self.possible(place, so_far) > self.best * self.keep_ratio {
+        } else if self.bound_remaining(place, partial_k) > self.best * self.keep_ratio {
             let from = self.points[place];
             let mut next: Vec<(f64, usize, C::State)> = (0..self.points.len())
                 .filter(|next| !self.used[*next] && self.chain.admissible(from, self.points[*next]))
@@ -107,44 +107,47 @@ impl<C: Chain> Walk<'_, C> {
                 .collect();
             next.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (gradient_k, next, state) in next {
-                let so_far = match self.figure {
-                    Figure::Sum => so_far + gradient_k,
-                    Figure::Worst => so_far.min(gradient_k),
+                let partial_k = match self.figure {
+                    Figure::Sum => partial_k + gradient_k,
+                    Figure::Minimum => partial_k.min(gradient_k),
                 };
-                self.enter(next, state, so_far);
+                self.extend(next, state, partial_k);
             }
         }
         self.used[place] = false;
         self.path.pop();
     }
 
-    /// The figure of a whole order, from that of its steps and what the last of them leaves.
-    fn with_way_back(&self, order: &[usize], state: C::State, so_far: f64) -> f64 {
-        let Some((last, first)) = way_back(self.chain, order) else { return so_far };
+    /// Adds the return jump to the figure of a complete order; `state` is the state after its last step.
+    fn add_return_jump(&self, order: &[usize], state: C::State, partial_k: f64) -> f64 {
+        let Some((last, first)) = return_jump(self.chain, order) else { return partial_k };
         let gradient_k = self.chain.step(last, first, state).0.abs();
         match self.figure {
             _ if gradient_k > self.chain.gradient_max_k() || !self.chain.admissible(last, first) => {
                 f64::NEG_INFINITY
             }
-            Figure::Sum => so_far + gradient_k,
-            Figure::Worst => so_far.min(gradient_k),
+            Figure::Sum => partial_k + gradient_k,
+            Figure::Minimum => partial_k.min(gradient_k),
         }
     }
 
-    /// What this partial order can come to at most.
-    fn possible(&self, last: usize, so_far: f64) -> f64 {
+    /// Upper bound on the figure of any completion of this partial order.
+    fn bound_remaining(&self, last: usize, partial_k: f64) -> f64 {
         let remaining = || (0..self.points.len()).filter(|place| !self.used[*place]);
         let into = |to: usize| {
-            let inner = remaining().filter(|from| *from != to).map(|from| self.optimistic.weight_k(from, to));
-            inner.fold(self.optimistic.weight_k(last, to), f64::max)
+            let inner =
+                remaining().filter(|from| *from != to).map(|from| self.gradient_bounds.weight_k(from, to));
+            inner.fold(self.gradient_bounds.weight_k(last, to), f64::max)
         };
-        // The first point too has yet to be reached, where the order goes back to it.
-        let first = self.path.first().copied().filter(|_| self.chain.returns());
+        // If the order returns to its first point, that point has yet to be reached too.
+        let first = self.path.first().copied().filter(|_| self.chain.has_return());
         let reached = || remaining().chain(first);
         match self.figure {
-            // The tighter of two bounds: how each point can be reached from the remaining points, or from any point.
-            Figure::Sum => so_far + reached().map(|to| into(to).min(self.best_into[to])).sum::<f64>(),
-            Figure::Worst => reached().map(into).fold(so_far, f64::min),
+            // The smaller of two bounds for each point: reached from the remaining points, or from any point.
+            Figure::Sum => {
+                partial_k + reached().map(|to| into(to).min(self.max_gradient_into_k[to])).sum::<f64>()
+            }
+            Figure::Minimum => reached().map(into).fold(partial_k, f64::min),
         }
     }
 }
@@ -160,7 +163,7 @@ mod tests {
     struct Fixed {
         weights: Vec<f64>,
         n: usize,
-        returns: bool,
+        has_return: bool,
     }
 
     impl Chain for Fixed {
@@ -173,11 +176,11 @@ mod tests {
             (self.weights[from * self.n + to], ())
         }
         fn settled(&self, _: usize) {}
-        fn alike(&self, (): (), (): ()) -> bool {
+        fn is_indistinguishable(&self, (): (), (): ()) -> bool {
             true
         }
-        fn returns(&self) -> bool {
-            self.returns
+        fn has_return(&self) -> bool {
+            self.has_return
         }
     }
 
@@ -200,14 +203,14 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
         fn brute_force_agrees(weights in prop::collection::vec(0.0..30.0f64, 49), n in 2usize..=7) {
-            let mut chain = Fixed { weights: weights[..n * n].to_vec(), n, returns: false };
+            let mut chain = Fixed { weights: weights[..n * n].to_vec(), n, has_return: false };
             let best = best_of_all(&chain, &mut Vec::new());
-            // So small that the search has no excuse.
+                        // The problem is so small that the search must find the optimum.
             let given: Vec<usize> = (0..n).collect();
             let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
             prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);
-            // The same with the way back to the first point.
-            chain.returns = true;
+                        // The same with the return to the first point.
+            chain.has_return = true;
             let best = best_of_all(&chain, &mut Vec::new());
             let found = search(&chain, &given, Objective::Sum, Effort { moves: 20_000, starts: 2 }, 7).swap_remove(0);
             prop_assert!((Objective::Sum.figure(&chain, &found) - best).abs() < 1e-9);

@@ -1,33 +1,33 @@
-//! The order of a set of points.
+//! Orders a set of points as the request demands.
 
 use crate::ordering::exact::{Figure, branch_and_bound};
 use crate::ordering::objective::Objective;
-use crate::ordering::search::{Effort, search, search_worst};
+use crate::ordering::search::{Effort, search, search_min_gradient};
 use crate::request::PlanRequest;
 use crate::thermal_memory::housing::Housing;
-use crate::upper_bound::bound::Optimistic;
+use crate::upper_bound::bound::GradientBounds;
 use mapper_core::{OperatingPoint, VisitOrder};
 
-/// Repeats are put where no gradient falls below this, K, if that can be.
+/// Repeats are inserted so that gradients stay above this, K, if possible.
 const REPEATS_KEEP_K: f64 = 30.0;
-/// An order is called the best when none is better by more than this.
+/// An order is proven to be the best if no other is better by more than this.
 pub(crate) const PROOF_TOLERANCE_RATIO: f64 = 1e-3;
-/// Up to this many points a proof is tried: within [`PROOF_NODES`] it hardly ever ends for more.
+/// Up to this many points a proof is attempted: for more it rarely ends within [`PROOF_NODES`].
 const MAX_PROVEN_POINTS: usize = 14;
-/// Partial orders that a proof may look at: a fraction of a second.
+/// Maximum number of partial orders of a proof: a fraction of a second.
 const PROOF_NODES: u64 = 300_000;
 
-/// An order with what is known of it.
+/// An order of points.
 #[derive(Debug, Clone)]
-pub(crate) struct Ordered {
+pub(crate) struct PointOrder {
     pub(crate) order: Vec<usize>,
-    /// Whether it is the best within [`PROOF_TOLERANCE_RATIO`] on the reduced housing.
+    /// Whether it is proven to be the best within [`PROOF_TOLERANCE_RATIO`] on the reduced housing.
     pub(crate) proven: bool,
 }
 
-impl Ordered {
+impl PointOrder {
     fn unproven(order: Vec<usize>) -> Self {
-        Ordered { order, proven: false }
+        PointOrder { order, proven: false }
     }
 }
 
@@ -37,41 +37,44 @@ pub(crate) fn by_speed_line(a: &OperatingPoint, b: &OperatingPoint) -> std::cmp:
     a.speed_rpm.total_cmp(&b.speed_rpm).then(by_opening)
 }
 
-/// What the search makes large for this order.
+/// The objective of the search for this kind of order.
 pub(crate) fn objective(order: VisitOrder) -> Objective {
     match order {
-        VisitOrder::MinGradient => Objective::Worst { target_k: REPEATS_KEEP_K },
+        VisitOrder::MinGradient => Objective::Minimum { target_k: REPEATS_KEEP_K },
         _ => Objective::Sum,
     }
 }
 
-/// Orders of the `given` points of the housing, the best first; more than one where their repeats decide.
-pub(crate) fn orders_on(
+/// Searches orders of the `given` points, the best first. Several are returned because repeats may change their ranking.
+pub(crate) fn search_orders(
     housing: &Housing,
     points: &[OperatingPoint],
     given: &[usize],
     request: &PlanRequest<'_>,
-) -> Vec<Ordered> {
+) -> Vec<PointOrder> {
     let effort = Effort::usual(given.len(), request.effort);
     let (orders, figure) = match request.order {
-        VisitOrder::Listed => return vec![Ordered::unproven(given.to_vec())],
+        VisitOrder::Listed => return vec![PointOrder::unproven(given.to_vec())],
         VisitOrder::SpeedLines | VisitOrder::Conventional => {
             let mut order = given.to_vec();
             order.sort_by(|a, b| by_speed_line(&points[*a], &points[*b]));
-            return vec![Ordered::unproven(order)];
+            return vec![PointOrder::unproven(order)];
         }
         VisitOrder::ThermalGradient => {
             (search(housing, given, Objective::Sum, effort, request.seed), Figure::Sum)
         }
-        VisitOrder::MinGradient => (vec![search_worst(housing, given, effort, request.seed)], Figure::Worst),
+        VisitOrder::MinGradient => {
+            (vec![search_min_gradient(housing, given, effort, request.seed)], Figure::Minimum)
+        }
     };
     let best = orders.first().filter(|order| request.bound && order.len() <= MAX_PROVEN_POINTS);
-    let optimistic = best.and_then(|order| Some((order, Optimistic::of(housing, order)?)));
-    if let Some((order, optimistic)) = optimistic {
-        let proof = branch_and_bound(housing, order, &optimistic, figure, PROOF_TOLERANCE_RATIO, PROOF_NODES);
+    let gradient_bounds = best.and_then(|order| Some((order, GradientBounds::new(housing, order)?)));
+    if let Some((order, gradient_bounds)) = gradient_bounds {
+        let proof =
+            branch_and_bound(housing, order, &gradient_bounds, figure, PROOF_TOLERANCE_RATIO, PROOF_NODES);
         if proof.proven {
-            return vec![Ordered { order: proof.order, proven: true }];
+            return vec![PointOrder { order: proof.order, proven: true }];
         }
     }
-    orders.into_iter().map(Ordered::unproven).collect()
+    orders.into_iter().map(PointOrder::unproven).collect()
 }

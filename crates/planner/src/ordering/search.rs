@@ -1,9 +1,8 @@
-//! Search for a good order under thermal memory: annealing with restarts, seeded, bounded by its number of moves.
+//! Searches a good order under thermal memory: simulated annealing with restarts, seeded, with a limited number of moves.
 //!
-//! A move swaps two points, reverses a short stretch, or puts a stretch elsewhere, near or far. Half of the moves are
-//! random; the others make a jump that the assignment of successors (`candidates`) thinks well of. A move is judged by
-//! going through the steps it touches and on until the housing no longer remembers: a few steps, however long the order
-//! is.
+//! A move swaps two points, reverses a short piece, or moves a piece elsewhere. Half of the moves are random; the others create a jump
+//! that the assignment of successors (`candidates`) favours. The effect of a move is computed from the first changed step until the
+//! housing has forgotten the change: a few steps, whatever the length of the order.
 
 use crate::ordering::candidates::Candidates;
 use crate::ordering::objective::Objective;
@@ -13,20 +12,20 @@ use mapper_numerics::statistics::nearest_rank;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Longest stretch that is reversed or shifted over: longer ones cost as much as they rarely gain.
-const LONGEST_STRETCH: usize = 50;
+/// Maximum length of a reversed piece, and of the distance of a short move: longer ones cost more and rarely improve the order.
+const MAX_PIECE_LENGTH: usize = 50;
 
-/// Above this many points there is time for one start.
+/// Above this many points a search makes a single start.
 const MANY_POINTS: usize = 500;
-/// Seeds of campaigns are small whole numbers: their starts lie apart by this.
-const SEEDS_APART: u64 = 1_000_003;
-/// Targets that a search for the largest smallest gradient sets itself.
-const TARGETS: u64 = 10;
-/// How much the second target lies above what the first has given, over the mean gradient of a greedy order; a target that
-/// is not met halves the next rise.
+/// Distance of the random seeds of two campaigns, whose own seeds are small integers: their starts must not share seeds.
+const SEED_STRIDE: u64 = 1_000_003;
+/// Number of targets in the search for the largest minimum gradient.
+const TARGET_ROUNDS: u64 = 10;
+/// Rise of the second target above the result of the first, relative to the mean gradient of a greedy order. A missed target halves the
+/// next rise.
 const FIRST_RISE_RATIO: f64 = 0.1;
 
-/// How much work a search does.
+/// Amount of work of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Moves tried in each start.
@@ -36,12 +35,12 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// A fraction of a second for 50 points, some seconds for 2000; `factor` scales the moves. Ten times as many find sums that are
-    /// larger by less than 0.3 % (docs/explanation/planner.md).
+    /// A fraction of a second for 50 points, some seconds for 2000. `factor` scales the moves: ten times as many increase the sum by
+    /// less than 0.3 % (docs/explanation/planner.md).
     pub fn usual(points: usize, factor: f64) -> Self {
         let (moves, starts) = match points {
             0..=40 => (10_000.0, 16),
-            // What repeats cost is seen when they are put into the orders that were found: the more of them the better.
+            // Repeats change the ranking of the orders, so several of them are useful.
             41..=100 => (1_000.0 * points as f64, 8),
             101..=MANY_POINTS => (1_000.0 * points as f64, 2),
             _ => (1_000.0 * points as f64, 1),
@@ -50,9 +49,7 @@ impl Effort {
     }
 }
 
-/// The best order found from each start, the best of them first.
-///
-/// The first of `given` is a start too; no order found is worse than it.
+/// Returns the best order of each start, the best of them first. None is worse than `given`.
 pub fn search<C: Chain + Sync>(
     chain: &C,
     given: &[usize],
@@ -60,7 +57,7 @@ pub fn search<C: Chain + Sync>(
     effort: Effort,
     seed: u64,
 ) -> Vec<Vec<usize>> {
-    search_among(chain, &Candidates::of(chain, given, objective), given, objective, effort, seed)
+    search_among(chain, &Candidates::new(chain, given, objective), given, objective, effort, seed)
 }
 
 fn search_among<C: Chain + Sync>(
@@ -74,10 +71,10 @@ fn search_among<C: Chain + Sync>(
     if given.len() < 2 {
         return vec![given.to_vec()];
     }
-    let greedy = greedy(chain, given, objective);
+    let greedy = build_greedy_order(chain, given, objective);
     let starts: Vec<u64> = (0..effort.starts.max(1)).collect();
     let one = |start: &u64| {
-        let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(SEEDS_APART).wrapping_add(*start));
+        let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(SEED_STRIDE).wrapping_add(*start));
         let mut best = given.to_vec();
         let mut best_figure = objective.figure(chain, &best);
         Annealing::new(chain, candidates, &greedy, objective).run(
@@ -93,22 +90,27 @@ fn search_among<C: Chain + Sync>(
     found.into_iter().map(|(_, order)| order).collect()
 }
 
-/// The order with the largest smallest gradient found from `given`: targets that rise as they are met.
-pub fn search_worst<C: Chain + Sync>(chain: &C, given: &[usize], effort: Effort, seed: u64) -> Vec<usize> {
-    let worst_k = |order: &[usize]| Objective::Worst { target_k: 0.0 }.figure(chain, order);
-    let mut order = greedy(chain, given, Objective::Sum);
+/// Searches the order with the largest minimum gradient. The target rises while it is met.
+pub fn search_min_gradient<C: Chain + Sync>(
+    chain: &C,
+    given: &[usize],
+    effort: Effort,
+    seed: u64,
+) -> Vec<usize> {
+    let min_k = |order: &[usize]| Objective::Minimum { target_k: 0.0 }.figure(chain, order);
+    let mut order = build_greedy_order(chain, given, Objective::Sum);
     let mean_k = gradients_k(chain, &order).iter().sum::<f64>() / (given.len() as f64 - 1.0).max(1.0);
     let mean_k = mean_k.min(chain.gradient_max_k());
-    let candidates = Candidates::of(chain, given, Objective::Worst { target_k: mean_k });
-    let (mut best_k, mut rise_k) = (worst_k(&order), mean_k);
+    let candidates = Candidates::new(chain, given, Objective::Minimum { target_k: mean_k });
+    let (mut best_k, mut rise_k) = (min_k(&order), mean_k);
     // Many points need more moves to agree on the smallest gradient than on their sum.
     let times = if given.len() > MANY_POINTS { 2 } else { 1 } * effort.starts.max(1);
-    let each = Effort { moves: effort.moves.saturating_mul(times) / TARGETS, starts: 1 };
-    for round in 0..TARGETS {
-        let objective = Objective::Worst { target_k: best_k.max(0.0) + rise_k };
+    let each = Effort { moves: effort.moves.saturating_mul(times) / TARGET_ROUNDS, starts: 1 };
+    for round in 0..TARGET_ROUNDS {
+        let objective = Objective::Minimum { target_k: best_k.max(0.0) + rise_k };
         let found = search_among(chain, &candidates, &order, objective, each, seed.wrapping_add(round))
             .swap_remove(0);
-        let found_k = worst_k(&found);
+        let found_k = min_k(&found);
         let risen_k = found_k - best_k;
         if risen_k > 0.0 {
             (order, best_k) = (found, found_k);
@@ -122,8 +124,8 @@ pub fn search_worst<C: Chain + Sync>(chain: &C, given: &[usize], effort: Effort,
     order
 }
 
-/// At each position the point whose step has the highest value.
-pub(crate) fn greedy<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Vec<usize> {
+/// Builds an order that continues at each position with the point of highest value.
+pub(crate) fn build_greedy_order<C: Chain>(chain: &C, given: &[usize], objective: Objective) -> Vec<usize> {
     let mut remaining = given.to_vec();
     let mut order = Vec::with_capacity(given.len());
     let mut state = None;
@@ -142,7 +144,7 @@ pub(crate) fn greedy<C: Chain>(chain: &C, given: &[usize], objective: Objective)
             }
             _ => 0,
         };
-        // Keeps the listed order of the rest: ties go to the first listed.
+        // `remove` keeps the listed order of the remaining points, so the first listed wins a tie.
         let to = remaining.remove(next);
         state = Some(match (state, order.last()) {
             (Some(state), Some(&from)) => chain.step(from, to, state).1,
@@ -161,29 +163,29 @@ struct Piece {
     reversed: bool,
 }
 
-fn forward(start: usize, end: usize) -> Piece {
+fn forward_piece(start: usize, end: usize) -> Piece {
     Piece { start, end, reversed: false }
 }
 
 /// State before a step, and the step's value.
-type Known<S> = (Option<S>, f64);
+type StepState<S> = (Option<S>, f64);
 
 struct Annealing<'a, C: Chain> {
     chain: &'a C,
     candidates: &'a Candidates,
     objective: Objective,
     order: Vec<usize>,
-    /// Position of each point of the chain; of no meaning for points that are not in the order.
-    place: Vec<usize>,
-    /// What is known of each position's step; no state at 0, and behind the last position what its step leaves and the
-    /// value of the way back to the first point.
-    known: Vec<Known<C::State>>,
-    /// The order that is proposed from the first piece's place on; what follows the pieces stays as it is.
+    /// Position of each point of the chain in the order; undefined for other points.
+    position_of: Vec<usize>,
+    /// State before each position's step and its value. Position 0 has no state; the entry behind the last position holds the final
+    /// state and the value of the return jump.
+    step_states: Vec<StepState<C::State>>,
+    /// The proposed order from position `begin` on; the points behind the pieces keep their order.
     pieces: Vec<Piece>,
     begin: usize,
-    /// New positions whose step changes.
-    log: Vec<(usize, Known<C::State>)>,
-    scratch: Vec<(usize, Known<C::State>)>,
+    /// Changed steps of the proposal, by new position.
+    log: Vec<(usize, StepState<C::State>)>,
+    scratch: Vec<(usize, StepState<C::State>)>,
 }
 
 impl<'a, C: Chain> Annealing<'a, C> {
@@ -193,45 +195,46 @@ impl<'a, C: Chain> Annealing<'a, C> {
             candidates,
             objective,
             order: order.to_vec(),
-            place: vec![0; chain.len()],
-            known: vec![(None, 0.0); order.len() + 1],
+            position_of: vec![0; chain.len()],
+            step_states: vec![(None, 0.0); order.len() + 1],
             pieces: Vec::new(),
             begin: 0,
             log: Vec::new(),
             scratch: Vec::new(),
         };
         for (position, point) in order.iter().enumerate() {
-            annealing.place[*point] = position;
+            annealing.position_of[*point] = position;
         }
         annealing.refresh();
         annealing
     }
 
-    /// Works out all states and values again.
+    /// Recomputes all states and values.
     fn refresh(&mut self) {
         let mut state = None;
         for k in 0..self.order.len() {
-            let (value, next) = self.at(k.checked_sub(1).map(|p| self.order[p]), self.order[k], state);
-            self.known[k] = (state, value);
+            let (value, next) =
+                self.evaluate_step(k.checked_sub(1).map(|p| self.order[p]), self.order[k], state);
+            self.step_states[k] = (state, value);
             state = Some(next);
         }
         let ends = self.order.first().copied().zip(self.order.last().copied());
-        self.known[self.order.len()] = (state, self.way_back(ends, state));
+        self.step_states[self.order.len()] = (state, self.return_jump(ends, state));
     }
 
     /// Value of the jump from the last point back to the first, if there is one.
     #[inline]
-    fn way_back(&self, ends: Option<(usize, usize)>, state: Option<C::State>) -> f64 {
+    fn return_jump(&self, ends: Option<(usize, usize)>, state: Option<C::State>) -> f64 {
         match (ends, state) {
-            (Some((first, last)), Some(state)) if self.chain.returns() && first != last => {
-                self.at(Some(last), first, Some(state)).0
+            (Some((first, last)), Some(state)) if self.chain.has_return() && first != last => {
+                self.evaluate_step(Some(last), first, Some(state)).0
             }
             _ => 0.0,
         }
     }
 
     #[inline]
-    fn at(&self, from: Option<usize>, to: usize, state: Option<C::State>) -> (f64, C::State) {
+    fn evaluate_step(&self, from: Option<usize>, to: usize, state: Option<C::State>) -> (f64, C::State) {
         match (from, state) {
             (Some(from), Some(state)) => {
                 let (gradient_k, next) = self.chain.step(from, to, state);
@@ -241,37 +244,37 @@ impl<'a, C: Chain> Annealing<'a, C> {
         }
     }
 
-    /// What the proposed pieces would gain; leaves the new states and values in the log.
-    fn gain(&mut self) -> f64 {
+    /// Returns the gain of the proposed pieces, and stores the new states and values in the log.
+    fn evaluate_proposal(&mut self) -> f64 {
         self.log.clear();
         let n = self.order.len();
         if self.pieces.is_empty() {
             return 0.0;
         }
         let mut gain = 0.0;
-        let mut state = self.known[self.begin].0;
+        let mut state = self.step_states[self.begin].0;
         let mut from = self.begin.checked_sub(1).map(|p| self.order[p]);
         let mut position = self.begin;
         let rest = self.pieces.iter().map(|piece| piece.end).max().unwrap_or(n);
         for which in 0..=self.pieces.len() {
-            let piece = self.pieces.get(which).copied().unwrap_or_else(|| forward(rest, n));
+            let piece = self.pieces.get(which).copied().unwrap_or_else(|| forward_piece(rest, n));
             let mut done = 0;
             while done < piece.end - piece.start {
                 let k = if piece.reversed { piece.end - 1 - done } else { piece.start + done };
-                let (old_state, old_value) = self.known[k];
+                let (old_state, old_value) = self.step_states[k];
                 if !piece.reversed
                     && let (Some(new), Some(old), Some(p)) = (state, old_state, k.checked_sub(1))
                     && from == Some(self.order[p])
-                    && self.chain.alike(new, old)
+                    && self.chain.is_indistinguishable(new, old)
                 {
-                    // The housing has forgotten: the rest of the piece goes as before.
+                    // The housing has forgotten the change: the rest of the piece is unchanged.
                     position += piece.end - k;
-                    state = self.known[piece.end].0;
+                    state = self.step_states[piece.end].0;
                     from = Some(self.order[piece.end - 1]);
                     break;
                 }
                 let to = self.order[k];
-                let (value, next) = self.at(from, to, state);
+                let (value, next) = self.evaluate_step(from, to, state);
                 gain += value - old_value;
                 self.log.push((position, (state, value)));
                 (state, from) = (Some(next), Some(to));
@@ -289,14 +292,14 @@ impl<'a, C: Chain> Annealing<'a, C> {
             }
             _ => self.order[0],
         };
-        let back = self.way_back(from.map(|last| (first, last)), state);
-        gain += back - self.known[n].1;
+        let back = self.return_jump(from.map(|last| (first, last)), state);
+        gain += back - self.step_states[n].1;
         self.log.push((n, (state, back)));
         gain
     }
 
     fn accept(&mut self) {
-        // What stays in its place is not moved; the far ends of a swap lie far apart.
+        // Copy only the points whose position changes: the ends of a swap may be far apart.
         self.scratch.clear();
         let mut position = self.begin;
         for piece in &self.pieces {
@@ -304,7 +307,7 @@ impl<'a, C: Chain> Annealing<'a, C> {
             if piece.reversed || piece.start != position {
                 for done in 0..length {
                     let k = if piece.reversed { piece.end - 1 - done } else { piece.start + done };
-                    self.scratch.push((self.order[k], self.known[k]));
+                    self.scratch.push((self.order[k], self.step_states[k]));
                 }
             }
             position += length;
@@ -315,111 +318,112 @@ impl<'a, C: Chain> Annealing<'a, C> {
             if piece.reversed || piece.start != position {
                 for k in position..position + length {
                     let (point, known) = self.scratch[next];
-                    (self.order[k], self.known[k], self.place[point]) = (point, known, k);
+                    (self.order[k], self.step_states[k], self.position_of[point]) = (point, known, k);
                     next += 1;
                 }
             }
             position += length;
         }
         for &(k, known) in &self.log {
-            self.known[k] = known;
+            self.step_states[k] = known;
         }
     }
 
-    fn set(&mut self, begin: usize, pieces: &[Piece]) {
+    fn set_proposal(&mut self, begin: usize, pieces: &[Piece]) {
         self.begin = begin;
         self.pieces.clear();
         self.pieces.extend(pieces.iter().filter(|piece| piece.start < piece.end));
     }
 
-    fn swap(&mut self, a: usize, b: usize) {
+    fn propose_swap(&mut self, a: usize, b: usize) {
         let (low, high) = (a.min(b), a.max(b));
         if low < high {
-            let ends = [forward(high, high + 1), forward(low + 1, high), forward(low, low + 1)];
-            self.set(low, &ends);
+            let ends =
+                [forward_piece(high, high + 1), forward_piece(low + 1, high), forward_piece(low, low + 1)];
+            self.set_proposal(low, &ends);
         }
     }
 
-    /// Puts the stretch `start..end` before position `to`, which lies outside of it.
-    fn shift(&mut self, start: usize, end: usize, to: usize, reversed: bool) {
-        let stretch = Piece { start, end, reversed };
+    /// Moves the piece `start..end` to position `to`, which lies outside of it.
+    fn propose_shift(&mut self, start: usize, end: usize, to: usize, reversed: bool) {
+        let piece = Piece { start, end, reversed };
         if to < start {
-            self.set(to, &[stretch, forward(to, start)]);
+            self.set_proposal(to, &[piece, forward_piece(to, start)]);
         } else if to > end {
-            self.set(start, &[forward(end, to), stretch]);
+            self.set_proposal(start, &[forward_piece(end, to), piece]);
         } else if reversed {
-            self.set(start, &[stretch]);
+            self.set_proposal(start, &[piece]);
         }
     }
 
-    /// Prepares a move; nothing where what was drawn changes nothing.
+    /// Draws a move. The proposal stays empty if the move would change nothing.
     fn propose(&mut self, random: &mut Pcg64Mcg) {
         self.pieces.clear();
         let n = self.order.len();
         let i = random.random_range(0..n);
         let kind: u32 = random.random_range(0..20);
-        if kind < 10 && self.guided(i, kind, random) {
+        if kind < 10 && self.propose_guided(i, kind, random) {
             return;
         }
         match kind % 10 {
             0..4 => {
                 let j = random.random_range(0..n);
-                self.swap(i, j);
+                self.propose_swap(i, j);
             }
             4..6 => {
-                let end = (i + 2 + random.random_range(0..LONGEST_STRETCH)).min(n);
-                self.set(i, &[Piece { start: i, end, reversed: true }]);
+                let end = (i + 2 + random.random_range(0..MAX_PIECE_LENGTH)).min(n);
+                self.set_proposal(i, &[Piece { start: i, end, reversed: true }]);
             }
             _ => {
                 let end = (i + random.random_range(1..=3usize)).min(n);
-                let reach = LONGEST_STRETCH.min(n);
+                let reach = MAX_PIECE_LENGTH.min(n);
                 let to = if random.random::<bool>() {
                     random.random_range(0..=n)
                 } else {
                     (i + random.random_range(0..=2 * reach)).saturating_sub(reach).min(n)
                 };
                 if !(i..=end).contains(&to) {
-                    self.shift(i, end, to, kind.is_multiple_of(4));
+                    self.propose_shift(i, end, to, kind.is_multiple_of(4));
                 }
             }
         }
     }
 
-    /// A move after which the point at `i` is followed by one of its candidates.
-    fn guided(&mut self, i: usize, kind: u32, random: &mut Pcg64Mcg) -> bool {
+    /// Proposes a move after which a candidate follows the point at `i`. Returns whether there is one.
+    fn propose_guided(&mut self, i: usize, kind: u32, random: &mut Pcg64Mcg) -> bool {
         let n = self.order.len();
         let Some(to) = self.candidates.draw(self.order[i], random) else { return false };
-        let q = self.place[to];
+        let q = self.position_of[to];
         if q == i + 1 || q == i {
             return false;
         }
-        // Mostly a few points, at times a long stretch: three cuts, no step reversed.
+        // Usually a few points, sometimes a long piece, never reversed.
         let length = match random.random_range(0..4u32) {
             0 => random.random_range(1..=n),
             _ => random.random_range(1..=3usize),
         };
         match kind % 3 {
-            0 if i + 1 < n => self.swap(i + 1, q),
-            // The stretch that begins with the candidate comes behind.
+            0 if i + 1 < n => self.propose_swap(i + 1, q),
+            // Move the piece that begins with the candidate behind this point.
             1 => {
                 let end = (q + length).min(if q < i { i } else { n });
-                self.shift(q, end, i + 1, false);
+                self.propose_shift(q, end, i + 1, false);
             }
-            // The stretch that ends with this point goes before the candidate.
+            // Move the piece that ends with this point before the candidate.
             _ => {
                 let start = (i + 1).saturating_sub(length).max(if q < i { q + 1 } else { 0 });
-                self.shift(start, i + 1, q, false);
+                self.propose_shift(start, i + 1, q, false);
             }
         }
         !self.pieces.is_empty()
     }
 
     fn run(&mut self, moves: u64, random: &mut Pcg64Mcg, best: &mut Vec<usize>, best_figure: &mut f64) {
-        // Typical change of value, from moves that are not made.
+        // Typical change of value, from trial moves.
         let sizes: Vec<f64> = (0..200)
             .map(|_| {
                 self.propose(random);
-                self.gain().abs()
+                self.evaluate_proposal().abs()
             })
             .filter(|size| *size > 0.0 && *size < 1e5)
             .collect();
@@ -431,12 +435,12 @@ impl<'a, C: Chain> Annealing<'a, C> {
             let temperature = hottest * (coldest / hottest).powf(share);
             for _ in 0..moves / STAGES {
                 self.propose(random);
-                let gain = self.gain();
+                let gain = self.evaluate_proposal();
                 if gain >= 0.0 || gain > temperature * random.random::<f64>().ln() {
                     self.accept();
                 }
             }
-            // Small differences that "alike" let pass do not add up beyond a stage.
+            // Recompute, so that differences neglected as indistinguishable do not accumulate.
             self.refresh();
             let figure = self.objective.figure(self.chain, &self.order);
             if figure > *best_figure {

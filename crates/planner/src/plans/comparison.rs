@@ -1,17 +1,18 @@
-//! The same points by the other orders, and by conventional mapping.
+//! Plans of the same points in the other orders, for comparison.
 
 use crate::plans::plan::make_plan;
 use crate::request::{PlanError, PlanRequest};
 use mapper_core::{Dwell, Plan, Timing, VisitOrder};
 use mapper_numerics::parallel;
 
-/// Plans of the same points by every order but that of `plan`, with its dwell; conventional mapping without repeats, at each point
-/// until T2 and the housing drift by less than [`STABLE_DRIFT_K_MIN`](crate::STABLE_DRIFT_K_MIN). Orders that a limit forbids are
-/// left out.
+/// Plans the points of `plan` in every other order, with the same dwell. Orders that a limit forbids are omitted.
+///
+/// Conventional mapping has no repeats and waits at each point until T2 and the housing drift by less than
+/// [`STABLE_DRIFT_K_MIN`](crate::STABLE_DRIFT_K_MIN).
 ///
 /// # Errors
 /// [`PlanError`] if a simulation fails.
-pub fn other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<Plan>, PlanError> {
+pub fn plan_other_orders(request: &PlanRequest<'_>, plan: &Plan) -> Result<Vec<Plan>, PlanError> {
     let others: Vec<VisitOrder> =
         VisitOrder::ALL.into_iter().filter(|order| order.name() != plan.objective).collect();
     let dwell_s = plan.steps.first().map_or(0.0, |step| step.dwell_s);

@@ -1,4 +1,4 @@
-//! Hashes of what a plan was made from.
+//! Hashes of the inputs of a plan, so that a run can tell whether campaign or model have changed since.
 
 use crate::request::PlanRequest;
 use mapper_core::PlanInputHashes;
@@ -14,8 +14,8 @@ pub fn sha256_hex(text: &str) -> String {
     })
 }
 
-/// What `request` is made of.
-pub fn made_from(request: &PlanRequest<'_>) -> PlanInputHashes {
+/// Hashes the campaign and the nominal machine of `request`.
+pub fn hash_inputs(request: &PlanRequest<'_>) -> PlanInputHashes {
     // Debug prints every parameter with all its digits.
     let model = format!("{:?} {}", request.model.params, request.model.map.fingerprint());
     PlanInputHashes {

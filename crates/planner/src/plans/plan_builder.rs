@@ -1,31 +1,30 @@
-//! The points that a plan visits, repeats and appended jump included, made into a plan.
+//! Builds a plan for a given dwell: order, repeats, appended jump, figures, bound and remarks.
 
 use crate::jumps::visits::{
-    RepeatedJump, Visit, append, plain, put_return, repeat_count, value, with_repeats,
+    Visit, append_jump, append_return, insert_repeats, repeat_count, value, visits_of_points,
 };
-use crate::jumps::walk::{Forbidden, Walk, walk};
-use crate::ordering::order::{Ordered, PROOF_TOLERANCE_RATIO, objective, orders_on};
-use crate::plans::fingerprint::made_from;
-use crate::plans::plan_figures::{figures, rms_error_eta};
+use crate::jumps::walk::{ForbiddenJump, Walk, walk};
+use crate::ordering::order::{PROOF_TOLERANCE_RATIO, PointOrder, objective, search_orders};
+use crate::plans::fingerprint::hash_inputs;
+use crate::plans::plan_figures::{compute_figures, rms_error_eta};
 use crate::request::{PlanError, PlanRequest};
-use crate::targets::reachable;
-use crate::thermal_memory::chain::gradients_k;
-use crate::thermal_memory::forecast::Resting;
+use crate::targets::solve_steady_states;
+use crate::thermal_memory::chain::{RepeatedJump, gradients_k};
+use crate::thermal_memory::forecast::ParameterError;
 use crate::thermal_memory::housing::Housing;
-use crate::upper_bound::bound::Optimistic;
-use crate::upper_bound::relaxation::Repeated;
+use crate::upper_bound::bound::GradientBounds;
 use mapper_core::{
     Dwell, Jump, NoBound, OperatingPoint, Plan, PlanBound, PlanRemark, PlanStep, Repeats, StepKind,
     VisitOrder,
 };
 use mapper_physics::simulation::steady::SteadyState;
 
-/// How often jumps that turn out not to be allowed are taken out and the rest is ordered again.
-const ROUNDS: usize = 25;
-/// Effort of ordering again, over the first: with one jump taken out, the best order is not far.
-const AGAIN_RATIO: f64 = 0.2;
+/// Maximum number of searches: each forbids the jumps that the full simulation rejected in the order before.
+const MAX_REORDERINGS: usize = 25;
+/// Effort of a repeated search relative to the first: with one jump forbidden, the best order changes little.
+const REORDER_EFFORT_RATIO: f64 = 0.2;
 
-/// The most steps that a plan can have: each repeat and the appended jump take two at most.
+/// Maximum number of steps of a plan: each repeat and the appended jump take at most two.
 pub fn max_steps(request: &PlanRequest<'_>) -> usize {
     let points = request.points.len();
     let repeats = request.repeats.map_or(0, |repeats| 2 * repeat_count(repeats, points));
@@ -33,25 +32,25 @@ pub fn max_steps(request: &PlanRequest<'_>) -> usize {
     points + repeats + appended + usize::from(request.return_to_first && points > 1)
 }
 
-/// Makes plans of the same points for any dwell.
+/// Builds plans of the same points for any dwell.
 pub(crate) struct PlanBuilder<'a> {
     request: &'a PlanRequest<'a>,
-    /// The request's points, then those that only repeats and the appended jump visit.
+    /// The request's points, then those that are visited only by repeats and the appended jump.
     points: Vec<OperatingPoint>,
     targets: Vec<SteadyState>,
     repeated: Option<RepeatedJump>,
     appended: Option<(usize, usize)>,
 }
 
-/// An order with its simulated steps.
+/// An order of the points with its simulated steps.
 pub(crate) struct Draft {
-    /// How long each step lasts, s; the shortest of them in conventional mapping.
+    /// Dwell of each step, s; in conventional mapping the minimum.
     pub(crate) dwell_s: f64,
-    ordered: Ordered,
+    ordered: PointOrder,
     visits: Vec<Visit>,
     steps: Vec<PlanStep>,
-    resting: Option<Resting>,
-    /// The reduced housing that the order was sought on, if it was made for this dwell.
+    parameter_error: Option<ParameterError>,
+    /// The reduced housing on which the order was searched; `None` if it was made for another dwell.
     housing: Option<Housing>,
 }
 
@@ -60,15 +59,15 @@ impl Draft {
         &self.steps
     }
 
-    /// Whether a method that identifies all steps together has made a forecast.
+    /// Whether a method that identifies all steps together has predicted errors.
     pub(crate) fn is_predicted(&self) -> bool {
-        self.resting.is_some()
+        self.parameter_error.is_some()
     }
 }
 
 impl<'a> PlanBuilder<'a> {
     /// `targets`: the steady states of the request's points.
-    pub(crate) fn of(
+    pub(crate) fn new(
         request: &'a PlanRequest<'a>,
         targets: &[SteadyState],
         repeats: Option<(Repeats, Jump)>,
@@ -90,55 +89,62 @@ impl<'a> PlanBuilder<'a> {
         if let Some(known) = self.points.iter().position(|other| *other == point) {
             return Ok(known);
         }
-        self.targets.extend(reachable(self.request, &[point])?);
+        self.targets.extend(solve_steady_states(self.request, &[point])?);
         self.points.push(point);
         Ok(self.points.len() - 1)
     }
 
-    /// The best order for steps of `dwell_s`.
+    /// Searches the best order for steps of `dwell_s`.
     pub(crate) fn draft(&self, dwell_s: f64) -> Result<Draft, PlanError> {
         let request = self.request;
-        let mut housing = Housing::of(request, &self.points, &self.targets, dwell_s)?;
-        housing.returns = request.return_to_first;
+        let mut housing = Housing::new(request, &self.points, &self.targets, dwell_s)?;
+        housing.has_return = request.return_to_first;
         let mut given: Vec<usize> = (0..request.points.len()).collect();
-        let mut barred: Vec<String> = Vec::new();
-        for round in 0..ROUNDS {
-            let effort = if round == 0 { request.effort } else { AGAIN_RATIO * request.effort };
+        let mut forbidden_jumps: Vec<String> = Vec::new();
+        for round in 0..MAX_REORDERINGS {
+            let effort = if round == 0 { request.effort } else { REORDER_EFFORT_RATIO * request.effort };
             let orders =
-                orders_on(&housing, &self.points, &given, &PlanRequest { effort, ..request.clone() });
+                search_orders(&housing, &self.points, &given, &PlanRequest { effort, ..request.clone() });
             let Some((ordered, visits, returned)) = self.best_of(&housing, orders) else { break };
-            let Walk { steps, forbidden, resting } =
+            let Walk { steps, forbidden, parameter_error } =
                 walk(request, &self.points, &self.targets, &visits, dwell_s)?;
             if forbidden.is_empty() {
-                // What was searched and proven is an order with its way back.
+                // The proof covers an order with its return: without the return it does not apply.
                 let proven = ordered.proven && (returned || !request.return_to_first || given.len() < 2);
-                let ordered = Ordered { proven, ..ordered };
-                return Ok(Draft { dwell_s, ordered, visits, steps, resting, housing: Some(housing) });
+                let ordered = PointOrder { proven, ..ordered };
+                return Ok(Draft {
+                    dwell_s,
+                    ordered,
+                    visits,
+                    steps,
+                    parameter_error,
+                    housing: Some(housing),
+                });
             }
-            let before = barred.len();
-            for Forbidden { from, to, reasons } in forbidden {
+            let before = forbidden_jumps.len();
+            for ForbiddenJump { from, to, reasons } in forbidden {
                 let text = format!("{} to {}: {reasons}", self.points[from], self.points[to]);
-                if !barred.contains(&text) {
-                    barred.push(text);
+                if !forbidden_jumps.contains(&text) {
+                    forbidden_jumps.push(text);
                 }
                 housing.forbid(from, to);
             }
             given = ordered.order;
-            if barred.len() == before || !request.order.is_searched() {
+            if forbidden_jumps.len() == before || !request.order.is_searched() {
                 break;
             }
         }
-        Err(PlanError::NoAdmissibleOrder(barred))
+        Err(PlanError::NoAdmissibleOrder(forbidden_jumps))
     }
 
     /// The order with the highest value including repeats, its visits, and whether they end with a return to the first point.
-    fn best_of(&self, housing: &Housing, orders: Vec<Ordered>) -> Option<(Ordered, Vec<Visit>, bool)> {
+    fn best_of(&self, housing: &Housing, orders: Vec<PointOrder>) -> Option<(PointOrder, Vec<Visit>, bool)> {
         let objective = objective(self.request.order);
         let with_visits = orders.into_iter().map(|ordered| {
             let (visits, returned) = self.visits(housing, &ordered.order);
             (value(housing, &visits, objective), (ordered, visits, returned))
         });
-        // Of equal ones the first.
+        // The first of equal ones.
         let better = |best: (f64, _), other: (f64, _)| if other.0 > best.0 { other } else { best };
         with_visits.reduce(better).map(|(_, best)| best)
     }
@@ -146,44 +152,44 @@ impl<'a> PlanBuilder<'a> {
     /// The visits of an order, and whether they end with a return to the first point.
     fn visits(&self, housing: &Housing, order: &[usize]) -> (Vec<Visit>, bool) {
         let mut visits = match self.repeated {
-            Some(jump) => with_repeats(housing, order, jump, objective(self.request.order)),
-            None => plain(order),
+            Some(jump) => insert_repeats(housing, order, jump, objective(self.request.order)),
+            None => visits_of_points(order),
         };
-        let returned = self.request.return_to_first && put_return(&mut visits);
+        let returned = self.request.return_to_first && append_return(&mut visits);
         if let Some((from, to)) = self.appended {
-            append(&mut visits, from, to);
+            append_jump(&mut visits, from, to);
         }
         (visits, returned)
     }
 
-    /// The same order with another dwell; another order if a limit forbids one of its jumps then.
+    /// Simulates the same order with another dwell. Searches a new order if a limit forbids one of its jumps at that dwell.
     pub(crate) fn with_dwell(&self, draft: Draft, dwell_s: f64) -> Result<Draft, PlanError> {
         if draft.dwell_s == dwell_s {
             return Ok(draft);
         }
-        let Walk { steps, forbidden, resting } =
+        let Walk { steps, forbidden, parameter_error } =
             walk(self.request, &self.points, &self.targets, &draft.visits, dwell_s)?;
         if !forbidden.is_empty() {
             return self.draft(dwell_s);
         }
-        // What was proven holds for the dwell that the order was sought for.
-        let ordered = Ordered { proven: false, ..draft.ordered };
-        Ok(Draft { dwell_s, ordered, steps, resting, housing: None, ..draft })
+        // The proof applies only to the dwell for which the order was searched.
+        let ordered = PointOrder { proven: false, ..draft.ordered };
+        Ok(Draft { dwell_s, ordered, steps, parameter_error, housing: None, ..draft })
     }
 
-    /// The plan with its figures, bound and remarks.
+    /// Completes the plan with its figures, bound and remarks.
     pub(crate) fn plan(&self, draft: Draft) -> Result<Plan, PlanError> {
         let request = self.request;
         let timing = request.timing;
         let steps_s = draft.steps.iter().map(|step| step.dwell_s).sum::<f64>();
         let minutes = (timing.warm_up_s + steps_s + timing.cool_down_s) / 60.0;
-        let figures = figures(&draft.steps, minutes, draft.resting);
+        let figures = compute_figures(&draft.steps, minutes, draft.parameter_error);
         let bound = if request.bound { self.bound(&draft)? } else { None };
         Ok(Plan {
             campaign: request.campaign_name.to_owned(),
             objective: request.order.name().to_owned(),
             seed: request.seed,
-            made_from: made_from(request),
+            made_from: hash_inputs(request),
             warm_up_s: timing.warm_up_s,
             cool_down_s: timing.cool_down_s,
             remarks: self.remarks(&draft),
@@ -205,26 +211,26 @@ impl<'a> PlanBuilder<'a> {
         let housing = match &draft.housing {
             Some(housing) => housing,
             None => {
-                made = Housing::of(request, &self.points, &self.targets, draft.dwell_s)?;
+                made = Housing::new(request, &self.points, &self.targets, draft.dwell_s)?;
                 &made
             }
         };
         let mut nodes: Vec<usize> = draft.ordered.order.clone();
-        let returns = draft.visits.iter().any(|visit| visit.kind == StepKind::Return);
+        let has_return = draft.visits.iter().any(|visit| visit.kind == StepKind::Return);
         let counted = nodes.len();
-        // The ends of the repeated jump need not be points of the grid.
+        // The ends of the repeated jump may lie outside the grid.
         let mut place = |index: usize| {
             nodes.iter().position(|node| *node == index).unwrap_or_else(|| {
                 nodes.push(index);
                 nodes.len() - 1
             })
         };
-        let repeated = self.repeated.map(|jump| Repeated {
+        let repeated = self.repeated.map(|jump| RepeatedJump {
             from: place(jump.from),
             to: place(jump.to),
             count: jump.count,
         });
-        let Some(optimistic) = Optimistic::of(housing, &nodes) else { return Ok(None) };
+        let Some(gradient_bounds) = GradientBounds::new(housing, &nodes) else { return Ok(None) };
         let order: Vec<usize> = draft.visits.iter().map(|visit| visit.index).collect();
         let reduced_k = gradients_k(housing, &order);
         let (mut found_k, mut more_k, mut error_k) = (0.0, 0.0, 0.0f64);
@@ -235,10 +241,10 @@ impl<'a> PlanBuilder<'a> {
                 (found_k, more_k) = (found_k + reduced_k, more_k + off_k);
             }
         }
-        let bound = optimistic.bound(counted, repeated, returns, found_k);
-        // The bound is one of the reduced housing; what the full model gives more along this plan is added to it.
-        let (sum_bound_k, min_bound_k) = (bound.sum_k + f64::max(more_k, 0.0), bound.worst_k + error_k);
-        let found = figures(&draft.steps, 0.0, None);
+        let bound = gradient_bounds.bound(counted, repeated, has_return, found_k);
+        // The bound applies to the reduced housing. Add the excess of the full model along this plan.
+        let (sum_bound_k, min_bound_k) = (bound.sum_k + f64::max(more_k, 0.0), bound.min_k + error_k);
+        let found = compute_figures(&draft.steps, 0.0, None);
         let below = |figure: f64, bound: f64| (bound > 0.0).then(|| 100.0 * (1.0 - figure / bound));
         Ok(Some(PlanBound {
             sum_gradient_k: sum_bound_k,
@@ -283,8 +289,8 @@ impl<'a> PlanBuilder<'a> {
                 remarks.push(PlanRemark::FirstPointWithoutJump { point: first.to });
             }
         }
-        if let Some(Resting { eta, max_eta, .. }) =
-            draft.resting.filter(|resting| resting.eta > resting.max_eta)
+        if let Some(ParameterError { eta, max_eta, .. }) =
+            draft.parameter_error.filter(|parameter_error| parameter_error.eta > parameter_error.max_eta)
         {
             remarks.push(PlanRemark::RestsOnDeclaration { eta_error: eta, max_eta_error: max_eta });
         }

@@ -1,8 +1,8 @@
-//! An order as a chain of steps, each judged by the state the one before has left.
+//! An order as a chain of steps, each of which starts from the final state of the previous one.
 
-/// A machine with memory, reduced to what ordering needs.
+/// A machine with memory, reduced to the functions that the search needs.
 pub trait Chain {
-    /// What a step leaves to the next.
+    /// State that one step passes to the next.
     type State: Copy;
 
     /// Number of points.
@@ -13,17 +13,17 @@ pub trait Chain {
         self.len() == 0
     }
 
-    /// State after the first step, to which no jump leads.
+    /// State after the first step of an order, which has no jump.
     fn first(&self, to: usize) -> Self::State;
 
-    /// The step `from` -> `to` from `state`: gradient of the housing within the window, K (signed), and the state after it.
+    /// Makes the step `from` -> `to` from `state`: change of the housing temperature in the window, K (signed), and the final state.
     fn step(&self, from: usize, to: usize, state: Self::State) -> (f64, Self::State);
 
-    /// State after a long stay at a point.
+    /// Steady state of a point.
     fn settled(&self, at: usize) -> Self::State;
 
-    /// Whether two states are so close that what follows no longer distinguishes them.
-    fn alike(&self, a: Self::State, b: Self::State) -> bool;
+    /// Whether the difference of two states is negligible for all later steps.
+    fn is_indistinguishable(&self, a: Self::State, b: Self::State) -> bool;
 
     /// Whether the jump is allowed.
     fn admissible(&self, _from: usize, _to: usize) -> bool {
@@ -35,21 +35,30 @@ pub trait Chain {
         f64::INFINITY
     }
 
-    /// Whether an order of two points and more ends with a jump back to its first point, which counts like the others.
-    fn returns(&self) -> bool {
+    /// Whether an order of two or more points ends with a jump back to its first point, which counts like the others.
+    fn has_return(&self) -> bool {
         false
     }
 }
 
-/// The jump back from the end of an order to its first point, where the chain makes one.
-pub(crate) fn way_back<C: Chain>(chain: &C, order: &[usize]) -> Option<(usize, usize)> {
+/// The repeated jump between two points of a chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RepeatedJump {
+    pub(crate) from: usize,
+    pub(crate) to: usize,
+    /// Number of repeats.
+    pub(crate) count: usize,
+}
+
+/// The jump from the last point of an order back to its first, if the chain has one.
+pub(crate) fn return_jump<C: Chain>(chain: &C, order: &[usize]) -> Option<(usize, usize)> {
     match order {
-        [first, .., last] if chain.returns() => Some((*last, *first)),
+        [first, .., last] if chain.has_return() => Some((*last, *first)),
         _ => None,
     }
 }
 
-/// The gradients of an order, K (absolute values), one for each step that has a jump, the way back included.
+/// The absolute gradients of an order, K: one for each step with a jump, the return included.
 pub fn gradients_k<C: Chain>(chain: &C, order: &[usize]) -> Vec<f64> {
     let mut gradients = Vec::with_capacity(order.len());
     let Some(&first) = order.first() else { return gradients };
@@ -59,6 +68,6 @@ pub fn gradients_k<C: Chain>(chain: &C, order: &[usize]) -> Vec<f64> {
         gradients.push(gradient_k.abs());
         state = next;
     }
-    gradients.extend(way_back(chain, order).map(|(last, first)| chain.step(last, first, state).0.abs()));
+    gradients.extend(return_jump(chain, order).map(|(last, first)| chain.step(last, first, state).0.abs()));
     gradients
 }

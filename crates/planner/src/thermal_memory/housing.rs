@@ -1,10 +1,9 @@
-//! The housing reduced to what ordering needs: what each point does to the two housing temperatures within a dwell.
+//! Reduced model of the housing for the search: the effect of a dwell at each point on the two housing temperatures.
 //!
-//! From point to point the temperatures (Tc, Tt) and the speed the shaft comes from answer almost linearly. Six
-//! simulations of the full model per point, from states spread over what a campaign reaches, fix
-//! `1, c, t, w, c^2` (c, t, w: Tc, Tt and the from-speed scaled to -1..1) for the gradient in the window and for both
-//! temperatures at the step's end. A step of the search is then three short sums. How far that is from the full
-//! simulation is measured on every plan and printed with it.
+//! The result of a step is almost linear in the initial temperatures (Tc, Tt) and the previous shaft speed. Six simulations of the
+//! full model per point, from states that span the campaign, fit the coefficients of `1, c, t, w, c^2` (c, t, w: Tc, Tt and the
+//! previous speed, scaled to -1..1) for the gradient in the window and for both final temperatures. A step of the search is then three
+//! short sums. Every plan states the deviation from the full simulation.
 
 use crate::request::{PlanError, PlanRequest};
 use crate::thermal_memory::chain::Chain;
@@ -16,10 +15,10 @@ use mapper_physics::simulation::model::State;
 use mapper_physics::simulation::steady::SteadyState;
 use std::collections::HashSet;
 
-/// States that differ by less, K, lead to gradients that differ by less than any sensor sees.
-const ALIKE_K: f64 = 0.01;
+/// Difference of two housing temperatures, K, whose effect on later gradients is below the resolution of any sensor.
+const INDISTINGUISHABLE_K: f64 = 0.01;
 
-/// Scaled (c, t, w) of three of the six starts; the other three are their mirror images.
+/// Scaled (c, t, w) of three of the six initial states; the other three are their mirror images.
 const DESIGN: [[f64; 3]; 3] = [[-1.0, -1.0, -1.0], [0.2, -0.6, -1.0], [0.6, 0.0, 1.0]];
 
 /// `k[0] + k[1] c + k[2] t + k[3] w + k[4] c^2`.
@@ -33,9 +32,9 @@ impl Surface {
         k[0] + (k[1] + k[4] * c) * c + k[2] * t + k[3] * w
     }
 
-    /// Through values at the design's starts and their mirror images: the odd part is exact, the even part a line in c^2
+    /// Fits values at the initial states of [`DESIGN`] and their mirror images: the odd part exactly, the even part as a line in c^2
     /// by least squares.
-    pub(crate) fn through(values: [[f64; 2]; 3]) -> Self {
+    pub(crate) fn fit(values: [[f64; 2]; 3]) -> Self {
         let odd = values.map(|[a, b]| 0.5 * (a - b));
         let even = values.map(|[a, b]| 0.5 * (a + b));
         let [k1, k2, k3] = solve3(DESIGN, odd);
@@ -78,38 +77,38 @@ fn solve3(m: [[f64; 3]; 3], y: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// What a dwell at one point does.
+/// Effect of a dwell at one point.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Response {
     pub(crate) gradient_k: Surface,
     /// Scaled Tc and Tt at the end.
     pub(crate) end: [Surface; 2],
-    /// Scaled speed that the next step comes from.
+    /// Scaled shaft speed of the point, from which the next step starts.
     pub(crate) speed: f64,
     /// The steady state, scaled.
     settled: [f64; 2],
-    /// What the first step of a campaign leaves, scaled.
+    /// State after the first step of a campaign, scaled.
     first: [f64; 2],
 }
 
 /// From the smallest to the largest.
 pub(crate) type Interval = (f64, f64);
 
-/// The scaled Tc and Tt that a dwell at a point can end in.
+/// Range of the scaled Tc and Tt at the end of a dwell.
 pub(crate) type StateBox = (Interval, Interval);
 
-/// The reduced machine.
+/// The reduced model of all points.
 #[derive(Debug, Clone)]
 pub(crate) struct Housing {
     pub(crate) responses: Vec<Response>,
     forbidden: HashSet<(usize, usize)>,
     gradient_max_k: f64,
-    alike: [f64; 2],
-    /// Whether orders end where they begin.
-    pub(crate) returns: bool,
+    is_indistinguishable: [f64; 2],
+    /// Whether orders return to their first point.
+    pub(crate) has_return: bool,
 }
 
-/// Middle and half width of what is reached.
+/// Middle and half width of the states of a campaign: Tc, Tt, shaft speed.
 #[derive(Debug, Clone, Copy)]
 struct Scale {
     middle: [f64; 3],
@@ -117,7 +116,7 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(targets: &[SteadyState]) -> Self {
+    fn new(targets: &[SteadyState]) -> Self {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
         for state in targets.iter().map(|target| target.state) {
@@ -140,29 +139,29 @@ impl Scale {
 
 impl Housing {
     /// Simulates steps of `dwell_s` to all points.
-    pub(crate) fn of(
+    pub(crate) fn new(
         request: &PlanRequest<'_>,
         points: &[OperatingPoint],
         targets: &[SteadyState],
         dwell_s: f64,
     ) -> Result<Self, PlanError> {
-        let scale = Scale::of(targets);
-        let ends = ends(targets).ok_or(PlanError::NoPoints)?;
+        let scale = Scale::new(targets);
+        let slowest_and_fastest = slowest_and_fastest(targets).ok_or(PlanError::NoPoints)?;
         let aims: Vec<(OperatingPoint, &SteadyState)> = points.iter().copied().zip(targets).collect();
         let one = |(to, target): &(OperatingPoint, &SteadyState)| {
-            response(request, target, dwell_s, &scale, ends)
+            simulate_response(request, target, dwell_s, &scale, slowest_and_fastest)
                 .map_err(|source| PlanError::Forecast { to: *to, source })
         };
         Ok(Housing {
             responses: parallel::try_map(&aims, one)?,
             forbidden: HashSet::new(),
             gradient_max_k: request.limits.housing_gradient_max_k.unwrap_or(f64::INFINITY),
-            alike: [ALIKE_K / scale.half[0], ALIKE_K / scale.half[1]],
-            returns: false,
+            is_indistinguishable: [INDISTINGUISHABLE_K / scale.half[0], INDISTINGUISHABLE_K / scale.half[1]],
+            has_return: false,
         })
     }
 
-    /// Takes a jump out of the search.
+    /// Forbids a jump.
     pub(crate) fn forbid(&mut self, from: usize, to: usize) {
         self.forbidden.insert((from, to));
     }
@@ -173,15 +172,15 @@ impl Housing {
     }
 }
 
-/// The slowest and the fastest of some points.
-fn ends(targets: &[SteadyState]) -> Option<[&SteadyState; 2]> {
+/// The steady states of the slowest and the fastest point.
+fn slowest_and_fastest(targets: &[SteadyState]) -> Option<[&SteadyState; 2]> {
     let by_speed =
         |a: &&SteadyState, b: &&SteadyState| a.state.shaft_speed_rad_s.total_cmp(&b.state.shaft_speed_rad_s);
     Some([targets.iter().min_by(by_speed)?, targets.iter().max_by(by_speed)?])
 }
 
-/// The states from which each point is simulated, spread over what a campaign reaches.
-fn starts(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 3] {
+/// Initial states of the simulations of each point, which span the campaign.
+fn start_states(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 3] {
     DESIGN.map(|design| {
         [1.0, -1.0].map(|sign| {
             let [c, t, w] = design.map(|x| sign * x);
@@ -195,7 +194,7 @@ fn starts(scale: &Scale, [slowest, fastest]: [&SteadyState; 2]) -> [[State; 2]; 
     })
 }
 
-fn response(
+fn simulate_response(
     request: &PlanRequest<'_>,
     target: &SteadyState,
     dwell_s: f64,
@@ -204,7 +203,7 @@ fn response(
 ) -> Result<Response, mapper_physics::simulation::simulate::SimulationError> {
     let mut gradient_k = [[0.0; 2]; 3];
     let mut end = [[[0.0; 2]; 3]; 2];
-    for (i, pair) in starts(scale, [slowest, fastest]).into_iter().enumerate() {
+    for (i, pair) in start_states(scale, [slowest, fastest]).into_iter().enumerate() {
         for (j, state) in pair.into_iter().enumerate() {
             let forecast = forecast(request, state, &target.boundary, dwell_s, true)?;
             gradient_k[i][j] = forecast.predicted.dtc_k.unwrap_or(0.0);
@@ -217,8 +216,8 @@ fn response(
     let first = scale.scaled(&warmed_up(request.model, target.state, &target.boundary, first_step_s)?);
     let settled = scale.scaled(&target.state);
     Ok(Response {
-        gradient_k: Surface::through(gradient_k),
-        end: end.map(Surface::through),
+        gradient_k: Surface::fit(gradient_k),
+        end: end.map(Surface::fit),
         speed: settled[2],
         settled: [settled[0], settled[1]],
         first: [first[0], first[1]],
@@ -247,8 +246,9 @@ impl Chain for Housing {
     }
 
     #[inline]
-    fn alike(&self, a: [f64; 2], b: [f64; 2]) -> bool {
-        (a[0] - b[0]).abs() < self.alike[0] && (a[1] - b[1]).abs() < self.alike[1]
+    fn is_indistinguishable(&self, a: [f64; 2], b: [f64; 2]) -> bool {
+        (a[0] - b[0]).abs() < self.is_indistinguishable[0]
+            && (a[1] - b[1]).abs() < self.is_indistinguishable[1]
     }
 
     #[inline]
@@ -256,8 +256,8 @@ impl Chain for Housing {
         self.forbidden.is_empty() || !self.forbidden.contains(&(from, to))
     }
 
-    fn returns(&self) -> bool {
-        self.returns
+    fn has_return(&self) -> bool {
+        self.has_return
     }
 
     fn gradient_max_k(&self) -> f64 {

@@ -1,4 +1,4 @@
-//! Fast forecast of steps for the planner: each step begins with the housing temperatures that the previous one left.
+//! Forecast of steps for the planner: each step begins with the final housing temperatures of the previous one.
 
 pub mod chain;
 pub(crate) mod forecast;

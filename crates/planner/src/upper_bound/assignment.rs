@@ -1,15 +1,16 @@
-//! The assignment problem: each row one column, largest total weight. The method of successive shortest paths (Kuhn,
-//! Munkres; in the form of Jonker and Volgenant, Computing 38:325, 1987), O(n^3) at worst and far less as a rule.
+//! The assignment problem: one column for each row, with the largest total weight. The method of successive shortest paths (Kuhn,
+//! Munkres; in the form of Jonker and Volgenant, Computing 38:325, 1987) takes O(n^3) at worst and usually far less.
 
-/// Largest total weight of a complete assignment of rows to columns, and the column of each row; `weight(row, column)` is finite.
-pub(crate) fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -> (f64, Vec<usize>) {
+/// Finds the complete assignment of rows to columns with the largest total weight: the total, and the column of each row.
+/// `weight(row, column)` has to be finite.
+pub(crate) fn solve_assignment(n: usize, weight: impl Fn(usize, usize) -> f64) -> (f64, Vec<usize>) {
     // Potentials of rows and columns, and the row of each column; index 0 stands for none.
     let (mut u, mut v) = (vec![0.0; n + 1], vec![0.0; n + 1]);
-    let (mut row_of, mut way) = (vec![0usize; n + 1], vec![0usize; n + 1]);
+    let (mut row_of, mut previous_column) = (vec![0usize; n + 1], vec![0usize; n + 1]);
     for row in 1..=n {
         row_of[0] = row;
         let mut column = 0;
-        let mut least = vec![f64::INFINITY; n + 1];
+        let mut min_reduced = vec![f64::INFINITY; n + 1];
         let mut used = vec![false; n + 1];
         loop {
             used[column] = true;
@@ -19,11 +20,11 @@ pub(crate) fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64)
                     continue;
                 }
                 let reduced = -weight(current - 1, j - 1) - u[current] - v[j];
-                if reduced < least[j] {
-                    (least[j], way[j]) = (reduced, column);
+                if reduced < min_reduced[j] {
+                    (min_reduced[j], previous_column[j]) = (reduced, column);
                 }
-                if least[j] < delta {
-                    (delta, next) = (least[j], j);
+                if min_reduced[j] < delta {
+                    (delta, next) = (min_reduced[j], j);
                 }
             }
             for j in 0..=n {
@@ -31,7 +32,7 @@ pub(crate) fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64)
                     u[row_of[j]] += delta;
                     v[j] -= delta;
                 } else {
-                    least[j] -= delta;
+                    min_reduced[j] -= delta;
                 }
             }
             column = next;
@@ -40,7 +41,7 @@ pub(crate) fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64)
             }
         }
         while column != 0 {
-            let before = way[column];
+            let before = previous_column[column];
             row_of[column] = row_of[before];
             column = before;
         }
@@ -50,8 +51,8 @@ pub(crate) fn largest_assignment(n: usize, weight: impl Fn(usize, usize) -> f64)
     (column_of.iter().enumerate().map(|(row, column)| weight(row, *column)).sum(), column_of)
 }
 
-/// Largest threshold at which all rows but `spared` of them still find columns of their own with at least that weight.
-pub(crate) fn bottleneck(
+/// Finds the largest threshold at which all rows except `spared` can be matched to different columns with at least that weight.
+pub(crate) fn solve_bottleneck(
     rows: usize,
     columns: usize,
     spared: usize,
@@ -62,7 +63,7 @@ pub(crate) fn bottleneck(
     thresholds.retain(|w| w.is_finite());
     thresholds.sort_by(f64::total_cmp);
     thresholds.dedup();
-    let enough = |threshold: f64| {
+    let can_match = |threshold: f64| {
         let mut row_of = vec![None; columns];
         let missing = (0..rows)
             .filter(|&row| {
@@ -77,7 +78,7 @@ pub(crate) fn bottleneck(
     // Invariant: the threshold at `low` is met (or low is 0), that at `high` is not.
     while high - low > 1 {
         let middle = (low + high) / 2;
-        if enough(thresholds[middle]) { low = middle } else { high = middle }
+        if can_match(thresholds[middle]) { low = middle } else { high = middle }
     }
     thresholds.get(low).copied().unwrap_or(f64::INFINITY)
 }
@@ -134,7 +135,7 @@ mod tests {
             let total = |p: &Vec<usize>| p.iter().enumerate().map(|(i, j)| weight(i, *j)).sum::<f64>();
             let best = all.iter().map(total).fold(f64::NEG_INFINITY, f64::max);
             // Sums of at most six numbers below 10.
-            prop_assert!((largest_assignment(n, weight).0 - best).abs() < 1e-12);
+            prop_assert!((solve_assignment(n, weight).0 - best).abs() < 1e-12);
             // All rows, and all but the worst one.
             for spared in 0..n.min(2) {
                 let smallest = |p: &Vec<usize>| {
@@ -142,8 +143,8 @@ mod tests {
                     row.sort_by(f64::total_cmp);
                     row[spared]
                 };
-                let widest = all.iter().map(smallest).fold(f64::NEG_INFINITY, f64::max);
-                prop_assert_eq!(bottleneck(n, n, spared, weight), widest);
+                let largest = all.iter().map(smallest).fold(f64::NEG_INFINITY, f64::max);
+                prop_assert_eq!(solve_bottleneck(n, n, spared, weight), largest);
             }
         }
     }

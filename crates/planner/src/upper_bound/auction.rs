@@ -1,37 +1,36 @@
-//! A nearly best assignment with prices, for many rows: the auction algorithm with falling increments (Bertsekas, Annals
-//! of Operations Research 14:105, 1988).
+//! A nearly optimal assignment with prices, for many rows: the auction algorithm with decreasing increments (Bertsekas, Annals of
+//! Operations Research 14:105, 1988).
 //!
-//! Jumps between far and near points have much the same value for many rows: the exact method then looks through nearly the whole
-//! table for each row. Prices that are off by an increment cost the bound that much per row, and save most of the time.
+//! Many rows have nearly equal weights, and then the exact method searches almost the whole table for each row. Here the prices are
+//! inexact by one increment. This loosens the bound by one increment per row, and saves most of the time.
 
-/// Increments from the first to the last, each this part of the one before.
-const FALL_RATIO: f64 = 0.2;
-/// Bids in each round, for each row, at most: whatever the weights, an auction ends.
-const BIDS: usize = 60;
+/// Ratio of each increment to the one before.
+const INCREMENT_RATIO: f64 = 0.2;
+/// Maximum number of bids for each row in a round, so that an auction ends whatever the weights.
+const MAX_BIDS_PER_ROW: usize = 60;
 
-/// Prices of columns, and what no assignment exceeds under them.
+/// Prices of the columns, and the resulting upper bound.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prices {
     /// No complete assignment has a larger total weight.
     pub(crate) bound: f64,
-    /// Most that each row can have at these prices: `max_j weight(i, j) - price(j)`.
+    /// Largest profit of each row at these prices: `max_j weight(i, j) - price(j)`.
     pub(crate) profit: Vec<f64>,
     pub(crate) price: Vec<f64>,
 }
 
-/// Prices for the assignment with the largest total of `weight`, `n` rows of `n` columns one after the other.
+/// Finds prices for the assignment with the largest total of `weight`, a table of `n` rows and `n` columns.
 ///
-/// `increments`: the first and the last. The bound is valid whatever they are; it is about `n` times the last one above the
-/// largest total.
-pub(crate) fn prices(n: usize, weight: &[f64], increments: (f64, f64)) -> Prices {
+/// `increments`: the first and the last. The bound is valid for any; it exceeds the largest total by about `n` times the last.
+pub(crate) fn run_auction(n: usize, weight: &[f64], increments: (f64, f64)) -> Prices {
     let mut price = vec![0.0f64; n];
     let (mut increment, last) = increments;
-    // A single row has nothing to bid against.
+    // A single row has no competitor.
     let mut more = n > 1;
     while more {
         let mut row_of: Vec<Option<usize>> = vec![None; n];
         let mut waiting: Vec<usize> = (0..n).rev().collect();
-        let mut left = BIDS * n;
+        let mut left = MAX_BIDS_PER_ROW * n;
         while let Some(row) = waiting.pop() {
             if left == 0 {
                 break;
@@ -52,7 +51,7 @@ pub(crate) fn prices(n: usize, weight: &[f64], increments: (f64, f64)) -> Prices
             waiting.extend(row_of[column].replace(row));
         }
         more = increment > last;
-        increment = (increment * FALL_RATIO).max(last);
+        increment = (increment * INCREMENT_RATIO).max(last);
     }
     let profit: Vec<f64> = (0..n)
         .map(|i| {
@@ -66,7 +65,7 @@ pub(crate) fn prices(n: usize, weight: &[f64], increments: (f64, f64)) -> Prices
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::upper_bound::assignment::largest_assignment;
+    use crate::upper_bound::assignment::solve_assignment;
     use proptest::prelude::*;
 
     proptest! {
@@ -76,8 +75,8 @@ mod tests {
             n in 2usize..=20,
         ) {
             let weight: Vec<f64> = weights[..n * n].to_vec();
-            let (best, _) = largest_assignment(n, |i, j| weight[n * i + j]);
-            let found = prices(n, &weight, (10.0, 0.01));
+            let (best, _) = solve_assignment(n, |i, j| weight[n * i + j]);
+            let found = run_auction(n, &weight, (10.0, 0.01));
             // Each row is content within one increment when all are assigned.
             prop_assert!(found.bound >= best - 1e-9 && found.bound <= best + 0.01 * n as f64 + 1e-9, "{} {best}", found.bound);
         }

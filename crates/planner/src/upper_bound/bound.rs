@@ -1,35 +1,35 @@
-//! What no order can exceed.
+//! Upper bounds on the gradients of any order.
 //!
-//! A step's gradient depends on the state before it, and that on all earlier steps. But after a dwell at a point only
-//! part of the states is possible, whatever came before. The largest gradient over that part makes a weight for each
-//! jump that no order exceeds, and the best assignment of successors under these weights a sum that no order exceeds. Of up to
-//! [`EXACT_POINTS`] points `relaxation` makes that sum smaller.
+//! The gradient of a step depends on the state before it, and so on all earlier steps. But a dwell at a point ends in a limited range of
+//! states, whatever came before. The largest gradient over that range is an upper bound for the jump, and the best assignment of
+//! successors with these weights is an upper bound on the sum of any order. For up to [`MAX_RELAXATION_POINTS`] points, `relaxation`
+//! tightens it.
 
-use crate::thermal_memory::chain::Chain;
+use crate::thermal_memory::chain::{Chain, RepeatedJump};
 use crate::thermal_memory::housing::{Housing, Interval, StateBox};
-use crate::upper_bound::assignment::bottleneck;
-use crate::upper_bound::auction::prices;
-use crate::upper_bound::relaxation::{Repeated, Visited, bounded_sum_k};
+use crate::upper_bound::assignment::solve_bottleneck;
+use crate::upper_bound::auction::run_auction;
+use crate::upper_bound::relaxation::{RelaxationProblem, bound_sum_k};
 
-/// Rounds of narrowing: each multiplies the remaining gain by what the housing remembers of a dwell.
+/// Rounds of narrowing the ranges: each multiplies the remaining excess by the memory of the housing over one dwell.
 const ROUNDS: usize = 12;
-/// Above this many points the sum is bounded by prices that are off by the last of these increments, K.
-pub(crate) const EXACT_POINTS: usize = 500;
+/// Above this many points an auction bounds the sum, with these first and last increments, K.
+pub(crate) const MAX_RELAXATION_POINTS: usize = 500;
 const INCREMENTS_K: (f64, f64) = (5.0, 0.01);
 /// Above this many points no bound is computed: its table grows with the square.
 pub(crate) const MAX_POINTS: usize = 4000;
-/// Above this many points the smallest gradient is bounded without a matching.
-const MATCHING_POINTS: usize = 400;
+/// Above this many points the minimum gradient is bounded without a matching.
+const MAX_MATCHING_POINTS: usize = 400;
 
 /// Upper bounds on the figures of any order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bound {
     pub(crate) sum_k: f64,
-    pub(crate) worst_k: f64,
+    pub(crate) min_k: f64,
 }
 
 /// Largest possible gradient of each jump, K, row after row.
-pub(crate) struct Optimistic<'a> {
+pub(crate) struct GradientBounds<'a> {
     housing: &'a Housing,
     points: Vec<usize>,
     boxes: Vec<StateBox>,
@@ -37,14 +37,14 @@ pub(crate) struct Optimistic<'a> {
     weight_k: Vec<f64>,
 }
 
-impl<'a> Optimistic<'a> {
-    /// `None` for too many points, and where the reduced housing does not stay within any bounds.
-    pub(crate) fn of(housing: &'a Housing, points: &[usize]) -> Option<Self> {
+impl<'a> GradientBounds<'a> {
+    /// `None` for too many points, or if the states of the reduced housing have no finite bound.
+    pub(crate) fn new(housing: &'a Housing, points: &[usize]) -> Option<Self> {
         let n = points.len();
         if n > MAX_POINTS {
             return None;
         }
-        let boxes = reachable_boxes(housing, points)?;
+        let boxes = bound_states(housing, points)?;
         let mut weight_k = vec![f64::NEG_INFINITY; n * n];
         for (i, &from) in points.iter().enumerate() {
             let (c, t) = boxes[i];
@@ -56,21 +56,21 @@ impl<'a> Optimistic<'a> {
                 }
             }
         }
-        Some(Optimistic { housing, points: points.to_vec(), boxes, n, weight_k })
+        Some(GradientBounds { housing, points: points.to_vec(), boxes, n, weight_k })
     }
 
-    /// Largest gradient of the step between two places of the list.
+    /// Largest gradient of the jump between two places of the list.
     pub(crate) fn weight_k(&self, from: usize, to: usize) -> f64 {
         self.weight_k[self.n * from + to]
     }
 
-    /// The bounds for orders of the first `counted` places; what lies beyond them is visited by repeats alone, whose own gradients do not
-    /// count. `returns`: the order ends with a jump back to its first point, which counts. `found_k`: the sum of an order.
+    /// Bounds for orders of the first `counted` places. Only repeats visit the others, and their gradients do not count. `has_return`:
+    /// the order ends with a jump back to its first point, which counts. `found_k`: the sum of a known order.
     pub(crate) fn bound(
         &self,
         counted: usize,
-        repeated: Option<Repeated>,
-        returns: bool,
+        repeated: Option<RepeatedJump>,
+        has_return: bool,
         found_k: f64,
     ) -> Bound {
         let n = self.n;
@@ -86,63 +86,63 @@ impl<'a> Optimistic<'a> {
             _ => i,
         };
         let end = n + copies;
-        let sum_k = if end <= EXACT_POINTS {
+        let sum_k = if end <= MAX_RELAXATION_POINTS {
             let (housing, points, boxes) = (self.housing, &self.points, &self.boxes);
-            bounded_sum_k(&Visited { housing, points, counted, boxes, repeated, returns }, found_k)
+            bound_sum_k(&RelaxationProblem { housing, points, counted, boxes, repeated, has_return }, found_k)
         } else {
-            // One more node closes the path to a circle: the first point follows it, and it follows the last. The way back closes it
-            // by itself.
-            let size = if returns { end } else { end + 1 };
+            // An extra node closes the path to a circle: it follows the last point and precedes the first. A return jump closes the
+            // circle itself.
+            let size = if has_return { end } else { end + 1 };
             let weight = |i: usize, j: usize| {
                 if i == end {
                     if j < n { 0.0 } else { -1e9 }
                 } else if j >= counted {
-                    // A repeat, or the way back to the start.
+                    // A repeat, or the end of the path.
                     0.0
                 } else {
                     self.weight_k(real(i), j).max(-1e9)
                 }
             };
             let table: Vec<f64> = (0..size * size).map(|place| weight(place / size, place % size)).collect();
-            prices(size, &table, INCREMENTS_K).bound
+            run_auction(size, &table, INCREMENTS_K).bound
         };
-        let worst_k = if n <= MATCHING_POINTS {
-            bottleneck(counted, end, usize::from(!returns), |j, i| self.weight_k(real(i), j))
+        let min_k = if n <= MAX_MATCHING_POINTS {
+            solve_bottleneck(counted, end, usize::from(!has_return), |j, i| self.weight_k(real(i), j))
         } else {
-            // All points have a step that leads to them, but for the first where nothing goes back to it.
+            // A step leads to every point, except to the first if the order does not return.
             let into = |j: usize| (0..n).map(|i| self.weight_k(i, j)).fold(f64::NEG_INFINITY, f64::max);
             let mut best: Vec<f64> = (0..counted).map(into).collect();
             best.sort_by(f64::total_cmp);
-            best.get(usize::from(!returns)).copied().unwrap_or(f64::INFINITY)
+            best.get(usize::from(!has_return)).copied().unwrap_or(f64::INFINITY)
         };
-        Bound { sum_k, worst_k }
+        Bound { sum_k, min_k }
     }
 }
 
-/// For each point the box of scaled states that a dwell there can end in.
-pub(crate) fn reachable_boxes(housing: &Housing, points: &[usize]) -> Option<Vec<(Interval, Interval)>> {
+/// Bounds the scaled states at the end of a dwell at each point.
+pub(crate) fn bound_states(housing: &Housing, points: &[usize]) -> Option<Vec<(Interval, Interval)>> {
     let everything = |size: f64| ((-size, size), (-size, size));
     let within = |inner: Interval, outer: Interval| inner.0 >= outer.0 && inner.1 <= outer.1;
     for size in [1.5, 3.0, 6.0] {
         let first_inside = points.iter().all(|&to| housing.first(to).iter().all(|x| x.abs() <= size));
         let mut boxes = vec![everything(size); points.len()];
-        let images = narrowed(housing, points, &boxes);
+        let images = propagate_boxes(housing, points, &boxes);
         let inside =
             |image: &(Interval, Interval)| within(image.0, (-size, size)) && within(image.1, (-size, size));
         if !(first_inside && images.iter().all(inside)) {
             continue;
         }
         boxes = images;
-        // The cost of a round is the square of the number of points.
+        // The cost of a round grows with the square of the number of points.
         for _ in 1..if points.len() > 500 { ROUNDS / 3 } else { ROUNDS } {
-            boxes = narrowed(housing, points, &boxes);
+            boxes = propagate_boxes(housing, points, &boxes);
         }
         return Some(boxes);
     }
     None
 }
 
-fn narrowed(
+fn propagate_boxes(
     housing: &Housing,
     points: &[usize],
     boxes: &[(Interval, Interval)],
@@ -171,7 +171,7 @@ fn narrowed(
 mod tests {
     use super::*;
     use crate::request::PlanRequest;
-    use crate::targets::reachable;
+    use crate::targets::solve_steady_states;
     use crate::thermal_memory::chain::gradients_k;
     use mapper_core::{Dwell, Limits, OperatingPoint, SettleBands, Timing, VisitOrder, WindowRule};
     use mapper_physics::simulation::model::Model;
@@ -220,9 +220,8 @@ mod tests {
         }
     }
 
-    /// The visits of an order with the jump between its first two points in number repeated behind the places in the mask, and whether
-    /// each of them counts.
-    fn with_jump(order: &[usize], behind: usize) -> Vec<(usize, bool)> {
+    /// The visits of an order, with the jump from point 0 to point 1 repeated behind the places in the mask, and whether each visit counts.
+    fn insert_repeats(order: &[usize], behind: usize) -> Vec<(usize, bool)> {
         let mut visits = Vec::new();
         for (place, &point) in order.iter().enumerate() {
             visits.push((point, place > 0));
@@ -239,13 +238,12 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// No order of some points, made with a repeated jump at any places and with a way back or none, has a larger sum than the bound;
-        /// the bound is close to the best of them where the housing remembers most, in short steps.
+                /// No order of some points has a larger sum than the bound, wherever the jump is repeated, with or without a return.
         #[test]
         fn no_order_exceeds_the_bound(
             places in prop::sample::subsequence((0..18usize).collect::<Vec<_>>(), 3..=5),
             dwell_s in 20.0..90.0f64,
-            returns in any::<bool>(),
+            has_return in any::<bool>(),
             repeats in 0usize..=2,
         ) {
             let model = Model::nominal();
@@ -257,15 +255,15 @@ mod tests {
                 })
                 .collect();
             let request = request(&model, &points);
-            let targets = reachable(&request, &points).unwrap();
-            let mut housing = Housing::of(&request, &points, &targets, dwell_s).unwrap();
+            let targets = solve_steady_states(&request, &points).unwrap();
+            let mut housing = Housing::new(&request, &points, &targets, dwell_s).unwrap();
             let mut best_k = f64::NEG_INFINITY;
             permute(&mut (0..points.len()).collect::<Vec<_>>(), 0, &mut |order| {
                 for behind in (0..1usize << order.len()).filter(|mask| mask.count_ones() as usize == repeats) {
-                    let mut visits = with_jump(order, behind);
-                    if returns && visits.last().is_some_and(|last| last.0 != order[0]) {
+                    let mut visits = insert_repeats(order, behind);
+                    if has_return && visits.last().is_some_and(|last| last.0 != order[0]) {
                         visits.push((order[0], true));
-                    } else if returns {
+                    } else if has_return {
                         continue;
                     }
                     if visits.windows(2).any(|pair| pair[0].0 == pair[1].0) {
@@ -278,12 +276,12 @@ mod tests {
                 }
             });
             prop_assume!(best_k.is_finite());
-            housing.returns = returns;
+            housing.has_return = has_return;
             let given: Vec<usize> = (0..points.len()).collect();
-            let repeated = (repeats > 0).then_some(Repeated { from: 0, to: 1, count: repeats });
-            if let Some(optimistic) = Optimistic::of(&housing, &given) {
+            let repeated = (repeats > 0).then_some(RepeatedJump { from: 0, to: 1, count: repeats });
+            if let Some(gradient_bounds) = GradientBounds::new(&housing, &given) {
                 for found_k in [0.0, best_k] {
-                    let bound_k = optimistic.bound(points.len(), repeated, returns, found_k).sum_k;
+                    let bound_k = gradient_bounds.bound(points.len(), repeated, has_return, found_k).sum_k;
                     // Sums of at most ten numbers.
                     prop_assert!(bound_k >= best_k - 1e-9, "{bound_k} below {best_k}");
                 }

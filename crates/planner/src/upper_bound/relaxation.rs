@@ -1,67 +1,59 @@
-//! The sum of gradients that no order exceeds, by Lagrangian relaxation.
+//! Upper bound on the sum of gradients of any order, by Lagrangian relaxation.
 //!
-//! The best assignment of successors bounds the sum if each jump may start from the state that suits it best. That is loose when the
-//! housing remembers much: a visit may then end in one state and be left in another. Here each visit has a price for the state it is
-//! left in, which is paid when it is left and received when it is reached. Along an order the prices cancel, so that the bound holds
-//! for any of them; the subgradient method finds prices under which it is small (Fisher, Management Science 27:1, 1981).
+//! The best assignment of successors bounds the sum if each jump may start from its most favourable state. That bound is loose when the
+//! housing has a long memory, because a visit may end in one state and the next jump start from another. Here the state of each visit
+//! has a price, which a jump receives at its end and pays at its start. The prices cancel along an order, so the bound is valid for any
+//! prices; the subgradient method finds prices that make it small (Fisher, Management Science 27:1, 1981).
 //!
-//! A price is piecewise linear in Tc and linear in Tt. Gradients and states are convex or affine on each piece, up to a small
-//! quadratic part that is allowed for, so that the largest weight of a jump is found at the corners of the pieces.
+//! A price is piecewise linear in Tc and linear in Tt. Gradients and states are convex or affine on each piece, except for a small
+//! quadratic part that is bounded separately. The largest weight of a jump is therefore at a corner of the pieces.
 
-use crate::thermal_memory::chain::Chain;
+use crate::thermal_memory::chain::{Chain, RepeatedJump};
 use crate::thermal_memory::housing::{Housing, StateBox, Surface};
-use crate::upper_bound::assignment::largest_assignment;
+use crate::upper_bound::assignment::solve_assignment;
 use mapper_numerics::parallel;
 
-/// Knots of a price over the box of a visit: more of them lower the bound of turbo_a by less than 0.2 %.
+/// Knots of a price over the Tc range of a visit: more of them lower the bound of turbo_a by less than 0.2 %.
 const KNOTS: usize = 7;
-/// Iterations, and pairs of visits that all of them look at together: some tenths of a second. A hundred more lower the bound of
-/// turbo_a by 0.2 %.
+/// Maximum number of iterations, and of pairs of visits in all of them: some tenths of a second. A hundred more iterations lower the
+/// bound of turbo_a by 0.2 %.
 const MAX_ITERATIONS: usize = 100;
 const MAX_PAIRS: usize = 1_000_000;
-/// The first step over Polyak's, how it falls after so many iterations without a smaller bound, and the share of the direction before
-/// that each direction keeps (Camerini, Fratta and Maffioli, Mathematical Programming Study 3:26, 1975). Any values give a bound; these gave
-/// the smallest of turbo_a after 100 iterations.
+/// Step control of the subgradient method: first step relative to Polyak's, its reduction after `PATIENCE` iterations without a
+/// smaller bound, and the share of the previous direction in the next one (Camerini, Fratta and Maffioli, Mathematical Programming Study
+/// 3:26, 1975). Any values give a valid bound; these gave the smallest for turbo_a after 100 iterations.
 const FIRST_STEP: f64 = 0.7;
 const STEP_FALL: f64 = 0.7;
 const PATIENCE: usize = 4;
 const MEMORY: f64 = 0.5;
-/// First points whose assignment is solved, those with the largest bounds; the bound of the next one holds for all others.
-const MAX_FIRSTS: usize = 32;
-/// Weight of a jump that is not possible, K: no sum of gradients makes up for it.
+/// Number of first points whose assignment is solved exactly, those with the largest bounds. The bound of the next one covers all others.
+const MAX_EXACT_FIRST_POINTS: usize = 32;
+/// Weight of an impossible jump, K: no sum of gradients can compensate for it.
 const IMPOSSIBLE_K: f64 = -1e9;
 
-/// The repeated jump: the places of its ends among the visited points, and how often it is made.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Repeated {
-    pub(crate) from: usize,
-    pub(crate) to: usize,
-    pub(crate) count: usize,
-}
-
-/// What is visited.
-pub(crate) struct Visited<'a> {
+/// The visits whose order is bounded.
+pub(crate) struct RelaxationProblem<'a> {
     pub(crate) housing: &'a Housing,
-    /// Points of the housing; those from `counted` on are visited by repeats alone.
+    /// Points of the housing; only repeats visit those from `counted` on.
     pub(crate) points: &'a [usize],
     pub(crate) counted: usize,
-    /// The states that a dwell at each point can end in.
+    /// Range of the states at the end of a dwell at each point.
     pub(crate) boxes: &'a [StateBox],
-    pub(crate) repeated: Option<Repeated>,
+    pub(crate) repeated: Option<RepeatedJump>,
     /// Whether the order ends with a jump back to its first point.
-    pub(crate) returns: bool,
+    pub(crate) has_return: bool,
 }
 
-/// What a node of the relaxation stands for.
+/// A node of the relaxation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Node {
-    /// The visit of a point that counts, by its place.
+    /// The visit of a point, by its place.
     Point(usize),
-    /// A visit of the start of the repeated jump for its sake; need not be made.
+    /// An extra visit of the start of the repeated jump; optional.
     RepeatFrom(usize),
-    /// A repeat.
+    /// The end of a repeated jump.
     RepeatTo(usize),
-    /// Before the first and behind the last visit.
+    /// Predecessor of the first visit and successor of the last.
     Outside,
 }
 
@@ -74,14 +66,14 @@ impl Node {
     }
 }
 
-/// Price of the state in which a visit is left, K.
+/// Price of the final state of a visit, K.
 #[derive(Debug, Clone, Copy)]
 struct Price {
     low: f64,
     spacing: f64,
-    /// At knots that are evenly spaced over the box of scaled Tc.
+    /// Values at knots that are evenly spaced over the range of scaled Tc.
     knots_k: [f64; KNOTS],
-    /// By scaled Tt.
+    /// Slope over scaled Tt.
     slope_k: f64,
 }
 
@@ -110,13 +102,13 @@ impl Price {
         self.low + self.spacing * index as f64
     }
 
-    /// Largest slope by scaled Tc, K.
+    /// Largest slope over scaled Tc, K.
     fn steepest_k(&self) -> f64 {
         let slopes = self.knots_k.windows(2).map(|pair| (pair[1] - pair[0]).abs() / self.spacing);
         slopes.fold(0.0, f64::max)
     }
 
-    /// Moves the price of a state.
+    /// Changes the price of a state.
     fn add(&mut self, (c, t): (f64, f64), by_k: f64) {
         let (below, x) = self.piece(c);
         self.knots_k[below] += by_k * (1.0 - x);
@@ -125,20 +117,20 @@ impl Price {
     }
 }
 
-/// The weight of a jump and the state in which it is largest.
+/// The largest weight of a jump, and the initial state at which it occurs.
 #[derive(Debug, Clone, Copy)]
-struct Best {
+struct JumpWeight {
     weight_k: f64,
     state: (f64, f64),
 }
 
-/// The largest sum of gradients of any order of the visited points, or somewhat more; `found_k` is that of an order.
-pub(crate) fn bounded_sum_k(visited: &Visited<'_>, found_k: f64) -> f64 {
-    let nodes = nodes(visited);
-    let relaxation = Relaxation { visited, nodes: &nodes };
+/// Bounds the sum of gradients of any order from above. `found_k`: the sum of a known order.
+pub(crate) fn bound_sum_k(problem: &RelaxationProblem<'_>, found_k: f64) -> f64 {
+    let nodes = build_nodes(problem);
+    let relaxation = Relaxation { problem, nodes: &nodes };
     let mut prices: Vec<Price> = nodes
         .iter()
-        .map(|node| Price::zero(node.place().map_or((0.0, 1.0), |place| visited.boxes[place].0)))
+        .map(|node| Price::zero(node.place().map_or((0.0, 1.0), |place| problem.boxes[place].0)))
         .collect();
     let pairs = nodes.len() * nodes.len();
     let iterations = (MAX_PAIRS / pairs.max(1)).min(MAX_ITERATIONS);
@@ -148,7 +140,7 @@ pub(crate) fn bounded_sum_k(visited: &Visited<'_>, found_k: f64) -> f64 {
     for _ in 0..=iterations {
         let table = relaxation.table(&prices);
         let weight = |from: usize, to: usize| table[from * nodes.len() + to].weight_k;
-        let (sum_k, successor) = largest_assignment(nodes.len(), weight);
+        let (sum_k, successor) = solve_assignment(nodes.len(), weight);
         if sum_k < bound_k - 1e-6 * sum_k.abs() {
             (bound_k, waited) = (sum_k, 0);
             best_prices.clone_from(&prices);
@@ -165,59 +157,61 @@ pub(crate) fn bounded_sum_k(visited: &Visited<'_>, found_k: f64) -> f64 {
         }
         relaxation.descend(&mut prices, &mut direction, &table, &successor, step * (sum_k - found_k));
     }
-    if visited.returns { relaxation.with_start(&best_prices, bound_k) } else { bound_k }
+    if problem.has_return { relaxation.bound_with_return_k(&best_prices, bound_k) } else { bound_k }
 }
 
-fn nodes(visited: &Visited<'_>) -> Vec<Node> {
-    let mut nodes: Vec<Node> = (0..visited.counted).map(Node::Point).collect();
-    if let Some(Repeated { from, to, count }) = visited.repeated {
+fn build_nodes(problem: &RelaxationProblem<'_>) -> Vec<Node> {
+    let mut nodes: Vec<Node> = (0..problem.counted).map(Node::Point).collect();
+    if let Some(RepeatedJump { from, to, count }) = problem.repeated {
         nodes.extend((0..count).flat_map(|_| [Node::RepeatFrom(from), Node::RepeatTo(to)]));
     }
-    if !visited.returns {
+    if !problem.has_return {
         nodes.push(Node::Outside);
     }
     nodes
 }
 
 struct Relaxation<'a> {
-    visited: &'a Visited<'a>,
+    problem: &'a RelaxationProblem<'a>,
     nodes: &'a [Node],
 }
 
 impl Relaxation<'_> {
     /// The weight of each jump, row after row.
-    fn table(&self, prices: &[Price]) -> Vec<Best> {
+    fn table(&self, prices: &[Price]) -> Vec<JumpWeight> {
         let rows: Vec<usize> = (0..self.nodes.len()).collect();
-        let row = |from: &usize| -> Vec<Best> {
-            (0..self.nodes.len()).map(|to| self.weight(*from, to, prices, Ends::Priced)).collect()
+        let row = |from: &usize| -> Vec<JumpWeight> {
+            (0..self.nodes.len()).map(|to| self.weight(*from, to, prices, EndPricing::Priced)).collect()
         };
         parallel::map(&rows, row).into_iter().flatten().collect()
     }
 
-    fn weight(&self, from: usize, to: usize, prices: &[Price], ends: Ends) -> Best {
-        let impossible = Best { weight_k: IMPOSSIBLE_K, state: (0.0, 0.0) };
-        let visited = self.visited;
+    fn weight(&self, from: usize, to: usize, prices: &[Price], ends: EndPricing) -> JumpWeight {
+        let impossible = JumpWeight { weight_k: IMPOSSIBLE_K, state: (0.0, 0.0) };
+        let problem = self.problem;
         let first = |place: usize| {
-            let [c, t] = visited.housing.first(visited.points[place]);
+            let [c, t] = problem.housing.first(problem.points[place]);
             (c, t)
         };
-        let start = self.nodes[from].place().filter(|_| ends == Ends::First).map(first);
+        let start = self.nodes[from].place().filter(|_| ends == EndPricing::First).map(first);
         match (self.nodes[from], self.nodes[to]) {
-            // A visit for the sake of a repeat that need not be made.
-            (Node::RepeatFrom(_), Node::RepeatFrom(_)) if from == to => Best { weight_k: 0.0, ..impossible },
+            // The extra visit is omitted.
+            (Node::RepeatFrom(_), Node::RepeatFrom(_)) if from == to => {
+                JumpWeight { weight_k: 0.0, ..impossible }
+            }
             (Node::Outside, Node::Point(place)) => {
                 let state = first(place);
-                Best { weight_k: prices[to].at(state.0, state.1), state }
+                JumpWeight { weight_k: prices[to].at(state.0, state.1), state }
             }
             (Node::Outside, _) => impossible,
             (node, Node::Outside) => match node.place() {
                 Some(place) if !matches!(node, Node::RepeatFrom(_)) => {
-                    lowest_price(&prices[from], visited.boxes[place])
+                    find_lowest_price(&prices[from], problem.boxes[place])
                 }
                 _ => impossible,
             },
             (Node::RepeatFrom(_), Node::Point(_) | Node::RepeatFrom(_)) => impossible,
-            (node, Node::RepeatTo(_)) => match (node, visited.repeated) {
+            (node, Node::RepeatTo(_)) => match (node, problem.repeated) {
                 (Node::RepeatFrom(_), _) => self.jump(from, to, prices, ends, start),
                 (Node::Point(place), Some(repeated)) if place == repeated.from => {
                     self.jump(from, to, prices, ends, start)
@@ -231,77 +225,84 @@ impl Relaxation<'_> {
         }
     }
 
-    /// The largest gradient of a jump, with the price that is received at its end and without the one that is paid at its start.
-    fn jump(&self, from: usize, to: usize, prices: &[Price], ends: Ends, start: Option<(f64, f64)>) -> Best {
-        let mut best = Best { weight_k: IMPOSSIBLE_K, state: (0.0, 0.0) };
+    /// The largest weight of a jump: its gradient, plus the price received at its end, minus the price paid at its start.
+    fn jump(
+        &self,
+        from: usize,
+        to: usize,
+        prices: &[Price],
+        ends: EndPricing,
+        start: Option<(f64, f64)>,
+    ) -> JumpWeight {
+        let mut best = JumpWeight { weight_k: IMPOSSIBLE_K, state: (0.0, 0.0) };
         let (Some(place), Some(next)) = (self.nodes[from].place(), self.nodes[to].place()) else {
             return best;
         };
-        let visited = self.visited;
-        let (at, goal) = (visited.points[place], visited.points[next]);
-        if !visited.housing.admissible(at, goal) {
+        let problem = self.problem;
+        let (at, goal) = (problem.points[place], problem.points[next]);
+        if !problem.housing.admissible(at, goal) {
             return best;
         }
-        let response = &visited.housing.responses[goal];
-        let w = visited.housing.responses[at].speed;
+        let response = &problem.housing.responses[goal];
+        let w = problem.housing.responses[at].speed;
         let counts = matches!(self.nodes[to], Node::Point(_));
         let (paid, received) = (&prices[from], &prices[to]);
         let [end_c, end_t] = &response.end;
-        let mut without_k = f64::NEG_INFINITY;
-        let mut look = |c: f64, t: f64| {
+        let mut max_price_k = f64::NEG_INFINITY;
+        let mut try_state = |c: f64, t: f64| {
             let mut price_k = 0.0;
-            if ends != Ends::Last {
+            if ends != EndPricing::Last {
                 price_k += received.at(end_c.at(c, t, w), end_t.at(c, t, w));
             }
             if start.is_none() {
                 price_k -= paid.at(c, t);
             }
             let gradient_k = if counts { response.gradient_k.at(c, t, w).abs() } else { 0.0 };
-            without_k = without_k.max(price_k);
+            max_price_k = max_price_k.max(price_k);
             if gradient_k + price_k > best.weight_k {
-                best = Best { weight_k: gradient_k + price_k, state: (c, t) };
+                best = JumpWeight { weight_k: gradient_k + price_k, state: (c, t) };
             }
         };
         if let Some((c, t)) = start {
-            look(c, t);
+            try_state(c, t);
             return best;
         }
-        let ((c_low, c_high), (t_low, t_high)) = visited.boxes[place];
+        let ((c_low, c_high), (t_low, t_high)) = problem.boxes[place];
         for t in [t_low, t_high] {
             for knot in 0..KNOTS {
                 let c = paid.knot(knot);
-                look(c, t);
-                // A knot of the price received may lie between the ends that this one leads to at both Tt.
+                try_state(c, t);
+                // The end temperatures at the two limits of Tt may enclose a knot of the received price.
                 if t == t_low {
-                    self.between(c, (t_low, t_high), end_c, w, received, &mut look);
+                    self.try_interior_knots(c, (t_low, t_high), end_c, w, received, &mut try_state);
                 }
             }
             for knot in 1..KNOTS - 1 {
-                let before = start_of(end_c, received.knot(knot), t, w);
+                let before = invert_end_temperature(end_c, received.knot(knot), t, w);
                 if before > c_low && before < c_high {
-                    look(before, t);
+                    try_state(before, t);
                 }
             }
         }
-        // Between the corners a quadratic rises above its chord by a quarter of its second coefficient times the square of the length.
+        // Between corners, a quadratic exceeds its chord by at most a quarter of its second coefficient times the square of the length.
         let bend_k = if counts { response.gradient_k.0[4].abs() } else { 0.0 }
             + received.steepest_k() * end_c.0[4].abs()
             + received.slope_k.abs() * end_t.0[4].abs();
         let allowed_k = 0.25 * bend_k * paid.spacing * paid.spacing;
-        let most_k = visited.housing.gradient_max_k() + without_k;
+        let most_k = problem.housing.gradient_max_k() + max_price_k;
         best.weight_k = (best.weight_k + allowed_k).min(most_k + allowed_k);
         best
     }
 
-    /// Looks where a knot of the price received is reached from `c` at some Tt of the range.
-    fn between(
+    /// Tries the states at `c`, within the Tt range, that end at a knot of the received price.
+    fn try_interior_knots(
         &self,
         c: f64,
         (t_low, t_high): (f64, f64),
         end_c: &Surface,
         w: f64,
         received: &Price,
-        look: &mut impl FnMut(f64, f64),
+        try_state: &mut impl FnMut(f64, f64),
     ) {
         let (one, other) = (end_c.at(c, t_low, w), end_c.at(c, t_high, w));
         let (low, high) = (one.min(other), one.max(other));
@@ -309,17 +310,18 @@ impl Relaxation<'_> {
         for knot in first..=last {
             let t = t_low + (t_high - t_low) * (received.knot(knot) - one) / (other - one);
             if t > t_low && t < t_high {
-                look(c, t);
+                try_state(c, t);
             }
         }
     }
 
-    /// One step against the subgradient: where a visit is reached in another state than it is left, the prices of both move.
+    /// Makes one step against the subgradient: if a visit ends in one state and the next jump starts from another, the prices of both
+    /// change.
     fn descend(
         &self,
         prices: &mut [Price],
         slope: &mut [Price],
-        table: &[Best],
+        table: &[JumpWeight],
         successor: &[usize],
         excess_k: f64,
     ) {
@@ -341,9 +343,9 @@ impl Relaxation<'_> {
                 slope[to].add(state, 1.0);
                 continue;
             };
-            let housing = self.visited.housing;
-            let w = housing.responses[self.visited.points[place]].speed;
-            let [end_c, end_t] = &housing.responses[self.visited.points[next]].end;
+            let housing = self.problem.housing;
+            let w = housing.responses[self.problem.points[place]].speed;
+            let [end_c, end_t] = &housing.responses[self.problem.points[next]].end;
             let end = (end_c.at(state.0, state.1, w), end_t.at(state.0, state.1, w));
             slope[to].add(end, 1.0);
             slope[from].add(state, -1.0);
@@ -360,20 +362,20 @@ impl Relaxation<'_> {
         }
     }
 
-    /// The bound of orders that return to their first point. That one is left in the state after the warm-up and reached in another
-    /// one, so that its prices do not cancel: with each point as the first, the jumps from it and to it are weighted without them.
-    fn with_start(&self, prices: &[Price], bound_k: f64) -> f64 {
+    /// Bounds orders that return to their first point. The first jump starts from the state after the warm-up, so the prices of the
+    /// first point do not cancel. For each possible first point, the jumps from it and to it are therefore weighted without its prices.
+    fn bound_with_return_k(&self, prices: &[Price], bound_k: f64) -> f64 {
         let n = self.nodes.len();
         let table = self.table(prices);
         let other_ends = |first: usize, from: usize, to: usize| {
             let ends = match () {
-                () if from == first => Ends::First,
-                () if to == first => Ends::Last,
+                () if from == first => EndPricing::First,
+                () if to == first => EndPricing::Last,
                 () => return table[from * n + to].weight_k,
             };
             self.weight(from, to, prices, ends).weight_k
         };
-        // No assignment gains more than its two changed jumps do.
+        // An assignment gains at most the gain of its two changed jumps.
         let gain_k = |first: &usize| {
             let gain_k = |from: usize, to: usize| {
                 let before_k = table[from * n + to].weight_k;
@@ -387,48 +389,48 @@ impl Relaxation<'_> {
             largest(&mut (0..n).map(|to| gain_k(*first, to)))
                 + largest(&mut (0..n).map(|from| gain_k(from, *first)))
         };
-        let points: Vec<usize> = (0..self.visited.counted).collect();
+        let points: Vec<usize> = (0..self.problem.counted).collect();
         let gains_k = parallel::map(&points, gain_k);
         let mut firsts: Vec<(f64, usize)> =
             gains_k.into_iter().map(|gain_k| bound_k + gain_k).zip(points).collect();
         firsts.sort_by(|a, b| b.0.total_cmp(&a.0));
         let exactly = |(_, first): &(f64, usize)| {
             let changed: Vec<f64> = (0..n * n).map(|at| other_ends(*first, at / n, at % n)).collect();
-            largest_assignment(n, |from, to| changed[from * n + to]).0
+            solve_assignment(n, |from, to| changed[from * n + to]).0
         };
-        let (some, others) = firsts.split_at(firsts.len().min(MAX_FIRSTS));
+        let (some, others) = firsts.split_at(firsts.len().min(MAX_EXACT_FIRST_POINTS));
         let of_others = others.first().map_or(f64::NEG_INFINITY, |first| first.0);
         parallel::map(some, exactly).into_iter().fold(of_others, f64::max)
     }
 }
 
-/// How the ends of a jump are priced.
+/// Which ends of a jump have a price.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ends {
+enum EndPricing {
     /// Both.
     Priced,
-    /// It is the first of the order, from the state after the warm-up.
+    /// Only the end: the first jump of an order starts from the state after the warm-up.
     First,
-    /// It is the last one, back to the first point.
+    /// Only the start: the last jump returns to the first point.
     Last,
 }
 
-/// The end of an order: the state with the lowest price is left.
-fn lowest_price(price: &Price, (_, (t_low, t_high)): StateBox) -> Best {
+/// The state with the lowest price, in which an order ends.
+fn find_lowest_price(price: &Price, (_, (t_low, t_high)): StateBox) -> JumpWeight {
     let corners = (0..KNOTS).flat_map(|knot| [t_low, t_high].map(|t| (price.knot(knot), t)));
-    corners.map(|(c, t)| Best { weight_k: -price.at(c, t), state: (c, t) }).fold(
-        Best { weight_k: f64::NEG_INFINITY, state: (0.0, 0.0) },
+    corners.map(|(c, t)| JumpWeight { weight_k: -price.at(c, t), state: (c, t) }).fold(
+        JumpWeight { weight_k: f64::NEG_INFINITY, state: (0.0, 0.0) },
         |best, other| {
             if other.weight_k > best.weight_k { other } else { best }
         },
     )
 }
 
-/// The scaled Tc from which a step ends at `end`; NaN if there is none near the box.
-fn start_of(surface: &Surface, end: f64, t: f64, w: f64) -> f64 {
+/// The scaled Tc from which a step ends at `end`; NaN if there is none near the range.
+fn invert_end_temperature(surface: &Surface, end: f64, t: f64, w: f64) -> f64 {
     let k = &surface.0;
     let offset = k[0] + k[2] * t + k[3] * w - end;
-    // Of k4 c^2 + k1 c + offset the root that is -offset/k1 for a straight line.
+    // The root of k4 c^2 + k1 c + offset that is -offset/k1 for a straight line.
     let root = (k[1] * k[1] - 4.0 * k[4] * offset).sqrt();
     -2.0 * offset / (k[1] + root.copysign(k[1]))
 }

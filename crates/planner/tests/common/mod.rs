@@ -8,7 +8,7 @@ use mapper_physics::{gas::air, laws::housing, simulation::steady};
 use mapper_planner::PlanRequest;
 use mapper_planner::thermal_memory::chain::Chain;
 
-/// Along speed lines, as conventional mapping goes.
+/// Points along speed lines, in the order of conventional mapping.
 pub fn grid() -> Vec<OperatingPoint> {
     [50e3, 70e3, 90e3, 110e3, 130e3, 150e3]
         .iter()
@@ -49,7 +49,7 @@ pub fn request<'a>(model: &'a Model, points: &'a [OperatingPoint], order: VisitO
     }
 }
 
-/// Compressor housing alone: from where it is towards the point's steady temperature with the point's time constant,
+/// The compressor housing alone: it approaches the point's steady temperature with the point's time constant,
 /// `C/(h A/(1 + NTU) + G_bearing)`.
 pub struct SimpleHousing {
     settled_k: Vec<f64>,
@@ -103,7 +103,7 @@ impl Chain for SimpleHousing {
         self.settled_k[at]
     }
 
-    fn alike(&self, a: f64, b: f64) -> bool {
+    fn is_indistinguishable(&self, a: f64, b: f64) -> bool {
         (a - b).abs() < 0.01
     }
 }

@@ -1,22 +1,22 @@
 //! A rig and its auxiliary instruments as one backend: only the rig receives commands, and no instrument delays the run.
 //!
-//! Each reading keeps the time at which it was taken, so a channel has the rate of its source: at other times its column is NaN.
-//! A reading that arrives after later rig samples is appended behind them, and keeps its own time as its source time.
+//! Each reading keeps its own time, so a channel has the rate of its source; at other times its column is NaN. A reading that arrives
+//! after later rig samples is appended behind them and keeps its own time as its source time.
 
-use crate::backends::reader_link::{Answer, ReaderLink};
+use crate::backends::instrument_link::{Answer, InstrumentLink};
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, ElementColumn, Event, EventKind, Provenance, Quality,
     RigDescription, SampleBatch, Setpoints, TruthColumn,
 };
 use std::time::{Duration, Instant};
 
-/// Time offset of a late reading behind the last sample that was passed on, s.
-const BEHIND_S: f64 = 1e-6;
+/// Time offset of a late reading from the last sample that was passed on, s.
+const LATE_OFFSET_S: f64 = 1e-6;
 /// Maximum number of readings of one instrument that wait for rig samples; an instrument that sends more is lost.
 const MAX_WAITING: usize = 100_000;
 
 /// An auxiliary instrument.
-pub struct Reader {
+pub struct AuxiliaryInstrument {
     /// Display name.
     pub name: String,
     /// Its backend.
@@ -28,16 +28,16 @@ pub struct Reader {
 struct Source {
     name: String,
     channels: Vec<Channel>,
-    link: ReaderLink,
+    link: InstrumentLink,
     /// Run time minus the instrument's own time, s.
     offset_s: f64,
-    /// In run time: readings that are later than the rig's last sample.
+    /// Readings later than the rig's last sample, in run time.
     waiting: SampleBatch,
     /// The instrument is no longer read.
     lost: bool,
 }
 
-/// See the module.
+/// A rig whose samples include the readings of auxiliary instruments.
 pub struct RigWithInstruments {
     description: RigDescription,
     rig: Box<dyn Backend>,
@@ -51,7 +51,7 @@ pub struct RigWithInstruments {
 /// An auxiliary instrument failed.
 #[derive(Debug, thiserror::Error)]
 #[error("the reader `{name}`: {words}")]
-struct ReaderFailed {
+struct InstrumentError {
     name: String,
     words: String,
 }
@@ -64,7 +64,7 @@ impl RigWithInstruments {
     /// [`BackendError::Lost`] if no thread can be started.
     pub fn new(
         rig: Box<dyn Backend>,
-        readers: Vec<Reader>,
+        readers: Vec<AuxiliaryInstrument>,
         deadline: Duration,
     ) -> Result<Self, BackendError> {
         let own = rig.describe();
@@ -75,11 +75,11 @@ impl RigWithInstruments {
             own.channels.iter().copied().filter(|channel| !taken.contains(channel)).collect();
         channels.extend(taken);
         channels.sort();
-        let source = |reader: Reader| {
+        let source = |reader: AuxiliaryInstrument| {
             Ok(Source {
                 name: reader.name,
                 channels: reader.channels,
-                link: ReaderLink::new(reader.backend, simulated_time, deadline)?,
+                link: InstrumentLink::new(reader.backend, simulated_time, deadline)?,
                 offset_s: 0.0,
                 waiting: SampleBatch::default(),
                 lost: false,
@@ -96,7 +96,7 @@ impl RigWithInstruments {
     }
 
     /// Merges the rig's samples with the readings up to them.
-    fn together(&mut self, rig: SampleBatch) -> SampleBatch {
+    fn merge(&mut self, rig: SampleBatch) -> SampleBatch {
         let last_s = rig.t_s.last().copied().or(self.rig_last_s);
         self.rig_last_s = last_s;
         let mut parts: Vec<SampleBatch> = Vec::new();
@@ -104,7 +104,7 @@ impl RigWithInstruments {
             let due = last_s.map_or(0, |last_s| source.waiting.t_s.partition_point(|t_s| *t_s <= last_s));
             let later = source.waiting.split_off(due);
             let mut part = std::mem::replace(&mut source.waiting, later);
-            move_behind(&mut part, self.last_s);
+            delay_late_readings(&mut part, self.last_s);
             parts.push(part);
         }
         let mut t_s: Vec<f64> = parts.iter().flat_map(|part| part.t_s.iter().copied()).collect();
@@ -112,25 +112,25 @@ impl RigWithInstruments {
         t_s.sort_by(f64::total_cmp);
         t_s.dedup();
         let taken = |channel: &Channel| self.sources.iter().any(|source| source.channels.contains(channel));
-        let mut whole = SampleBatch { first_sequence: self.next_sequence, ..SampleBatch::default() };
+        let mut merged = SampleBatch { first_sequence: self.next_sequence, ..SampleBatch::default() };
         // Only the rig provides truth.
-        whole.truth = truth_at(&rig, &t_s);
-        put(&mut whole, rig, &t_s, &|channel| !taken(&channel));
+        merged.truth = resample_truth(&rig, &t_s);
+        add_channels(&mut merged, rig, &t_s, &|channel| !taken(&channel));
         for (source, part) in self.sources.iter().zip(parts) {
-            put(&mut whole, part, &t_s, &|channel| source.channels.contains(&channel));
+            add_channels(&mut merged, part, &t_s, &|channel| source.channels.contains(&channel));
         }
         // A channel without a reading has a column of NaN.
         for channel in &self.description.channels {
-            if whole.column(*channel).is_none() {
-                whole.columns.push(ChannelColumn { channel: *channel, values: vec![f64::NAN; t_s.len()] });
+            if merged.column(*channel).is_none() {
+                merged.columns.push(ChannelColumn { channel: *channel, values: vec![f64::NAN; t_s.len()] });
             }
         }
-        whole.columns.sort_by_key(|column| column.channel);
-        whole.events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        merged.columns.sort_by_key(|column| column.channel);
+        merged.events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         self.next_sequence += t_s.len() as u64;
         self.last_s = t_s.last().copied().or(self.last_s);
-        whole.t_s = t_s;
-        whole
+        merged.t_s = t_s;
+        merged
     }
 
     /// Disconnects all instruments that were connected.
@@ -142,7 +142,7 @@ impl RigWithInstruments {
 
 impl Source {
     /// Takes an answer of the instrument, converted to run time. Its events go into `events` as notes.
-    fn take(&mut self, answer: Answer, until_s: f64, events: &mut Vec<Event>) {
+    fn add_answer(&mut self, answer: Answer, until_s: f64, events: &mut Vec<Event>) {
         let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
         match answer {
             Ok(mut batch) => {
@@ -160,7 +160,7 @@ impl Source {
                 // Readings from before the start of the run are dropped.
                 let early = batch.t_s.partition_point(|t_s| *t_s < 0.0);
                 let batch = batch.split_off(early);
-                if is_whole(&batch, self.waiting.t_s.last().copied())
+                if is_valid(&batch, self.waiting.t_s.last().copied())
                     && self.waiting.t_s.len() + batch.t_s.len() <= MAX_WAITING
                 {
                     self.waiting.append(batch);
@@ -168,13 +168,13 @@ impl Source {
                 }
                 self.lost = true;
                 events.push(note(format!(
-                    "the reader `{}` sends what cannot be used; it is read no more",
+                    "the reader `{}` sends invalid samples and is no longer read",
                     self.name
                 )));
             }
             Err(error) => {
                 self.lost = true;
-                events.push(note(format!("the reader `{}` is read no more: {error}", self.name)));
+                events.push(note(format!("the reader `{}` is no longer read: {error}", self.name)));
             }
         }
     }
@@ -191,7 +191,8 @@ impl Backend for RigWithInstruments {
         for index in 0..self.sources.len() {
             let Some(source) = self.sources.get_mut(index) else { break };
             if let Err(error) = source.link.arm() {
-                let source = Box::new(ReaderFailed { name: source.name.clone(), words: error.to_string() });
+                let source =
+                    Box::new(InstrumentError { name: source.name.clone(), words: error.to_string() });
                 self.disconnect();
                 return Err(BackendError::Lost { t_s: 0.0, source });
             }
@@ -218,21 +219,21 @@ impl Backend for RigWithInstruments {
 
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
         for source in self.sources.iter_mut().filter(|source| !source.lost) {
-            source.link.ask(until_s - source.offset_s);
+            source.link.request(until_s - source.offset_s);
         }
         let rig = self.rig.poll(until_s)?;
         let mut events = Vec::new();
         for source in self.sources.iter_mut().filter(|source| !source.lost) {
             while let Some(answer) = source.link.answer() {
-                source.take(answer, until_s, &mut events);
+                source.add_answer(answer, until_s, &mut events);
                 if source.lost {
                     break;
                 }
             }
         }
-        let mut whole = self.together(rig);
-        whole.events.extend(events);
-        Ok(whole)
+        let mut merged = self.merge(rig);
+        merged.events.extend(events);
+        Ok(merged)
     }
 
     fn hold(&mut self) -> Result<(), BackendError> {
@@ -251,7 +252,7 @@ impl Backend for RigWithInstruments {
 }
 
 /// Whether the samples continue after `last_s`, with columns of equal length.
-fn is_whole(batch: &SampleBatch, last_s: Option<f64>) -> bool {
+fn is_valid(batch: &SampleBatch, last_s: Option<f64>) -> bool {
     let samples = batch.t_s.len();
     let lengths = batch.columns.iter().map(|column| column.values.len());
     let lengths = lengths.chain(batch.elements.iter().map(|column| column.values.len()));
@@ -263,7 +264,7 @@ fn is_whole(batch: &SampleBatch, last_s: Option<f64>) -> bool {
 }
 
 /// Moves late readings behind `last_s`; they keep their source time.
-fn move_behind(part: &mut SampleBatch, last_s: Option<f64>) {
+fn delay_late_readings(part: &mut SampleBatch, last_s: Option<f64>) {
     let Some(last_s) = last_s else { return };
     let late = part.t_s.partition_point(|t_s| *t_s <= last_s);
     if late == 0 {
@@ -281,13 +282,13 @@ fn move_behind(part: &mut SampleBatch, last_s: Option<f64>) {
             break;
         }
         // A step of one microsecond, or of the last bit if that is larger.
-        behind_s = (behind_s + BEHIND_S).max(behind_s.next_up());
+        behind_s = (behind_s + LATE_OFFSET_S).max(behind_s.next_up());
         *t_s = behind_s;
     }
 }
 
 /// Distributes values over a superset of their times; `absent` elsewhere.
-fn spread<T: Copy>(values: &[T], own_s: &[f64], t_s: &[f64], absent: T) -> Vec<T> {
+fn resample<T: Copy>(values: &[T], own_s: &[f64], t_s: &[f64], absent: T) -> Vec<T> {
     if own_s.len() == t_s.len() {
         return values.to_vec();
     }
@@ -297,9 +298,9 @@ fn spread<T: Copy>(values: &[T], own_s: &[f64], t_s: &[f64], absent: T) -> Vec<T
         .collect()
 }
 
-fn truth_at(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
+fn resample_truth(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
     let column = |column: &TruthColumn| TruthColumn {
-        values: spread(&column.values, &rig.t_s, t_s, f64::NAN),
+        values: resample(&column.values, &rig.t_s, t_s, f64::NAN),
         name: column.name.clone(),
         unit: column.unit.clone(),
     };
@@ -307,23 +308,23 @@ fn truth_at(rig: &SampleBatch, t_s: &[f64]) -> Vec<TruthColumn> {
 }
 
 /// Adds the wanted channels of one source to the merged batch.
-fn put(whole: &mut SampleBatch, part: SampleBatch, t_s: &[f64], wanted: &dyn Fn(Channel) -> bool) {
+fn add_channels(merged: &mut SampleBatch, part: SampleBatch, t_s: &[f64], wanted: &dyn Fn(Channel) -> bool) {
     for column in part.columns.into_iter().filter(|column| wanted(column.channel)) {
-        let values = spread(&column.values, &part.t_s, t_s, f64::NAN);
-        whole.columns.push(ChannelColumn { values, ..column });
+        let values = resample(&column.values, &part.t_s, t_s, f64::NAN);
+        merged.columns.push(ChannelColumn { values, ..column });
     }
     for column in part.elements.into_iter().filter(|column| wanted(column.element.channel)) {
-        let values = spread(&column.values, &part.t_s, t_s, f64::NAN);
-        whole.elements.push(ElementColumn { values, ..column });
+        let values = resample(&column.values, &part.t_s, t_s, f64::NAN);
+        merged.elements.push(ElementColumn { values, ..column });
     }
     for from in part.provenance.into_iter().filter(|from| wanted(from.channel)) {
-        let mut source_t_s = spread(&from.source_t_s, &part.t_s, t_s, f64::NAN);
+        let mut source_t_s = resample(&from.source_t_s, &part.t_s, t_s, f64::NAN);
         // A time without a reading of this source is not old.
         for (source_s, t_s) in source_t_s.iter_mut().zip(t_s).filter(|(source_s, _)| source_s.is_nan()) {
             *source_s = *t_s;
         }
-        let quality = spread(&from.quality, &part.t_s, t_s, Quality::Good);
-        whole.provenance.push(Provenance { source_t_s, quality, ..from });
+        let quality = resample(&from.quality, &part.t_s, t_s, Quality::Good);
+        merged.provenance.push(Provenance { source_t_s, quality, ..from });
     }
-    whole.events.extend(part.events);
+    merged.events.extend(part.events);
 }

@@ -1,6 +1,6 @@
 //! A backend whose calls return within a deadline, whatever the rig does: a separate thread makes them.
 
-use crate::run_control::run::words_of;
+use crate::run_control::run::panic_message;
 use mapper_core::{Backend, BackendError, RigDescription, SampleBatch, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -21,7 +21,7 @@ type Answer = (u64, Result<Option<SampleBatch>, BackendError>);
 
 /// Adds deadlines to another backend. A call that has timed out is not repeated: later calls wait behind it, and time out
 /// themselves until the rig answers. Late answers are discarded, and the samples in them count as missed.
-pub struct Deadlined {
+pub struct DeadlineBackend {
     description: RigDescription,
     calls: Sender<(u64, Call)>,
     answers: Receiver<Answer>,
@@ -41,9 +41,9 @@ pub struct Deadlines {
 /// The rig's thread has ended.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-struct Gone(String);
+struct ThreadEnded(String);
 
-impl Deadlined {
+impl DeadlineBackend {
     /// `backend` with these deadlines for its calls.
     ///
     /// # Errors
@@ -66,7 +66,10 @@ impl Deadlined {
                         Call::Disarm => backend.disarm().map(|()| None),
                     }));
                     let answer = answer.unwrap_or_else(|panic| {
-                        let source = Box::new(Gone(format!("the backend panicked: {}", words_of(&*panic))));
+                        let source = Box::new(ThreadEnded(format!(
+                            "the backend panicked: {}",
+                            panic_message(&*panic)
+                        )));
                         Err(BackendError::Lost { t_s: 0.0, source })
                     });
                     if reply.send((number, answer)).is_err() {
@@ -75,7 +78,7 @@ impl Deadlined {
                 }
             })
             .map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
-        Ok(Deadlined { description, calls, answers, number: 0, deadlines })
+        Ok(DeadlineBackend { description, calls, answers, number: 0, deadlines })
     }
 
     fn call(&mut self, name: &'static str, call: Call) -> Result<Option<SampleBatch>, BackendError> {
@@ -84,11 +87,11 @@ impl Deadlined {
             _ => self.deadlines.call,
         };
         self.number += 1;
-        let gone = || {
-            let source = Box::new(Gone("its thread has ended".to_owned()));
+        let lost_error = || {
+            let source = Box::new(ThreadEnded("its thread has ended".to_owned()));
             BackendError::Lost { t_s: 0.0, source }
         };
-        self.calls.send((self.number, call)).map_err(|_| gone())?;
+        self.calls.send((self.number, call)).map_err(|_| lost_error())?;
         loop {
             match self.answers.recv_timeout(limit) {
                 // A late answer to a call that has timed out.
@@ -97,13 +100,13 @@ impl Deadlined {
                 Err(RecvTimeoutError::Timeout) => {
                     return Err(BackendError::Deadline { call: name, limit_s: limit.as_secs_f64() });
                 }
-                Err(RecvTimeoutError::Disconnected) => return Err(gone()),
+                Err(RecvTimeoutError::Disconnected) => return Err(lost_error()),
             }
         }
     }
 }
 
-impl Backend for Deadlined {
+impl Backend for DeadlineBackend {
     fn describe(&self) -> RigDescription {
         self.description.clone()
     }
@@ -177,11 +180,12 @@ mod tests {
     }
 
     #[test]
-    fn a_rig_that_hangs_is_given_up_and_late_answers_are_not_mixed_up() {
+    fn calls_to_a_hanging_rig_time_out_and_late_answers_are_discarded() {
         let (go, going) = channel();
         // One second allows for a machine that is busy with other tests.
         let [arming, call] = [Duration::from_secs(10), Duration::from_secs(1)];
-        let mut rig = Deadlined::new(Box::new(Hangs(Mutex::new(going))), Deadlines { arming, call }).unwrap();
+        let mut rig =
+            DeadlineBackend::new(Box::new(Hangs(Mutex::new(going))), Deadlines { arming, call }).unwrap();
         rig.arm().unwrap();
         go.send(()).unwrap();
         assert_eq!(rig.poll(1.0).unwrap().t_s, [1.0]);

@@ -2,4 +2,4 @@
 
 pub(crate) mod auxiliary_instruments;
 pub(crate) mod deadline;
-pub(crate) mod reader_link;
+pub(crate) mod instrument_link;

@@ -4,7 +4,7 @@ use crate::guards::guard::{Commanded, Guard, Trip};
 use mapper_core::{GuardName, Reaction, SampleBatch};
 
 /// How far a sample may lie beyond the requested time, s: the clocks of rig and program differ.
-const AHEAD_S: f64 = 1.0;
+const MAX_AHEAD_S: f64 = 1.0;
 
 /// Trips at the first invalid batch.
 #[derive(Debug, Clone, Default)]
@@ -16,7 +16,7 @@ pub struct BatchWatch {
 
 impl BatchWatch {
     /// Describes the fault of a batch.
-    fn fault(&mut self, batch: &SampleBatch, now_s: f64) -> Option<String> {
+    fn find_fault(&mut self, batch: &SampleBatch, now_s: f64) -> Option<String> {
         let samples = batch.t_s.len();
         if let Some(column) = batch.columns.iter().find(|column| column.values.len() != samples) {
             let count = column.values.len();
@@ -29,7 +29,7 @@ impl BatchWatch {
                     return Some(format!("{} samples were lost before {now_s:.1} s", first - expected));
                 }
                 Some(expected) if first < expected => {
-                    return Some(format!("{} samples came twice at {now_s:.1} s", expected - first));
+                    return Some(format!("{} samples were sent twice at {now_s:.1} s", expected - first));
                 }
                 _ => {}
             }
@@ -42,8 +42,8 @@ impl BatchWatch {
                     "time runs backward: a sample at {t_s:.3} s after one at {last_s:.3} s"
                 ));
             }
-            if *t_s > now_s + AHEAD_S {
-                return Some(format!("a sample at {t_s:.1} s lies beyond the time asked for, {now_s:.1} s"));
+            if *t_s > now_s + MAX_AHEAD_S {
+                return Some(format!("a sample at {t_s:.1} s lies beyond the requested time, {now_s:.1} s"));
             }
             self.last_s = Some(*t_s);
         }
@@ -52,8 +52,8 @@ impl BatchWatch {
 }
 
 impl Guard for BatchWatch {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
-        let reason = self.fault(batch, now_s).filter(|_| !self.tripped)?;
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
+        let reason = self.find_fault(batch, now_s).filter(|_| !self.tripped)?;
         self.tripped = true;
         Some(Trip { t_s: now_s, guard: GuardName::Signals, reaction: Reaction::Safe, reason })
     }
@@ -65,7 +65,7 @@ mod tests {
     use mapper_core::{Channel, ChannelColumn};
 
     #[test]
-    fn what_is_lost_doubled_reordered_or_torn_is_named() {
+    fn lost_repeated_disordered_and_incomplete_batches_trip() {
         let at = |first_sequence: u64, t_s: &[f64], values: usize| SampleBatch {
             first_sequence,
             t_s: t_s.to_vec(),
@@ -74,22 +74,22 @@ mod tests {
         };
         for (batch, words) in [
             (at(5, &[0.5, 0.6], 2), "3 samples were lost"),
-            (at(1, &[0.1, 0.2], 2), "1 samples came twice"),
+            (at(1, &[0.1, 0.2], 2), "1 samples were sent twice"),
             (at(2, &[0.3, 0.2], 2), "time runs backward"),
             (at(2, &[0.05, 0.3], 2), "time runs backward"),
             (at(2, &[0.3, f64::NAN], 2), "time runs backward"),
-            (at(2, &[0.3, 9.0], 2), "beyond the time asked for"),
+            (at(2, &[0.3, 9.0], 2), "beyond the requested time"),
             (at(2, &[0.3, 0.4], 3), "3 values for 2 times"),
         ] {
             let mut guard = BatchWatch::default();
-            assert_eq!(guard.look(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
+            assert_eq!(guard.check(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
             // An empty batch is left to the age guards.
-            assert_eq!(guard.look(&SampleBatch::default(), 0.2, &Commanded::default()), None);
-            let trip = guard.look(&batch, 0.6, &Commanded::default()).unwrap();
+            assert_eq!(guard.check(&SampleBatch::default(), 0.2, &Commanded::default()), None);
+            let trip = guard.check(&batch, 0.6, &Commanded::default()).unwrap();
             assert!(trip.reason.contains(words), "{}", trip.reason);
         }
         let mut guard = BatchWatch::default();
-        assert_eq!(guard.look(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
-        assert_eq!(guard.look(&at(2, &[0.2], 1), 0.2, &Commanded::default()), None);
+        assert_eq!(guard.check(&at(0, &[0.0, 0.1], 2), 0.1, &Commanded::default()), None);
+        assert_eq!(guard.check(&at(2, &[0.2], 1), 0.2, &Commanded::default()), None);
     }
 }

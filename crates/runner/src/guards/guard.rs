@@ -31,7 +31,7 @@ pub struct Commanded {
 /// Checks every sample and may trip.
 pub trait Guard: Send {
     /// Checks the samples of a poll up to `now_s` (possibly none). Each violation trips once.
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip>;
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip>;
 
     /// Whether the violation continues: a hold ends when it does not.
     fn is_violated(&self) -> bool {
@@ -45,19 +45,19 @@ pub trait Guard: Send {
 }
 
 /// All guards of a run, checked together.
-pub(crate) struct Bench<'a> {
+pub(crate) struct ActiveGuards<'a> {
     guards: &'a mut [Box<dyn Guard>],
 }
 
-impl<'a> Bench<'a> {
+impl<'a> ActiveGuards<'a> {
     pub(crate) fn new(guards: &'a mut [Box<dyn Guard>]) -> Self {
-        Bench { guards }
+        ActiveGuards { guards }
     }
 
     /// All trips of these samples, the most severe first, then the earliest.
-    pub(crate) fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Vec<Trip> {
+    pub(crate) fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Vec<Trip> {
         let mut trips: Vec<Trip> =
-            self.guards.iter_mut().filter_map(|guard| guard.look(batch, now_s, state)).collect();
+            self.guards.iter_mut().filter_map(|guard| guard.check(batch, now_s, state)).collect();
         trips.sort_by(|a, b| b.reaction.cmp(&a.reaction).then(a.t_s.total_cmp(&b.t_s)));
         trips
     }

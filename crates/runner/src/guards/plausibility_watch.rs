@@ -1,76 +1,77 @@
 //! Judges every sample against physics: the range of each sensor, jumps faster than its lag, and readings that contradict each other.
 //!
-//! Impossible readings are marked [`Quality::Bad`], so that the recording never has them as good. If they last, the run ends: guards
-//! cannot rely on such a channel. Guards still see every raw value, so a mark never hides a value above a limit.
+//! Impossible readings are marked [`Quality::Bad`] in the recording. If they persist, the run ends, because guards cannot rely on such a
+//! channel. Guards still receive every raw value, so a mark never hides a value above a limit.
 //!
 //! | rule | why |
 //! |---|---|
 //! | range | [`plausible`]: no machine of any size reads beyond it |
-//! | jump | behind a first-order lag, a reading covers at most `1 - exp(-dt/lag)` of the way to the end of its range |
-//! | T2 | compression heats at least isentropically; the housing cools the gas at most half of the way to its own temperature |
-//! | N | a wheel transfers at most the square of its tip speed (Euler, without pre-swirl) |
-//! | m_c | a compressor that holds a pressure ratio delivers; backflow of surge is shorter than its cycle |
+//! | jump | a sensor with a first-order lag covers at most `1 - exp(-dt/lag)` of the distance to the end of its range |
+//! | T2 | compression heats the gas at least isentropically; the housing cools it by at most half of the difference to its own temperature |
+//! | N | a wheel transfers at most the square of its tip speed as specific work (Euler, without pre-swirl) |
+//! | m_c | a compressor at a pressure ratio delivers flow; backflow in surge is shorter than a surge cycle |
 //! | P3, T3 | expansion lowers pressure and temperature; only the housing heats the gas |
 //!
-//! Each of several sensors of a channel is judged by itself. An impossible one is recorded as without a reading, and only noted: the
-//! others go on.
+//! If a channel has several sensors, each is checked separately. An impossible sensor is recorded as missing and noted; the run
+//! continues with the others.
 //!
-//! Pressures, flow and shaft speed have no lag that bounds a jump between two samples, so only the rules that combine channels judge
-//! them. A pressure wave changes a pressure by `rho a du`, 20 kPa for 50 m/s, within milliseconds, and the plenum of a turbocharger
-//! (1 l) fills by 20 MPa/s. Flow in a pipe of 0.5 m changes by 200 kg/s2 at 100 kPa. The shaft (16e-6 kg m2) is accelerated by 30 kW at
-//! 95 krpm by 1.8 Mrpm/s: all of it is more than the range within one sample at 10 Hz.
+//! Pressures, flow and shaft speed have no lag that limits a jump between two samples, so only rules that combine channels apply to
+//! them. A pressure wave changes a pressure by `rho a du`, 20 kPa for 50 m/s, within milliseconds, and the pressure in the plenum of a
+//! turbocharger (1 l) rises by up to 20 MPa/s. Flow in a pipe of 0.5 m changes by 200 kg/s2 at 100 kPa. A power of 30 kW accelerates the
+//! shaft (16e-6 kg m2) at 95 krpm by 1.8 Mrpm/s. At 10 Hz, each of these exceeds the measuring range within one sample.
 
-use crate::guards::first_look::NEEDED;
 use crate::guards::guard::{Commanded, Trip};
-use crate::guards::recent_extreme::RecentExtreme;
+use crate::guards::recent_minimum::RecentMinimum;
+use crate::guards::start_check::REQUIRED_CHANNELS;
 use mapper_core::{
     Channel, Dimension, Element, GuardName, Provenance, Quality, Reaction, SampleBatch, measurable,
     plausible, readable,
 };
 use std::collections::BTreeMap;
 
-/// Time after which a contradiction ends the run, s. Cycles of surge and electrical interference are shorter, and the usual age limit of a
-/// guarded signal (3 s) is longer.
-const LASTS_S: f64 = 2.0;
-/// A reading is compared with others for this time, s: slow instruments deliver every second.
-const FRESH_S: f64 = 1.5;
-/// Time within which pressure and temperature at the outlet follow the shaft, s: a volume of 100 l empties through the valve of a large
-/// machine in some 0.7 s.
-const FOLLOWS_S: f64 = 2.0;
-/// Lags of a probe after which it has reached the gas (0.7 % are left).
-const LAGS: f64 = 5.0;
-/// Time within which the turbine's outlet probe follows its inlet, s: the sheathed probes of gas stands have lags of seconds.
-const TURBINE_FOLLOWS_S: f64 = 30.0;
-/// Shortest lag of a housing, s: the smallest one (0.2 kg of aluminium, 180 J/K) at its largest conductance (some 20 W/K) needs 9 s.
+/// Duration of a contradiction that ends the run, s: longer than surge cycles and electrical interference, shorter than the default age
+/// limit of a guarded signal (3 s).
+const MIN_DURATION_S: f64 = 2.0;
+/// Maximum age of a reading that is compared with others, s: slow instruments deliver one reading per second.
+const MAX_AGE_S: f64 = 1.5;
+/// Maximum delay of outlet pressure and temperature behind the shaft, s: a volume of 100 l empties through the valve of a large machine in
+/// about 0.7 s.
+const OUTLET_DELAY_S: f64 = 2.0;
+/// Number of lags after which a probe has reached the gas temperature (within 0.7 %).
+const SETTLING_LAGS: f64 = 5.0;
+/// Maximum delay of the turbine outlet probe behind the inlet, s: the sheathed probes of gas stands have lags of seconds.
+const TURBINE_DELAY_S: f64 = 30.0;
+/// Minimum lag of a housing, s: the smallest one (0.2 kg of aluminium, 180 J/K) at its largest conductance (about 20 W/K) has 9 s.
 const HOUSING_LAG_S: f64 = 5.0;
-/// Pressure ratio above which a compressor certainly works: beyond offsets and dynamic pressures of its taps.
-const WORKS_PR: f64 = 1.05;
-/// Share of the pressure ratio not used by the rules: static taps, at Mach 0.35 in the pipes, show up to 9 % more than total pressures.
+/// Pressure ratio above which a compressor certainly compresses: larger than offsets and dynamic pressures at its taps.
+const MIN_WORKING_PR: f64 = 1.05;
+/// Divisor of the measured pressure ratio that gives a safe lower bound: with static taps at Mach 0.35 in the pipes, the ratio is up to
+/// 9 % higher than that of total pressures.
 const TAP_RATIO: f64 = 1.1;
 /// `(k - 1)/k` of hot moist air (k = 1.37): lower than that of cold dry air, so the isentropic rise is a lower bound.
-const EXPONENT: f64 = 0.27;
+const ISENTROPIC_EXPONENT: f64 = 0.27;
 /// Heat capacity of air, J/(kg K).
 const CP_J_KGK: f64 = 1005.0;
 /// Largest cooling by the housing: `1 - exp(-NTU)` with the NTU of 0.7 of a small compressor at idle.
-const COOLED_RATIO: f64 = 0.5;
-/// Offsets of two temperature sensors together, K.
-const OFFSETS_K: f64 = 3.0;
-/// Isentropic work over the square of the tip speed. Physics allows 1; the square of a wheel diameter that is 20 % off allows 1.5.
+const MAX_COOLING_RATIO: f64 = 0.5;
+/// Combined offset of two temperature sensors, K.
+const SENSOR_OFFSETS_K: f64 = 3.0;
+/// Maximum isentropic work over the square of the tip speed. Physics allows 1; an error of 20 % in the wheel diameter allows 1.5.
 const HEAD_MAX_RATIO: f64 = 1.5;
-/// Time within which backflow of surge ends, s: cycles of turbochargers last less.
-const BACKFLOW_S: f64 = 1.0;
-/// Smallest ratio of P3 to P4 with offsets and taps.
-const EXPANDS_RATIO: f64 = 0.9;
-/// Noise of a reading that a jump must exceed: two readings at six standard deviations, and the resolution of a logger, K.
+/// Maximum duration of backflow in surge, s: surge cycles of turbochargers are shorter.
+const MAX_BACKFLOW_S: f64 = 1.0;
+/// Minimum ratio of P3 to P4, offsets and taps included.
+const MIN_EXPANSION_RATIO: f64 = 0.9;
+/// Noise that a jump must exceed: two readings with six standard deviations each, and the resolution of a logger, K.
 const NOISE_SIGMAS: f64 = 12.0;
 const RESOLUTION_K: f64 = 1.0;
 
-/// What the campaign declares about machine and sensors, as far as the rules need it.
+/// Properties of machine and sensors that the rules use, as declared in the campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReadingBounds {
     /// Diameter of the compressor wheel, m; `None`: not declared.
     pub wheel_diameter_m: Option<f64>,
-    /// Lag of the thinnest T2 probe at the highest possible flow and of the thickest at the lowest, s; 0: a probe without inertia.
+    /// Minimum lag of T2 (thinnest probe, highest flow) and maximum lag (thickest probe, lowest flow), s; 0: a probe without inertia.
     pub t2_lag_s: (f64, f64),
     /// Noise of the noisiest sensor of T2, Tc and Tt, K, one standard deviation.
     pub noise_k: [f64; 3],
@@ -100,7 +101,7 @@ impl Sensor {
 struct Track {
     /// Time and value of the last reading that is in its range.
     last: (f64, f64),
-    /// Where it was before it jumped too fast, with the time.
+    /// Time and value before an impossible jump.
     jumped: Option<(f64, f64)>,
 }
 
@@ -119,7 +120,7 @@ enum Rule {
 }
 
 impl Rule {
-    /// The readings of which at least one is wrong.
+    /// The readings that the rule combines, of which at least one is wrong.
     fn sensors(self) -> Vec<Sensor> {
         use Channel as C;
         let channels = match self {
@@ -133,11 +134,12 @@ impl Rule {
         channels.into_iter().map(Sensor::of).collect()
     }
 
-    /// Whether the run depends on one of the readings: identification needs the channel, or a limit of the rig relates to it. One of
-    /// several sensors has others.
+    /// Whether the run depends on one of the readings, because identification needs the channel or a limit of the rig uses it. A single
+    /// sensor of several can fail, because the others replace it.
     fn ends_the_run(self) -> bool {
         self.sensors().iter().any(|Sensor { channel, number }| {
-            *number == 0 && (NEEDED.contains(channel) || matches!(channel, Channel::P3 | Channel::T3))
+            *number == 0
+                && (REQUIRED_CHANNELS.contains(channel) || matches!(channel, Channel::P3 | Channel::T3))
         })
     }
 }
@@ -151,20 +153,20 @@ struct Violation {
     reported: bool,
 }
 
-/// See the module.
+/// Marks impossible readings, and trips if they persist.
 #[derive(Debug, Clone)]
 pub struct PlausibilityWatch {
     bounds: ReadingBounds,
     tracks: BTreeMap<Sensor, Track>,
     violations: Vec<Violation>,
-    /// Lowest isentropic outlet temperature while the probe follows, K.
-    isentropic_k: RecentExtreme,
-    /// Lowest isentropic work while the shaft follows, J/kg.
-    work_j_kg: RecentExtreme,
-    /// Highest P3, Pa, and negative T3, K, while the outlet follows.
-    p3_pa: RecentExtreme,
-    t3_k: RecentExtreme,
-    /// Since when a working compressor shows no flow, s.
+    /// Minimum isentropic outlet temperature over the delay of the probe, K.
+    isentropic_k: RecentMinimum,
+    /// Minimum isentropic work over the delay of the outlet, J/kg.
+    work_j_kg: RecentMinimum,
+    /// Minima of -P3, Pa, and -T3, K, over the delay of the outlet.
+    p3_pa: RecentMinimum,
+    t3_k: RecentMinimum,
+    /// Start of the period in which a compressing machine shows no flow, s.
     no_flow_since_s: Option<f64>,
 }
 
@@ -175,31 +177,31 @@ impl PlausibilityWatch {
             bounds,
             tracks: BTreeMap::new(),
             violations: Vec::new(),
-            isentropic_k: RecentExtreme::default(),
-            work_j_kg: RecentExtreme::default(),
-            p3_pa: RecentExtreme::default(),
-            t3_k: RecentExtreme::default(),
+            isentropic_k: RecentMinimum::default(),
+            work_j_kg: RecentMinimum::default(),
+            p3_pa: RecentMinimum::default(),
+            t3_k: RecentMinimum::default(),
             no_flow_since_s: None,
         }
     }
 
-    /// Marks the impossible readings of a batch, and reports what has been impossible for too long.
+    /// Marks the impossible readings of a batch. Trips on a violation that has lasted too long.
     pub fn judge(&mut self, batch: &mut SampleBatch, state: &Commanded) -> Option<Trip> {
         let mut marks: Vec<(Sensor, usize)> = Vec::new();
         let mut trip: Option<Trip> = None;
         for index in 0..batch.t_s.len() {
             let Some(t_s) = batch.t_s.get(index).copied().filter(|t_s| t_s.is_finite()) else { continue };
-            let found = self.sample(batch, index, t_s, state);
+            let found = self.check_sample(batch, index, t_s, state);
             let sensors = found.iter().flat_map(|(rule, _)| rule.sensors());
             marks.extend(sensors.map(|sensor| (sensor, index)));
-            trip = trip.or(self.lasting(t_s, found));
+            trip = trip.or(self.update_violations(t_s, found));
         }
-        marks.into_iter().for_each(|(sensor, index)| mark(batch, sensor, index));
+        marks.into_iter().for_each(|(sensor, index)| mark_bad(batch, sensor, index));
         trip
     }
 
     /// The violated rules of one sample.
-    fn sample(
+    fn check_sample(
         &mut self,
         batch: &SampleBatch,
         index: usize,
@@ -219,28 +221,28 @@ impl PlausibilityWatch {
             let channel = sensor.channel;
             let value = values.get(index).copied().filter(|value| value.is_finite() && !is_bad(channel));
             let Some(value) = value else { continue };
-            if !can_be(channel, value, state.running) {
+            if !is_possible(channel, value, state.running) {
                 found.push((
                     Rule::Range(sensor),
-                    format!("{} reads {}", sensor.name(), shown(channel, value)),
+                    format!("{} reads {}", sensor.name(), format_value(channel, value)),
                 ));
                 continue;
             }
-            let jumped = self.jump(sensor, t_s, value);
+            let jumped = self.find_jump(sensor, t_s, value);
             if let Some((_, from)) = jumped {
                 let reason = format!(
                     "{} jumped from {} to {}, faster than its sensor can follow",
                     sensor.name(),
-                    shown(channel, from),
-                    shown(channel, value)
+                    format_value(channel, from),
+                    format_value(channel, value)
                 );
                 found.push((Rule::Jump(sensor), reason));
             }
             self.tracks.insert(sensor, Track { last: (t_s, value), jumped });
         }
         if state.running {
-            found.extend(self.compressor(t_s));
-            found.extend(self.turbine(t_s));
+            found.extend(self.check_compressor(t_s));
+            found.extend(self.check_turbine(t_s));
         } else {
             self.no_flow_since_s = None;
         }
@@ -248,7 +250,7 @@ impl PlausibilityWatch {
     }
 
     /// Time and value before a jump that the sensor's lag excludes, until the reading is back.
-    fn jump(&self, sensor: Sensor, t_s: f64, value: f64) -> Option<(f64, f64)> {
+    fn find_jump(&self, sensor: Sensor, t_s: f64, value: f64) -> Option<(f64, f64)> {
         let (lag_s, noise_k) = match sensor.channel {
             Channel::T2 => (self.bounds.t2_lag_s.0, self.bounds.noise_k[0]),
             Channel::Tc => (HOUSING_LAG_S, self.bounds.noise_k[1]),
@@ -264,56 +266,56 @@ impl PlausibilityWatch {
             (value - from).abs() <= noise_k + share * (end - from).abs()
         };
         let step_s = t_s - then_s;
-        let jumps = !reaches(then, step_s);
+        let is_jump = !reaches(then, step_s);
         match jumped {
-            None if jumps => Some((then_s, then)),
+            None if is_jump => Some((then_s, then)),
             None => None,
-            // It is back after a jump to a place that the gas may have reached meanwhile, or where it was.
-            Some((since_s, from)) if jumps && reaches(from, t_s - since_s) => None,
+            // The jump is over if a second jump leads to a temperature that the sensor may have reached since, or back to the first value.
+            Some((since_s, from)) if is_jump && reaches(from, t_s - since_s) => None,
             Some((_, from)) if reaches(from, step_s) => None,
             still => still,
         }
     }
 
     /// A recent possible reading.
-    fn now(&self, channel: Channel, t_s: f64) -> Option<f64> {
-        self.reading(Sensor::of(channel), t_s)
+    fn latest(&self, channel: Channel, t_s: f64) -> Option<f64> {
+        self.latest_of(Sensor::of(channel), t_s)
     }
 
-    fn reading(&self, sensor: Sensor, t_s: f64) -> Option<f64> {
+    fn latest_of(&self, sensor: Sensor, t_s: f64) -> Option<f64> {
         let (then_s, value) = self.tracks.get(&sensor)?.last;
-        (t_s - then_s <= FRESH_S).then_some(value)
+        (t_s - then_s <= MAX_AGE_S).then_some(value)
     }
 
-    fn compressor(&mut self, t_s: f64) -> Vec<(Rule, String)> {
+    fn check_compressor(&mut self, t_s: f64) -> Vec<(Rule, String)> {
         use Channel as C;
         let mut found = Vec::new();
-        let read = (self.now(C::P1, t_s), self.now(C::T1, t_s), self.now(C::P2, t_s));
+        let read = (self.latest(C::P1, t_s), self.latest(C::T1, t_s), self.latest(C::P2, t_s));
         let (Some(p1_pa), Some(t1_k), Some(p2_pa)) = read else { return found };
         let pr = p2_pa / p1_pa;
-        let surely = (pr / TAP_RATIO).max(1.0);
-        let isentropic_k = t1_k * surely.powf(EXPONENT);
-        let at = || format!("P2/P1 = {pr:.2} and T1 = {}", shown(C::T1, t1_k));
-        let follows_s = FOLLOWS_S + LAGS * self.bounds.t2_lag_s.1;
-        let lowest_k = self.isentropic_k.lowest(t_s, isentropic_k, follows_s);
-        // Without Tc the housing is taken for as cold as the inlet.
-        let housing_k = self.now(C::Tc, t_s).unwrap_or(t1_k).min(lowest_k);
-        let bound_k = lowest_k - COOLED_RATIO * (lowest_k - housing_k) - OFFSETS_K;
+        let min_pr = (pr / TAP_RATIO).max(1.0);
+        let isentropic_k = t1_k * min_pr.powf(ISENTROPIC_EXPONENT);
+        let at = || format!("P2/P1 = {pr:.2} and T1 = {}", format_value(C::T1, t1_k));
+        let delay_s = OUTLET_DELAY_S + SETTLING_LAGS * self.bounds.t2_lag_s.1;
+        let lowest_k = self.isentropic_k.update(t_s, isentropic_k, delay_s);
+        // Without Tc, the housing is assumed to be as cold as the inlet.
+        let housing_k = self.latest(C::Tc, t_s).unwrap_or(t1_k).min(lowest_k);
+        let bound_k = lowest_k - MAX_COOLING_RATIO * (lowest_k - housing_k) - SENSOR_OFFSETS_K;
         for sensor in self.tracks.keys().copied().filter(|sensor| sensor.channel == C::T2) {
-            let Some(t2_k) = self.reading(sensor, t_s).filter(|t2_k| *t2_k < bound_k) else { continue };
-            let (t2, bound) = (shown(C::T2, t2_k), shown(C::T2, bound_k));
+            let Some(t2_k) = self.latest_of(sensor, t_s).filter(|t2_k| *t2_k < bound_k) else { continue };
+            let (t2, bound) = (format_value(C::T2, t2_k), format_value(C::T2, bound_k));
             let name = sensor.name();
             let reason = format!("{name} reads {t2}, although {} heat the air to {bound} at least", at());
             let all = sensor.number == 0;
             found.push((if all { Rule::OutletTemperature } else { Rule::OutletProbe(sensor) }, reason));
         }
-        let work_j_kg = self.work_j_kg.lowest(t_s, CP_J_KGK * (isentropic_k - t1_k), FOLLOWS_S);
+        let work_j_kg = self.work_j_kg.update(t_s, CP_J_KGK * (isentropic_k - t1_k), OUTLET_DELAY_S);
         if let (Some(speed_rpm), Some(diameter_m)) =
-            (self.now(C::ShaftSpeed, t_s), self.bounds.wheel_diameter_m)
+            (self.latest(C::ShaftSpeed, t_s), self.bounds.wheel_diameter_m)
         {
             let tip_m_s = std::f64::consts::PI * diameter_m * speed_rpm / 60.0;
-            if work_j_kg > HEAD_MAX_RATIO * tip_m_s * tip_m_s && surely > 1.0 {
-                let speed = shown(C::ShaftSpeed, speed_rpm);
+            if work_j_kg > HEAD_MAX_RATIO * tip_m_s * tip_m_s && min_pr > 1.0 {
+                let speed = format_value(C::ShaftSpeed, speed_rpm);
                 let reason = format!(
                     "N reads {speed}, at which a wheel of {:.0} mm cannot compress to {}",
                     1e3 * diameter_m,
@@ -322,13 +324,13 @@ impl PlausibilityWatch {
                 found.push((Rule::Head, reason));
             }
         }
-        let flow = self.now(C::CompressorFlow, t_s);
-        let delivers = flow.is_none_or(|flow| flow >= *plausible(C::CompressorFlow).running.start());
+        let flow = self.latest(C::CompressorFlow, t_s);
+        let has_flow = flow.is_none_or(|flow| flow >= *plausible(C::CompressorFlow).running.start());
         match self.no_flow_since_s {
-            _ if delivers || pr < WORKS_PR => self.no_flow_since_s = None,
+            _ if has_flow || pr < MIN_WORKING_PR => self.no_flow_since_s = None,
             None => self.no_flow_since_s = Some(t_s),
-            Some(since_s) if t_s - since_s > BACKFLOW_S => {
-                let flow = shown(C::CompressorFlow, flow.unwrap_or(f64::NAN));
+            Some(since_s) if t_s - since_s > MAX_BACKFLOW_S => {
+                let flow = format_value(C::CompressorFlow, flow.unwrap_or(f64::NAN));
                 found.push((Rule::Flow, format!("m_c reads {flow}, although the compressor holds {}", at())));
             }
             Some(_) => {}
@@ -336,22 +338,22 @@ impl PlausibilityWatch {
         found
     }
 
-    fn turbine(&mut self, t_s: f64) -> Vec<(Rule, String)> {
+    fn check_turbine(&mut self, t_s: f64) -> Vec<(Rule, String)> {
         use Channel as C;
         let mut found = Vec::new();
-        if let (Some(p3_pa), Some(p4_pa)) = (self.now(C::P3, t_s), self.now(C::P4, t_s)) {
-            let highest_pa = -self.p3_pa.lowest(t_s, -p3_pa, FOLLOWS_S);
-            if highest_pa < EXPANDS_RATIO * p4_pa {
-                let (p3, p4) = (shown(C::P3, p3_pa), shown(C::P4, p4_pa));
+        if let (Some(p3_pa), Some(p4_pa)) = (self.latest(C::P3, t_s), self.latest(C::P4, t_s)) {
+            let highest_pa = -self.p3_pa.update(t_s, -p3_pa, OUTLET_DELAY_S);
+            if highest_pa < MIN_EXPANSION_RATIO * p4_pa {
+                let (p3, p4) = (format_value(C::P3, p3_pa), format_value(C::P4, p4_pa));
                 let reason = format!("P3 reads {p3} and P4 {p4}, although a turbine expands");
                 found.push((Rule::TurbinePressure, reason));
             }
         }
-        let read = (self.now(C::T3, t_s), self.now(C::T4, t_s), self.now(C::Tt, t_s));
+        let read = (self.latest(C::T3, t_s), self.latest(C::T4, t_s), self.latest(C::Tt, t_s));
         if let (Some(t3_k), Some(t4_k), Some(tt_k)) = read {
-            let highest_k = -self.t3_k.lowest(t_s, -t3_k, TURBINE_FOLLOWS_S);
-            if t4_k > highest_k.max(tt_k) + 2.0 * OFFSETS_K {
-                let (t3, t4) = (shown(C::T3, t3_k), shown(C::T4, t4_k));
+            let highest_k = -self.t3_k.update(t_s, -t3_k, TURBINE_DELAY_S);
+            if t4_k > highest_k.max(tt_k) + 2.0 * SENSOR_OFFSETS_K {
+                let (t3, t4) = (format_value(C::T3, t3_k), format_value(C::T4, t4_k));
                 let reason = format!("T4 reads {t4} and T3 {t3}, although a turbine cools its gas");
                 found.push((Rule::TurbineTemperature, reason));
             }
@@ -359,8 +361,8 @@ impl PlausibilityWatch {
         found
     }
 
-    /// Follows how long each rule has been violated. Each violation is reported once.
-    fn lasting(&mut self, t_s: f64, found: Vec<(Rule, String)>) -> Option<Trip> {
+    /// Updates the duration of each violation, and reports each violation once.
+    fn update_violations(&mut self, t_s: f64, found: Vec<(Rule, String)>) -> Option<Trip> {
         self.violations.retain(|known| found.iter().any(|(rule, _)| *rule == known.rule));
         for (rule, reason) in found {
             match self.violations.iter_mut().find(|known| known.rule == rule) {
@@ -371,13 +373,13 @@ impl PlausibilityWatch {
         let mut worst: Option<Trip> = None;
         for violation in self.violations.iter_mut().filter(|one| !one.reported) {
             // One microsecond covers the rounding of accumulated sample times.
-            if t_s - violation.since_s < LASTS_S - 1e-6 {
+            if t_s - violation.since_s < MIN_DURATION_S - 1e-6 {
                 continue;
             }
             violation.reported = true;
             let reaction = if violation.rule.ends_the_run() { Reaction::Safe } else { Reaction::Note };
             let reason = format!(
-                "{} since {:.1} s: such readings cannot be true, and were recorded as bad; check the sensors",
+                "{} since {:.1} s: such readings are impossible and are recorded as bad; check the sensors",
                 violation.reason, violation.since_s
             );
             if worst.as_ref().is_none_or(|before| before.reaction < reaction) {
@@ -388,20 +390,20 @@ impl PlausibilityWatch {
     }
 }
 
-/// Whether a sensor of this channel can read this value now. Shaft speed and flow start from zero while the rig already runs.
-pub(crate) fn can_be(channel: Channel, value: f64, running: bool) -> bool {
+/// Whether a reading of this channel is physically possible. Shaft speed and flow may be zero while the rig starts.
+pub(crate) fn is_possible(channel: Channel, value: f64, running: bool) -> bool {
     let from_rest = matches!(channel.info().dimension, Dimension::RotationalSpeed | Dimension::MassFlow);
     value.is_finite()
         && measurable(channel.info().dimension).contains(&value)
         && (!running || from_rest || plausible(channel).running.contains(&value))
 }
 
-fn shown(channel: Channel, value: f64) -> String {
+fn format_value(channel: Channel, value: f64) -> String {
     readable(value, channel.unit())
 }
 
-/// Marks one reading as bad. One of several sensors has no quality of its own: it is left without a reading.
-fn mark(batch: &mut SampleBatch, Sensor { channel, number }: Sensor, index: usize) {
+/// Marks one reading as bad. A single sensor of several has no quality flag, so its reading is removed.
+fn mark_bad(batch: &mut SampleBatch, Sensor { channel, number }: Sensor, index: usize) {
     let element = batch.elements.iter_mut().find(|one| one.element == Element { channel, number });
     if let Some(value) = element.and_then(|one| one.values.get_mut(index)) {
         *value = f64::NAN;

@@ -3,12 +3,12 @@
 use crate::guards::guard::{Commanded, Guard, Trip};
 use mapper_core::{Channel, EventKind, GuardName, Reaction, SampleBatch};
 
-/// Time after the start of a step by which the shaft has come up to speed, s: cold machines start in the warm-up.
-const UP_S: f64 = 30.0;
+/// Time after the start of a step in which the shaft may accelerate, s.
+const START_UP_S: f64 = 30.0;
 /// A shaft below this share of its target speed is not driven.
-const COLLAPSED_RATIO: f64 = 0.5;
+const MIN_DRIVEN_RATIO: f64 = 0.5;
 /// Duration of the low speed before the guard trips, s.
-const COLLAPSED_S: f64 = 5.0;
+const MAX_LOW_SPEED_S: f64 = 5.0;
 
 /// Trips if the rig reports its own trip, or if the shaft speed collapses.
 #[derive(Debug, Clone, Default)]
@@ -29,7 +29,7 @@ impl RigWatch {
 }
 
 impl Guard for RigWatch {
-    fn look(&mut self, batch: &SampleBatch, _: f64, state: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, _: f64, state: &Commanded) -> Option<Trip> {
         if let Some(event) = batch.events.iter().find(|event| event.kind == EventKind::RigTripped) {
             return self.trip(event.t_s, event.message.clone());
         }
@@ -38,15 +38,14 @@ impl Guard for RigWatch {
             return None;
         };
         let speeds = batch.column(Channel::ShaftSpeed)?;
-        for (t_s, speed_rpm) in batch.t_s.iter().zip(speeds).filter(|(t_s, _)| **t_s - since_s > UP_S) {
-            if *speed_rpm >= COLLAPSED_RATIO * aim.speed_rpm {
+        for (t_s, speed_rpm) in batch.t_s.iter().zip(speeds).filter(|(t_s, _)| **t_s - since_s > START_UP_S) {
+            if *speed_rpm >= MIN_DRIVEN_RATIO * aim.speed_rpm {
                 self.slow_since_s = None;
             } else if speed_rpm.is_finite() {
                 let slow_since_s = *self.slow_since_s.get_or_insert(*t_s);
-                if t_s - slow_since_s > COLLAPSED_S {
+                if t_s - slow_since_s > MAX_LOW_SPEED_S {
                     let reason = format!(
-                        "the shaft turns at {:.2} krpm where {:.2} krpm are asked for, since {slow_since_s:.1} s: the rig no \
-                         longer drives it",
+                        "the shaft turns at {:.2} krpm instead of {:.2} krpm since {slow_since_s:.1} s: the rig no longer drives it",
                         speed_rpm / 1e3,
                         aim.speed_rpm / 1e3
                     );
@@ -74,16 +73,20 @@ mod tests {
             SampleBatch { t_s, columns, ..SampleBatch::default() }
         };
         let mut guard = RigWatch::default();
-        assert_eq!(guard.look(&speeds(0.0, 30.0), 10.0, &state), None, "it is still coming up");
-        assert_eq!(guard.look(&speeds(40.0, 60e3), 50.0, &state), None, "slow is for another guard");
-        let trip = guard.look(&speeds(50.0, 30.0), 60.0, &state).unwrap();
+        assert_eq!(guard.check(&speeds(0.0, 30.0), 10.0, &state), None, "the shaft still accelerates");
+        assert_eq!(
+            guard.check(&speeds(40.0, 60e3), 50.0, &state),
+            None,
+            "another guard checks a small speed error"
+        );
+        let trip = guard.check(&speeds(50.0, 30.0), 60.0, &state).unwrap();
         assert_eq!(trip.reaction, Reaction::Latch);
         assert!((55.0..55.3).contains(&trip.t_s), "{}", trip.t_s);
-        assert_eq!(guard.look(&speeds(60.0, 30.0), 70.0, &state), None);
+        assert_eq!(guard.check(&speeds(60.0, 30.0), 70.0, &state), None);
         let mut tripped = speeds(0.0, 1e5);
         let message = "overspeed".to_owned();
         tripped.events.push(Event { t_s: 3.0, kind: EventKind::RigTripped, message });
-        let trip = RigWatch::default().look(&tripped, 10.0, &state).unwrap();
+        let trip = RigWatch::default().check(&tripped, 10.0, &state).unwrap();
         assert_eq!((trip.t_s, trip.reason.as_str()), (3.0, "overspeed"));
     }
 }

@@ -1,30 +1,30 @@
 //! The guard for one channel: value, rate of change, age, quality, and a frozen reading.
 
 use crate::guards::guard::{Commanded, Guard, Trip};
-use crate::guards::plausibility_watch::can_be;
+use crate::guards::plausibility_watch::is_possible;
 use mapper_core::{Quality, Reaction, SampleBatch, SignalGuard, readable};
 use std::collections::VecDeque;
 
 /// A continuing violation trips again after this time, s.
-const AGAIN_S: f64 = 10.0;
+const REPEAT_TRIP_S: f64 = 10.0;
 /// Relative distance to a bound below which the rig is polled sample by sample.
 const NEAR_RATIO: f64 = 0.03;
 /// Time over which the slope is computed, s.
 const SLOPE_S: f64 = 0.5;
 /// A reading is frozen if it moves by no more than this ratio (4 mK of 400 K, 2 Pa of 200 kPa). The noise of thermocouple and
 /// pressure amplifiers is larger, and a jump of the setpoints moves a reading a hundred times as far.
-const STILL_RATIO: f64 = 1e-5;
+const FROZEN_RATIO: f64 = 1e-5;
 /// Minimum spacing of the readings kept for a change, as a share of its time. It bounds the memory for fast rigs.
 const CHANGE_RESOLUTION_RATIO: f64 = 1e-3;
 
-/// See [`SignalGuard`].
+/// Checks one channel as specified by a [`SignalGuard`].
 #[derive(Debug, Clone)]
 pub struct SignalWatch {
     spec: SignalGuard,
     /// Source time of the last good reading, s.
     last_good_s: Option<f64>,
     /// Time of the first sample or poll, s: age counts from there.
-    first_look_s: Option<f64>,
+    first_poll_s: Option<f64>,
     last_value: Option<f64>,
     /// Time and value of a reading about half a second ago, and the slope since then, unit of the channel per second.
     anchor: Option<(f64, f64)>,
@@ -35,8 +35,8 @@ pub struct SignalWatch {
     quiet_until_s: Option<f64>,
     /// Times and readings within the window of the change limit.
     recent: VecDeque<(f64, f64)>,
-    /// Start of the period without movement, s, and its reading.
-    still: Option<(f64, f64)>,
+    /// Start of the period of constant readings, s, and their value.
+    constant_since: Option<(f64, f64)>,
 }
 
 impl SignalWatch {
@@ -45,14 +45,14 @@ impl SignalWatch {
         SignalWatch {
             spec,
             last_good_s: None,
-            first_look_s: None,
+            first_poll_s: None,
             last_value: None,
             anchor: None,
             slope_per_s: 0.0,
             beyond_since_s: None,
             quiet_until_s: None,
             recent: VecDeque::new(),
-            still: None,
+            constant_since: None,
         }
     }
 
@@ -60,14 +60,14 @@ impl SignalWatch {
         if self.quiet_until_s.is_some_and(|quiet_s| t_s < quiet_s) {
             return None;
         }
-        self.quiet_until_s = Some(t_s + AGAIN_S);
+        self.quiet_until_s = Some(t_s + REPEAT_TRIP_S);
         let channel = self.spec.channel;
         let reason = format!("{} ({channel}) {what}", channel.info().description);
         Some(Trip { t_s, guard: self.spec.name, reaction, reason })
     }
 
     /// Describes the bound that a value violates.
-    fn beyond(&self, value: f64, running: bool, slack: f64) -> Option<String> {
+    fn describe_violation(&self, value: f64, running: bool, slack: f64) -> Option<String> {
         let unit = self.spec.channel.unit();
         match (self.spec.above, self.spec.below) {
             (Some(high), _) if value > high - slack => {
@@ -80,7 +80,7 @@ impl SignalWatch {
         }
     }
 
-    fn one(&mut self, t_s: f64, value: f64, state: &Commanded) -> Option<Trip> {
+    fn check_sample(&mut self, t_s: f64, value: f64, state: &Commanded) -> Option<Trip> {
         // The slope over a single sample would be noise.
         match self.anchor {
             Some((then_s, then)) if t_s - then_s >= SLOPE_S => {
@@ -91,12 +91,12 @@ impl SignalWatch {
             None => self.anchor = Some((t_s, value)),
         }
         self.last_good_s = Some(t_s);
-        let unchanged = |(_, there): &(f64, f64)| (value - there).abs() <= STILL_RATIO * there.abs();
-        self.still = self.still.filter(unchanged).or(Some((t_s, value)));
+        let unchanged = |(_, there): &(f64, f64)| (value - there).abs() <= FROZEN_RATIO * there.abs();
+        self.constant_since = self.constant_since.filter(unchanged).or(Some((t_s, value)));
         self.last_value = Some(value);
         // Hysteresis: after a violation, the value has to return past the bound by this amount.
         let slack = if self.beyond_since_s.is_some() { self.spec.hysteresis } else { 0.0 };
-        if let Some(what) = self.beyond(value, state.running, slack) {
+        if let Some(what) = self.describe_violation(value, state.running, slack) {
             let since_s = *self.beyond_since_s.get_or_insert(t_s);
             // One microsecond covers the rounding of accumulated sample times.
             if t_s - since_s >= self.spec.dwell_s - 1e-6 {
@@ -105,11 +105,11 @@ impl SignalWatch {
         } else {
             self.beyond_since_s = None;
         }
-        self.changed(t_s, value).or_else(|| self.frozen(t_s, state))
+        self.check_change(t_s, value).or_else(|| self.check_frozen(t_s, state))
     }
 
     /// Trips if the reading changes by more than the allowed change.
-    fn changed(&mut self, t_s: f64, value: f64) -> Option<Trip> {
+    fn check_change(&mut self, t_s: f64, value: f64) -> Option<Trip> {
         let largest = self.spec.change?;
         while self.recent.front().is_some_and(|(then_s, _)| t_s - then_s > largest.within_s) {
             self.recent.pop_front();
@@ -135,8 +135,8 @@ impl SignalWatch {
     }
 
     /// Trips if the reading has not moved although the setpoints have.
-    fn frozen(&mut self, t_s: f64, state: &Commanded) -> Option<Trip> {
-        let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.still?, state.jumped_s?);
+    fn check_frozen(&mut self, t_s: f64, state: &Commanded) -> Option<Trip> {
+        let (frozen_s, (same_s, _), jumped_s) = (self.spec.frozen_s?, self.constant_since?, state.jumped_s?);
         let since_jump_s = t_s - jumped_s;
         // The reading must be unchanged since before the jump.
         if !state.running || since_jump_s < frozen_s || same_s > jumped_s {
@@ -150,8 +150,8 @@ impl SignalWatch {
 }
 
 impl Guard for SignalWatch {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip> {
-        let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, state: &Commanded) -> Option<Trip> {
+        let first_s = *self.first_poll_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         if let Some(values) = batch.column(self.spec.channel) {
             let provenance = batch.provenance_of(self.spec.channel);
             let mut found: Option<Trip> = None;
@@ -163,9 +163,9 @@ impl Guard for SignalWatch {
                 let new = self.last_good_s.is_none_or(|last_s| taken_s > last_s);
                 // A value above its limit counts even if it is implausible.
                 let above = value.is_finite() && self.spec.above.is_some_and(|high| *value > high);
-                let read = above || can_be(self.spec.channel, *value, state.running);
+                let read = above || is_possible(self.spec.channel, *value, state.running);
                 if read && taken_s.is_finite() && !bad && new {
-                    let trip = self.one(taken_s, *value, state);
+                    let trip = self.check_sample(taken_s, *value, state);
                     found = found.or(trip);
                 }
             }
@@ -225,11 +225,11 @@ mod tests {
     }
 
     fn look(guard: &mut SignalWatch, batch: &SampleBatch, now_s: f64) -> Option<Trip> {
-        guard.look(batch, now_s, &Commanded { running: true, ..Commanded::default() })
+        guard.check(batch, now_s, &Commanded { running: true, ..Commanded::default() })
     }
 
     #[test]
-    fn one_noisy_sample_does_not_trip_but_a_dwell_across_batches_does_and_nan_does_not_reset_it() {
+    fn a_violation_trips_after_its_dwell_across_batches_despite_nan() {
         let mut guard = SignalWatch::new(SignalGuard { hysteresis: 0.0, ..spec() });
         assert_eq!(look(&mut guard, &batch(0, &[401.0, 399.0, 401.0, f64::NAN]), 0.3), None);
         assert!(guard.is_violated() && guard.is_alert());
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_nan_bad_quality_and_old_sources_are_trips_that_end_the_run() {
+    fn missing_bad_and_old_readings_end_the_run() {
         let nothing = SampleBatch::default();
         let good = batch(0, &[300.0; 2]);
         let bad = |source_s: f64, quality| SampleBatch {
@@ -288,7 +288,7 @@ mod tests {
 
     /// A clock set back by an hour looks like a source without new readings; a clock set forward does not.
     #[test]
-    fn a_clock_that_is_set_back_is_silence_and_one_that_is_set_on_is_not() {
+    fn a_source_clock_that_is_set_back_trips_and_one_set_forward_does_not() {
         for (step_s, trips) in [(-3600.0, true), (3600.0, false)] {
             let mut guard = SignalWatch::new(spec());
             assert_eq!(look(&mut guard, &batch(0, &[300.0; 2]), 0.1), None);
@@ -301,9 +301,9 @@ mod tests {
         }
     }
 
-    /// Wrong units (degC for K, Pa for kPa) appear in mid-run: no limit trips on them, but they age out as missing readings.
+    /// The unit changes during the run (degC for K, kPa for Pa): no limit trips, but the readings count as missing.
     #[test]
-    fn a_reading_that_cannot_be_is_silence_and_one_above_its_limit_is_not() {
+    fn impossible_readings_count_as_missing_unless_they_exceed_a_limit() {
         for (channel, good, wrong) in [
             (Channel::T2, 390.0, 117.0),
             (Channel::T2, 390.0, -50.0),
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_and_a_frozen_reading_are_seen() {
+    fn a_large_change_and_a_frozen_reading_trip() {
         let change = Some(LargestChange { change: 5.0, within_s: 1.0 });
         let mut guard = SignalWatch::new(SignalGuard { above: None, change, ..spec() });
         assert_eq!(look(&mut guard, &batch(0, &[300.0, 301.0, 302.0, 303.0]), 0.3), None);
@@ -337,14 +337,14 @@ mod tests {
         let after_jump =
             |jumped_s| Commanded { running: true, jumped_s: Some(jumped_s), ..Commanded::default() };
         // Unchanged without a jump; moved after one; not moved.
-        assert_eq!(guard.look(&batch(0, &[300.0; 100]), 9.9, &after_jump(9.5)), None);
+        assert_eq!(guard.check(&batch(0, &[300.0; 100]), 9.9, &after_jump(9.5)), None);
         let mut moved = guard.clone();
-        assert_eq!(moved.look(&batch(100, &[300.1; 30]), 12.9, &after_jump(9.5)), None);
-        let trip = guard.clone().look(&batch(100, &[300.0; 30]), 12.9, &after_jump(9.5)).unwrap();
+        assert_eq!(moved.check(&batch(100, &[300.1; 30]), 12.9, &after_jump(9.5)), None);
+        let trip = guard.clone().check(&batch(100, &[300.0; 30]), 12.9, &after_jump(9.5)).unwrap();
         assert_eq!(trip.reaction, Reaction::Safe);
         // A flickering last digit is not movement.
         let flicker: Vec<f64> = (0..30).map(|i| 300.0 + 1e-3 * f64::from(i % 2)).collect();
-        assert!(guard.look(&batch(100, &flicker), 12.9, &after_jump(9.5)).is_some());
+        assert!(guard.check(&batch(100, &flicker), 12.9, &after_jump(9.5)).is_some());
         assert!((trip.t_s - 11.5).abs() < 0.11 && trip.reason.contains("frozen"), "{trip:?}");
     }
 }

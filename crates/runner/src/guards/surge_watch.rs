@@ -10,21 +10,21 @@ use mapper_numerics::statistics::median;
 use std::collections::VecDeque;
 
 /// Sampling interval of the guard, s.
-const LOOK_S: f64 = 0.1;
-/// Number of samples that are compared: two seconds.
-const LOOKS: usize = 20;
+const SAMPLE_INTERVAL_S: f64 = 0.1;
+/// Number of samples that are evaluated: two seconds.
+const SAMPLES: usize = 20;
 /// Ratio of the median absolute second difference to the standard deviation of independent normal noise: 0.6745 sqrt(6).
 const SECOND_DIFFERENCE: f64 = 1.652;
 
-/// See [`SurgeVariation`].
+/// Checks flow and pressures for surge, as specified by a [`SurgeVariation`].
 #[derive(Debug, Clone)]
 pub struct SurgeWatch {
     spec: SurgeVariation,
-    next_look_s: f64,
+    next_sample_s: f64,
     /// Newest readings of flow, P2 and P1 since the last sample. They may come from several sources with different times.
     newest: [f64; 3],
     /// Flow, P2 and P1 of the last samples.
-    looks: VecDeque<[f64; 3]>,
+    samples: VecDeque<[f64; 3]>,
     since_s: Option<f64>,
     last_s: f64,
     reported: bool,
@@ -35,9 +35,9 @@ impl SurgeWatch {
     pub fn new(spec: SurgeVariation) -> Self {
         SurgeWatch {
             spec,
-            next_look_s: f64::NEG_INFINITY,
+            next_sample_s: f64::NEG_INFINITY,
             newest: [f64::NAN; 3],
-            looks: VecDeque::new(),
+            samples: VecDeque::new(),
             since_s: None,
             last_s: 0.0,
             reported: false,
@@ -47,8 +47,8 @@ impl SurgeWatch {
     /// Standard deviation of one of the three channels relative to its mean; 0 if too few readings exist.
     fn variation_ratio(&self, which: usize) -> f64 {
         let values: Vec<f64> =
-            self.looks.iter().map(|look| look[which]).filter(|value| value.is_finite()).collect();
-        if values.len() < LOOKS / 2 {
+            self.samples.iter().map(|look| look[which]).filter(|value| value.is_finite()).collect();
+        if values.len() < SAMPLES / 2 {
             return 0.0;
         }
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -57,7 +57,7 @@ impl SurgeWatch {
         if mean.abs() > 0.0 { typical / mean.abs() } else { 0.0 }
     }
 
-    fn surges(&self) -> Option<(f64, f64)> {
+    fn detect_surge(&self) -> Option<(f64, f64)> {
         let flow = self.variation_ratio(0);
         if flow <= self.spec.flow_ratio {
             return None;
@@ -68,9 +68,9 @@ impl SurgeWatch {
 }
 
 impl Guard for SurgeWatch {
-    fn look(&mut self, batch: &SampleBatch, _: f64, state: &Commanded) -> Option<Trip> {
+    fn check(&mut self, batch: &SampleBatch, _: f64, state: &Commanded) -> Option<Trip> {
         if !state.running {
-            self.looks.clear();
+            self.samples.clear();
             (self.since_s, self.reported) = (None, false);
             return None;
         }
@@ -81,15 +81,15 @@ impl Guard for SurgeWatch {
                 let value = column.and_then(|values| values.get(index)).copied();
                 *newest = value.filter(|value| value.is_finite()).unwrap_or(*newest);
             }
-            if *t_s < self.next_look_s - 1e-6 {
+            if *t_s < self.next_sample_s - 1e-6 {
                 continue;
             }
-            (self.next_look_s, self.last_s) = (t_s + LOOK_S, *t_s);
-            self.looks.push_back(std::mem::replace(&mut self.newest, [f64::NAN; 3]));
-            if self.looks.len() > LOOKS {
-                self.looks.pop_front();
+            (self.next_sample_s, self.last_s) = (t_s + SAMPLE_INTERVAL_S, *t_s);
+            self.samples.push_back(std::mem::replace(&mut self.newest, [f64::NAN; 3]));
+            if self.samples.len() > SAMPLES {
+                self.samples.pop_front();
             }
-            let Some((flow, pressure)) = self.surges() else {
+            let Some((flow, pressure)) = self.detect_surge() else {
                 (self.since_s, self.reported) = (None, false);
                 continue;
             };
@@ -143,7 +143,7 @@ mod tests {
             };
             let columns = vec![column(Channel::CompressorFlow, 0.05, &flow), column(Channel::P2, 150e3, &p2)];
             let batch = SampleBatch { columns, t_s: t_s.clone(), ..SampleBatch::default() };
-            guard.look(&batch, t_s[99], &state).map(|trip| trip.t_s)
+            guard.check(&batch, t_s[99], &state).map(|trip| trip.t_s)
         })
     }
 

@@ -67,11 +67,11 @@ pub trait RunObserver {
         Ok(())
     }
 
-    /// The step that has just ended is complete: neither a stop nor a fault ended it.
+    /// The step that has just ended was complete: neither a stop nor a fault cut it short.
     ///
     /// # Errors
     /// [`ObserverError`].
-    fn on_step_held(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
+    fn on_step_completed(&mut self, _marker: &StepMarker) -> Result<(), ObserverError> {
         Ok(())
     }
 }
@@ -102,7 +102,7 @@ impl RunObserver for Vec<&mut dyn RunObserver> {
         self.iter_mut().try_for_each(|observer| observer.on_step_end(marker))
     }
 
-    fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
-        self.iter_mut().try_for_each(|observer| observer.on_step_held(marker))
+    fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+        self.iter_mut().try_for_each(|observer| observer.on_step_completed(marker))
     }
 }

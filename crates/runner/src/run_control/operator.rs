@@ -4,35 +4,35 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Maximum number of requests that wait to be recorded; further ones are dropped.
-const WAITING_MAX: usize = 64;
+const MAX_WAITING: usize = 64;
 
-/// Set from any thread; the run checks it after every batch of samples.
+/// Requests of the operator, from any thread. The run reads them after every batch of samples.
 #[derive(Debug, Default)]
 pub struct Operator {
-    holds: AtomicBool,
+    is_held: AtomicBool,
     requests: Mutex<Vec<String>>,
 }
 
 impl Operator {
-    /// Holds the current step until [`Operator::go_on`].
+    /// Holds the current step until [`Operator::release`].
     pub fn hold(&self) {
-        self.holds.store(true, Ordering::SeqCst);
+        self.is_held.store(true, Ordering::SeqCst);
     }
 
-    /// Lets the step end.
-    pub fn go_on(&self) {
-        self.holds.store(false, Ordering::SeqCst);
+    /// Releases a held step.
+    pub fn release(&self) {
+        self.is_held.store(false, Ordering::SeqCst);
     }
 
     /// Whether the step is held.
-    pub fn holds(&self) -> bool {
-        self.holds.load(Ordering::SeqCst)
+    pub fn is_holding(&self) -> bool {
+        self.is_held.load(Ordering::SeqCst)
     }
 
     /// Adds a sentence to the recording: the request and who made it.
-    pub fn say(&self, sentence: String) {
+    pub fn add_message(&self, sentence: String) {
         if let Ok(mut requests) = self.requests.lock()
-            && requests.len() < WAITING_MAX
+            && requests.len() < MAX_WAITING
         {
             requests.push(sentence);
         }

@@ -5,7 +5,7 @@ use crate::run_control::operator::Operator;
 use mapper_core::{SafeTrajectory, SetpointRanges, SpeedBand};
 use std::sync::atomic::AtomicBool;
 
-/// See the module. [`Protection::default`] applies no protection.
+/// Protection of a run; [`Protection::default`] applies none.
 #[derive(Debug, Clone, Copy)]
 pub struct Protection<'a> {
     /// The trajectory into the safe state.
@@ -16,7 +16,7 @@ pub struct Protection<'a> {
     pub accepts: Option<SetpointRanges>,
     /// Allowed deviation of a step's speed; `None`: not checked.
     pub speed: Option<SpeedBand>,
-    /// Machine and sensors, against which every sample is judged; `None`: not judged.
+    /// Bounds for the plausibility check of every sample; `None`: not checked.
     pub readings: Option<ReadingBounds>,
     /// Set from outside to stop at the end of the step.
     pub stop_after_step: &'a AtomicBool,

@@ -1,8 +1,8 @@
 //! The run itself: soak, warm-up, steps, cool-down.
 
-use crate::guards::guard::{Bench, Commanded, Guard, Trip};
+use crate::guards::guard::{ActiveGuards, Commanded, Guard, Trip};
 use crate::guards::plausibility_watch::PlausibilityWatch;
-use crate::guards::speed_reached::Reached;
+use crate::guards::speed_history::SpeedHistory;
 use crate::run_control::observer::{ObserverError, RunObserver};
 use crate::run_control::operator::Operator;
 use crate::run_control::protection::Protection;
@@ -21,14 +21,14 @@ const POLL_INTERVAL_S: f64 = 1.0;
 /// Relative change of P3 that counts as a jump (twice this for the valve): sensors have to follow it.
 const JUMP_RATIO: f64 = 0.01;
 /// Longest time that a guard may hold the setpoints, s.
-const HOLD_MAX_S: f64 = 300.0;
+const MAX_HOLD_S: f64 = 300.0;
 /// Longest time that the operator may hold a step, s. It limits a hold that an operator forgets.
-const OPERATOR_HOLD_MAX_S: f64 = 4.0 * 3600.0;
+const MAX_OPERATOR_HOLD_S: f64 = 4.0 * 3600.0;
 /// Number of stages when a step is approached again, and the duration of each, s.
-const SMALLER_STEPS: u32 = 4;
-const SMALLER_STEP_S: f64 = 10.0;
+const APPROACH_STAGES: u32 = 4;
+const APPROACH_STAGE_S: f64 = 10.0;
 /// Maximum number of consecutive steps that guards may skip; one more ends the run.
-const SKIPPED_MAX: u32 = 3;
+const MAX_SKIPPED_STEPS: u32 = 3;
 
 /// How a run ended, if the program did not fail.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,20 +80,20 @@ impl<E: Into<RunError>> From<E> for Halt {
 
 /// A run that is under way.
 pub(crate) struct Run<'a, 'p> {
-    pub(crate) with: Runner<'a>,
+    pub(crate) runner: Runner<'a>,
     pub(crate) protection: &'p Protection<'p>,
     pub(crate) now_s: f64,
     /// The most recent setpoints.
     pub(crate) sent: Option<Setpoints>,
     pub(crate) commanded: Commanded,
     sample_s: f64,
-    reached: Reached,
+    speed_history: SpeedHistory,
     plausibility: Option<PlausibilityWatch>,
     skipped: u32,
     /// The step that a guard has cut short, until its end is reported.
-    pub(crate) open: Option<StepMarker>,
+    pub(crate) open_step: Option<StepMarker>,
     /// Whether the operator was informed that the run ends with this step.
-    pub(crate) stop_sent: bool,
+    pub(crate) stop_confirmed: bool,
 }
 
 impl Runner<'_> {
@@ -115,57 +115,57 @@ impl Runner<'_> {
         self.backend.arm().map_err(RunError::NotArmed)?;
         let sample_s = 1.0 / self.backend.describe().sample_rate_hz;
         let mut run = Run {
-            with: self,
+            runner: self,
             protection,
             now_s: 0.0,
             sent: None,
             commanded: Commanded::default(),
             sample_s: if sample_s > 0.0 { sample_s.min(POLL_INTERVAL_S) } else { POLL_INTERVAL_S },
-            reached: Reached::default(),
+            speed_history: SpeedHistory::default(),
             plausibility: protection.readings.map(PlausibilityWatch::new),
             skipped: 0,
-            open: None,
-            stop_sent: false,
+            open_step: None,
+            stop_confirmed: false,
         };
         // After a panic, the possibly inconsistent state is used only to make the rig safe.
-        let end = match catch_unwind(AssertUnwindSafe(|| run.forward())) {
+        let end = match catch_unwind(AssertUnwindSafe(|| run.execute())) {
             Ok(Ok(())) => Ok(RunEnd::Completed),
-            Ok(Err(halt)) => run.way_out(halt),
-            Err(panic) => run.way_out(Halt::Failed(RunError::Panicked { message: words_of(&*panic) })),
+            Ok(Err(halt)) => run.shut_down(halt),
+            Err(panic) => run.shut_down(Halt::Failed(RunError::Panicked { message: panic_message(&*panic) })),
         };
-        let disarmed = catch_unwind(AssertUnwindSafe(|| run.with.backend.disarm()));
+        let disarmed = catch_unwind(AssertUnwindSafe(|| run.runner.backend.disarm()));
         let end = end?;
         match disarmed {
             Ok(disarmed) => disarmed?,
-            Err(panic) => return Err(RunError::Panicked { message: words_of(&*panic) }),
+            Err(panic) => return Err(RunError::Panicked { message: panic_message(&*panic) }),
         }
         Ok(end)
     }
 }
 
 /// The message of a panic.
-pub(crate) fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
+pub(crate) fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "a panic".to_owned())
 }
 
 impl Run<'_, '_> {
-    fn forward(&mut self) -> Result<(), Halt> {
-        self.with.observer.on_start(&self.with.backend.describe())?;
+    fn execute(&mut self) -> Result<(), Halt> {
+        self.runner.observer.on_start(&self.runner.backend.describe())?;
         let mut next = self.next_step()?;
         self.pass_notes()?;
         if let Some(first) = &next {
-            if let Some(soak) = self.with.steps.soak() {
+            if let Some(soak) = self.runner.steps.soak() {
                 self.soak(first, soak)?;
             }
-            let warm_s = self.now_s + self.with.steps.warm_up_s();
+            let warm_s = self.now_s + self.runner.steps.warm_up_s();
             if warm_s > self.now_s {
-                let first_setpoints = self.begin(first);
+                let first_setpoints = self.begin_step(first);
                 self.send(first_setpoints)?;
-                self.watch(warm_s, false, true)?;
-                // Whether the speed was reached is reported for the first step, not for its warm-up.
+                self.run_until(warm_s, false, true)?;
+                // The first step reports whether its speed was reached; the warm-up does not.
                 let now_s = self.now_s;
-                let _ = self.with.speed.as_mut().map(|speed| speed.end(now_s));
+                let _ = self.runner.speed.as_mut().map(|speed| speed.end(now_s));
             }
         }
         while let Some(step) = next {
@@ -173,25 +173,24 @@ impl Run<'_, '_> {
             next = self.next_step()?;
             self.pass_notes()?;
         }
-        self.with.backend.make_safe()?;
+        self.runner.backend.make_safe()?;
         (self.sent, self.commanded) = (None, Commanded::default());
-        let end_s = self.now_s + self.with.steps.cool_down_s();
-        self.watch(end_s, false, false)
+        let end_s = self.now_s + self.runner.steps.cool_down_s();
+        self.run_until(end_s, false, false)
     }
 
-    /// The next step, unless a stop was requested: while the rig was connected, in the last step, or while waiting for this one. A rig
-    /// that runs in real time is watched meanwhile.
+    /// Waits for the next step, unless a stop is requested. A rig in real time is polled and guarded meanwhile.
     fn next_step(&mut self) -> Result<Option<PlanStep>, Halt> {
         loop {
-            self.look_for_a_stop(false, self.now_s)?;
-            if self.with.steps.is_ready() {
+            self.check_for_stop(false, self.now_s)?;
+            if self.runner.steps.is_ready() {
                 break;
             }
-            if self.sent.is_some() && self.with.clock.advances_by_itself() {
-                self.watch(self.now_s + self.sample_s, false, true)?;
+            if self.sent.is_some() && self.runner.clock.advances_by_itself() {
+                self.run_until(self.now_s + self.sample_s, false, true)?;
             }
         }
-        Ok(self.with.steps.next_step()?)
+        Ok(self.runner.steps.next_step()?)
     }
 
     /// Executes one step, and repeats it once if a guard requests smaller steps.
@@ -199,7 +198,7 @@ impl Run<'_, '_> {
         let before = self.sent;
         let mut again = false;
         loop {
-            let setpoints = self.begin(step);
+            let setpoints = self.begin_step(step);
             if again && let Some(before) = before {
                 self.approach(before, setpoints)?;
             }
@@ -215,50 +214,50 @@ impl Run<'_, '_> {
             };
             self.send(setpoints)?;
             (self.commanded.step_since_s, self.commanded.aim) = (Some(self.now_s), Some(step.to));
-            self.reached.clear();
-            self.with.observer.on_step_start(&marker)?;
-            self.with.steps.begins(&marker);
-            let watched = self.watch(marker.end_s, true, true);
-            let watched = watched.and_then(|()| {
-                self.end()?;
-                self.speed_is_reached(step)
+            self.speed_history.clear();
+            self.runner.observer.on_step_start(&marker)?;
+            self.runner.steps.before_step(&marker);
+            let result = self.run_until(marker.end_s, true, true);
+            let result = result.and_then(|()| {
+                self.end_speed_control()?;
+                self.check_speed(step)
             });
             (self.commanded.step_since_s, self.commanded.aim) = (None, None);
             marker.end_s = self.now_s;
-            let trip = match watched {
+            let trip = match result {
                 Err(Halt::Cut(trip)) => trip,
                 Err(halt @ Halt::Tripped(..)) => {
                     // The rig comes first: the safe shutdown reports the end of the step after its samples.
-                    self.open = Some(marker);
+                    self.open_step = Some(marker);
                     return Err(halt);
                 }
                 ended => {
                     // The reason for an early end takes precedence over a failure to write the marker.
-                    let recorded = self.with.observer.on_step_end(&marker);
+                    let recorded = self.runner.observer.on_step_end(&marker);
                     ended?;
                     recorded?;
-                    self.with.observer.on_step_held(&marker)?;
-                    self.with.steps.after_step(&marker)?;
+                    self.runner.observer.on_step_completed(&marker)?;
+                    self.runner.steps.after_step(&marker)?;
                     self.skipped = 0;
                     return Ok(());
                 }
             };
-            self.with.observer.on_step_abandoned(&marker)?;
-            let (goes_again, what) = match trip.reaction {
+            self.runner.observer.on_step_abandoned(&marker)?;
+            let (is_repeated, what) = match trip.reaction {
                 Reaction::SmallerSteps if !again && before.is_some() => {
-                    (true, "the step is approached again")
+                    (true, "the step is repeated in smaller steps")
                 }
-                _ => (false, "the step is left out"),
+                _ => (false, "the step is skipped"),
             };
-            self.act(&trip, what)?;
-            if !goes_again {
+            self.report_trip(&trip, what)?;
+            if !is_repeated {
                 self.skipped += 1;
-                if self.skipped > SKIPPED_MAX {
+                if self.skipped > MAX_SKIPPED_STEPS {
                     let reason =
-                        format!("{} steps in a row were left out; the last: {}", self.skipped, trip.reason);
+                        format!("{} consecutive steps were skipped; the last: {}", self.skipped, trip.reason);
                     return Err(Halt::Tripped(Trip { reaction: Reaction::Safe, reason, ..trip }, None));
                 }
-                self.with.steps.skipped(&marker)?;
+                self.runner.steps.after_skipped_step(&marker)?;
                 return Ok(());
             }
             again = true;
@@ -267,15 +266,15 @@ impl Run<'_, '_> {
 
     /// Returns to `before`, then approaches `to` in stages.
     fn approach(&mut self, before: Setpoints, to: Setpoints) -> Result<(), Halt> {
-        for piece in 0..SMALLER_STEPS {
-            let share = f64::from(piece) / f64::from(SMALLER_STEPS);
+        for piece in 0..APPROACH_STAGES {
+            let share = f64::from(piece) / f64::from(APPROACH_STAGES);
             let between = |from: f64, to: f64| from + share * (to - from);
             self.send(Setpoints {
                 p3_pa: between(before.p3_pa, to.p3_pa),
                 valve_opening_ratio: between(before.valve_opening_ratio, to.valve_opening_ratio),
                 ..to
             })?;
-            match self.watch(self.now_s + SMALLER_STEP_S, true, false) {
+            match self.run_until(self.now_s + APPROACH_STAGE_S, true, false) {
                 // The same guard tripped again: the step itself reports it.
                 Ok(()) | Err(Halt::Cut(_)) => {}
                 halt => return halt,
@@ -285,26 +284,26 @@ impl Run<'_, '_> {
     }
 
     /// Checks the speed at the end of a step against the campaign's band.
-    fn speed_is_reached(&mut self, step: &PlanStep) -> Result<(), Halt> {
-        let missed = self.protection.speed.and_then(|band| self.reached.missed(band, step, self.now_s));
+    fn check_speed(&mut self, step: &PlanStep) -> Result<(), Halt> {
+        let missed = self.protection.speed.and_then(|band| self.speed_history.check(band, step, self.now_s));
         let Some(trip) = missed else { return Ok(()) };
         match trip.reaction {
-            Reaction::Note | Reaction::Hold => self.act(&trip, "the run goes on"),
+            Reaction::Note | Reaction::Hold => self.report_trip(&trip, "the run continues"),
             Reaction::SmallerSteps | Reaction::SkipStep => Err(Halt::Cut(trip)),
             Reaction::Safe | Reaction::Latch => Err(Halt::Tripped(trip, None)),
         }
     }
 
-    /// The setpoints at the start of a step.
-    fn begin(&mut self, step: &PlanStep) -> Setpoints {
+    /// Starts the speed control of a step, and returns its first setpoints.
+    fn begin_step(&mut self, step: &PlanStep) -> Setpoints {
         let now_s = self.now_s;
-        let p3_pa = self.with.speed.as_mut().map_or(step.p3_pa, |speed| speed.begin(step, now_s));
+        let p3_pa = self.runner.speed.as_mut().map_or(step.p3_pa, |speed| speed.begin(step, now_s));
         Setpoints { p3_pa, ..setpoints(step) }
     }
 
     /// Sends setpoints to the rig, and updates the state that the guards use.
     pub(crate) fn send(&mut self, setpoints: Setpoints) -> Result<(), BackendError> {
-        self.with.backend.set(&setpoints)?;
+        self.runner.backend.set(&setpoints)?;
         let running = setpoints.mode == RigMode::Running;
         let jumps = self.sent.is_some_and(|before| {
             let change = |from: f64, to: f64| (to - from).abs() / from.abs();
@@ -320,18 +319,18 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Reports a step whose speed was not reached.
-    fn end(&mut self) -> Result<(), ObserverError> {
+    /// Ends the speed control of a step, and reports a speed that was not reached.
+    fn end_speed_control(&mut self) -> Result<(), ObserverError> {
         let now_s = self.now_s;
-        let event = self.with.speed.as_mut().and_then(|speed| speed.end(now_s));
-        event.map_or(Ok(()), |event| self.with.observer.on_event(&event))
+        let event = self.runner.speed.as_mut().and_then(|speed| speed.end(now_s));
+        event.map_or(Ok(()), |event| self.runner.observer.on_event(&event))
     }
 
     /// Reports a guard that does not end the run.
-    fn act(&mut self, trip: &Trip, what: &str) -> Result<(), Halt> {
+    fn report_trip(&mut self, trip: &Trip, what: &str) -> Result<(), Halt> {
         let message = format!("guard `{}`: {}; {what}", trip.guard, trip.reason);
         let t_s = trip.t_s.max(self.now_s);
-        Ok(self.with.observer.on_event(&Event { t_s, kind: EventKind::GuardActed, message })?)
+        Ok(self.runner.observer.on_event(&Event { t_s, kind: EventKind::GuardActed, message })?)
     }
 
     /// Keeps the machine at rest for the duration of the soak; events mark start and end.
@@ -344,19 +343,19 @@ impl Run<'_, '_> {
         let message =
             format!("soak for {:.0} s: air off, oil at {:.2} K", soak.duration_s, soak.oil_temperature_k);
         let (t_s, kind) = (self.now_s, EventKind::SoakStarted);
-        self.with.observer.on_event(&Event { t_s, kind, message })?;
-        self.watch(self.now_s + soak.duration_s, false, false)?;
-        let message = "the soak is over, air on".to_owned();
+        self.runner.observer.on_event(&Event { t_s, kind, message })?;
+        self.run_until(self.now_s + soak.duration_s, false, false)?;
+        let message = "soak completed, air on".to_owned();
         let (t_s, kind) = (self.now_s, EventKind::SoakEnded);
-        self.with.observer.on_event(&Event { t_s, kind, message })?;
+        self.runner.observer.on_event(&Event { t_s, kind, message })?;
         Ok(())
     }
 
     /// Passes the source's notes to the observer.
     pub(crate) fn pass_notes(&mut self) -> Result<(), ObserverError> {
         let (t_s, kind) = (self.now_s, EventKind::Note);
-        let mut notes = self.with.steps.take_notes().into_iter();
-        notes.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))?;
+        let mut notes = self.runner.steps.take_notes().into_iter();
+        notes.try_for_each(|message| self.runner.observer.on_event(&Event { t_s, kind, message }))?;
         self.pass_requests()
     }
 
@@ -365,25 +364,27 @@ impl Run<'_, '_> {
         let Some(operator) = self.protection.operator else { return Ok(()) };
         let (t_s, kind) = (self.now_s, EventKind::Note);
         let mut requests = operator.take_messages().into_iter();
-        requests.try_for_each(|message| self.with.observer.on_event(&Event { t_s, kind, message }))
+        requests.try_for_each(|message| self.runner.observer.on_event(&Event { t_s, kind, message }))
     }
 
     /// Runs the rig to `until_s` while guards, observer and source receive its samples. Within a step the source may end it early,
     /// and a guard may hold or cut it short. Outside a step, a guard that would cut a step short ends the run.
-    fn watch(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
+    fn run_until(&mut self, mut until_s: f64, in_step: bool, hold_speed: bool) -> Result<(), Halt> {
         let (mut held_s, mut operator_held_s, mut hold_sent) = (0.0, 0.0, false);
         while self.now_s < until_s {
-            self.look_for_a_stop(in_step, until_s)?;
+            self.check_for_stop(in_step, until_s)?;
             let before_s = self.now_s;
-            let (batch, trips) = self.acquire(until_s, in_step)?;
+            let (batch, trips) = self.poll_until_trip(until_s, in_step)?;
             if let Some(trip) = trips.iter().find(|trip| trip.reaction.ends_the_run()) {
                 return Err(Halt::Tripped(trip.clone(), Some(Box::new(batch))));
             }
-            self.with.observer.on_batch(&batch)?;
+            self.runner.observer.on_batch(&batch)?;
             for trip in &trips {
                 match trip.reaction {
-                    Reaction::Note => self.act(trip, "the run goes on")?,
-                    Reaction::Hold if held_s < HOLD_MAX_S => self.act(trip, "the setpoints are held")?,
+                    Reaction::Note => self.report_trip(trip, "the run continues")?,
+                    Reaction::Hold if held_s < MAX_HOLD_S => {
+                        self.report_trip(trip, "the setpoints are held")?
+                    }
                     Reaction::SmallerSteps | Reaction::SkipStep if in_step => {
                         return Err(Halt::Cut(trip.clone()));
                     }
@@ -391,19 +392,19 @@ impl Run<'_, '_> {
                 }
             }
             self.pass_requests()?;
-            let operator_holds = self.protection.operator.is_some_and(Operator::holds)
-                && operator_held_s < OPERATOR_HOLD_MAX_S;
+            let operator_holds = self.protection.operator.is_some_and(Operator::is_holding)
+                && operator_held_s < MAX_OPERATOR_HOLD_S;
             if operator_holds {
                 let more_s = self.now_s - before_s;
                 (operator_held_s, until_s) = (operator_held_s + more_s, until_s + more_s);
             }
-            self.reached.keep(&batch, self.now_s);
-            let ends = self.with.steps.on_batch(&batch);
+            self.speed_history.add(&batch, self.now_s);
+            let ends = self.runner.steps.on_batch(&batch);
             let holding = trips.iter().any(|trip| trip.reaction == Reaction::Hold)
-                || (held_s > 0.0 && Bench::new(&mut self.with.guards).is_violated());
+                || (held_s > 0.0 && ActiveGuards::new(&mut self.runner.guards).is_violated());
             // Sent once per hold: the backend reports whether it still accepts commands.
             if (holding || operator_holds) && !hold_sent {
-                self.with.backend.hold()?;
+                self.runner.backend.hold()?;
             }
             hold_sent = holding || operator_holds;
             if holding {
@@ -411,9 +412,9 @@ impl Run<'_, '_> {
                     batch.t_s.first().zip(batch.t_s.last()).map_or(0.0, |(first, last)| last - first);
                 let more_s = last_s.max(self.sample_s);
                 (held_s, until_s) = (held_s + more_s, until_s + more_s);
-                if held_s >= HOLD_MAX_S {
+                if held_s >= MAX_HOLD_S {
                     let reason = format!(
-                        "a guard has held the setpoints for {HOLD_MAX_S:.0} s, and is still violated"
+                        "a guard has held the setpoints for {MAX_HOLD_S:.0} s, and is still violated"
                     );
                     let (guard, reaction) = (GuardName::Signals, Reaction::Safe);
                     return Err(Halt::Tripped(Trip { t_s: self.now_s, guard, reaction, reason }, None));
@@ -424,9 +425,9 @@ impl Run<'_, '_> {
             if ends && in_step {
                 break;
             }
-            if hold_speed && let (Some(speed), Some(sent)) = (&mut self.with.speed, self.sent) {
+            if hold_speed && let (Some(speed), Some(sent)) = (&mut self.runner.speed, self.sent) {
                 let (p3_pa, event) = speed.on_batch(&batch);
-                event.map_or(Ok(()), |event| self.with.observer.on_event(&event))?;
+                event.map_or(Ok(()), |event| self.runner.observer.on_event(&event))?;
                 // At the end of a step the next step sets P3.
                 if let Some(p3_pa) = p3_pa.filter(|_| self.now_s < until_s) {
                     self.send(Setpoints { p3_pa, ..sent })?;
@@ -436,20 +437,24 @@ impl Run<'_, '_> {
         Ok(())
     }
 
-    /// Samples of one second, up to `until_s`, or up to the sample at which a guard trips.
-    fn acquire(&mut self, until_s: f64, in_step: bool) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
+    /// Polls samples for one second, at most to `until_s`, and stops at the sample at which a guard trips.
+    fn poll_until_trip(
+        &mut self,
+        until_s: f64,
+        in_step: bool,
+    ) -> Result<(SampleBatch, Vec<Trip>), BackendError> {
         let end_s = (self.now_s + POLL_INTERVAL_S).min(until_s);
         let mut whole: Option<SampleBatch> = None;
         loop {
-            let alert = self.protection.each_sample || Bench::new(&mut self.with.guards).is_alert();
+            let alert = self.protection.each_sample || ActiveGuards::new(&mut self.runner.guards).is_alert();
             let next_s = if alert { (self.now_s + self.sample_s).min(end_s) } else { end_s };
-            if !self.waited_until(next_s, in_step) {
+            if !self.wait_until_or_stop(next_s, in_step) {
                 return Ok((whole.unwrap_or_default(), Vec::new()));
             }
-            let mut batch = self.with.backend.poll(next_s)?;
+            let mut batch = self.runner.backend.poll(next_s)?;
             self.now_s = next_s;
-            // Guards see the readings before impossible ones are marked: a mark must not hide a value above its limit.
-            let mut trips = Bench::new(&mut self.with.guards).look(&batch, next_s, &self.commanded);
+            // Guards check the readings before impossible ones are marked, because a mark must not hide a value above its limit.
+            let mut trips = ActiveGuards::new(&mut self.runner.guards).check(&batch, next_s, &self.commanded);
             let judged =
                 self.plausibility.as_mut().and_then(|watch| watch.judge(&mut batch, &self.commanded));
             trips.extend(judged);

@@ -1,14 +1,14 @@
-//! Why a run could not go on.
+//! Errors of a run.
 
 use crate::run_control::observer::ObserverError;
 use crate::step_sources::step_source::StepSourceError;
 use mapper_core::BackendError;
 
-/// Why a run could not go on. The rig was asked to become safe before this is returned.
+/// Failure of a run. The rig was commanded to its safe state before this is returned.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The rig could not be armed.
-    #[error("the rig could not be armed, no step was begun on it: {0}")]
+    #[error("the rig could not be armed, and no step was started: {0}")]
     NotArmed(#[source] BackendError),
     /// The rig failed.
     #[error("the rig failed: {0}")]
@@ -21,7 +21,7 @@ pub enum RunError {
     Source(#[from] StepSourceError),
     /// The program itself failed.
     #[error(
-        "the program failed on the way ({message}); the rig is safe. Please report this as a fault of the program"
+        "the program failed during the run ({message}); the rig is safe. Please report this as a fault of the program"
     )]
     Panicked {
         /// Message of the panic.
@@ -41,7 +41,7 @@ pub enum RunError {
 
 impl RunError {
     /// Whether the state of the rig is unknown.
-    pub fn leaves_doubt(&self) -> bool {
+    pub fn leaves_rig_state_unknown(&self) -> bool {
         match self {
             RunError::NotSafe { .. } | RunError::Panicked { .. } => true,
             RunError::Backend(error) => {

@@ -34,15 +34,15 @@ const TRANSIENT_MAX_S: f64 = 15.0;
 /// The transient is over when the relative change of speed per second falls below this.
 const AT_REST_RATIO: f64 = 1e-3;
 /// Smallest change of the command that is sent, as a share of the speed band: it saves valve wear.
-const SENT_SHARE: f64 = 0.05;
+const MIN_CHANGE_SHARE: f64 = 0.05;
 /// Largest deficit in either direction: a larger one indicates another fault, most likely of the speed sensor.
 const DEFICIT_MAX: f64 = 0.4;
 /// Minimum weight of a step's own deficit in the running average, which averages out the effect of the housings.
 const LEARNING_MIN_RATIO: f64 = 0.3;
 /// Time at the end of a step over which its speed is judged, s.
-const END_S: f64 = 10.0;
+const AVERAGING_S: f64 = 10.0;
 /// Consecutive seconds beyond the band after which the loop restarts with its fast time constant.
-const OFF_SECONDS: usize = 3;
+const MAX_SECONDS_OFF: usize = 3;
 
 /// Limits of the control loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ pub struct SpeedControl<'a> {
     /// Deficit with which steps begin.
     deficit: f64,
     /// Number of steps in the deficit's average.
-    learnt: usize,
+    averaged_steps: usize,
     hold: Option<Hold>,
     /// The last command, Pa.
     sent_pa: Option<f64>,
@@ -121,7 +121,15 @@ impl<'a> SpeedControl<'a> {
         limits: SpeedControlLimits,
         response_at: ResponseAt<'a>,
     ) -> Self {
-        SpeedControl { settings, limits, response_at, deficit: 0.0, learnt: 0, hold: None, sent_pa: None }
+        SpeedControl {
+            settings,
+            limits,
+            response_at,
+            deficit: 0.0,
+            averaged_steps: 0,
+            hold: None,
+            sent_pa: None,
+        }
     }
 
     /// Deficit of turbine power with which the next step begins, natural logarithm.
@@ -179,7 +187,7 @@ impl<'a> SpeedControl<'a> {
         let Some(mut hold) = self.hold.take() else { return (None, None) };
         let event = self.advance(&mut hold, batch);
         let smallest_pa =
-            SENT_SHARE * self.settings.band_ratio * hold.target.speed_rpm / hold.response.rpm_per_pa;
+            MIN_CHANGE_SHARE * self.settings.band_ratio * hold.target.speed_rpm / hold.response.rpm_per_pa;
         let send = self.sent_pa.is_none_or(|sent_pa| (hold.wanted_pa - sent_pa).abs() > smallest_pa);
         let next = send.then_some(hold.wanted_pa);
         if send {
@@ -194,7 +202,7 @@ impl<'a> SpeedControl<'a> {
         let speeds = batch.column(Channel::ShaftSpeed)?;
         let speed_rpm = median(speeds.iter().filter(|speed| speed.is_finite()))?;
         hold.recent.push_back((now_s, speed_rpm));
-        while hold.recent.front().is_some_and(|(t_s, _)| *t_s < now_s - END_S) {
+        while hold.recent.front().is_some_and(|(t_s, _)| *t_s < now_s - AVERAGING_S) {
             hold.recent.pop_front();
         }
         let error_rpm = hold.target.speed_rpm - speed_rpm;
@@ -215,7 +223,7 @@ impl<'a> SpeedControl<'a> {
         }
         let beyond = error_rpm.abs() > self.settings.band_ratio * hold.target.speed_rpm;
         hold.off = if beyond { hold.off + 1 } else { 0 };
-        if hold.off == OFF_SECONDS {
+        if hold.off == MAX_SECONDS_OFF {
             hold.closed_s = Some(now_s - dt_s);
         }
         let closed_for_s = now_s - hold.closed_s.unwrap_or(now_s);
@@ -250,29 +258,29 @@ impl<'a> SpeedControl<'a> {
             return None;
         }
         let (since_s, reported) = hold.saturated.unwrap_or((now_s, false));
-        let report = !reported && now_s - since_s >= OFF_SECONDS as f64;
+        let report = !reported && now_s - since_s >= MAX_SECONDS_OFF as f64;
         hold.saturated = Some((since_s, reported || report));
         report.then(|| Event {
             t_s: now_s,
             kind: EventKind::Note,
             message: format!(
-                "speed control: P3 stays at {:.1} kPa, {}; the speed is {:.2} krpm where {:.2} krpm are asked for",
+                "speed control: P3 stays at {:.1} kPa, {}; the speed is {:.2} krpm instead of {:.2} krpm",
                 hold.wanted_pa / 1e3,
-                self.limit_in_words(hold.wanted_pa),
+                self.describe_limit(hold.wanted_pa),
                 speed_rpm / 1e3,
                 hold.target.speed_rpm / 1e3
             ),
         })
     }
 
-    fn limit_in_words(&self, p3_pa: f64) -> String {
+    fn describe_limit(&self, p3_pa: f64) -> String {
         if p3_pa >= self.limits.p3_max_pa {
-            "its highest".to_owned()
+            "its upper limit".to_owned()
         } else if p3_pa <= self.limits.p3_min_pa {
-            "its lowest".to_owned()
+            "its lower limit".to_owned()
         } else {
             format!(
-                "as far from the plan as turbine power may be ({:.0} %); is the speed's sensor right?",
+                "the largest correction of turbine power ({:.0} %); check the speed sensor",
                 100.0 * DEFICIT_MAX.exp_m1()
             )
         }
@@ -283,8 +291,8 @@ impl<'a> SpeedControl<'a> {
         let hold = self.hold.as_ref()?;
         if hold.closed_s.is_some() {
             let own = hold.deficit(hold.wanted_pa);
-            self.learnt += 1;
-            let weight = (1.0 / self.learnt as f64).max(LEARNING_MIN_RATIO);
+            self.averaged_steps += 1;
+            let weight = (1.0 / self.averaged_steps as f64).max(LEARNING_MIN_RATIO);
             self.deficit += weight * (own - self.deficit);
         }
         let (asked_rpm, reached_rpm) = (hold.target.speed_rpm, hold.reached_rpm()?);
@@ -293,7 +301,7 @@ impl<'a> SpeedControl<'a> {
             t_s,
             kind: EventKind::SpeedNotReached,
             message: format!(
-                "the speed was not reached: {:.2} krpm asked for, {:.2} krpm in the last {END_S:.0} s ({:+.2} %, band {:.2} %)",
+                "the speed was not reached: {:.2} krpm requested, {:.2} krpm in the last {AVERAGING_S:.0} s ({:+.2} %, band {:.2} %)",
                 asked_rpm / 1e3,
                 reached_rpm / 1e3,
                 100.0 * off_ratio,

@@ -9,9 +9,9 @@ use std::collections::{BTreeMap, VecDeque};
 /// Time at the end of a step whose readings are compared, s.
 const END_S: f64 = 20.0;
 /// Threshold of a difference in declared standard deviations: 95 %.
-const WIDTH: f64 = 1.96;
+const THRESHOLD_SIGMAS: f64 = 1.96;
 /// Compared channels. T2 is taken relative to T1 and P2 relative to P1, so that changes of the inlet are not drift.
-const WATCHED: [Channel; 4] = [Channel::T2, Channel::P2, Channel::CompressorFlow, Channel::Tc];
+const COMPARED_CHANNELS: [Channel; 4] = [Channel::T2, Channel::P2, Channel::CompressorFlow, Channel::Tc];
 
 /// The steps of another source; a reference jump is repeated if it differs from its first visit.
 ///
@@ -30,12 +30,12 @@ pub struct DriftWatch<'a> {
     inserted: VecDeque<PlanStep>,
     /// Whether the current jump is a confirmation.
     confirming: bool,
-    handed_out: usize,
+    next_index: usize,
     /// Total duration of the inserted steps, s.
-    later_s: f64,
+    delay_s: f64,
     notes: Vec<String>,
     /// Why the run ends before its last step.
-    ended: Option<String>,
+    end_reason: Option<String>,
 }
 
 impl<'a> DriftWatch<'a> {
@@ -55,35 +55,35 @@ impl<'a> DriftWatch<'a> {
             readings: VecDeque::new(),
             inserted: VecDeque::new(),
             confirming: false,
-            handed_out: 0,
-            later_s: 0.0,
+            next_index: 0,
+            delay_s: 0.0,
             notes: Vec::new(),
-            ended: None,
+            end_reason: None,
         }
     }
 
     /// Why drift ended the run before its last step; `None` if it did not.
-    pub fn ended_by_drift(&self) -> Option<&str> {
-        self.ended.as_deref()
+    pub fn end_reason(&self) -> Option<&str> {
+        self.end_reason.as_deref()
     }
 
     /// Means at the end of the step, in the order of [`WATCHED`]; NaN for missing channels.
-    fn end_means(&self) -> Vec<f64> {
+    fn mean_readings(&self) -> Vec<f64> {
         let count = self.readings.len() as f64;
-        (0..WATCHED.len())
+        (0..COMPARED_CHANNELS.len())
             .map(|column| self.readings.iter().map(|(_, values)| values[column]).sum::<f64>() / count)
             .collect()
     }
 
     /// Describes the differences beyond the declared uncertainty.
-    fn differences(&self, first: &[f64], now: &[f64]) -> Vec<String> {
+    fn describe_differences(&self, first: &[f64], now: &[f64]) -> Vec<String> {
         let mut differences = Vec::new();
-        for ((channel, first), now) in WATCHED.iter().zip(first).zip(now) {
+        for ((channel, first), now) in COMPARED_CHANNELS.iter().zip(first).zip(now) {
             let Some(declared) = self.declared.get(channel) else { continue };
             let fixed = declared.offset_sigma.hypot(declared.gain_sigma_ratio * first);
             // Noise of consecutive samples is correlated: they count as one sample in two seconds.
             let noise = declared.noise_sigma * (2.0 * 2.0 / END_S).sqrt();
-            let limit = WIDTH * fixed.hypot(noise);
+            let limit = THRESHOLD_SIGMAS * fixed.hypot(noise);
             let change = now - first;
             if limit > 0.0 && change.abs() > limit {
                 differences.push(format!(
@@ -96,15 +96,17 @@ impl<'a> DriftWatch<'a> {
         differences
     }
 
-    fn act(&mut self, differences: &str) {
+    fn report_drift(&mut self, differences: &str) {
         let consequence = match self.on_drift {
-            OnDrift::Continue => "the run goes on, as the campaign says",
-            OnDrift::Hold => "the run is held in its safe state; look before going on",
-            OnDrift::Zero => "the run is stopped without flow: zero the sensors, then run the rest",
+            OnDrift::Continue => "the run continues (`on_drift: continue`)",
+            OnDrift::Hold => "the run is held in its safe state; inspect the rig before you continue",
+            OnDrift::Zero => {
+                "the run is stopped without flow: zero the sensors, then run the remaining steps"
+            }
         };
         let note = format!("drift: the repeated jump differs again, {differences}; {consequence}");
         if self.on_drift != OnDrift::Continue {
-            self.ended = Some(note.clone());
+            self.end_reason = Some(note.clone());
         }
         self.notes.push(note);
     }
@@ -120,7 +122,7 @@ impl StepSource for DriftWatch<'_> {
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
-        if self.ended.is_some() {
+        if self.end_reason.is_some() {
             return Ok(None);
         }
         let next = match self.inserted.pop_front() {
@@ -128,14 +130,14 @@ impl StepSource for DriftWatch<'_> {
             None => self.inner.next_step()?,
         };
         let next = next.map(|step| PlanStep {
-            index: self.handed_out,
+            index: self.next_index,
             // The real origin: a step that follows an inserted one starts from it.
             from: self.current.as_ref().map_or(step.from, |current| Some(current.to)),
-            start_s: step.start_s + self.later_s,
+            start_s: step.start_s + self.delay_s,
             ..step
         });
         if next.is_some() {
-            self.handed_out += 1;
+            self.next_index += 1;
             self.before = self.current.take();
             self.current.clone_from(&next);
             self.readings.clear();
@@ -147,7 +149,7 @@ impl StepSource for DriftWatch<'_> {
         for (index, t_s) in batch.t_s.iter().enumerate() {
             let value = |channel| batch.column(channel).and_then(|values| values.get(index)).copied();
             let over = |channel| value(channel).unwrap_or(f64::NAN);
-            let row = WATCHED
+            let row = COMPARED_CHANNELS
                 .iter()
                 .map(|channel| match channel {
                     Channel::T2 => over(Channel::T2) - value(Channel::T1).unwrap_or(0.0),
@@ -171,14 +173,14 @@ impl StepSource for DriftWatch<'_> {
         let Some(jump) = marker.from.zip(marker.to).filter(|_| compared) else {
             return Ok(());
         };
-        let now = self.end_means();
+        let now = self.mean_readings();
         let Some((_, first)) = self.first.iter().find(|(known, _)| *known == jump) else {
             self.first.push((jump, now));
             return Ok(());
         };
-        let differences = self.differences(first, &now).join(", ");
+        let differences = self.describe_differences(first, &now).join(", ");
         if !differences.is_empty() && self.confirming {
-            self.act(&differences);
+            self.report_drift(&differences);
             // The reported state is the new reference for all jumps, so that it is not reported at every repeat.
             self.first.clear();
             self.first.push((jump, now));
@@ -187,14 +189,14 @@ impl StepSource for DriftWatch<'_> {
             && self.inserted.is_empty()
         {
             self.notes.push(format!(
-                "drift? a repeated jump differs from its first visit, {differences}; it is made again"
+                "drift? a repeated jump differs from its first visit, {differences}; it is repeated"
             ));
-            self.later_s += before.dwell_s + current.dwell_s;
+            self.delay_s += before.dwell_s + current.dwell_s;
             self.inserted.extend([before.clone(), current.clone()]);
             self.confirming = true;
             return Ok(());
         } else if self.confirming && self.inserted.is_empty() {
-            self.notes.push("drift: not seen again, the run goes on".to_owned());
+            self.notes.push("drift: not confirmed, the run continues".to_owned());
         }
         if self.inserted.is_empty() {
             self.confirming = false;

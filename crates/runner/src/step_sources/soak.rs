@@ -4,19 +4,19 @@ use crate::step_sources::step_source::{StepSource, StepSourceError};
 use mapper_core::{PlanStep, Soak};
 
 /// The steps of another source, delayed by a soak.
-pub struct Soaked<'a> {
+pub struct SoakSource<'a> {
     inner: &'a mut dyn StepSource,
     soak: Soak,
 }
 
-impl<'a> Soaked<'a> {
+impl<'a> SoakSource<'a> {
     /// `inner` after `soak`.
     pub fn new(inner: &'a mut dyn StepSource, soak: Soak) -> Self {
-        Soaked { inner, soak }
+        SoakSource { inner, soak }
     }
 }
 
-impl StepSource for Soaked<'_> {
+impl StepSource for SoakSource<'_> {
     fn inner(&self) -> Option<&dyn StepSource> {
         Some(self.inner)
     }

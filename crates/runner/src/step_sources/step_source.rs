@@ -59,10 +59,10 @@ pub trait StepSource {
     /// [`StepSourceError`] ends the run in its safe state.
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError>;
 
-    /// The latest step begins with its jump; called again if a guard has the step repeated. Does nothing by default.
-    fn begins(&mut self, marker: &StepMarker) {
+    /// Called when the latest step starts with its jump, and again if a guard requests that the step is repeated. Does nothing by default.
+    fn before_step(&mut self, marker: &StepMarker) {
         if let Some(inner) = self.inner_mut() {
-            inner.begins(marker);
+            inner.before_step(marker);
         }
     }
 
@@ -83,8 +83,8 @@ pub trait StepSource {
     ///
     /// # Errors
     /// [`StepSourceError`] ends the run in its safe state.
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
-        self.inner_mut().map_or(Ok(()), |inner| inner.skipped(marker))
+    fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+        self.inner_mut().map_or(Ok(()), |inner| inner.after_skipped_step(marker))
     }
 
     /// Notes for the recording since the last call. None by default.

@@ -2,7 +2,7 @@
 //! as the readings allow.
 
 use crate::step_sources::step_source::{StepSource, StepSourceError};
-use crate::surge::{Move, SurgeEstimate, SurgeReading, Why, next_move};
+use crate::surge::{LineEnd, Move, SurgeEstimate, SurgeReading, choose_next_move};
 use mapper_core::{
     Channel, EventKind, OperatingPoint, PlanStep, Predicted, Recording, ReferenceState, SampleBatch,
     StepKind, StepMarker, SurgeSeek,
@@ -21,7 +21,7 @@ const REVERSED_SAMPLES: usize = 2;
 
 /// Boundary conditions that hold the machine at a point, by the nominal model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub struct HoldConditions {
     /// Turbine inlet total pressure, Pa.
     pub p3_pa: f64,
     /// Turbine inlet total temperature, K.
@@ -35,20 +35,20 @@ pub struct Held {
 }
 
 /// Returns the conditions that hold the machine at a point; `None` if they violate the campaign's limits.
-pub type Hold<'a> = &'a dyn Fn(OperatingPoint) -> Option<Held>;
+pub type HoldConditionsAt<'a> = &'a dyn Fn(OperatingPoint) -> Option<HoldConditions>;
 
 /// The steps of another source, followed by the approaches to surge: one for each speed, slowest first.
 pub struct SurgeSearch<'a> {
     inner: &'a mut dyn StepSource,
     seek: SurgeSeek,
     reference: ReferenceState,
-    hold: Hold<'a>,
+    hold: HoldConditionsAt<'a>,
     /// The step nearest surge at each speed, from the inner source.
     line_ends: Vec<PlanStep>,
     /// Remaining lines, the next one last; `None` while the inner source has steps.
     lines: Option<Vec<PlanStep>>,
     approach: Option<Approach>,
-    handed_out: usize,
+    next_index: usize,
     last: Option<OperatingPoint>,
     /// Start of the next step in the plan's time, s.
     start_s: f64,
@@ -60,13 +60,13 @@ pub struct SurgeSearch<'a> {
 struct Approach {
     end: PlanStep,
     stage: Stage,
-    looks: Vec<SurgeReading>,
+    readings: Vec<SurgeReading>,
     /// Readings of the current step.
-    readings: Recording,
+    recording: Recording,
     nominal_margin_ratio: Option<f64>,
     /// Ratio of commanded to wanted speed.
     trim_ratio: f64,
-    surged: bool,
+    has_surged: bool,
     reversed_samples: usize,
 }
 
@@ -88,7 +88,7 @@ impl<'a> SurgeSearch<'a> {
         inner: &'a mut dyn StepSource,
         seek: SurgeSeek,
         reference: ReferenceState,
-        hold: Hold<'a>,
+        hold: HoldConditionsAt<'a>,
     ) -> Self {
         SurgeSearch {
             inner,
@@ -98,7 +98,7 @@ impl<'a> SurgeSearch<'a> {
             line_ends: Vec::new(),
             lines: None,
             approach: None,
-            handed_out: 0,
+            next_index: 0,
             last: None,
             start_s: 0.0,
             notes: Vec::new(),
@@ -106,7 +106,7 @@ impl<'a> SurgeSearch<'a> {
         }
     }
 
-    /// Time of a line without its readings, s.
+    /// Time of a line in addition to its readings, s.
     pub const AROUND_S: f64 = ARRIVE_S + RETURN_S;
 
     /// Number of surge events during the approaches.
@@ -114,7 +114,7 @@ impl<'a> SurgeSearch<'a> {
         self.surges
     }
 
-    fn remember(&mut self, step: &PlanStep) {
+    fn update_line_ends(&mut self, step: &PlanStep) {
         let known = self.line_ends.iter_mut().find(|end| (end.to.speed_rpm - step.to.speed_rpm).abs() < 1e-3);
         match known {
             Some(end) if end.to.valve_opening_ratio <= step.to.valve_opening_ratio => {}
@@ -124,7 +124,7 @@ impl<'a> SurgeSearch<'a> {
     }
 
     /// The next step of the approaches; `None` after the last line.
-    fn next_of_approaches(&mut self) -> Option<PlanStep> {
+    fn next_approach_step(&mut self) -> Option<PlanStep> {
         let lines = self.lines.get_or_insert_with(|| {
             let mut lines = std::mem::take(&mut self.line_ends);
             lines.sort_by(|a, b| b.to.speed_rpm.total_cmp(&a.to.speed_rpm));
@@ -141,7 +141,7 @@ impl<'a> SurgeSearch<'a> {
             // The point is outside the limits: the line ends with the readings so far.
             let speed_rpm = approach.end.to.speed_rpm;
             self.notes.push(format!(
-                "surge search: {speed_rpm:.0} rpm cannot be held any further within the limits; the line is left"
+                "surge search: {speed_rpm:.0} rpm cannot be held any further within the limits; the line ends"
             ));
             approach.stage = match approach.stage {
                 Stage::SurgeReading(_) => Stage::Return,
@@ -156,17 +156,17 @@ impl Approach {
         Approach {
             end,
             stage: Stage::Arrive,
-            looks: Vec::new(),
-            readings: Recording::default(),
+            readings: Vec::new(),
+            recording: Recording::default(),
             nominal_margin_ratio: None,
             trim_ratio: 1.0,
-            surged: false,
+            has_surged: false,
             reversed_samples: 0,
         }
     }
 
     /// The step of the current stage, without index, start time and origin.
-    fn step(&mut self, seek: &SurgeSeek, hold: Hold<'_>) -> Option<PlanStep> {
+    fn step(&mut self, seek: &SurgeSeek, hold: HoldConditionsAt<'_>) -> Option<PlanStep> {
         let safe = self.end.to.valve_opening_ratio;
         let (opening, dwell_s) = match self.stage {
             Stage::Arrive => (safe, ARRIVE_S),
@@ -184,7 +184,7 @@ impl Approach {
             self.nominal_margin_ratio = Some(held.surge_margin_ratio);
         }
         step.predicted.minutes = dwell_s / 60.0;
-        self.readings = Recording::default();
+        self.recording = Recording::default();
         self.reversed_samples = 0;
         Some(step)
     }
@@ -193,7 +193,7 @@ impl Approach {
     fn read(&mut self, batch: &SampleBatch) -> bool {
         for channel in READ {
             if let Some(values) = batch.column(channel) {
-                let series = self.readings.series.entry(channel).or_default();
+                let series = self.recording.series.entry(channel).or_default();
                 series.t_s.extend_from_slice(&batch.t_s);
                 series.values.extend_from_slice(values);
             }
@@ -203,13 +203,13 @@ impl Approach {
             self.reversed_samples = if *flow_kg_s <= 0.0 { self.reversed_samples + 1 } else { 0 };
         }
         let surges = self.stage != Stage::Return && (entered || self.reversed_samples >= REVERSED_SAMPLES);
-        self.surged |= surges;
+        self.has_surged |= surges;
         surges
     }
 
     /// Corrects the commanded speed by the measured one.
     fn trim(&mut self, end_s: f64) {
-        let Some(series) = self.readings.series.get(&Channel::ShaftSpeed) else { return };
+        let Some(series) = self.recording.series.get(&Channel::ShaftSpeed) else { return };
         let (_, values) = series.slice(end_s - SPEED_S, end_s);
         let finite: Vec<f64> = values.iter().copied().filter(|value| *value > 0.0).collect();
         if !finite.is_empty() {
@@ -220,7 +220,7 @@ impl Approach {
     }
 
     /// Decides how the approach continues after a step; a note if the line ends.
-    fn conclude(
+    fn decide_next_stage(
         &mut self,
         marker: &StepMarker,
         seek: &SurgeSeek,
@@ -230,7 +230,7 @@ impl Approach {
         let safe = self.end.to.valve_opening_ratio;
         let (stage, note) = match self.stage {
             Stage::Return | Stage::Over => (Stage::Over, None),
-            _ if self.surged => (
+            _ if self.has_surged => (
                 Stage::Return,
                 Some(format!(
                     "{}: surge at opening {:.3}, the valve opens",
@@ -240,35 +240,37 @@ impl Approach {
             ),
             Stage::Arrive => (Stage::SurgeReading(safe), None),
             Stage::SurgeReading(_) => {
-                self.looks.extend(SurgeReading::of(&self.readings, marker, reference));
-                match next_move(&self.looks, seek, self.nominal_margin_ratio) {
+                self.readings.extend(SurgeReading::of(&self.recording, marker, reference));
+                match choose_next_move(&self.readings, seek, self.nominal_margin_ratio) {
                     Move::To(opening) => (Stage::SurgeReading(opening), None),
-                    Move::Done(why) => (Stage::Return, Some(format!("{}: {}", line(), self.found(why)))),
+                    Move::Done(why) => {
+                        (Stage::Return, Some(format!("{}: {}", line(), self.describe_result(why))))
+                    }
                 }
             }
         };
-        if !self.surged && matches!(self.stage, Stage::Arrive | Stage::SurgeReading(_)) {
+        if !self.has_surged && matches!(self.stage, Stage::Arrive | Stage::SurgeReading(_)) {
             self.trim(marker.end_s);
         }
         self.stage = stage;
         note
     }
 
-    fn found(&self, why: Why) -> String {
+    fn describe_result(&self, why: LineEnd) -> String {
         let why = match why {
-            Why::Known => "known as well as asked for",
-            Why::NearEnough => "as near as is safe",
-            Why::Steps => "so many steps are allowed",
+            LineEnd::AccuracyReached => "required accuracy reached",
+            LineEnd::DistanceReached => "minimum distance to surge reached",
+            LineEnd::MaxSteps => "maximum number of steps reached",
         };
-        match SurgeEstimate::of(&self.looks).filter(|estimate| estimate.seen) {
+        match SurgeEstimate::of(&self.readings).filter(|estimate| estimate.is_usable) {
             Some(estimate) => format!(
                 "surge at {:.5} kg/s corrected, standard error {:.1} %, from {} openings down to {:.1} % above it ({why}); the valve opens",
                 estimate.flow_corrected_kg_s,
                 100.0 * estimate.standard_error_ratio(),
-                self.looks.len(),
+                self.readings.len(),
                 100.0 * (estimate.closest_flow_kg_s / estimate.flow_corrected_kg_s - 1.0),
             ),
-            None => format!("no sign of surge at {} openings ({why}); the valve opens", self.looks.len()),
+            None => format!("no sign of surge at {} openings ({why}); the valve opens", self.readings.len()),
         }
     }
 }
@@ -286,27 +288,27 @@ impl StepSource for SurgeSearch<'_> {
         let from_inner = if self.lines.is_none() { self.inner.next_step()? } else { None };
         let next = match from_inner {
             Some(step) => {
-                self.remember(&step);
+                self.update_line_ends(&step);
                 Some(step)
             }
-            None => self.next_of_approaches().map(|step| PlanStep {
-                index: self.handed_out,
+            None => self.next_approach_step().map(|step| PlanStep {
+                index: self.next_index,
                 from: self.last,
                 start_s: self.start_s,
                 ..step
             }),
         };
         if let Some(step) = &next {
-            self.handed_out = step.index + 1;
+            self.next_index = step.index + 1;
             self.last = Some(step.to);
             self.start_s = step.start_s + step.dwell_s;
         }
         Ok(next)
     }
 
-    fn begins(&mut self, marker: &StepMarker) {
+    fn before_step(&mut self, marker: &StepMarker) {
         if self.approach.is_none() {
-            self.inner.begins(marker);
+            self.inner.before_step(marker);
         }
     }
 
@@ -322,16 +324,17 @@ impl StepSource for SurgeSearch<'_> {
 
     fn after_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(approach) = &mut self.approach else { return self.inner.after_step(marker) };
-        self.surges +=
-            usize::from(approach.surged && matches!(approach.stage, Stage::Arrive | Stage::SurgeReading(_)));
-        let note = approach.conclude(marker, &self.seek, self.reference);
+        self.surges += usize::from(
+            approach.has_surged && matches!(approach.stage, Stage::Arrive | Stage::SurgeReading(_)),
+        );
+        let note = approach.decide_next_stage(marker, &self.seek, self.reference);
         self.notes.extend(note);
         Ok(())
     }
 
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+    fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         match &mut self.approach {
-            None => self.inner.skipped(marker),
+            None => self.inner.after_skipped_step(marker),
             // The valve opens: a guard limits how far a line is followed.
             Some(approach) => {
                 approach.stage = match approach.stage {

@@ -1,8 +1,8 @@
 //! Estimates the surge flow from the readings so far.
 
-use crate::surge::growth_law::{GrowthLaw, Read, excess, log_likelihood};
-use crate::surge::smoothed_flow::Smoothed;
-use crate::surge::surge_reading::{LOOKED_AT, SurgeReading};
+use crate::surge::growth_law::{GrowthLaw, Observation, log_likelihood, log_likelihood_excess};
+use crate::surge::smoothed_flow::SmoothedFlow;
+use crate::surge::surge_reading::{PRECURSOR_CHANNELS, SurgeReading};
 use mapper_numerics::statistics::mean;
 
 /// Exponents of the growth of the variance with the inverse margin, with their prior probabilities: theory predicts 1, and rigs
@@ -14,11 +14,11 @@ const ONSETS: [f64; 8] = [10.0, 0.5, 0.35, 0.28, 0.22, 0.17, 0.13, 0.1];
 /// is uniform in the logarithm of the distance.
 const DISTANCES: (f64, f64, usize) = (1e-3, 0.4, 90);
 /// Readings at the start of an approach that are far from surge: they define the quiet level.
-const QUIET: usize = 3;
+const QUIET_READINGS: usize = 3;
 /// Minimum number of readings with significant growth before the law is extrapolated.
 const MIN_GROWN: usize = 3;
 /// Minimum ratio of the largest variance to the quiet level: the onset of growth alone resembles a distant surge.
-const WELL_GROWN_RATIO: f64 = 6.0;
+const MIN_GROWTH_RATIO: f64 = 6.0;
 /// Log-likelihood ratio of growth to the quiet level above which growth is significant: chance exceeds it once in some thousand
 /// readings.
 const MIN_EXCESS: f64 = 7.0;
@@ -38,64 +38,66 @@ pub struct SurgeEstimate {
     /// Smallest corrected flow so far, kg/s.
     pub closest_flow_kg_s: f64,
     /// Whether the variation has grown enough, at enough readings; otherwise the other values have little meaning.
-    pub seen: bool,
+    pub is_usable: bool,
     /// Whether the variation has begun to grow, at any number of readings.
-    pub grows: bool,
+    pub has_growth: bool,
 }
 
 impl SurgeEstimate {
     /// The estimate from readings at decreasing openings; `None` for fewer than four.
-    pub fn of(looks: &[SurgeReading]) -> Option<Self> {
-        if looks.len() < 4 {
+    pub fn of(readings: &[SurgeReading]) -> Option<Self> {
+        if readings.len() < 4 {
             return None;
         }
-        let Smoothed { flows_kg_s, flow_error_ratio } = Smoothed::of(looks)?;
+        let SmoothedFlow { flows_kg_s, flow_error_ratio } = SmoothedFlow::fit(readings)?;
         let closest_flow_kg_s = flows_kg_s.iter().copied().fold(f64::INFINITY, f64::min);
-        let levels: Vec<Option<f64>> = (0..LOOKED_AT.len()).map(|channel| level(looks, channel)).collect();
-        let is_significant = |look: &SurgeReading| {
-            let channels = look.variations.iter().zip(&levels);
-            channels.filter_map(|(read, level)| Some(excess((*read)?, (*level)?))).sum::<f64>() > MIN_EXCESS
+        let levels: Vec<Option<f64>> =
+            (0..PRECURSOR_CHANNELS.len()).map(|channel| quiet_variance(readings, channel)).collect();
+        let is_significant = |reading: &SurgeReading| {
+            let channels = reading.variations.iter().zip(&levels);
+            channels.filter_map(|(read, level)| Some(log_likelihood_excess((*read)?, (*level)?))).sum::<f64>()
+                > MIN_EXCESS
         };
-        let well_grown = |look: &SurgeReading| {
-            let mut channels = look.variations.iter().zip(&levels);
+        let has_large_growth = |reading: &SurgeReading| {
+            let mut channels = reading.variations.iter().zip(&levels);
             channels.any(|(read, level)| {
-                read.zip(*level).is_some_and(|(read, level)| read.variance >= WELL_GROWN_RATIO * level)
+                read.zip(*level).is_some_and(|(read, level)| read.variance >= MIN_GROWTH_RATIO * level)
             })
         };
-        let grown = looks.iter().rev().take_while(|look| is_significant(look)).count();
-        let places = places(closest_flow_kg_s);
+        let grown = readings.iter().rev().take_while(|reading| is_significant(reading)).count();
+        let candidates = candidates(closest_flow_kg_s);
         let mut logs: Vec<(usize, f64)> = Vec::new();
-        for (place, surge_kg_s) in places.iter().enumerate() {
+        for (candidate, surge_kg_s) in candidates.iter().enumerate() {
             for (exponent, weight) in EXPONENTS {
                 for onset_ratio in ONSETS {
                     let law = GrowthLaw { exponent, onset_ratio };
                     let parts: Vec<f64> =
-                        flows_kg_s.iter().map(|flow| law.part(flow / surge_kg_s - 1.0)).collect();
+                        flows_kg_s.iter().map(|flow| law.growth_at(flow / surge_kg_s - 1.0)).collect();
                     let channel = |channel: usize| -> f64 {
-                        let read: Vec<Read> = parts
+                        let read: Vec<Observation> = parts
                             .iter()
-                            .zip(looks)
-                            .filter_map(|(part, look)| Some((*part, look.variations[channel]?)))
+                            .zip(readings)
+                            .filter_map(|(part, reading)| Some((*part, reading.variations[channel]?)))
                             .collect();
                         if read.is_empty() { 0.0 } else { log_likelihood(&read) }
                     };
-                    let log: f64 = (0..LOOKED_AT.len()).map(channel).sum();
-                    logs.push((place, log + f64::ln(weight)));
+                    let log: f64 = (0..PRECURSOR_CHANNELS.len()).map(channel).sum();
+                    logs.push((candidate, log + f64::ln(weight)));
                 }
             }
         }
         let best = logs.iter().map(|(_, log)| *log).fold(f64::NEG_INFINITY, f64::max);
-        let mut weights = vec![0.0; places.len()];
-        for (place, log) in logs {
-            weights[place] += (log - best).exp();
+        let mut weights = vec![0.0; candidates.len()];
+        for (candidate, log) in logs {
+            weights[candidate] += (log - best).exp();
         }
         let all: f64 = weights.iter().sum();
-        let middle = places.iter().zip(&weights).map(|(flow, w)| flow * w).sum::<f64>() / all;
+        let middle = candidates.iter().zip(&weights).map(|(flow, w)| flow * w).sum::<f64>() / all;
         let variance =
-            places.iter().zip(&weights).map(|(flow, w)| (flow - middle).powi(2) * w).sum::<f64>() / all;
+            candidates.iter().zip(&weights).map(|(flow, w)| (flow - middle).powi(2) * w).sum::<f64>() / all;
         // Candidates are ordered from the highest flow to the lowest.
         let mut above = 0.0;
-        let highest = places.iter().zip(&weights).find(|(_, weight)| {
+        let highest = candidates.iter().zip(&weights).find(|(_, weight)| {
             above += **weight;
             above >= 0.02 * all
         });
@@ -107,8 +109,8 @@ impl SurgeEstimate {
                 .hypot(LAW_ERROR_RATIO * (closest_flow_kg_s - middle)),
             highest_flow_kg_s: highest.map_or(closest_flow_kg_s, |(flow, _)| *flow),
             closest_flow_kg_s,
-            seen: grown >= MIN_GROWN && looks.last().is_some_and(well_grown),
-            grows: grown > 0,
+            is_usable: grown >= MIN_GROWN && readings.last().is_some_and(has_large_growth),
+            has_growth: grown > 0,
         })
     }
 
@@ -119,14 +121,17 @@ impl SurgeEstimate {
 }
 
 /// The variance of a channel far from surge.
-fn level(looks: &[SurgeReading], channel: usize) -> Option<f64> {
-    let quiet: Vec<f64> =
-        looks.iter().take(QUIET).filter_map(|look| Some(look.variations[channel]?.variance)).collect();
+fn quiet_variance(readings: &[SurgeReading], channel: usize) -> Option<f64> {
+    let quiet: Vec<f64> = readings
+        .iter()
+        .take(QUIET_READINGS)
+        .filter_map(|reading| Some(reading.variations[channel]?.variance))
+        .collect();
     mean(&quiet)
 }
 
 /// Candidate surge flows, from the highest down, kg/s.
-fn places(closest_flow_kg_s: f64) -> Vec<f64> {
+fn candidates(closest_flow_kg_s: f64) -> Vec<f64> {
     let (min, max, count) = DISTANCES;
     let step = (max / min).ln() / (count - 1) as f64;
     (0..count).map(|i| closest_flow_kg_s * (1.0 - min * (step * i as f64).exp())).collect()

@@ -13,21 +13,21 @@ pub(crate) struct GrowthLaw {
 
 impl GrowthLaw {
     /// The growing part at a margin, without its scale factor.
-    pub(crate) fn part(self, margin_ratio: f64) -> f64 {
+    pub(crate) fn growth_at(self, margin_ratio: f64) -> f64 {
         let part = |margin: f64| margin.max(1e-6).powf(-self.exponent);
         (part(margin_ratio) - part(self.onset_ratio)).max(0.0)
     }
 }
 
 /// The growing part without its scale factor, and the measured variation at that reading.
-pub(crate) type Read = (f64, Variation);
+pub(crate) type Observation = (f64, Variation);
 
 /// Iterations of the reweighted fit; the variance then changes by less than its own error.
 const ROUNDS: usize = 5;
 
 /// Log-likelihood of a channel's variations at the most likely non-negative level and size. A variance follows a chi-squared
 /// distribution with its degrees of freedom.
-pub(crate) fn log_likelihood(read: &[Read]) -> f64 {
+pub(crate) fn log_likelihood(read: &[Observation]) -> f64 {
     let level_min = 0.2 * read.iter().map(|(_, v)| v.variance).fold(f64::INFINITY, f64::min);
     let mut expected: Vec<f64> = read.iter().map(|(_, variation)| variation.variance).collect();
     for _ in 0..ROUNDS {
@@ -62,7 +62,7 @@ pub(crate) fn log_likelihood(read: &[Read]) -> f64 {
 }
 
 /// Log-likelihood ratio of a free variance to one of known level; 0 if the variance is smaller.
-pub(crate) fn excess(read: Variation, level: f64) -> f64 {
+pub(crate) fn log_likelihood_excess(read: Variation, level: f64) -> f64 {
     let ratio = read.variance / level;
     if ratio > 1.0 { 0.5 * read.degrees_of_freedom * (ratio - 1.0 - ratio.ln()) } else { 0.0 }
 }

@@ -43,9 +43,9 @@ pub struct SurgeMarks {
 }
 
 /// The marks of all approaches to surge in a recording.
-pub fn surge_marks(recording: &Recording, reference: ReferenceState, errors: SurgeErrors) -> SurgeMarks {
+pub fn find_surge_marks(recording: &Recording, reference: ReferenceState, errors: SurgeErrors) -> SurgeMarks {
     let mut found = SurgeMarks::default();
-    for approach in approaches(&recording.steps) {
+    for approach in group_approaches(&recording.steps) {
         let entered = |step: &&StepMarker| {
             recording.events.iter().any(|event| {
                 event.kind == EventKind::SurgeEntered && (step.start_s..step.end_s).contains(&event.t_s)
@@ -53,7 +53,7 @@ pub fn surge_marks(recording: &Recording, reference: ReferenceState, errors: Sur
         };
         let surged = approach.iter().find(entered);
         found.surges += usize::from(surged.is_some());
-        let looks: Vec<SurgeReading> = approach
+        let readings: Vec<SurgeReading> = approach
             .iter()
             // The first step brings the machine to the end of the line.
             .skip(1)
@@ -61,7 +61,8 @@ pub fn surge_marks(recording: &Recording, reference: ReferenceState, errors: Sur
             .filter_map(|step| SurgeReading::of(recording, step, reference))
             .collect();
         let target_speed_rpm = approach.first().and_then(|step| step.to).map_or(0.0, |to| to.speed_rpm);
-        match mark(&looks, target_speed_rpm, surged.map(|step| step.valve_opening_ratio), errors) {
+        match mark_approach(&readings, target_speed_rpm, surged.map(|step| step.valve_opening_ratio), errors)
+        {
             Ok(mark) => found.marks.push(mark),
             Err(not_found) => found.remarks.push(not_found),
         }
@@ -71,7 +72,7 @@ pub fn surge_marks(recording: &Recording, reference: ReferenceState, errors: Sur
 }
 
 /// Steps of each approach: one speed, and a valve that never opens.
-fn approaches(steps: &[StepMarker]) -> Vec<Vec<StepMarker>> {
+fn group_approaches(steps: &[StepMarker]) -> Vec<Vec<StepMarker>> {
     let mut approaches: Vec<Vec<StepMarker>> = Vec::new();
     let mut returned = false;
     for step in steps.iter().filter(|step| step.kind == StepKind::Approach) {
@@ -93,14 +94,14 @@ fn approaches(steps: &[StepMarker]) -> Vec<Vec<StepMarker>> {
 }
 
 /// The mark of one approach; `surged_at_ratio` is the opening at which the compressor went into surge.
-fn mark(
-    looks: &[SurgeReading],
+fn mark_approach(
+    readings: &[SurgeReading],
     target_speed_rpm: f64,
     surged_at_ratio: Option<f64>,
     errors: SurgeErrors,
 ) -> Result<SurgeMark, SurgeNotFound> {
-    let not_found = |enough: bool| SurgeNotFound { target_speed_rpm, openings: looks.len(), enough };
-    let last = looks.last().ok_or(not_found(false))?;
+    let not_found = |enough: bool| SurgeNotFound { target_speed_rpm, openings: readings.len(), enough };
+    let last = readings.last().ok_or(not_found(false))?;
     let (flow_kg_s, standard_error_kg_s, closest_kg_s) = match surged_at_ratio {
         Some(surged_at_ratio) => {
             let high = last.flow_corrected_kg_s;
@@ -109,14 +110,14 @@ fn mark(
             (0.5 * (low + high), (high - low) / 12.0f64.sqrt(), high)
         }
         None => {
-            let estimate = SurgeEstimate::of(looks).ok_or(not_found(false))?;
-            if !estimate.seen {
+            let estimate = SurgeEstimate::of(readings).ok_or(not_found(false))?;
+            if !estimate.is_usable {
                 return Err(not_found(true));
             }
             (estimate.flow_corrected_kg_s, estimate.standard_error_kg_s, estimate.closest_flow_kg_s)
         }
     };
-    let (pressure_ratio, own_error) = pressure_ratio_at(looks, last, flow_kg_s);
+    let (pressure_ratio, own_error) = pressure_ratio_at(readings, last, flow_kg_s);
     let offsets_pa = errors.p2_offset_pa.hypot(pressure_ratio * errors.p1_offset_pa);
     Ok(SurgeMark {
         target_speed_rpm,
@@ -129,19 +130,19 @@ fn mark(
         closest_flow_corrected_kg_s: closest_kg_s,
         closest_end_s: last.end_s,
         found_by: if surged_at_ratio.is_some() { SurgeFoundBy::Surge } else { SurgeFoundBy::Precursor },
-        steps: looks.len(),
+        steps: readings.len(),
     })
 }
 
 /// Pressure ratio extrapolated linearly in flow from the last readings, with its standard error.
-fn pressure_ratio_at(looks: &[SurgeReading], last: &SurgeReading, flow_kg_s: f64) -> (f64, f64) {
+fn pressure_ratio_at(readings: &[SurgeReading], last: &SurgeReading, flow_kg_s: f64) -> (f64, f64) {
     const TAKEN: usize = 5;
-    let taken = &looks[looks.len().saturating_sub(TAKEN)..];
-    let point = |look: &SurgeReading| {
-        let factor = last.speed_corrected_rpm / look.speed_corrected_rpm;
+    let taken = &readings[readings.len().saturating_sub(TAKEN)..];
+    let point = |reading: &SurgeReading| {
+        let factor = last.speed_corrected_rpm / reading.speed_corrected_rpm;
         let (flow, ratio) = mapper_physics::compressor_map::similarity::at_speed(
-            look.flow_corrected_kg_s,
-            look.pressure_ratio,
+            reading.flow_corrected_kg_s,
+            reading.pressure_ratio,
             factor,
         );
         (flow, ratio)

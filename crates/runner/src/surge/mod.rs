@@ -1,7 +1,7 @@
 //! Estimates the surge line from its precursors: the variation of pressures and flow grows as the valve closes.
 //!
 //! A [`SurgeReading`] holds the readings at one opening. [`SurgeEstimate`] extrapolates the growth of the variation to the flow at
-//! which it would diverge. [`next_move`] limits the next closing of the valve, and [`surge_marks`] applies the same rules to a whole
+//! which it would diverge. [`choose_next_move`] limits the next closing of the valve, and [`find_surge_marks`] applies the same rules to a whole
 //! recording. docs/reference/maps.md describes them.
 
 mod estimate;
@@ -13,7 +13,7 @@ mod surge_reading;
 mod variation;
 
 pub use estimate::SurgeEstimate;
-pub use mark::{SurgeErrors, SurgeMarks, surge_marks};
-pub use next_move::{Move, Why, expected_looks, next_move};
-pub use surge_reading::{LOOKED_AT, SurgeReading};
+pub use mark::{SurgeErrors, SurgeMarks, find_surge_marks};
+pub use next_move::{LineEnd, Move, choose_next_move, expected_readings};
+pub use surge_reading::{PRECURSOR_CHANNELS, SurgeReading};
 pub use variation::Variation;

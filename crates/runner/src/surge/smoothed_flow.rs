@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Flows and pressure ratios at one speed, in the order of the readings.
 #[derive(Debug, Clone)]
-pub(crate) struct Smoothed {
+pub(crate) struct SmoothedFlow {
     /// Corrected flow at the speed of the last reading, kg/s.
     pub(crate) flows_kg_s: Vec<f64>,
     /// Relative standard error of the smoothed flow, from the scatter about the curve.
@@ -15,40 +15,40 @@ pub(crate) struct Smoothed {
 /// Range of openings above the smallest one that is fitted: beyond it a parabola does not describe a valve.
 const REACH_RATIO: f64 = 1.7;
 
-impl Smoothed {
+impl SmoothedFlow {
     /// Flows converted to the speed of the last reading by similarity, then smoothed by a parabola of the logarithm of flow over
     /// the logarithm of the opening. With fewer than five readings the flows are as measured.
-    pub(crate) fn of(looks: &[SurgeReading]) -> Option<Self> {
-        let last = looks.last()?;
-        let to_speed = |look: &SurgeReading| {
-            look.flow_corrected_kg_s * last.speed_corrected_rpm / look.speed_corrected_rpm
+    pub(crate) fn fit(readings: &[SurgeReading]) -> Option<Self> {
+        let last = readings.last()?;
+        let to_speed = |reading: &SurgeReading| {
+            reading.flow_corrected_kg_s * last.speed_corrected_rpm / reading.speed_corrected_rpm
         };
-        let measured: Vec<f64> = looks.iter().map(to_speed).collect();
-        let place = |look: &SurgeReading| (look.valve_opening_ratio / last.valve_opening_ratio).ln();
-        let taken = |look: &SurgeReading| place(look).abs() < REACH_RATIO.ln();
+        let measured: Vec<f64> = readings.iter().map(to_speed).collect();
+        let place = |reading: &SurgeReading| (reading.valve_opening_ratio / last.valve_opening_ratio).ln();
+        let taken = |reading: &SurgeReading| place(reading).abs() < REACH_RATIO.ln();
         let (mut square, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let mut count = 0usize;
-        for (look, flow) in looks.iter().zip(&measured).filter(|(look, _)| taken(look)) {
-            let row = row(place(look));
+        for (reading, flow) in readings.iter().zip(&measured).filter(|(reading, _)| taken(reading)) {
+            let row = row(place(reading));
             square += row * row.transpose();
             right += row * flow.ln();
             count += 1;
         }
-        let unsmoothed = Smoothed { flows_kg_s: measured.clone(), flow_error_ratio: 0.0 };
+        let unsmoothed = SmoothedFlow { flows_kg_s: measured.clone(), flow_error_ratio: 0.0 };
         let (true, Some(inverse)) = (count >= 5, square.try_inverse()) else { return Some(unsmoothed) };
         let parabola = inverse * right;
-        let flow = |look: &SurgeReading| row(place(look)).dot(&parabola);
-        let pairs = || looks.iter().zip(&measured).filter(|(look, _)| taken(look));
-        let residual: f64 = pairs().map(|(look, measured)| (measured.ln() - flow(look)).powi(2)).sum();
+        let flow = |reading: &SurgeReading| row(place(reading)).dot(&parabola);
+        let pairs = || readings.iter().zip(&measured).filter(|(reading, _)| taken(reading));
+        let residual: f64 = pairs().map(|(reading, measured)| (measured.ln() - flow(reading)).powi(2)).sum();
         let sigma_ratio = (residual / (count - 3).max(1) as f64).sqrt();
         let at_last = row(0.0);
-        let flows_kg_s = looks
+        let flows_kg_s = readings
             .iter()
             .zip(&measured)
-            .map(|(look, measured)| if taken(look) { flow(look).exp() } else { *measured })
+            .map(|(reading, measured)| if taken(reading) { flow(reading).exp() } else { *measured })
             .collect();
         let flow_error_ratio = sigma_ratio * at_last.dot(&(inverse * at_last)).max(0.0).sqrt();
-        Some(Smoothed { flows_kg_s, flow_error_ratio })
+        Some(SmoothedFlow { flows_kg_s, flow_error_ratio })
     }
 }
 

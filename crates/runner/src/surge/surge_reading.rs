@@ -5,7 +5,7 @@ use mapper_core::{Channel, Recording, ReferenceState, StepMarker, SurgeSeek};
 use mapper_numerics::statistics::mean;
 
 /// Channels whose variation indicates surge.
-pub const LOOKED_AT: [Channel; 3] = [Channel::P2, Channel::CompressorFlow, Channel::P1];
+pub const PRECURSOR_CHANNELS: [Channel; 3] = [Channel::P2, Channel::CompressorFlow, Channel::P1];
 
 /// Means and variation at one opening.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,8 +24,8 @@ pub struct SurgeReading {
     pub pressure_ratio: f64,
     /// Total inlet pressure P1, Pa.
     pub p1_pa: f64,
-    /// Variation of [`LOOKED_AT`]; `None` if a channel has too few samples.
-    pub variations: [Option<Variation>; LOOKED_AT.len()],
+    /// Variation of [`PRECURSOR_CHANNELS`]; `None` if a channel has too few samples.
+    pub variations: [Option<Variation>; PRECURSOR_CHANNELS.len()],
 }
 
 impl SurgeReading {
@@ -40,7 +40,7 @@ impl SurgeReading {
         let level = |channel: Channel| mean(&samples(channel)?.1).filter(|level| *level > 0.0);
         let (speed_rpm, flow_kg_s) = (level(Channel::ShaftSpeed)?, level(Channel::CompressorFlow)?);
         let (t1_k, p1_pa, p2_pa) = (level(Channel::T1)?, level(Channel::P1)?, level(Channel::P2)?);
-        let variations = LOOKED_AT.map(|channel| {
+        let variations = PRECURSOR_CHANNELS.map(|channel| {
             let (t_s, values) = samples(channel)?;
             Variation::of(&t_s, &values)
         });

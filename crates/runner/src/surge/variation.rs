@@ -2,13 +2,13 @@
 
 /// Length of the segments that are detrended by a straight line, s. Drift is not due to surge, and slow sampling may fold fast
 /// oscillations to low frequencies.
-const PIECE_S: f64 = 5.0;
+const SEGMENT_S: f64 = 5.0;
 /// Minimum number of samples in a segment.
 const MIN_SAMPLES: usize = 10;
 /// Maximum lag of the autocorrelation, in samples; smaller than a segment.
 const LAGS: usize = 6;
 /// Minimum number of segments.
-const MIN_PIECES: usize = 1;
+const MIN_SEGMENTS: usize = 1;
 
 /// A variance with its degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,24 +23,25 @@ impl Variation {
     /// The variation of samples; `None` if there are too few.
     pub fn of(t_s: &[f64], values: &[f64]) -> Option<Self> {
         let first_s = *t_s.first()?;
-        let mut pieces: Vec<Vec<f64>> = Vec::new();
+        let mut segments: Vec<Vec<f64>> = Vec::new();
         let mut from = 0;
         while from < t_s.len() {
-            let piece = ((t_s[from] - first_s) / PIECE_S).floor();
-            let count = t_s[from..].partition_point(|t| ((t - first_s) / PIECE_S).floor() <= piece).max(1);
+            let segment = ((t_s[from] - first_s) / SEGMENT_S).floor();
+            let count =
+                t_s[from..].partition_point(|t| ((t - first_s) / SEGMENT_S).floor() <= segment).max(1);
             let to = from + count;
             if count >= MIN_SAMPLES {
-                pieces.push(about_a_line(&t_s[from..to], &values[from..to]));
+                segments.push(detrend(&t_s[from..to], &values[from..to]));
             }
             from = to;
         }
-        if pieces.len() < MIN_PIECES {
+        if segments.len() < MIN_SEGMENTS {
             return None;
         }
-        let samples = pieces.iter().map(Vec::len).sum::<usize>() as f64;
-        let freedom = samples - 2.0 * pieces.len() as f64;
+        let samples = segments.iter().map(Vec::len).sum::<usize>() as f64;
+        let freedom = samples - 2.0 * segments.len() as f64;
         let lagged = |lag: usize| -> f64 {
-            pieces.iter().flat_map(|piece| piece.iter().zip(&piece[lag..]).map(|(a, b)| a * b)).sum()
+            segments.iter().flat_map(|segment| segment.iter().zip(&segment[lag..]).map(|(a, b)| a * b)).sum()
         };
         let square = lagged(0);
         // Bartlett: correlated samples add less information about the variance. Chance alone makes the square of a
@@ -55,7 +56,7 @@ impl Variation {
 }
 
 /// Residual of the samples about their regression line.
-fn about_a_line(t_s: &[f64], values: &[f64]) -> Vec<f64> {
+fn detrend(t_s: &[f64], values: &[f64]) -> Vec<f64> {
     let count = t_s.len() as f64;
     let middle_s = t_s.iter().sum::<f64>() / count;
     let level = values.iter().sum::<f64>() / count;
@@ -75,7 +76,7 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     #[test]
-    fn the_fast_variance_is_found_whatever_the_mean_does() {
+    fn a_drift_of_the_mean_does_not_change_the_fast_variance() {
         let mut random = rand_pcg::Pcg64::seed_from_u64(4);
         let normal = Normal::new(0.0, 0.5).unwrap();
         let t_s: Vec<f64> = (0..4000).map(|i| f64::from(i) * 0.1).collect();
@@ -88,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn what_remembers_is_known_less_well() {
+    fn correlated_samples_have_fewer_degrees_of_freedom() {
         let mut random = rand_pcg::Pcg64::seed_from_u64(4);
         let normal = Normal::new(0.0, 1.0).unwrap();
         let t_s: Vec<f64> = (0..4000).map(|i| f64::from(i) * 0.1).collect();

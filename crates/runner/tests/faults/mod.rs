@@ -1,18 +1,18 @@
 //! Every fault of a rig, injected into the virtual lab by a misbehaving backend: the reaction of the run, and the safe state at
 //! its end.
 
-mod behind;
+mod faulty_driver;
 #[cfg(unix)]
 mod over_protocol;
 
 use super::{Notebook, Recorded, plan};
-use behind::{FAULT_S, lab};
+use faulty_driver::{FAULT_S, lab};
 use mapper_backends::virtual_lab::VirtualLab;
 use mapper_core::{
     Backend, Channel, EventKind, GuardName, GuardSet, Plan, Reaction, SafeTrajectory, SignalGuard, SpeedBand,
     SurgeVariation, UnpacedClock,
 };
-use mapper_driver_host::conformance::{Fault, Misbehaving};
+use mapper_driver_host::conformance::{Fault, FaultyBackend};
 use mapper_runner::{
     BatchWatch, Guard, PlanSteps, Protection, ReadingBounds, RigWatch, RunEnd, RunError, Runner, SignalWatch,
     SurgeWatch,
@@ -20,7 +20,7 @@ use mapper_runner::{
 use std::sync::atomic::AtomicBool;
 
 /// Two steps of a minute after 10 s of warm-up.
-fn minutes() -> Plan {
+fn plan_of_minutes() -> Plan {
     let mut plan = plan();
     for (index, step) in plan.steps.iter_mut().enumerate() {
         (step.dwell_s, step.start_s) = (60.0, 10.0 + 60.0 * index as f64);
@@ -45,7 +45,7 @@ fn guard(name: GuardName, channel: Channel, above: Option<f64>) -> SignalGuard {
 }
 
 /// The default guards of a campaign.
-fn usual() -> GuardSet {
+fn default_guards() -> GuardSet {
     GuardSet {
         signals: vec![
             guard(GuardName::Overspeed, Channel::ShaftSpeed, Some(180e3)),
@@ -68,20 +68,20 @@ fn readings() -> ReadingBounds {
     ReadingBounds { wheel_diameter_m: Some(0.052), t2_lag_s: (0.0, 0.0), noise_k: [0.1, 0.0, 0.0] }
 }
 
-struct Night {
+struct FaultRun {
     end: Result<RunEnd, RunError>,
     notebook: Notebook,
-    rig: Misbehaving<VirtualLab>,
+    rig: FaultyBackend<VirtualLab>,
 }
 
-fn night(faults: &[(f64, Fault)], set: &GuardSet) -> Night {
-    let mut rig = Misbehaving::new(lab(), faults.to_vec());
-    let (end, notebook) = night_on(&mut rig, set);
-    Night { end, notebook, rig }
+fn run_with_faults(faults: &[(f64, Fault)], set: &GuardSet) -> FaultRun {
+    let mut rig = FaultyBackend::new(lab(), faults.to_vec());
+    let (end, notebook) = run_on(&mut rig, set);
+    FaultRun { end, notebook, rig }
 }
 
-fn night_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnd, RunError>, Notebook) {
-    let plan = minutes();
+fn run_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnd, RunError>, Notebook) {
+    let plan = plan_of_minutes();
     let mut notebook = Notebook::default();
     let mut guards: Vec<Box<dyn Guard>> =
         vec![Box::new(BatchWatch::default()), Box::new(RigWatch::default())];
@@ -108,12 +108,12 @@ fn night_on(rig: &mut dyn Backend, set: &GuardSet) -> (Result<RunEnd, RunError>,
 }
 
 #[test]
-fn without_a_fault_no_guard_has_anything_to_say() {
-    let night = night(&[], &usual());
-    assert_eq!(night.end.unwrap(), RunEnd::Completed);
-    assert_eq!(night.notebook.events, []);
-    assert!(night.notebook.bad.is_empty(), "{:?}", night.notebook.bad);
-    assert_eq!(night.rig.safe_at_s, [130.0], "made safe once, at its end");
+fn without_a_fault_no_guard_trips() {
+    let run = run_with_faults(&[], &default_guards());
+    assert_eq!(run.end.unwrap(), RunEnd::Completed);
+    assert_eq!(run.notebook.events, []);
+    assert!(run.notebook.bad.is_empty(), "{:?}", run.notebook.bad);
+    assert_eq!(run.rig.safe_at_s, [130.0], "made safe once, at its end");
 }
 
 /// Each fault trips with its text within its time, the rig is made safe, and the events follow in order. Two cases take longest:
@@ -131,31 +131,31 @@ fn every_fault_of_a_rig_ends_the_run_in_the_safe_state() {
         (Fault::Reads(ShaftSpeed, 181e3), "(N) is 181", FAULT_S + 1.5),
         (Fault::Reads(P3, 401e3), "(P3) is 401", FAULT_S + 1.5),
         (Fault::Reads(T2, 600.0), "(T2) is", FAULT_S + 1.5),
-        (Fault::Doubled, "came twice", FAULT_S + 1.5),
+        (Fault::Doubled, "sent twice", FAULT_S + 1.5),
         (Fault::Reordered, "time runs backward", FAULT_S + 1.5),
         (Fault::Backward(100.0), "time runs backward", FAULT_S + 1.5),
         (Fault::Torn(T2), "values for", FAULT_S + 1.5),
-        (Fault::Trips { says_so: true }, "tripped by itself", FAULT_S + 1.5),
-        (Fault::Trips { says_so: false }, "no longer drives it", 130.0),
-        (Fault::Ignores, "asked for", 130.0),
+        (Fault::Trips { is_reported: true }, "tripped by itself", FAULT_S + 1.5),
+        (Fault::Trips { is_reported: false }, "no longer drives it", 130.0),
+        (Fault::Ignores, "not reached", 130.0),
     ] {
         // Setpoints are ignored from before the jump.
         let begin_s = if fault == Fault::Ignores { 60.0 } else { FAULT_S };
-        let night = night(&[(begin_s, fault.clone())], &usual());
-        let end = night.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
+        let run = run_with_faults(&[(begin_s, fault.clone())], &default_guards());
+        let end = run.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
         let RunEnd::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
         assert!(trip.reason.contains(words), "{fault:?}: {}", trip.reason);
         // A fault affects the whole batch of its second.
         assert!((begin_s - 1.0..=at_most_s).contains(&trip.t_s), "{fault:?}: at {} s", trip.t_s);
-        assert!(!night.rig.safe_at_s.is_empty(), "{fault:?}: the air is still on");
-        let kinds = &night.notebook.events;
+        assert!(!run.rig.safe_at_s.is_empty(), "{fault:?}: the air is still on");
+        let kinds = &run.notebook.events;
         let place = |kind| kinds.iter().position(|seen| *seen == kind);
         assert!(place(EventKind::GuardTripped) < place(EventKind::SafeState), "{fault:?}: {kinds:?}");
     }
 }
 
-/// Readings that physics excludes end the run within two seconds and their first sample, and are recorded as bad from the first one on. None of
-/// them violates a limit, and all but a few are within the range of their sensor.
+/// Impossible readings end the run two seconds after their first sample, and are recorded as bad from the first one on. None of them
+/// violates a limit, and most are within the range of their sensor.
 #[test]
 fn readings_that_contradict_physics_end_the_run() {
     use Channel::{CompressorFlow, P1, P2, P3, ShaftSpeed, T1, T2, T3, T4, Tc, Tt};
@@ -177,8 +177,8 @@ fn readings_that_contradict_physics_end_the_run() {
         (Fault::Scaled(P3, 0.5), P3),
         (Fault::Shifted(T3, -400.0), T3),
     ] {
-        let night = night(&[(FAULT_S + 20.0, fault.clone())], &usual());
-        let end = night.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
+        let run = run_with_faults(&[(FAULT_S + 20.0, fault.clone())], &default_guards());
+        let end = run.end.unwrap_or_else(|error| panic!("{fault:?}: {error}"));
         let RunEnd::Tripped(trip) = end else { panic!("{fault:?}: {end:?}") };
         assert_eq!((trip.guard, trip.reaction), (GuardName::Signals, Reaction::Safe), "{fault:?}");
         // A fault affects the whole batch of its second; what follows the shaft late, and backflow of surge, may last two seconds more.
@@ -191,26 +191,26 @@ fn readings_that_contradict_physics_end_the_run() {
             trip.t_s
         );
         assert!(trip.reason.contains(channel.symbol()), "{fault:?}: {}", trip.reason);
-        let bad = &night.notebook.bad;
+        let bad = &run.notebook.bad;
         assert!(bad.contains(&channel), "{fault:?}: {bad:?}");
     }
     // A turbine-side channel that nothing depends on is noted, and the run goes on.
     for fault in [Fault::Shifted(Tt, 300.0), Fault::Reads(T4, 100.0)] {
-        let night = night(&[(FAULT_S + 20.0, fault.clone())], &usual());
-        assert_eq!(night.end.unwrap(), RunEnd::Completed, "{fault:?}");
-        assert_eq!(night.notebook.events, [EventKind::GuardActed], "{fault:?}");
+        let run = run_with_faults(&[(FAULT_S + 20.0, fault.clone())], &default_guards());
+        assert_eq!(run.end.unwrap(), RunEnd::Completed, "{fault:?}");
+        assert_eq!(run.notebook.events, [EventKind::GuardActed], "{fault:?}");
     }
 }
 
 /// A sensor that froze before the jump at 70 s is detected 20 s after it, with a polling interval of one second; N and T2 earlier, since they
 /// then contradict the pressure ratio.
 #[test]
-fn a_frozen_sensor_is_seen_after_the_next_jump() {
+fn a_frozen_sensor_is_detected_after_the_next_jump() {
     for (channel, at_s) in
         [(Channel::P2, 90.0..91.5), (Channel::T2, 71.0..85.0), (Channel::ShaftSpeed, 71.0..85.0)]
     {
-        let night = night(&[(40.0, Fault::Frozen(channel))], &usual());
-        let RunEnd::Tripped(trip) = night.end.unwrap() else { panic!("{channel}") };
+        let run = run_with_faults(&[(40.0, Fault::Frozen(channel))], &default_guards());
+        let RunEnd::Tripped(trip) = run.end.unwrap() else { panic!("{channel}") };
         assert_eq!(trip.reason.contains("frozen"), channel == Channel::P2, "{}", trip.reason);
         assert!(trip.reason.contains(channel.symbol()), "{}", trip.reason);
         assert!(at_s.contains(&trip.t_s), "{channel}: {}", trip.t_s);
@@ -218,30 +218,33 @@ fn a_frozen_sensor_is_seen_after_the_next_jump() {
 }
 
 #[test]
-fn a_link_that_is_gone_for_a_second_is_lost_samples_and_one_that_waits_is_nothing() {
+fn an_interrupted_link_loses_samples_and_a_delayed_one_does_not() {
     // The samples of that second are lost, which the sequence numbers of later ones show.
-    let night_without = night(&[(FAULT_S, Fault::Mute(1.5))], &usual());
+    let night_without = run_with_faults(&[(FAULT_S, Fault::Mute(1.5))], &default_guards());
     let RunEnd::Tripped(trip) = night_without.end.unwrap() else { panic!("not seen") };
     assert!(trip.reason.contains("samples were lost"), "{}", trip.reason);
     // Samples that are only delayed are not lost.
-    let held = night(&[(FAULT_S, Fault::Late(1.5))], &usual());
+    let held = run_with_faults(&[(FAULT_S, Fault::Late(1.5))], &default_guards());
     assert_eq!(held.end.unwrap(), RunEnd::Completed);
     assert_eq!(held.notebook.samples.len(), 1351);
 }
 
 #[test]
-fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_in_doubt() {
-    let refused = night(&[(60.0, Fault::Refuses)], &usual());
+fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_reported_as_unknown() {
+    let refused = run_with_faults(&[(60.0, Fault::Refuses)], &default_guards());
     let error = refused.end.unwrap_err();
-    assert!(error.to_string().contains("outside the range of the rig") && !error.leaves_doubt(), "{error}");
+    assert!(
+        error.to_string().contains("outside the range of the rig") && !error.leaves_rig_state_unknown(),
+        "{error}"
+    );
     assert!(!refused.rig.safe_at_s.is_empty());
-    let panicked = night(&[(FAULT_S, Fault::Panics)], &usual());
+    let panicked = run_with_faults(&[(FAULT_S, Fault::Panics)], &default_guards());
     let error = panicked.end.unwrap_err();
-    assert!(matches!(error, RunError::Panicked { .. }) && error.leaves_doubt(), "{error}");
+    assert!(matches!(error, RunError::Panicked { .. }) && error.leaves_rig_state_unknown(), "{error}");
     assert!(!panicked.rig.safe_at_s.is_empty(), "a panic cuts the air too");
-    let lost = night(&[(FAULT_S, Fault::Lost)], &usual());
+    let lost = run_with_faults(&[(FAULT_S, Fault::Lost)], &default_guards());
     let error = lost.end.unwrap_err();
-    assert!(matches!(error, RunError::NotSafe { .. }) && error.leaves_doubt(), "{error}");
+    assert!(matches!(error, RunError::NotSafe { .. }) && error.leaves_rig_state_unknown(), "{error}");
     assert!(error.to_string().contains("Cut its air by hand"), "{error}");
     assert!(lost.notebook.events.contains(&EventKind::Latched));
 }
@@ -249,19 +252,19 @@ fn refused_setpoints_and_a_panic_end_safe_and_a_lost_rig_is_in_doubt() {
 #[test]
 fn the_safe_state_is_retried_and_then_its_failure_is_reported() {
     let nan = (FAULT_S, Fault::Nan(Channel::T2));
-    let twice = night(&[nan.clone(), (0.0, Fault::NotSafe(2))], &usual());
+    let twice = run_with_faults(&[nan.clone(), (0.0, Fault::NotSafe(2))], &default_guards());
     assert!(matches!(twice.end, Ok(RunEnd::Tripped(_))));
     assert_eq!(twice.rig.safe_at_s.len(), 1);
-    let never = night(&[nan, (0.0, Fault::NotSafe(usize::MAX))], &usual());
+    let never = run_with_faults(&[nan, (0.0, Fault::NotSafe(usize::MAX))], &default_guards());
     let error = never.end.unwrap_err();
-    assert!(matches!(error, RunError::NotSafe { .. }) && error.leaves_doubt(), "{error}");
+    assert!(matches!(error, RunError::NotSafe { .. }) && error.leaves_rig_state_unknown(), "{error}");
     assert!(error.to_string().contains("(T2) has given no good reading"), "{error}");
 }
 
 /// A clock that advances only during waits and slow disk writes.
-struct Idle(std::cell::Cell<f64>);
+struct WaitClock(std::cell::Cell<f64>);
 
-impl mapper_core::Wall for &Idle {
+impl mapper_core::Wall for &WaitClock {
     fn now_s(&self) -> f64 {
         self.0.get()
     }
@@ -272,7 +275,7 @@ impl mapper_core::Wall for &Idle {
 
 /// Takes this time for every write, s on the wall clock.
 struct SlowDisk<'a> {
-    wall: &'a Idle,
+    wall: &'a WaitClock,
     takes_s: f64,
     written: usize,
 }
@@ -286,15 +289,18 @@ impl mapper_runner::RunObserver for SlowDisk<'_> {
 }
 
 /// Faults with a wall clock: the rig is polled sample by sample, and every write is slow.
-fn night_by_the_clock(
+fn run_on_wall_clock(
     faults: &[(f64, Fault)],
     takes_s: f64,
-) -> (Result<RunEnd, RunError>, Misbehaving<VirtualLab>, usize, f64) {
-    let (plan, wall) = (minutes(), Idle(std::cell::Cell::new(0.0)));
-    let mut rig = Misbehaving::new(lab(), faults.to_vec());
+) -> (Result<RunEnd, RunError>, FaultyBackend<VirtualLab>, usize, f64) {
+    let (plan, wall) = (plan_of_minutes(), WaitClock(std::cell::Cell::new(0.0)));
+    let mut rig = FaultyBackend::new(lab(), faults.to_vec());
     let mut disk = SlowDisk { wall: &wall, takes_s, written: 0 };
-    let guards =
-        usual().signals.iter().map(|spec| Box::new(SignalWatch::new(*spec)) as Box<dyn Guard>).collect();
+    let guards = default_guards()
+        .signals
+        .iter()
+        .map(|spec| Box::new(SignalWatch::new(*spec)) as Box<dyn Guard>)
+        .collect();
     let protection = Protection {
         safe: SafeTrajectory { p3_slew_pa_s: Some(50e3), valve_opening_ratio: 1.0, within_s: 20.0 },
         p3_min_pa: 110e3,
@@ -315,14 +321,13 @@ fn night_by_the_clock(
     (end, rig, written, wall.0.get())
 }
 
-/// A disk that takes 0.8 s for each second's samples delays only itself: the run catches up at each poll. The first safe command
-/// follows the violating sample directly, before anything is written. A disk that takes 3 s delays the run, but the guards still
-/// see every sample.
+/// The first safe command follows the violating sample directly, before anything is written. If writing one second of samples takes 0.8 s,
+/// the run catches up at each poll. If it takes 3 s, the run is delayed, but the guards still check every sample.
 #[test]
-fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
+fn a_slow_disk_does_not_delay_the_first_safe_command() {
     for (takes_s, late_s) in [(0.8, 1.0), (3.0, 400.0)] {
         let faults = [(FAULT_S, Fault::Reads(Channel::T2, 600.0))];
-        let (end, rig, written, wall_s) = night_by_the_clock(&faults, takes_s);
+        let (end, rig, written, wall_s) = run_on_wall_clock(&faults, takes_s);
         let RunEnd::Tripped(trip) = end.unwrap() else { panic!("not seen") };
         // The dwell of 0.2 s, and the next sample.
         assert!(trip.t_s - FAULT_S < 0.35, "{takes_s} s: {}", trip.t_s);
@@ -335,10 +340,10 @@ fn a_slow_disk_delays_the_run_and_not_the_first_safe_command() {
 
 /// Between two safe-state commands the link has half a second of the run's clock to recover.
 #[test]
-fn the_tries_of_the_safe_state_have_a_pause_between_them() {
+fn attempts_to_make_the_rig_safe_are_half_a_second_apart() {
     let wall_of = |fails: usize| {
         let faults = [(FAULT_S, Fault::Reads(Channel::T2, 600.0)), (0.0, Fault::NotSafe(fails))];
-        let (end, rig, _, wall_s) = night_by_the_clock(&faults, 0.0);
+        let (end, rig, _, wall_s) = run_on_wall_clock(&faults, 0.0);
         assert_eq!(end.is_ok(), fails < 3);
         assert_eq!(rig.safe_at_s.len(), usize::from(fails < 3));
         // Until the safe state: a confirmed one is followed by seconds of observation.
@@ -353,11 +358,11 @@ fn the_tries_of_the_safe_state_have_a_pause_between_them() {
 /// P3 falls by 50 kPa/s, in steps of a tenth of a second, with the valve open and the heater off. The air is cut at the lowest
 /// P3.
 #[test]
-fn the_way_down_is_the_declared_one() {
-    let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
-    let RunEnd::Tripped(trip) = night.end.unwrap() else { panic!("not seen") };
-    let way: Vec<_> = night.rig.commands.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
-    let before = night.rig.commands.iter().rev().find(|(_, sent)| sent.t3_k > 300.0).unwrap().1;
+fn the_run_down_follows_the_declared_trajectory() {
+    let run = run_with_faults(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &default_guards());
+    let RunEnd::Tripped(trip) = run.end.unwrap() else { panic!("not seen") };
+    let way: Vec<_> = run.rig.commands.iter().filter(|(_, sent)| sent.t3_k < 300.0).collect();
+    let before = run.rig.commands.iter().rev().find(|(_, sent)| sent.t3_k > 300.0).unwrap().1;
     let expected = ((before.p3_pa - 110e3) / 5e3).floor() as usize;
     assert_eq!(way.len(), expected, "from {} Pa", before.p3_pa);
     // The first command follows the poll with the violation; a simulated rig is polled every second.
@@ -366,27 +371,27 @@ fn the_way_down_is_the_declared_one() {
         assert!((sent.p3_pa - (before.p3_pa - 5e3 * (step + 1) as f64)).abs() < 1e-6);
         assert!(sent.valve_opening_ratio >= 1.0 && sent.valve_opening_ratio >= before.valve_opening_ratio);
     }
-    assert!(night.rig.safe_at_s[0] - trip.t_s < 20.0);
+    assert!(run.rig.safe_at_s[0] - trip.t_s < 20.0);
 }
 
 #[test]
-fn two_guards_at_once_and_the_graver_has_the_say() {
-    let mut set = usual();
+fn of_two_guards_the_more_severe_reaction_wins() {
+    let mut set = default_guards();
     set.signals[2].reaction = Reaction::Note;
     set.signals[0].reaction = Reaction::Latch;
     let faults =
         [(FAULT_S, Fault::Reads(Channel::T2, 600.0)), (FAULT_S, Fault::Reads(Channel::ShaftSpeed, 2e5))];
-    let RunEnd::Tripped(trip) = night(&faults, &set).end.unwrap() else { panic!("not seen") };
+    let RunEnd::Tripped(trip) = run_with_faults(&faults, &set).end.unwrap() else { panic!("not seen") };
     assert_eq!((trip.guard, trip.reaction), (GuardName::Overspeed, Reaction::Latch));
 }
 
 /// Mild reactions to a T2 above its limit in the second step.
 #[test]
-fn mild_reactions_do_what_they_say() {
+fn mild_reactions_note_skip_repeat_or_hold() {
     let with = |reaction: Reaction, faults: &[(f64, Fault)]| {
-        let mut set = usual();
+        let mut set = default_guards();
         set.signals[2].reaction = reaction;
-        night(faults, &set)
+        run_with_faults(faults, &set)
     };
     let high = [(FAULT_S + 5.0, Fault::Reads(Channel::T2, 600.0))];
     let noted = with(Reaction::Note, &high);
@@ -420,12 +425,12 @@ fn mild_reactions_do_what_they_say() {
 }
 
 #[test]
-fn what_is_recorded_of_a_fault_is_whole() {
-    let night = night(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &usual());
-    let times: Vec<f64> = night.notebook.samples.iter().map(|(t_s, _)| *t_s).collect();
+fn the_recording_of_a_fault_has_no_gaps() {
+    let run = run_with_faults(&[(FAULT_S, Fault::Reads(Channel::T2, 600.0))], &default_guards());
+    let times: Vec<f64> = run.notebook.samples.iter().map(|(t_s, _)| *t_s).collect();
     assert!(times.is_sorted_by(|a, b| a < b));
     // Ten samples a second, through the violation and the run-down.
     let gaps = times.windows(2).map(|two| two[1] - two[0]);
     assert!(gaps.into_iter().all(|gap_s| (gap_s - 0.1).abs() < 1e-6));
-    let _: &Recorded = &night.notebook.samples;
+    let _: &Recorded = &run.notebook.samples;
 }

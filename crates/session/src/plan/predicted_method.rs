@@ -34,7 +34,7 @@ impl Forecaster {
 }
 
 impl PredictedMethod for Forecaster {
-    fn alone(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
+    fn predict_step(&self, window: &[ForecastRow], interval_s: f64) -> Option<MethodResult> {
         if self.scope != Scope::EachStep || window.is_empty() {
             return None;
         }
@@ -42,7 +42,7 @@ impl PredictedMethod for Forecaster {
         Some(result(expected(&rows, interval_s, &self.config)?))
     }
 
-    fn together(&self, steps: &[&[ForecastRow]]) -> Option<MethodResults> {
+    fn predict_campaign(&self, steps: &[&[ForecastRow]]) -> Option<MethodResults> {
         if self.scope != Scope::AllSteps {
             return None;
         }
@@ -59,12 +59,12 @@ impl PredictedMethod for Forecaster {
         let found = expected_together(&steps, &self.config)?;
         Some(MethodResults {
             steps: found.steps.into_iter().map(|found| found.map(result)).collect(),
-            resting_eta: found.resting_eta,
-            max_resting_eta: MAX_RESTING_ETA,
+            parameter_error_eta: found.resting_eta,
+            max_parameter_error_eta: MAX_RESTING_ETA,
         })
     }
 
-    fn settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
+    fn predict_settled(&self, row: &ForecastRow) -> Option<(f64, f64)> {
         expected_steady(&expected_row(row), &self.config)
     }
 }

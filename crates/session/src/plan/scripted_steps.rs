@@ -10,7 +10,7 @@ use mapper_core::{Plan, PlanStep, Recording, SampleBatch, StepMarker, step_numbe
 use mapper_identify::{IdentifyConfig, identify_each};
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{StepSource, StepSourceError};
-use mapper_sequence::{Hold, Script, SequenceRequest, SequenceRunner, SettleWatch, StepResult};
+use mapper_sequence::{EndCondition, Script, SequenceRequest, SequenceRunner, SettleWatch, StepResult};
 
 /// The steps of a script, each identified as soon as it ends.
 pub(crate) struct ScriptedSteps {
@@ -62,16 +62,16 @@ impl StepSource for ScriptedSteps {
     }
 
     fn is_ready(&mut self) -> bool {
-        self.script.ask(self.finished.take());
+        self.script.request_step(self.finished.take());
         self.script.is_ready()
     }
 
     fn next_step(&mut self) -> Result<Option<PlanStep>, StepSourceError> {
         let next = self.script.next_step(self.finished.take()).map_err(source_error)?;
         let Some(next) = next else { return Ok(None) };
-        self.settling = match next.hold {
-            Hold::Dwell => None,
-            Hold::UntilSettled(rule) => Some(SettleWatch::new(rule, next.step.start_s)),
+        self.settling = match next.end {
+            EndCondition::Dwell => None,
+            EndCondition::UntilSettled(rule) => Some(SettleWatch::new(rule, next.step.start_s)),
         };
         self.current_step = Some(next.step.clone());
         Ok(Some(next.step))
@@ -101,7 +101,7 @@ impl StepSource for ScriptedSteps {
     }
 
     /// Reports to the script that a result is missing.
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+    fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let Some(step) = self.current_step.take() else { return Ok(()) };
         self.finished = Some(StepResult {
             number: step_number(step.index),

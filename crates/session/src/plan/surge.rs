@@ -8,19 +8,19 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::hold_speed;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
-use mapper_runner::surge::{SurgeErrors, SurgeMarks, surge_marks};
-use mapper_runner::{Held, SurgeSearch};
+use mapper_runner::surge::{SurgeErrors, SurgeMarks, find_surge_marks};
+use mapper_runner::{HoldConditions, SurgeSearch};
 
 /// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
 /// campaign's limits.
-pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint) -> Option<Held> {
+pub fn hold_near_surge(campaign: &Campaign, model: &Model, point: OperatingPoint) -> Option<HoldConditions> {
     let boundary = BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
     let held = hold_speed(model, point.speed_rpm, &boundary, campaign.follow_outlet).ok()?;
     let (limits, outputs) = (&campaign.limits, &held.outputs);
     let p3_pa = held.boundary.p3_pa;
     let within = (limits.p3_min_pa..=limits.p3_max_pa).contains(&p3_pa)
         && limits.t2_max_k.is_none_or(|limit_k| outputs.t2_k <= limit_k);
-    within.then(|| Held {
+    within.then(|| HoldConditions {
         p3_pa,
         t3_k: held.boundary.t3_k,
         oil_temperature_k: held.boundary.oil_temperature_k,
@@ -55,7 +55,7 @@ pub fn surge_forecast(campaign: &Campaign, model: &Model, plan: &Plan) -> Option
         hold_near_surge(campaign, model, *end).map_or(1.0, |held| held.surge_margin_ratio)
     };
     let approaches: usize =
-        ends.iter().map(|end| mapper_runner::surge::expected_looks(margin(end), &seek)).sum();
+        ends.iter().map(|end| mapper_runner::surge::expected_readings(margin(end), &seek)).sum();
     Some(SurgeForecast {
         lines: ends.len(),
         steps: approaches + 2 * ends.len(),
@@ -93,5 +93,5 @@ pub(crate) fn find_surge_marks(
     let errors = campaign.map_or_else(SurgeErrors::default, |campaign| {
         SurgeErrors::of(&declared(campaign, &ChannelMap::native()))
     });
-    surge_marks(approaches, config.reference, errors)
+    find_surge_marks(approaches, config.reference, errors)
 }

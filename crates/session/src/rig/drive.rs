@@ -8,8 +8,8 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::speed_response::speed_response;
 use mapper_physics::simulation::model::Model;
 use mapper_runner::{
-    Operator, Protection, ReadChannel, ReadingBounds, RunEnd, RunError, RunObserver, Runner, Soaked,
-    SpeedControl, SpeedControlLimits, StepSource,
+    InstrumentChannel, Operator, Protection, ReadingBounds, RunEnd, RunError, RunObserver, Runner,
+    SoakSource, SpeedControl, SpeedControlLimits, StepSource,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -52,7 +52,7 @@ pub struct Pace<'a> {
     /// Other operator requests.
     pub operator: Option<&'a Operator>,
     /// Channels of auxiliary instruments; a guard watches that their data arrive.
-    pub read: &'a [ReadChannel],
+    pub read: &'a [InstrumentChannel],
 }
 
 /// Same as [`drive`], at a given pace.
@@ -73,7 +73,7 @@ pub fn drive_paced(
     let steps: &mut dyn StepSource = match campaign.zero {
         None => steps,
         Some(soak) => {
-            soaked = Soaked::new(steps, soak);
+            soaked = SoakSource::new(steps, soak);
             &mut soaked
         }
     };

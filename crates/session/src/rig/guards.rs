@@ -4,12 +4,16 @@ use crate::SessionError;
 use mapper_campaign::Campaign;
 use mapper_core::{GuardName, RigDescription};
 use mapper_runner::{
-    BatchWatch, FirstLook, Guard, ReadChannel, ReaderWatch, RigWatch, SignalWatch, SurgeWatch,
+    BatchWatch, Guard, InstrumentChannel, InstrumentWatch, RigWatch, SignalWatch, StartCheck, SurgeWatch,
 };
 
 /// Makes the guards for a run of this campaign on this rig. A default guard is omitted if the rig does not deliver its signal. Declared and
 /// required guards are always included; they trip if their signal is missing.
-pub fn make_guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChannel]) -> Vec<Box<dyn Guard>> {
+pub fn make_guards(
+    campaign: &Campaign,
+    rig: &RigDescription,
+    read: &[InstrumentChannel],
+) -> Vec<Box<dyn Guard>> {
     let set = campaign.guard_set();
     let mut guards: Vec<Box<dyn Guard>> = vec![Box::new(BatchWatch::default())];
     for spec in set.signals {
@@ -20,11 +24,11 @@ pub fn make_guards(campaign: &Campaign, rig: &RigDescription, read: &[ReadChanne
     }
     guards.extend(set.surge.map(|spec| Box::new(SurgeWatch::new(spec)) as Box<dyn Guard>));
     if !read.is_empty() {
-        guards.push(Box::new(ReaderWatch::new(read.to_vec())));
+        guards.push(Box::new(InstrumentWatch::new(read.to_vec())));
     }
     if rig.controls {
         guards.push(Box::new(RigWatch::default()));
-        guards.push(Box::new(FirstLook::new(rig.channels.clone())));
+        guards.push(Box::new(StartCheck::new(rig.channels.clone())));
     }
     guards
 }

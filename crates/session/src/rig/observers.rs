@@ -95,7 +95,7 @@ impl RunObserver for Recorder {
         self.writer.write_step(marker, StepPhase::End).map_err(ObserverError::of)
     }
 
-    fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+    fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
         self.queue_entry(Entry::StepSaved(marker.index));
         Ok(())
     }

@@ -5,7 +5,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::ReaderChoice;
 use mapper_core::{Backend, BackendError, Channel, RigDescription};
 use mapper_physics::simulation::model::Model;
-use mapper_runner::{ReadChannel, Reader, RigWithInstruments};
+use mapper_runner::{AuxiliaryInstrument, InstrumentChannel, RigWithInstruments};
 use std::time::Duration;
 
 /// Connection timeout of an auxiliary instrument, equal to that of a rig.
@@ -35,7 +35,7 @@ pub struct Sources {
     /// All sources combined into one backend.
     pub backend: Box<dyn Backend>,
     /// Every channel of an auxiliary instrument.
-    pub read: Vec<ReadChannel>,
+    pub read: Vec<InstrumentChannel>,
     /// Names of instruments that only one run may use at a time.
     pub exclusive: Vec<String>,
 }
@@ -70,11 +70,14 @@ impl Registry {
             let rig = backend.describe();
             let channels = select_channels(choice, &rig, &mut taken)?;
             let age_s = age_s.max(MAX_MISSED_SAMPLES / rig.sample_rate_hz.max(1e-3));
-            let as_read =
-                |channel: &Channel| ReadChannel { reader: choice.name.clone(), channel: *channel, age_s };
+            let as_read = |channel: &Channel| InstrumentChannel {
+                reader: choice.name.clone(),
+                channel: *channel,
+                age_s,
+            };
             read.extend(channels.iter().map(as_read));
             exclusive.extend(rig.exclusive);
-            readers.push(Reader { name: choice.name.clone(), backend, channels });
+            readers.push(AuxiliaryInstrument { name: choice.name.clone(), backend, channels });
         }
         let backend =
             RigWithInstruments::new(rig, readers, CONNECT_TIMEOUT).map_err(SessionError::Backend)?;

@@ -70,7 +70,7 @@ fn observe(observer: &mut impl RunObserver, message: ObserverMessage) -> Result<
         ObserverMessage::Event(event) => observer.on_event(&event),
         ObserverMessage::StepAbandoned(marker) => observer.on_step_abandoned(&marker),
         ObserverMessage::StepEnd(marker) => observer.on_step_end(&marker),
-        ObserverMessage::StepHeld(marker) => observer.on_step_held(&marker),
+        ObserverMessage::StepHeld(marker) => observer.on_step_completed(&marker),
     }
 }
 
@@ -95,7 +95,7 @@ impl<O> RunObserver for ThreadedObserver<'_, O> {
         self.send(ObserverMessage::StepEnd(*marker))
     }
 
-    fn on_step_held(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
+    fn on_step_completed(&mut self, marker: &StepMarker) -> Result<(), ObserverError> {
         self.send(ObserverMessage::StepHeld(*marker))
     }
 }

@@ -31,7 +31,7 @@ use mapper_physics::simulation::model::Model;
 use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
 use mapper_report::ending_sentence;
 use mapper_runner::{
-    Deadlined, Deadlines, DriftWatch, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch,
+    DeadlineBackend, Deadlines, DriftWatch, PlanSteps, RunError, RunObserver, StepSource, SurgeSearch,
 };
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -191,8 +191,9 @@ impl PreparedRun<'_> {
         let campaign = self.request.campaign;
         let rig = self.rig();
         if !rig.simulated_time {
-            let deadlined = Deadlined::new(self.sources.backend, DEADLINES).map_err(SessionError::Backend)?;
-            self.sources.backend = Box::new(deadlined);
+            let backend =
+                DeadlineBackend::new(self.sources.backend, DEADLINES).map_err(SessionError::Backend)?;
+            self.sources.backend = Box::new(backend);
         }
         if let Some(outcome) = self.finish_complete_run(session)? {
             return Ok(outcome);
@@ -255,7 +256,7 @@ impl PreparedRun<'_> {
 
     /// Removes the files of a run whose rig was not armed, and returns the error of the run.
     fn discard_unarmed_run(&self, error: RunError, directory: &Path) -> SessionError {
-        if self.request.resume.is_none() && !error.leaves_doubt() {
+        if self.request.resume.is_none() && !error.leaves_rig_state_unknown() {
             // If this fails, an empty run directory remains, which does no harm.
             let _ = std::fs::remove_dir_all(directory);
         }
@@ -401,7 +402,7 @@ impl PreparedRun<'_> {
                 Some(on_drift) => {
                     let sensors = declared(campaign, &ChannelMap::native());
                     let mut watch = DriftWatch::new(steps, on_drift, sensors);
-                    (run_steps(&mut watch), watch.ended_by_drift().map(str::to_owned))
+                    (run_steps(&mut watch), watch.end_reason().map(str::to_owned))
                 }
                 None => (run_steps(steps), None),
             };

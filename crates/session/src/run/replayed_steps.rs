@@ -103,10 +103,10 @@ impl StepSource for ResumedSteps<'_> {
         self.inner.next_step()
     }
 
-    fn begins(&mut self, marker: &StepMarker) {
+    fn before_step(&mut self, marker: &StepMarker) {
         if !self.repeating {
             let shifted = self.shifted(marker);
-            self.inner.begins(&shifted);
+            self.inner.before_step(&shifted);
         }
     }
 
@@ -123,9 +123,9 @@ impl StepSource for ResumedSteps<'_> {
         if self.repeating { Ok(()) } else { self.inner.after_step(&shifted) }
     }
 
-    fn skipped(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
+    fn after_skipped_step(&mut self, marker: &StepMarker) -> Result<(), StepSourceError> {
         let shifted = self.shifted(marker);
-        if self.repeating { Ok(()) } else { self.inner.skipped(&shifted) }
+        if self.repeating { Ok(()) } else { self.inner.after_skipped_step(&shifted) }
     }
 
     fn take_notes(&mut self) -> Vec<String> {
@@ -156,7 +156,7 @@ impl Replay<'_, '_> {
             // Before the first step, the source has already handed out its step, as in the original run.
             self.advance_to(&shifted)?;
             batches.replay_until(self.inner, shifted.start_s);
-            self.inner.begins(&shifted);
+            self.inner.before_step(&shifted);
             batches.replay_until(self.inner, shifted.end_s);
             self.inner.after_step(&shifted).map_err(|error| self.mismatch(error.to_string()))?;
             self.replayed_steps += 1;
@@ -183,8 +183,10 @@ impl Replay<'_, '_> {
                     end_s: recorded.start_s,
                     ..*recorded
                 };
-                self.inner.begins(&skipped_step);
-                self.inner.skipped(&skipped_step).map_err(|error| self.mismatch(error.to_string()))?;
+                self.inner.before_step(&skipped_step);
+                self.inner
+                    .after_skipped_step(&skipped_step)
+                    .map_err(|error| self.mismatch(error.to_string()))?;
                 continue;
             }
             let near = |a: f64, b: f64| (a - b).abs() <= TARGET_TOLERANCE_RATIO * a.abs().max(b.abs());

@@ -59,7 +59,7 @@ impl RunTermination {
 pub(crate) fn lockout_reason(end: &Result<RunEnd, RunError>) -> Option<String> {
     match end {
         Ok(RunEnd::Tripped(trip)) if trip.reaction == Reaction::Latch => Some(trip.reason.clone()),
-        Err(error) if error.leaves_doubt() => Some(error.to_string()),
+        Err(error) if error.leaves_rig_state_unknown() => Some(error.to_string()),
         _ => None,
     }
 }

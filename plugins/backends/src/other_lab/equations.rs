@@ -1,4 +1,4 @@
-//! These equations in the virtual lab's rig.
+//! Puts the equations of this lab into the rig of the virtual lab.
 
 use super::motion::Motion;
 use super::structure::{NAME, OtherStructure};
@@ -9,8 +9,8 @@ use mapper_physics::simulation::simulate::Watch;
 use mapper_physics::simulation::steady;
 use std::sync::Arc;
 
-/// Replaces equations and sensors of a virtual lab by those of this one.
-pub fn turn_into(lab: &mut LabSettings, structure: OtherStructure) {
+/// Replaces the equations and sensors of a virtual lab by those of this lab.
+pub fn apply_structure(lab: &mut LabSettings, structure: OtherStructure) {
     let sensors = structure.sensors();
     lab.second_order = sensors
         .into_iter()
@@ -24,7 +24,7 @@ impl Structure for OtherStructure {
         NAME
     }
 
-    fn started(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine> {
+    fn start(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine> {
         Box::new(Motion::new(model, self.clone(), t_s, state, watch))
     }
 

@@ -4,7 +4,8 @@
 //! The coupling of the parts differs.
 
 use super::passage::{
-    AREA_SHARES, BACK_NODE, CAPACITY_SHARES, EXTERNAL_SHARES, FLANGE_NODE, NODES, PROBE_NODE, along, h_ratios,
+    AREA_SHARES, BACK_NODE, CAPACITY_SHARES, EXTERNAL_SHARES, FLANGE_NODE, NODES, PROBE_NODE, h_ratios,
+    heat_nodes,
 };
 use super::structure::OtherStructure;
 use mapper_physics::machine::params::BoundaryConditions;
@@ -36,14 +37,14 @@ pub(super) const SIZES: [f64; STATES] =
 /// Specific heat ratio of air in the volumes.
 const GAMMA: f64 = 1.4;
 /// Position on the speed line at which the flow separates, and the return that it needs to reattach.
-const SEPARATES_AT: f64 = 0.90;
-const LIES_ON_BELOW: f64 = 0.12;
+const SEPARATION_POSITION: f64 = 0.90;
+const REATTACHMENT_DISTANCE: f64 = 0.12;
 /// Width of that transition as a position on the speed line, and its time, s.
 const TRANSITION: f64 = 0.04;
 const SEPARATION_S: f64 = 0.5;
 
-/// One instant.
-pub(super) struct Instantly {
+/// State, outputs and rates at one instant.
+pub(super) struct Evaluation {
     pub(super) state: State,
     pub(super) outputs: Outputs,
     pub(super) rates: [f64; STATES],
@@ -67,7 +68,7 @@ pub(super) fn start(model: &Model, boundary: &BoundaryConditions, state: &State)
 }
 
 /// The state as the rig's sensors define it: P2 before the valve, Tc at its probe.
-pub(super) fn seen(y: &[f64; STATES]) -> State {
+pub(super) fn lumped_state(y: &[f64; STATES]) -> State {
     State {
         shaft_speed_rad_s: y[SHAFT],
         p2_pa: y[P_SECOND],
@@ -79,7 +80,7 @@ pub(super) fn seen(y: &[f64; STATES]) -> State {
     }
 }
 
-fn four(y: &[f64; STATES], first: usize) -> [f64; NODES] {
+fn node_values(y: &[f64; STATES], first: usize) -> [f64; NODES] {
     std::array::from_fn(|node| y[first + node])
 }
 
@@ -94,7 +95,7 @@ pub(super) fn evaluate(
     t_s: f64,
     boundary: &BoundaryConditions,
     y: &[f64; STATES],
-) -> Instantly {
+) -> Evaluation {
     let separation = y[SEPARATION].clamp(0.0, 1.0);
     let mut separated = model.clone();
     let compressor = &mut separated.params.compressor;
@@ -103,20 +104,20 @@ pub(super) fn evaluate(
     let prepared = separated.prepare_at(t_s, boundary);
     let params = &separated.params;
     let compressor = &params.compressor;
-    let (outer_k, inner_k) = (four(y, OUTER), four(y, INNER));
+    let (outer_k, inner_k) = (node_values(y, OUTER), node_values(y, INNER));
     let has_inner = separated.has_inner_wall();
     let walls_k = if has_inner { inner_k } else { outer_k };
     let wheel = State {
         p2_pa: y[P_FIRST],
         tc_k: mean(&outer_k, &CAPACITY_SHARES),
         inner_k: mean(&inner_k, &AREA_SHARES),
-        ..seen(y)
+        ..lumped_state(y)
     };
     // The model's own map, wheel and turbine, at the mean wall temperature.
     let lumped = prepared.evaluate(&wheel);
     let mut outputs = lumped;
 
-    // Along the nodes instead of the single wall.
+    // Replace the single wall by the nodes.
     let flow_kg_s = lumped.flow_kg_s;
     let moist_cp_ratio = air::moist_heat_capacity_ratio(compressor.humidity_kg_kg);
     let gas_constant_j_kgk = air::moist_gas_constant_j_kgk(compressor.humidity_kg_kg);
@@ -127,17 +128,24 @@ pub(super) fn evaluate(
     let whole_w_k = lumped.h_w_m2k * compressor.internal_area_m2;
     let directed_w_k =
         |wall_k: f64, gas_k: f64| whole_w_k * if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 };
-    let behind_w_k =
+    let after_wheel_w_k =
         |wall_k: f64, gas_k: f64| directed_w_k(wall_k, gas_k) * (1.0 - compressor.alpha_area_ratio);
     let h_ratios = h_ratios(structure);
-    let (gas_k, mut heats_w) =
-        along(&h_ratios, structure.mixed_gas, behind_w_k, lumped.t2_prime_k, &walls_k, flow_kg_s, cp2_j_kgk);
-    let one_wall_w_k = behind_w_k(lumped.wall_k, lumped.t2_prime_k);
+    let (gas_k, mut heats_w) = heat_nodes(
+        &h_ratios,
+        structure.mixed_gas,
+        after_wheel_w_k,
+        lumped.t2_prime_k,
+        &walls_k,
+        flow_kg_s,
+        cp2_j_kgk,
+    );
+    let one_wall_w_k = after_wheel_w_k(lumped.wall_k, lumped.t2_prime_k);
     let (one_wall_w, one_wall_k) =
         compression::after_wheel(one_wall_w_k, lumped.t2_prime_k, lumped.wall_k, flow_kg_s, cp2_j_kgk);
     // Keeps the change that hooks make to the outlet gas.
     let gas_k = gas_k + (lumped.t2_k - one_wall_k);
-    // Before the wheel the gas meets the shroud; its temperature there is the model's, at the mean wall temperature.
+    // Before the wheel, the gas exchanges heat with the shroud. Its temperature there is the model's, at the mean wall temperature.
     heats_w[0] += lumped.compressor_heat_w - one_wall_w;
 
     // Two volumes and the duct between them.
@@ -216,12 +224,12 @@ pub(super) fn evaluate(
         } else {
             gas_w
         };
-        let from_behind_w = if node == BACK_NODE {
+        let from_bearing_w = if node == BACK_NODE {
             bearing_w_k * (bearing_k - outer_k[node]) + outputs.radiation_w
         } else {
             0.0
         };
-        rates[OUTER + node] = (from_inside_w + along_w + from_behind_w - external_w[node]
+        rates[OUTER + node] = (from_inside_w + along_w + from_bearing_w - external_w[node]
             + share * lumped.added.compressor_heat_w)
             / ((1.0 - phi) * capacity_j_k(outer_k[node]));
     }
@@ -235,7 +243,7 @@ pub(super) fn evaluate(
     rates[GAS] = gas_rate;
     rates[SEPARATION] = separation_rate(structure, lumped.surge_position_ratio, y[SEPARATION]);
     rates[EXTRA..].copy_from_slice(&lumped.added.extra_rates_k_s);
-    Instantly { state: seen(y), outputs, rates }
+    Evaluation { state: lumped_state(y), outputs, rates }
 }
 
 /// Two stable states between the two thresholds: attached flow separates at the upper one, separated flow reattaches
@@ -244,7 +252,7 @@ fn separation_rate(structure: &OtherStructure, place: f64, separation: f64) -> f
     if structure.hysteresis_ratio == 0.0 {
         return 0.0;
     }
-    let threshold = SEPARATES_AT - LIES_ON_BELOW * separation;
+    let threshold = SEPARATION_POSITION - REATTACHMENT_DISTANCE * separation;
     let wanted = 1.0 / (1.0 + (-(place - threshold) / (0.25 * TRANSITION)).exp());
     (wanted - separation) / SEPARATION_S
 }
@@ -255,7 +263,7 @@ mod tests {
 
     /// Between the thresholds the flow keeps its state.
     #[test]
-    fn what_separated_stays_so_until_it_is_well_back() {
+    fn separated_flow_reattaches_only_below_the_lower_threshold() {
         let structure = OtherStructure::default();
         let rest = |place: f64, from: f64| {
             (0..2000).fold(from, |at, _| at + 0.05 * separation_rate(&structure, place, at))

@@ -1,6 +1,6 @@
-//! A gas stand with different equations than the model, so that a diagnosis is not checked by the model that it assumes: a
-//! housing of four nodes, a volume, a duct and another volume behind the wheel, a map with hysteresis, sensors of second
-//! order. Actuators, weather, offsets, noise, standstill and trips are the virtual lab's.
+//! A simulated gas stand with other equations than the lumped model, so that a diagnosis can be checked with a machine that it does not
+//! assume: a housing of four nodes, two volumes and a duct behind the wheel, a map with hysteresis, second-order sensors. Actuators,
+//! weather, offsets, noise, standstill and trips are those of the virtual lab.
 
 mod equations;
 mod machine;
@@ -9,7 +9,7 @@ mod passage;
 mod settings_file;
 mod structure;
 
-pub use equations::turn_into;
+pub use equations::apply_structure;
 pub use structure::{NAME, OtherStructure};
 
 use crate::virtual_lab::VirtualLab;
@@ -18,8 +18,11 @@ use mapper_physics::rig::backend_plugin::BackendPlugin;
 use mapper_physics::rig::nominal_rig::NominalRig;
 
 /// The lab as a plugin for campaigns.
-pub const PLUGIN: BackendPlugin =
-    BackendPlugin { name: NAME, summary: "simulated gas stand of other equations, needs nothing", make };
+pub const PLUGIN: BackendPlugin = BackendPlugin {
+    name: NAME,
+    summary: "simulated gas stand with other equations, needs no hardware",
+    make,
+};
 
 fn make(rig: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(VirtualLab::new(settings_file::read(settings, rig)?)))

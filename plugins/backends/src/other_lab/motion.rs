@@ -1,6 +1,6 @@
 //! Integration of this lab's machine.
 
-use super::machine::{SIZES, STATES, evaluate, seen, start};
+use super::machine::{SIZES, STATES, evaluate, lumped_state, start};
 use super::structure::OtherStructure;
 use crate::virtual_lab::{LabInputs, RunningMachine, StructureError};
 use mapper_physics::machine::params::{BoundaryConditions, Params};
@@ -11,8 +11,8 @@ use mapper_physics::simulation::simulate::{
     Crossing, DEFAULT_RELATIVE_TOLERANCE, ModelEvent, SimulationError, Watch,
 };
 
-/// Time to a steady state: many time constants of the turbine housing, s.
-const LONG_S: f64 = 40_000.0;
+/// Simulated time to a steady state, s: many time constants of the turbine housing.
+const SETTLING_TIME_S: f64 = 40_000.0;
 
 /// A machine with these equations.
 #[derive(Debug)]
@@ -43,10 +43,10 @@ impl Motion {
         let (t_s, state) = self.begin;
         let mut integrator = Integrator::new(t_s, start(&self.model, boundary, &state), tolerances());
         let mut system = System::new(&self.model, &self.structure, boundary, t_s);
-        while integrator.t_s < t_s + LONG_S {
-            integrator.step(&mut system, t_s + LONG_S)?;
+        while integrator.t_s < t_s + SETTLING_TIME_S {
+            integrator.step(&mut system, t_s + SETTLING_TIME_S)?;
         }
-        self.begin.1 = seen(&integrator.y);
+        self.begin.1 = lumped_state(&integrator.y);
         self.integrator = Some(Integrator::new(t_s, integrator.y, tolerances()));
         Ok(())
     }
@@ -59,7 +59,7 @@ fn tolerances() -> Tolerances<STATES> {
 
 impl RunningMachine for Motion {
     fn state(&self) -> State {
-        self.integrator.as_ref().map_or(self.begin.1, |integrator| seen(&integrator.y))
+        self.integrator.as_ref().map_or(self.begin.1, |integrator| lumped_state(&integrator.y))
     }
 
     fn restart(&mut self) {
@@ -101,10 +101,10 @@ impl RunningMachine for Motion {
             let boundary = inputs.at(start_s);
             boundary.check().map_err(|source| SimulationError::Boundary { t_s: start_s, source })?;
             let kink_s = inputs.next_kink_s(start_s);
-            let stretch_end_s = kink_s.min(end_s);
+            let segment_end_s = kink_s.min(end_s);
             let mut system = System::new(model, structure, inputs, start_s);
-            while integrator.t_s < stretch_end_s {
-                let step = integrator.step(&mut system, stretch_end_s)?;
+            while integrator.t_s < segment_end_s {
+                let step = integrator.step(&mut system, segment_end_s)?;
                 while let Some(t_s) = samples.next_if(|t| *t <= step.t1_s) {
                     sample(t_s, &step.at(t_s));
                 }
@@ -118,7 +118,7 @@ impl RunningMachine for Motion {
     }
 }
 
-/// Reports crossings of limits since the last step, at the step's end: the steps are far shorter than any sample.
+/// Reports crossings of limits since the last step, with the time of the step's end: the steps are far shorter than a sample.
 fn report(
     model: &Model,
     structure: &OtherStructure,
@@ -172,7 +172,7 @@ impl<I: Inputs> OdeSystem<STATES> for System<'_, I> {
         if self.constant {
             return None;
         }
-        // A one-sided forward difference: there may be a kink behind.
+        // A forward difference, because there may be a kink at `t_s`.
         let ahead_s = 1e-6;
         let moved = self.rates(t_s + ahead_s, y);
         Some(std::array::from_fn(|i| (moved[i] - rates[i]) / ahead_s))

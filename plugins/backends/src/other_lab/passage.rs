@@ -27,12 +27,11 @@ pub(super) fn h_ratios(structure: &OtherStructure) -> [f64; NODES] {
     raw.map(|raw| raw / mean)
 }
 
-/// Gas behind the last node, K, and the heat into each node, W. `conductance_w_k` is that of all nodes together at
-/// mean h, as a function of the wall and its gas;
-/// `mixed` gas has one temperature in the whole passage.
-pub(super) fn along(
+/// Returns the gas temperature after the last node, K, and the heat into each node, W. `conductance_w_k`: total conductance of all nodes
+/// at mean h, as a function of wall and gas temperature. `is_mixed`: the gas has one temperature in the whole passage.
+pub(super) fn heat_nodes(
     h_ratios: &[f64; NODES],
-    mixed: bool,
+    is_mixed: bool,
     conductance_w_k: impl Fn(f64, f64) -> f64,
     gas_k: f64,
     walls_k: &[f64; NODES],
@@ -41,7 +40,7 @@ pub(super) fn along(
 ) -> (f64, [f64; NODES]) {
     let node_w_k =
         |node: usize, gas_k: f64| conductance_w_k(walls_k[node], gas_k) * h_ratios[node] * AREA_SHARES[node];
-    if mixed {
+    if is_mixed {
         // Each node meets the outlet gas: eq. 3 with several walls.
         let nodes_w_k: [f64; NODES] = std::array::from_fn(|node| node_w_k(node, gas_k));
         let stream_w_k = flow_kg_s * cp_j_kgk;
@@ -51,9 +50,8 @@ pub(super) fn along(
     }
     let mut gas_k = gas_k;
     let heats_w = std::array::from_fn(|node| {
-        let (heat_w, behind_k) =
-            after_wheel(node_w_k(node, gas_k), gas_k, walls_k[node], flow_kg_s, cp_j_kgk);
-        gas_k = behind_k;
+        let (heat_w, next_k) = after_wheel(node_w_k(node, gas_k), gas_k, walls_k[node], flow_kg_s, cp_j_kgk);
+        gas_k = next_k;
         heat_w
     });
     (gas_k, heats_w)
@@ -64,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_are_whole_and_the_mean_of_h_is_kept() {
+    fn shares_add_up_to_one_and_the_mean_of_h_is_kept() {
         for shares in [AREA_SHARES, CAPACITY_SHARES, EXTERNAL_SHARES] {
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }
@@ -78,8 +76,8 @@ mod tests {
     fn the_gas_loses_what_the_nodes_take() {
         let walls_k = [330.0, 325.0, 320.0, 318.0];
         let ratios = h_ratios(&OtherStructure::default());
-        for mixed in [false, true] {
-            let (out_k, heats_w) = along(&ratios, mixed, |_, _| 4.0, 390.0, &walls_k, 0.04, 1008.0);
+        for is_mixed in [false, true] {
+            let (out_k, heats_w) = heat_nodes(&ratios, is_mixed, |_, _| 4.0, 390.0, &walls_k, 0.04, 1008.0);
             let lost_w = 0.04 * 1008.0 * (390.0 - out_k);
             assert!((heats_w.iter().sum::<f64>() - lost_w).abs() < 1e-9, "{heats_w:?} {lost_w}");
         }

@@ -1,7 +1,7 @@
 //! The lab's settings as a campaign writes them below `backend: {other_lab: ...}`: all keys of the virtual lab, and
 //! `structure`.
 
-use super::equations::turn_into;
+use super::equations::apply_structure;
 use super::structure::{NAME, OtherStructure};
 use crate::virtual_lab::{LabSettings, SettingProblem, read_settings, within};
 use mapper_core::BackendError;
@@ -56,22 +56,22 @@ fn read_keys(settings: &serde_json::Value, nominal: &NominalRig) -> Result<LabSe
         })?
     };
     let mut lab = read_settings(&rest, nominal)?;
-    turn_into(&mut lab, file.structure()?);
+    apply_structure(&mut lab, file.structure()?);
     Ok(lab)
 }
 
 impl StructureFile {
     fn structure(&self) -> Result<OtherStructure, BackendError> {
-        let usual = OtherStructure::default();
+        let defaults = OtherStructure::default();
         let structure = OtherStructure {
-            housing_coupling_w_k: self.housing_coupling.map_or(usual.housing_coupling_w_k, |it| it.inside),
-            uneven_h_ratio: self.uneven_h.map_or(usual.uneven_h_ratio, |it| it.inside),
-            mixed_gas: self.mixed_gas.unwrap_or(usual.mixed_gas),
-            duct_length_m: self.duct_length.map_or(usual.duct_length_m, |it| it.inside),
-            duct_loss_ratio: self.duct_loss.unwrap_or(usual.duct_loss_ratio),
-            volume_share_ratio: self.volume_share.map_or(usual.volume_share_ratio, |it| it.inside),
-            hysteresis_ratio: self.hysteresis.map_or(usual.hysteresis_ratio, |it| it.inside),
-            sensor_speed_ratio: self.sensor_speed.unwrap_or(usual.sensor_speed_ratio),
+            housing_coupling_w_k: self.housing_coupling.map_or(defaults.housing_coupling_w_k, |it| it.inside),
+            uneven_h_ratio: self.uneven_h.map_or(defaults.uneven_h_ratio, |it| it.inside),
+            mixed_gas: self.mixed_gas.unwrap_or(defaults.mixed_gas),
+            duct_length_m: self.duct_length.map_or(defaults.duct_length_m, |it| it.inside),
+            duct_loss_ratio: self.duct_loss.unwrap_or(defaults.duct_loss_ratio),
+            volume_share_ratio: self.volume_share.map_or(defaults.volume_share_ratio, |it| it.inside),
+            hysteresis_ratio: self.hysteresis.map_or(defaults.hysteresis_ratio, |it| it.inside),
+            sensor_speed_ratio: self.sensor_speed.unwrap_or(defaults.sensor_speed_ratio),
         };
         for (key, value, unit, range) in [
             ("housing_coupling", structure.housing_coupling_w_k, "W/K", 0.1..=1e6),

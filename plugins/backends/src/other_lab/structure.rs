@@ -63,7 +63,7 @@ impl OtherStructure {
     /// Second-order sensors: channel, natural frequency in Hz, damping. Pressure lines oscillate, meters are filtered, probes
     /// in a sheath have two lags.
     pub(super) fn sensors(&self) -> Vec<(Channel, f64, f64)> {
-        let usual = [
+        let defaults = [
             (Channel::P2, 8.0, 0.5),
             (Channel::CompressorFlow, 3.0, 0.7),
             (Channel::TurbineFlow, 3.0, 0.7),
@@ -75,6 +75,6 @@ impl OtherStructure {
         if self.sensor_speed_ratio.is_infinite() {
             return Vec::new();
         }
-        usual.map(|(channel, hz, damping)| (channel, hz * self.sensor_speed_ratio, damping)).to_vec()
+        defaults.map(|(channel, hz, damping)| (channel, hz * self.sensor_speed_ratio, damping)).to_vec()
     }
 }

@@ -1,11 +1,11 @@
 //! The virtual gas stand: the lumped model behind actuators and sensors, in simulated time.
 
-use super::samples::{Instant, Readers, SampleCollector};
+use super::samples::{Instant, SampleCollector, SensorBank};
 use super::settings::{LabSettings, Start};
 use crate::setpoint_limits;
 use crate::virtual_lab::rig::actuator::Actuator;
 use crate::virtual_lab::rig::drift::{self, LabDrift};
-use crate::virtual_lab::rig::inputs::{LOWEST_EXPANSION_RATIO, LabInputs};
+use crate::virtual_lab::rig::inputs::{LabInputs, MIN_EXPANSION_RATIO};
 use crate::virtual_lab::rig::precursor::Resonator;
 use crate::virtual_lab::rig::running::RunningMachine;
 use crate::virtual_lab::sensors::elements::ElementBank;
@@ -57,7 +57,7 @@ struct Armed {
     machine: Option<Machine>,
     wanted: RigMode,
     tripped: bool,
-    readers: Readers,
+    sensor_bank: SensorBank,
     commands: Option<Setpoints>,
     now_s: f64,
     next_sequence: u64,
@@ -127,7 +127,7 @@ impl Backend for VirtualLab {
             inputs: LabInputs {
                 cell,
                 weather: settings.weather.clone(),
-                p3: Actuator::at_rest(settings.p3_actuator, cell.p4_pa * LOWEST_EXPANSION_RATIO),
+                p3: Actuator::at_rest(settings.p3_actuator, cell.p4_pa * MIN_EXPANSION_RATIO),
                 t3: Actuator::at_rest(settings.t3_actuator, cell.t3_k),
                 valve: Actuator::at_rest(settings.valve_actuator, cell.valve_opening_ratio),
                 oil: Actuator::at_rest(settings.oil_actuator, cell.oil_temperature_k),
@@ -138,7 +138,7 @@ impl Backend for VirtualLab {
             },
             wanted: RigMode::Standstill,
             tripped: false,
-            readers: Readers {
+            sensor_bank: SensorBank {
                 sensors,
                 followers: CHANNELS
                     .iter()
@@ -173,7 +173,7 @@ impl Backend for VirtualLab {
         let now_s = armed.now_s;
         let p3_pa = match armed.wanted {
             RigMode::Running => setpoints.p3_pa,
-            RigMode::Standstill => armed.inputs.cell.p4_pa * LOWEST_EXPANSION_RATIO,
+            RigMode::Standstill => armed.inputs.cell.p4_pa * MIN_EXPANSION_RATIO,
         };
         let first = armed.machine.is_none();
         for (actuator, command) in [
@@ -210,7 +210,7 @@ impl Backend for VirtualLab {
         let (settings, armed) = self.armed("make_safe")?;
         let now_s = armed.now_s;
         armed.wanted = RigMode::Standstill;
-        armed.inputs.p3.set(now_s, armed.inputs.cell.p4_pa * LOWEST_EXPANSION_RATIO);
+        armed.inputs.p3.set(now_s, armed.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
         armed.inputs.valve.set(now_s, 1.0f64.max(armed.inputs.valve.value(now_s)));
         if let Some(Machine::Running(simulator)) = armed.machine.as_mut() {
             simulator.restart();
@@ -255,7 +255,7 @@ fn watch(settings: &LabSettings) -> Watch {
 
 impl Armed {
     fn advance(&mut self, settings: &LabSettings, until_s: f64) -> Result<SampleBatch, BackendError> {
-        let mut batch = SampleCollector::new(self.next_sequence, &self.readers);
+        let mut batch = SampleCollector::new(self.next_sequence, &self.sensor_bank);
         // A time before the first sample, or NaN, requests no sample.
         let asks_for_the_first = self.next_sequence == 0 && until_s >= 0.0;
         while self.now_s < until_s || (self.now_s == 0.0 && asks_for_the_first) {
@@ -279,7 +279,7 @@ impl Armed {
                 let cell = &self.inputs.cell;
                 let speed_rad_s = rad_s_of_rpm(CRANKING_SPEED_RPM);
                 let start = State::new(speed_rad_s, cell.p1_pa * 1.0005, state.tc_k, state.tt_k, cell.t1_k);
-                Machine::Running(settings.structure.started(&settings.model, now_s, start, watch(settings)))
+                Machine::Running(settings.structure.start(&settings.model, now_s, start, watch(settings)))
             }
             (Some(Machine::Running(simulator)), RigMode::Standstill)
                 if simulator.state().shaft_speed_rpm() < CRANKING_SPEED_RPM =>
@@ -297,8 +297,8 @@ impl Armed {
         if let Some(Machine::Running(simulator)) = self.machine.as_mut()
             && settings.drifts.iter().any(LabDrift::is_machine)
         {
-            let held_s = (self.now_s / drift::MACHINE_HOLDS_S + 1e-9).floor() * drift::MACHINE_HOLDS_S;
-            let middle_s = held_s + 0.5 * drift::MACHINE_HOLDS_S;
+            let held_s = (self.now_s / drift::MACHINE_UPDATE_S + 1e-9).floor() * drift::MACHINE_UPDATE_S;
+            let middle_s = held_s + 0.5 * drift::MACHINE_UPDATE_S;
             simulator.change_params(drift::drifted_machine(
                 &settings.drifts,
                 settings.model.params,
@@ -318,15 +318,15 @@ impl Armed {
         let coasting = self.wanted == RigMode::Standstill;
         let mut end_s = if coasting { until_s.min(start_s + 1.0) } else { until_s };
         if settings.drifts.iter().any(LabDrift::is_machine) {
-            // A fixed grid, so that the polling rate changes nothing.
-            end_s =
-                end_s.min(((start_s / drift::MACHINE_HOLDS_S + 1e-9).floor() + 1.0) * drift::MACHINE_HOLDS_S);
+            // A fixed grid, so that the result does not depend on the polling rate.
+            end_s = end_s
+                .min(((start_s / drift::MACHINE_UPDATE_S + 1e-9).floor() + 1.0) * drift::MACHINE_UPDATE_S);
         }
         let first_index = self.next_sequence + batch.len() as u64;
         let rate_hz = settings.sample_rate_hz;
         let mut sample_times_s =
             (first_index..).map(|index| index as f64 / rate_hz).take_while(|t| *t <= end_s);
-        let Armed { inputs, machine, readers, commands, .. } = self;
+        let Armed { inputs, machine, sensor_bank, commands, .. } = self;
         match machine {
             None => Err(BackendError::OutOfOrder {
                 call: "poll",
@@ -347,7 +347,7 @@ impl Armed {
                             tt_k: state.tt_k,
                             running: Some((state, outputs)),
                         };
-                        batch.push(t_s, &instant, commands.as_ref(), readers, settings);
+                        batch.push(t_s, &instant, commands.as_ref(), sensor_bank, settings);
                     },
                     &mut |event| crossings.push(event),
                 );
@@ -379,7 +379,7 @@ impl Armed {
                     let StandstillState { tc_k, tt_k } = relax_to(t_s);
                     let boundary = inputs.at(t_s);
                     let instant = Instant { speed_rpm: 0.0, boundary, tc_k, tt_k, running: None };
-                    batch.push(t_s, &instant, commands.as_ref(), readers, settings);
+                    batch.push(t_s, &instant, commands.as_ref(), sensor_bank, settings);
                 }
                 relax_to(end_s);
                 Ok(end_s)
@@ -401,7 +401,7 @@ impl Armed {
             ),
             Crossing::SurgeLeft => (
                 EventKind::SurgeLeft,
-                format!("out of surge at {speed_rpm:.0} rpm, pressure ratio {pressure_ratio:.4}"),
+                format!("surge has ended at {speed_rpm:.0} rpm, pressure ratio {pressure_ratio:.4}"),
             ),
             Crossing::OverspeedEntered => (
                 EventKind::OverspeedEntered,
@@ -418,7 +418,7 @@ impl Armed {
         if crossing == Crossing::OverspeedEntered {
             self.tripped = true;
             self.wanted = RigMode::Standstill;
-            self.inputs.p3.set(now_s, self.inputs.cell.p4_pa * LOWEST_EXPANSION_RATIO);
+            self.inputs.p3.set(now_s, self.inputs.cell.p4_pa * MIN_EXPANSION_RATIO);
         }
         self.pending_events.push(Event { t_s, kind, message });
         if crossing == Crossing::OverspeedEntered {

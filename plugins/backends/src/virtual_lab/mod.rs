@@ -15,7 +15,7 @@ pub use lab::VirtualLab;
 pub use name::NAME;
 pub use rig::actuator::ActuatorDynamics;
 pub use rig::boundary_wander::Weather;
-pub use rig::drift::{Drifting, LabDrift};
+pub use rig::drift::{DriftTarget, LabDrift};
 pub use rig::inputs::LabInputs;
 pub use rig::precursor::SurgePrecursor;
 pub use rig::running::{RunningMachine, Structure, StructureError};
@@ -31,7 +31,7 @@ use mapper_physics::rig::nominal_rig::NominalRig;
 
 /// The lab as a plugin for campaigns.
 pub const PLUGIN: BackendPlugin =
-    BackendPlugin { name: NAME, summary: "simulated gas stand, needs nothing", make };
+    BackendPlugin { name: NAME, summary: "simulated gas stand, needs no hardware", make };
 
 fn make(rig: &NominalRig, settings: &serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(VirtualLab::new(read_settings(settings, rig)?)))

@@ -43,9 +43,9 @@ impl Instant<'_> {
     }
 }
 
-/// Everything that reads.
+/// All sensors, with the state of their dynamics.
 #[derive(Debug)]
-pub(super) struct Readers {
+pub(super) struct SensorBank {
     pub(super) sensors: Vec<(Channel, Sensor)>,
     pub(super) followers: Vec<ChannelFollower>,
     /// Second-order sensors, by channel.
@@ -66,12 +66,12 @@ pub(super) struct SampleCollector {
 }
 
 impl SampleCollector {
-    pub(super) fn new(first_sequence: u64, readers: &Readers) -> Self {
+    pub(super) fn new(first_sequence: u64, sensor_bank: &SensorBank) -> Self {
         SampleCollector {
             first_sequence,
             t_s: Vec::new(),
             columns: vec![Vec::new(); CHANNELS.len()],
-            elements: readers.several.iter().flat_map(ElementBank::columns).collect(),
+            elements: sensor_bank.several.iter().flat_map(ElementBank::columns).collect(),
             truth: TruthRecorder::default(),
         }
     }
@@ -87,20 +87,20 @@ impl SampleCollector {
         t_s: f64,
         instant: &Instant<'_>,
         commands: Option<&Setpoints>,
-        readers: &mut Readers,
+        sensor_bank: &mut SensorBank,
         settings: &LabSettings,
     ) {
         self.t_s.push(t_s);
         let surge_flow_kg_s = instant.surge_flow_kg_s(settings);
         let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
-        let Readers { sensors, followers, second_order, several, resonator } = readers;
-        let swing = swing(t_s, instant, surge_flow_kg_s, resonator, settings);
+        let SensorBank { sensors, followers, second_order, several, resonator } = sensor_bank;
+        let compute_swing = compute_swing(t_s, instant, surge_flow_kg_s, resonator, settings);
         let mut elements = self.elements.iter_mut();
         let follow = followers.iter_mut().zip(second_order);
         for ((row, column), (follower, second)) in CHANNELS.iter().zip(&mut self.columns).zip(follow) {
-            let total = true_value(row.channel, instant, prepared.as_ref(), commands, swing);
+            let total = true_value(row.channel, instant, prepared.as_ref(), commands, compute_swing);
             let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
-                Some(pipe_diameter_m) => at_the_wall_pa(row.channel, total, *pipe_diameter_m, instant),
+                Some(pipe_diameter_m) => wall_pressure_pa(row.channel, total, *pipe_diameter_m, instant),
                 None => total,
             };
             let uneven = settings.uneven_at_rest.get(&row.channel).filter(|_| instant.running.is_none());
@@ -135,7 +135,7 @@ impl SampleCollector {
 }
 
 /// Swing of flow and pressures: by the surge cycle in surge, by the precursor before it.
-fn swing(
+fn compute_swing(
     t_s: f64,
     instant: &Instant<'_>,
     surge_flow_kg_s: f64,
@@ -150,13 +150,13 @@ fn swing(
     }
     let margin_ratio = outputs.flow_kg_s / surge_flow_kg_s - 1.0;
     // Half of the swing in surge, beyond which the surge cycle takes over.
-    let most_ratio = 0.5 * settings.surge_swing_ratio;
+    let max_rms_ratio = 0.5 * settings.surge_swing_ratio;
     let params = &settings.model.params;
-    resonator.next(margin_ratio, 1.0 / settings.sample_rate_hz, params, outputs.t2_k, most_ratio)
+    resonator.next(margin_ratio, 1.0 / settings.sample_rate_hz, params, outputs.t2_k, max_rms_ratio)
 }
 
 /// Static pressure at the pipe wall of one of the four stations; the total pressure if the pipe would choke.
-fn at_the_wall_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant: &Instant<'_>) -> f64 {
+fn wall_pressure_pa(channel: Channel, total_pa: f64, pipe_diameter_m: f64, instant: &Instant<'_>) -> f64 {
     let Some(outputs) = instant.outputs() else { return total_pa };
     let (flow_kg_s, temperature_k) = match channel {
         Channel::P1 => (outputs.flow_kg_s, instant.boundary.t1_k),
@@ -173,7 +173,7 @@ fn true_value(
     instant: &Instant<'_>,
     prepared: Option<&PreparedModel<'_>>,
     commands: Option<&Setpoints>,
-    swing: Swing,
+    compute_swing: Swing,
 ) -> f64 {
     let boundary = &instant.boundary;
     let command = |value: fn(&Setpoints) -> f64| commands.map_or(f64::NAN, value);
@@ -187,9 +187,9 @@ fn true_value(
     if let (Some((state, outputs)), Some(prepared)) = (instant.running, prepared) {
         let value = instruments::true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
         return match channel {
-            Channel::CompressorFlow => value * (1.0 + swing.flow_ratio),
-            Channel::P2 => value * (1.0 + swing.p2_ratio),
-            Channel::P1 => value * (1.0 + swing.p1_ratio),
+            Channel::CompressorFlow => value * (1.0 + compute_swing.flow_ratio),
+            Channel::P2 => value * (1.0 + compute_swing.p2_ratio),
+            Channel::P1 => value * (1.0 + compute_swing.p1_ratio),
             _ => value,
         };
     }

@@ -12,15 +12,35 @@ use mapper_physics::simulation::model::Model;
 /// All backends, in their practical configuration.
 fn candidates() -> [Candidate<'static>; 5] {
     [
-        Candidate { name: virtual_lab::NAME, make: &settled_lab, setpoints: setpoints(150e3), lasts_s: None },
-        Candidate { name: virtual_lab::NAME, make: &lab_at_rest, setpoints: setpoints(150e3), lasts_s: None },
-        Candidate { name: other_lab::NAME, make: &settled_other, setpoints: setpoints(150e3), lasts_s: None },
-        Candidate { name: other_lab::NAME, make: &other_at_rest, setpoints: setpoints(150e3), lasts_s: None },
+        Candidate {
+            name: virtual_lab::NAME,
+            make: &settled_lab,
+            setpoints: setpoints(150e3),
+            duration_s: None,
+        },
+        Candidate {
+            name: virtual_lab::NAME,
+            make: &lab_at_rest,
+            setpoints: setpoints(150e3),
+            duration_s: None,
+        },
+        Candidate {
+            name: other_lab::NAME,
+            make: &settled_other,
+            setpoints: setpoints(150e3),
+            duration_s: None,
+        },
+        Candidate {
+            name: other_lab::NAME,
+            make: &other_at_rest,
+            setpoints: setpoints(150e3),
+            duration_s: None,
+        },
         Candidate {
             name: replay::NAME,
             make: &replay_of_the_lab,
             setpoints: setpoints(150e3),
-            lasts_s: Some(RECORDED_S),
+            duration_s: Some(RECORDED_S),
         },
     ]
 }
@@ -63,7 +83,7 @@ fn lab_at_rest() -> Result<Box<dyn Backend>, BackendError> {
 
 fn other(start: Start) -> Result<Box<dyn Backend>, BackendError> {
     let mut settings = lab(start);
-    other_lab::turn_into(&mut settings, OtherStructure::default());
+    other_lab::apply_structure(&mut settings, OtherStructure::default());
     Ok(Box::new(VirtualLab::new(settings)))
 }
 

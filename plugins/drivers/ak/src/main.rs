@@ -7,7 +7,7 @@ fn main() -> std::process::ExitCode {
     let about = mapper_driver::About {
         name: settings::NAME,
         version: env!("CARGO_PKG_VERSION"),
-        summary: "Instruments of a test bed that speak the AK telegram over TCP; they are read alone.",
+        summary: "Instruments of a test bed with the AK protocol over TCP; they are only read.",
         settings: r#"docs/how-to/rig.md, "Instruments next to the PLC""#,
     };
     about.serve(rig::open)

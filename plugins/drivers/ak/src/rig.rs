@@ -1,7 +1,7 @@
 //! An AK instrument as a read-only backend.
 
-use crate::settings::{NAME, Questions, Settings};
-use mapper_backend_ak::telegram::{Answer, Assembler, Code, TelegramError, answer, question};
+use crate::settings::{NAME, Requests, Settings};
+use mapper_backend_ak::telegram::{Answer, Assembler, Code, TelegramError, parse_answer, write_request};
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, RigDescription, SafeTrajectory,
     SampleBatch, SetpointRange, SetpointRanges, Setpoints,
@@ -22,13 +22,13 @@ const PLAUSIBLE: SetpointRanges = SetpointRanges {
 
 /// Creates the backend without connecting.
 pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
-    let (settings, questions) = Settings::read(value)?;
-    Ok(Box::new(Instrument { settings, questions, stream: None, armed: None }))
+    let (settings, requests) = Settings::read(value)?;
+    Ok(Box::new(Instrument { settings, requests, stream: None, armed: None }))
 }
 
 /// Why a request failed.
 #[derive(Debug, thiserror::Error)]
-enum AskError {
+enum RequestError {
     #[error("{0}")]
     Io(#[from] std::io::Error),
     #[error("the instrument did not answer {0} in time")]
@@ -48,7 +48,7 @@ struct Armed {
 
 struct Instrument {
     settings: Settings,
-    questions: Questions,
+    requests: Requests,
     stream: Option<TcpStream>,
     armed: Option<Armed>,
 }
@@ -59,7 +59,7 @@ impl Instrument {
     }
 
     /// Sends a request and reads its answer. A failure closes the connection: a late answer would be taken for the next one.
-    fn ask(&mut self, code: Code, channel: u8) -> Result<Answer, AskError> {
+    fn request(&mut self, code: Code, channel: u8) -> Result<Answer, RequestError> {
         let within = Duration::from_secs_f64(self.settings.timeout_s());
         let until = Instant::now() + within;
         let mut stream = match self.stream.take() {
@@ -67,16 +67,16 @@ impl Instrument {
             None => TcpStream::connect_timeout(&self.settings.address, within)?,
         };
         stream.set_write_timeout(Some(within))?;
-        stream.write_all(&question(code, channel, ""))?;
+        stream.write_all(&write_request(code, channel, ""))?;
         let (mut assembler, mut bytes) = (Assembler::default(), [0u8; 512]);
         loop {
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
-                return Err(AskError::Late(code));
+                return Err(RequestError::Late(code));
             }
             stream.set_read_timeout(Some(left))?;
             let count = match stream.read(&mut bytes) {
-                Ok(0) => return Err(AskError::Closed),
+                Ok(0) => return Err(RequestError::Closed),
                 Ok(count) => count,
                 Err(error)
                     if matches!(
@@ -84,13 +84,13 @@ impl Instrument {
                         std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
                     ) =>
                 {
-                    return Err(AskError::Late(code));
+                    return Err(RequestError::Late(code));
                 }
                 Err(error) => return Err(error.into()),
             };
             let whole = bytes.iter().take(count).find_map(|byte| assembler.push(*byte));
             if let Some(body) = whole {
-                let found = answer(&body, code)?;
+                let found = parse_answer(&body, code)?;
                 self.stream = Some(stream);
                 return Ok(found);
             }
@@ -119,8 +119,8 @@ impl Backend for Instrument {
         if self.armed.is_some() {
             return Err(BackendError::OutOfOrder { call: "arm", state: "armed", needed: "not armed" });
         }
-        for (code, channel) in self.questions.keys().copied().collect::<Vec<_>>() {
-            let asked = self.ask(code, channel);
+        for (code, channel) in self.requests.keys().copied().collect::<Vec<_>>() {
+            let asked = self.request(code, channel);
             asked.map_err(|error| BackendError::Lost { t_s: 0.0, source: Box::new(error) })?;
         }
         self.armed = Some(Armed { sequence: 0, last_s: -1.0, error: 0 });
@@ -141,9 +141,9 @@ impl Backend for Instrument {
         }
         (armed.last_s, armed.sequence) = (until_s, first_sequence + 1);
         let (mut values, mut error) = (BTreeMap::<Channel, f64>::new(), before);
-        for ((code, channel), places) in self.questions.clone() {
+        for ((code, channel), places) in self.requests.clone() {
             // If the instrument does not answer, the sample has no readings, and the guards count how long that lasts.
-            let Ok(found) = self.ask(code, channel) else { continue };
+            let Ok(found) = self.request(code, channel) else { continue };
             error = found.error;
             for (channel, place) in places {
                 let value = found.number(place.value).map(|number| number * place.scale + place.offset);

@@ -65,18 +65,20 @@ pub(crate) enum SettingError {
     #[error("a scale of {0} loses the value; it is between 1e-12 and 1e12, or between -1e12 and -1e-12")]
     Scale(f64),
     #[error(
-        "this number of the answer is read as {0} already; one of the two is not there. Give it its own, or leave it out"
+        "{0} reads the same number of the answer; give each channel its own number, or remove one of them"
     )]
     ReadTwice(Channel),
     #[error(transparent)]
     Code(#[from] TelegramError),
-    #[error("{0} would control or set the instrument; it is only read, by codes that begin with A")]
+    #[error(
+        "{0} would control or configure the instrument; this driver only reads, with codes that begin with A"
+    )]
     Controls(Code),
     #[error(
-        "{questions} questions at {rate_hz} Hz are more than the {MAX_HZ} a second that instruments answer"
+        "{requests} requests at {rate_hz} Hz exceed the {MAX_HZ} answers per second of instruments; lower `rate` or read fewer codes"
     )]
-    TooMany { questions: usize, rate_hz: f64 },
-    #[error("nothing is read")]
+    TooMany { requests: usize, rate_hz: f64 },
+    #[error("no channel is read")]
     Nothing,
 }
 
@@ -91,14 +93,14 @@ fn within(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Re
 
 impl Settings {
     /// Reads and checks the settings. Each request appears once, with the channels in its answer.
-    pub(crate) fn read(value: &Value) -> Result<(Settings, Questions), BackendError> {
+    pub(crate) fn read(value: &Value) -> Result<(Settings, Requests), BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
             wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
         })?;
         within("rate", settings.rate_hz(), "Hz", 0.1, MAX_HZ)?;
         within("timeout", settings.timeout_s(), "s", 0.01, 0.8)?;
-        let mut questions = Questions::new();
+        let mut requests = Requests::new();
         for (channel, place) in &settings.read {
             let path = format!("read.{channel}");
             if !(1e-12..=1e12).contains(&place.scale.abs()) {
@@ -106,22 +108,22 @@ impl Settings {
             }
             within(&format!("{path}.value"), place.value as f64, "", 1.0, 1000.0)?;
             let code: Code = place.code.parse().map_err(|error: TelegramError| wrong(&path, error.into()))?;
-            if !code.asks() {
+            if !code.is_read_request() {
                 return Err(wrong(path, SettingError::Controls(code)));
             }
-            let asked = questions.entry((code, place.channel)).or_default();
+            let asked = requests.entry((code, place.channel)).or_default();
             if let Some((other, _)) = asked.iter().find(|(_, other)| other.value == place.value) {
                 return Err(wrong(path, SettingError::ReadTwice(*other)));
             }
             asked.push((*channel, place.clone()));
         }
         let rate_hz = settings.rate_hz();
-        match questions.len() {
+        match requests.len() {
             0 => Err(wrong("read", SettingError::Nothing)),
             count if count as f64 * rate_hz > MAX_HZ => {
-                Err(wrong("rate", SettingError::TooMany { questions: count, rate_hz }))
+                Err(wrong("rate", SettingError::TooMany { requests: count, rate_hz }))
             }
-            _ => Ok((settings, questions)),
+            _ => Ok((settings, requests)),
         }
     }
 
@@ -137,4 +139,4 @@ impl Settings {
 }
 
 /// Code and channel of each request, and the position of each mapper channel in its answer.
-pub(crate) type Questions = BTreeMap<(Code, u8), Vec<(Channel, Place)>>;
+pub(crate) type Requests = BTreeMap<(Code, u8), Vec<(Channel, Place)>>;

@@ -9,7 +9,7 @@ const ETX: u8 = 0x03;
 /// Default of the don't-care byte after STX.
 const DONT_CARE: u8 = b' ';
 /// Maximum length of a telegram, bytes: some hundred numbers.
-const LONGEST: usize = 4096;
+const MAX_BYTES: usize = 4096;
 /// Answer of an instrument to an unknown code.
 const UNKNOWN: [u8; 4] = *b"????";
 
@@ -19,7 +19,7 @@ pub struct Code([u8; 4]);
 
 impl Code {
     /// Whether the code is a read request. Other codes control (`S`) or configure (`E`) an instrument.
-    pub fn asks(self) -> bool {
+    pub fn is_read_request(self) -> bool {
         self.0[0] == b'A'
     }
 }
@@ -31,7 +31,7 @@ impl FromStr for Code {
         let fits =
             |bytes: &[u8; 4]| bytes.iter().all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit());
         let code = <[u8; 4]>::try_from(text.as_bytes()).ok().filter(fits);
-        code.map(Code).ok_or_else(|| TelegramError::NoCode(text.to_owned()))
+        code.map(Code).ok_or_else(|| TelegramError::InvalidCode(text.to_owned()))
     }
 }
 
@@ -46,10 +46,10 @@ impl std::fmt::Display for Code {
 pub enum TelegramError {
     /// Not a function code.
     #[error("`{0}` is not a code of four capital letters, such as AKON")]
-    NoCode(String),
+    InvalidCode(String),
     /// It ends too early, or a required blank is missing.
     #[error("{0:?} is not an AK telegram")]
-    Torn(String),
+    Malformed(String),
     /// The code is unknown to the instrument.
     #[error("the instrument does not know {0}")]
     Unknown(Code),
@@ -64,7 +64,7 @@ pub enum TelegramError {
 }
 
 /// The request for a channel of the instrument, with parameters.
-pub fn question(code: Code, channel: u8, parameters: &str) -> Vec<u8> {
+pub fn write_request(code: Code, channel: u8, parameters: &str) -> Vec<u8> {
     let mut telegram = vec![STX, DONT_CARE];
     telegram.extend(code.0);
     telegram.extend(format!(" K{channel}").bytes());
@@ -101,10 +101,10 @@ impl Answer {
 ///
 /// # Errors
 /// [`TelegramError`] if the body is not an answer, or answers another request.
-pub fn answer(body: &[u8], asked: Code) -> Result<Answer, TelegramError> {
-    let torn = || TelegramError::Torn(String::from_utf8_lossy(body).into_owned());
+pub fn parse_answer(body: &[u8], asked: Code) -> Result<Answer, TelegramError> {
+    let malformed = || TelegramError::Malformed(String::from_utf8_lossy(body).into_owned());
     let (Some(code), Some(b' '), Some(status)) = (body.get(1..5), body.get(5), body.get(6)) else {
-        return Err(torn());
+        return Err(malformed());
     };
     if code == UNKNOWN {
         return Err(TelegramError::Unknown(asked));
@@ -115,7 +115,7 @@ pub fn answer(body: &[u8], asked: Code) -> Result<Answer, TelegramError> {
     let data = body.get(7..).unwrap_or_default();
     let separated = data.first().is_none_or(|byte| b" \r\n".contains(byte));
     if !status.is_ascii_digit() || !separated || !data.is_ascii() {
-        return Err(torn());
+        return Err(malformed());
     }
     let words = data.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     let words = words.map(|word| String::from_utf8_lossy(word).into_owned()).collect();
@@ -141,7 +141,7 @@ impl Assembler {
             _ => {
                 let body = self.body.as_mut()?;
                 body.push(byte);
-                if body.len() > LONGEST {
+                if body.len() > MAX_BYTES {
                     self.body = None;
                 }
                 None
@@ -154,17 +154,17 @@ impl Assembler {
 ///
 /// # Errors
 /// [`TelegramError::Torn`]
-pub fn asked(body: &[u8]) -> Result<(Code, u8, String), TelegramError> {
-    let torn = || TelegramError::Torn(String::from_utf8_lossy(body).into_owned());
-    let text = std::str::from_utf8(body.get(1..).ok_or_else(torn)?).map_err(|_| torn())?;
+pub fn parse_request(body: &[u8]) -> Result<(Code, u8, String), TelegramError> {
+    let malformed = || TelegramError::Malformed(String::from_utf8_lossy(body).into_owned());
+    let text = std::str::from_utf8(body.get(1..).ok_or_else(malformed)?).map_err(|_| malformed())?;
     let mut words = text.splitn(3, ' ');
     let code = words.next().unwrap_or_default().parse()?;
     let channel = words.next().and_then(|word| word.strip_prefix('K')).and_then(|word| word.parse().ok());
-    Ok((code, channel.ok_or_else(torn)?, words.next().unwrap_or_default().to_owned()))
+    Ok((code, channel.ok_or_else(malformed)?, words.next().unwrap_or_default().to_owned()))
 }
 
 /// The answer of an instrument without errors; with `None`, the answer to an unknown code.
-pub fn reply(code: Option<Code>, words: &[String]) -> Vec<u8> {
+pub fn write_answer(code: Option<Code>, words: &[String]) -> Vec<u8> {
     let mut telegram = vec![STX, DONT_CARE];
     telegram.extend(code.map_or(UNKNOWN, |code| code.0));
     telegram.extend(b" 0");
@@ -192,21 +192,21 @@ mod tests {
 
     /// The example of the CAI and Servomex manuals: 02H 20H "ASTZ" 20H "K0" 03H, answered by "ASTZ 0 SREM STBY".
     #[test]
-    fn the_example_of_manuals() {
-        assert_eq!(question(code("ASTZ"), 0, ""), b"\x02 ASTZ K0\x03");
+    fn the_example_of_the_manuals_is_written_and_read() {
+        assert_eq!(write_request(code("ASTZ"), 0, ""), b"\x02 ASTZ K0\x03");
         let found = bodies(b"\x02 ASTZ 0 SREM STBY\x03");
-        let answer = answer(&found[0], code("ASTZ")).unwrap();
+        let answer = parse_answer(&found[0], code("ASTZ")).unwrap();
         assert_eq!((answer.error, answer.words), (0, vec!["SREM".to_owned(), "STBY".to_owned()]));
         // Testo: the don't-care byte is 30H, an unknown code is echoed as ????.
         let found = bodies(b"\x020???? 0\x03");
-        assert_eq!(super::answer(&found[0], code("AXXX")), Err(TelegramError::Unknown(code("AXXX"))));
+        assert_eq!(super::parse_answer(&found[0], code("AXXX")), Err(TelegramError::Unknown(code("AXXX"))));
     }
 
     /// Numbers in plain and E notation, separated by blanks or by line ends; the error status is parsed too.
     #[test]
-    fn numbers_stand_at_their_places() {
+    fn numbers_are_read_by_position() {
         let found = bodies(b"\x020AKON 3 12.5 -1.25E+02\r\n#7.0 0 inf\x03");
-        let answer = answer(&found[0], code("AKON")).unwrap();
+        let answer = parse_answer(&found[0], code("AKON")).unwrap();
         let numbers: Vec<_> = (0..=6).map(|place| answer.number(place)).collect();
         assert_eq!(numbers, [None, Some(12.5), Some(-125.0), None, Some(0.0), None, None]);
         assert_eq!(answer.error, 3);
@@ -214,32 +214,36 @@ mod tests {
 
     /// If the end of a telegram is lost, the next STX starts a new one.
     #[test]
-    fn torn_telegrams_are_thrown_away() {
+    fn incomplete_telegrams_are_discarded() {
         assert_eq!(bodies(b"noise\x03\x02 AKON 0 1\x02 AKON 0 2\x03"), [b" AKON 0 2".to_vec()]);
         assert!(bodies(&[&b"\x02 AKON 0 "[..], &[b'1'; 5000], b"\x03"].concat()).is_empty());
-        for torn in [&b""[..], b" AKO", b" AKON", b" AKON 0x", b" AKON  1", b" AKON0 1", b" AKON 0 \xff"] {
-            assert!(matches!(answer(torn, code("AKON")), Err(TelegramError::Torn(_))), "{torn:?}");
+        for malformed in [&b""[..], b" AKO", b" AKON", b" AKON 0x", b" AKON  1", b" AKON0 1", b" AKON 0 \xff"]
+        {
+            assert!(
+                matches!(parse_answer(malformed, code("AKON")), Err(TelegramError::Malformed(_))),
+                "{malformed:?}"
+            );
         }
-        assert!(matches!(answer(b" ASTF 0", code("AKON")), Err(TelegramError::Other { .. })));
+        assert!(matches!(parse_answer(b" ASTF 0", code("AKON")), Err(TelegramError::Other { .. })));
     }
 
     proptest! {
         #[test]
-        fn any_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        fn any_bytes_are_parsed_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
             for body in bodies(&bytes) {
-                let _ = answer(&body, code("AKON")).map(|answer| answer.number(1));
-                let _ = asked(&body);
+                let _ = parse_answer(&body, code("AKON")).map(|answer| answer.number(1));
+                let _ = parse_request(&body);
             }
-            let _ = answer(&bytes, code("AKON"));
+            let _ = parse_answer(&bytes, code("AKON"));
         }
 
         #[test]
-        fn what_is_asked_and_replied_is_read(channel in 0u8..100, numbers in prop::collection::vec(-1e6f64..1e6, 0..40)) {
-            let question = bodies(&question(code("AKON"), channel, "1 2"));
-            prop_assert_eq!(asked(&question[0]).unwrap(), (code("AKON"), channel, "1 2".to_owned()));
+        fn written_requests_and_answers_are_read_back(channel in 0u8..100, numbers in prop::collection::vec(-1e6f64..1e6, 0..40)) {
+            let write_request = bodies(&write_request(code("AKON"), channel, "1 2"));
+            prop_assert_eq!(parse_request(&write_request[0]).unwrap(), (code("AKON"), channel, "1 2".to_owned()));
             let words: Vec<String> = numbers.iter().map(|number| number.to_string()).collect();
-            let found = bodies(&reply(Some(code("AKON")), &words));
-            let answer = answer(&found[0], code("AKON")).unwrap();
+            let found = bodies(&write_answer(Some(code("AKON")), &words));
+            let answer = parse_answer(&found[0], code("AKON")).unwrap();
             let read: Vec<f64> = (1..=numbers.len()).filter_map(|place| answer.number(place)).collect();
             prop_assert_eq!(read, numbers);
         }

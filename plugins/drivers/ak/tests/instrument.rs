@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, Channel};
-use mapper_driver_host::{Driver, PATIENCE};
+use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver};
 use serde_json::json;
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -40,12 +40,12 @@ fn driver(address: &str, code: &str) -> Result<Driver, mapper_core::BackendError
         "address": address, "rate": "5 Hz", "timeout": "800 ms",
         "read": {"m_c": {"code": code, "value": 1, "scale": 0.001}, "T1": {"code": code, "value": 2, "offset": 273.15}},
     });
-    Driver::of_program(env!("CARGO_BIN_EXE_mapper-backend-ak").as_ref(), "ak", &settings, PATIENCE)
+    Driver::start_program(env!("CARGO_BIN_EXE_mapper-backend-ak").as_ref(), "ak", &settings, DEFAULT_TIMEOUTS)
 }
 
 /// An answer in pieces, one with Testo's don't-care byte, a torn one (which forces a new connection), and an invalid one.
 #[test]
-fn readings_come_and_torn_answers_are_none() {
+fn incomplete_answers_give_no_reading() {
     let address = instrument(&[
         &[b"\x02 AKON 0 50.0 20.0\x03"],
         &[b"\x020AK", b"ON 0 51.5 2.1E+01\x03"],

@@ -1,15 +1,19 @@
-//! Code shared by drivers of gas stands behind a controller, whatever the protocol. An author implements [`Controller`], and [`rig`] makes a
-//! rig of it. The rig keeps the heartbeat and writes setpoints in a safe order. If the controller does not answer, the rig returns a sample
-//! without readings, so that the guards count how long. Before the first write it checks the readings and refuses implausible ones.
+//! The common part of drivers for gas stands with a PLC or another controller, independent of its protocol. An author of such a driver
+//! implements [`Controller`], and [`rig`] turns it into a backend.
+//!
+//! The rig sends the heartbeat and writes setpoints in a safe order. Before the first write it checks that the readings are plausible. If
+//! the controller does not answer, it returns samples without readings, so that the guards trip.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod absurd;
+mod implausible;
 mod limits;
 mod rig;
 
-pub use absurd::{can_be_read, short};
-pub use limits::{Accepts, LimitError, NEEDS, Safe, Target, fine_enough, scale, within};
+pub use implausible::{format_short, is_plausible};
+pub use limits::{
+    Accepts, LimitError, REQUIRED_GUARDS, Safe, Target, check_range, check_resolution, check_scale,
+};
 pub use rig::{Reading, Stand, rig};
 
 use mapper_core::Channel;

@@ -5,7 +5,7 @@ use mapper_yaml::units::{Duration, Pressure, PressureRate, Quantity, Temperature
 use serde::Deserialize;
 
 /// Guards that every rig requires, with their channels.
-pub const NEEDS: [(GuardName, Channel); 2] =
+pub const REQUIRED_GUARDS: [(GuardName, Channel); 2] =
     [(GuardName::Overspeed, Channel::ShaftSpeed), (GuardName::TurbineInletPressure, Channel::P3)];
 
 /// A quantity that the driver writes.
@@ -44,7 +44,7 @@ impl Target {
 }
 
 /// Maximum count of the heartbeat; 0 follows.
-pub(crate) const HEARTBEAT_MAX: u16 = 9999;
+pub(crate) const MAX_HEARTBEAT: u16 = 9999;
 
 /// Setpoint ranges that a rig accepts.
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -69,7 +69,7 @@ impl Accepts {
             Target::Valve => (self.valve[0], self.valve[1]),
             Target::OilTemperature => (self.oil_temperature[0].inside, self.oil_temperature[1].inside),
             Target::Air => (0.0, 1.0),
-            Target::Heartbeat => (0.0, f64::from(HEARTBEAT_MAX)),
+            Target::Heartbeat => (0.0, f64::from(MAX_HEARTBEAT)),
         };
         SetpointRange { low, high }
     }
@@ -124,12 +124,12 @@ pub enum LimitError {
         high: f64,
     },
     /// A scale that loses the value.
-    #[error("a scale of {0} loses the value; it is between 1e-12 and 1e12, or between -1e12 and -1e-12")]
+    #[error("a scale of {0} loses the value; its magnitude must be between 1e-12 and 1e12")]
     Scale(f64),
     /// A setpoint with too coarse a resolution.
     #[error(
-        "holds whole numbers, so that it goes in steps of {step} from {low} to {high} (SI): what lies between would be rounded without a word. Use a \
-         type with a fraction there, or a finer `scale`"
+        "holds integers, so the setpoint would be rounded to steps of {step} from {low} to {high} (SI). Use a floating-point type, or a smaller \
+                 `scale`"
     )]
     Coarse {
         /// Increment, SI.
@@ -145,13 +145,13 @@ pub enum LimitError {
 }
 
 /// Maximum increment of a setpoint over its range: 0.12 of a valve of 0.1 to 2.5, 15 kPa of 300 kPa.
-const COARSE_RATIO: f64 = 0.05;
+const MAX_STEP_RATIO: f64 = 0.05;
 
 /// Returns the scale if it is invertible.
 ///
 /// # Errors
 /// [`LimitError::Scale`], also for 0 and NaN.
-pub fn scale(scale: f64) -> Result<f64, LimitError> {
+pub fn check_scale(scale: f64) -> Result<f64, LimitError> {
     match (1e-12..=1e12).contains(&scale.abs()) {
         true => Ok(scale),
         false => Err(LimitError::Scale(scale)),
@@ -162,11 +162,11 @@ pub fn scale(scale: f64) -> Result<f64, LimitError> {
 ///
 /// # Errors
 /// [`LimitError::Coarse`].
-pub fn fine_enough(target: Target, step: f64, range: SetpointRange) -> Result<(), LimitError> {
+pub fn check_resolution(target: Target, step: f64, range: SetpointRange) -> Result<(), LimitError> {
     let SetpointRange { low, high } = range;
     match target {
         Target::Air | Target::Heartbeat => Ok(()),
-        _ if step.abs() <= COARSE_RATIO * (high - low) => Ok(()),
+        _ if step.abs() <= MAX_STEP_RATIO * (high - low) => Ok(()),
         _ => Err(LimitError::Coarse { step: step.abs(), low, high }),
     }
 }
@@ -175,7 +175,7 @@ pub fn fine_enough(target: Target, step: f64, range: SetpointRange) -> Result<()
 ///
 /// # Errors
 /// [`LimitError::Outside`], also for NaN.
-pub fn within(value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, LimitError> {
+pub fn check_range(value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, LimitError> {
     match (low..=high).contains(&value) {
         true => Ok(value),
         false => Err(LimitError::Outside { value, unit, low, high }),

@@ -1,7 +1,7 @@
 //! The rig behind a controller.
 
-use crate::limits::{Accepts, HEARTBEAT_MAX, LimitError, NEEDS, Safe, Target, within};
-use crate::{Controller, absurd};
+use crate::limits::{Accepts, LimitError, MAX_HEARTBEAT, REQUIRED_GUARDS, Safe, Target, check_range};
+use crate::{Controller, implausible};
 use mapper_core::{
     Backend, BackendError, Channel, ChannelColumn, Event, EventKind, Provenance, Quality, RigDescription,
     RigMode, SampleBatch, Setpoints,
@@ -24,13 +24,13 @@ pub struct Reading {
     /// Quality as reported by the controller.
     pub quality: Quality,
     /// Why it is not good, as the controller reports it; may be empty.
-    pub why: String,
+    pub reason: String,
 }
 
 impl Reading {
     /// A good reading with its time of arrival.
     pub fn good(value: f64) -> Reading {
-        Reading { value, source_t_s: None, quality: Quality::Good, why: String::new() }
+        Reading { value, source_t_s: None, quality: Quality::Good, reason: String::new() }
     }
 }
 
@@ -66,9 +66,9 @@ impl Stand {
             move |error| (path, error)
         };
         // The heartbeat is sent with the samples.
-        within(self.rate_hz, "Hz", 2.0, 50.0).map_err(at("rate"))?;
-        within(self.safe.within.inside, "s", 0.1, 120.0).map_err(at("safe.within"))?;
-        for (_, channel) in NEEDS {
+        check_range(self.rate_hz, "Hz", 2.0, 50.0).map_err(at("rate"))?;
+        check_range(self.safe.within.inside, "s", 0.1, 120.0).map_err(at("safe.within"))?;
+        for (_, channel) in REQUIRED_GUARDS {
             if !self.channels.contains(&channel) {
                 return Err(("read".to_owned(), LimitError::NotMeasured(channel)));
             }
@@ -76,10 +76,10 @@ impl Stand {
         for target in Target::ALL {
             let range = self.accepts.range(target);
             let path = format!("accepts.{}", target.key());
-            within(range.high - range.low, "", 0.0, f64::MAX).map_err(at(&path))?;
+            check_range(range.high - range.low, "", 0.0, f64::MAX).map_err(at(&path))?;
         }
         let opening = self.accepts.range(Target::Valve);
-        within(self.safe.opening, "", opening.low, opening.high).map_err(at("safe.opening")).map(drop)
+        check_range(self.safe.opening, "", opening.low, opening.high).map_err(at("safe.opening")).map(drop)
     }
 }
 
@@ -102,7 +102,7 @@ struct Armed {
     last_s: f64,
     heartbeat: u16,
     /// Time of the last heartbeat, s.
-    beaten_s: f64,
+    last_heartbeat_s: f64,
     /// Readings already reported as not good, with the reason.
     reported: BTreeSet<(Channel, Quality, String)>,
 }
@@ -121,32 +121,35 @@ impl<C: Controller> Rig<C> {
         self.controller.write(values).map_err(|error| self.lost(error))
     }
 
-    fn beat(&mut self, until_s: f64) {
-        let Some(armed) = self.armed.as_mut().filter(|armed| until_s - armed.beaten_s >= HEARTBEAT_S) else {
+    fn send_heartbeat(&mut self, until_s: f64) {
+        let Some(armed) = self.armed.as_mut().filter(|armed| until_s - armed.last_heartbeat_s >= HEARTBEAT_S)
+        else {
             return;
         };
-        armed.beaten_s = until_s;
-        armed.heartbeat = (armed.heartbeat + 1) % (HEARTBEAT_MAX + 1);
+        armed.last_heartbeat_s = until_s;
+        armed.heartbeat = (armed.heartbeat + 1) % (MAX_HEARTBEAT + 1);
         let count = f64::from(armed.heartbeat);
         // If it does not arrive, the controller cuts the air, as intended.
         let _ = self.write(&[(Target::Heartbeat, count)]);
     }
 
     /// Reports the channels that the controller does not mark as good, once for each quality and reason.
-    fn doubts(&mut self, readings: &BTreeMap<Channel, Reading>) -> Option<String> {
+    fn report_bad_readings(&mut self, readings: &BTreeMap<Channel, Reading>) -> Option<String> {
         let reported = &mut self.armed.as_mut()?.reported;
-        let doubted = readings.iter().filter(|(_, reading)| reading.quality != Quality::Good);
-        let new: Vec<String> = doubted
-            .filter(|(channel, reading)| reported.insert((**channel, reading.quality, reading.why.clone())))
-            .map(|(channel, Reading { quality, why, .. })| {
+        let bad_readings = readings.iter().filter(|(_, reading)| reading.quality != Quality::Good);
+        let new: Vec<String> = bad_readings
+            .filter(|(channel, reading)| {
+                reported.insert((**channel, reading.quality, reading.reason.clone()))
+            })
+            .map(|(channel, Reading { quality, reason, .. })| {
                 let word = if *quality == Quality::Uncertain { "uncertain" } else { "bad" };
-                let why = if why.is_empty() { String::new() } else { format!(" ({why})") };
-                format!("{} {word}{why}", channel.symbol())
+                let reason = if reason.is_empty() { String::new() } else { format!(" ({reason})") };
+                format!("{} {word}{reason}", channel.symbol())
             })
             .collect();
         (!new.is_empty()).then(|| {
             format!(
-                "readings are not good by the controller's word: {}; the recording has the quality of each, look at the sensors there",
+                "the controller reports bad or uncertain readings: {}; check these sensors (the recording has the quality of each reading)",
                 new.join(", ")
             )
         })
@@ -199,7 +202,7 @@ impl<C: Controller> Backend for Rig<C> {
             controls: true,
             exclusive: Some(self.stand.rig.clone()),
             reached_at: Some(self.stand.reached_at.clone()),
-            needs_guarded: NEEDS.map(|(guard, _)| guard).to_vec(),
+            needs_guarded: REQUIRED_GUARDS.map(|(guard, _)| guard).to_vec(),
             accepts: Some(self.stand.accepts.ranges()),
             safe: self.stand.safe.trajectory(),
         }
@@ -216,10 +219,10 @@ impl<C: Controller> Backend for Rig<C> {
         // A wrong word order or scale would also be wrong in every write.
         let readings = self.controller.read(0.0);
         let readings = readings.iter().map(|(channel, reading)| (*channel, reading.value));
-        if let Err(absurd) = absurd::check(&self.controller, readings) {
+        if let Err(implausible) = implausible::check(&self.controller, readings) {
             self.controller.close();
-            let (backend, path) = (self.stand.backend.to_owned(), format!("read.{}", absurd.channel));
-            return Err(BackendError::Settings { backend, path, source: absurd });
+            let (backend, path) = (self.stand.backend.to_owned(), format!("read.{}", implausible.channel));
+            return Err(BackendError::Settings { backend, path, source: implausible });
         }
         let heater_off_k = self.heater_off_k();
         // A killed driver may have left the air on, and a heartbeat must not restore it.
@@ -237,7 +240,7 @@ impl<C: Controller> Backend for Rig<C> {
             sequence: 0,
             last_s: -1.0,
             heartbeat: 0,
-            beaten_s: 0.0,
+            last_heartbeat_s: 0.0,
             reported: BTreeSet::new(),
         });
         Ok(())
@@ -273,7 +276,7 @@ impl<C: Controller> Backend for Rig<C> {
         }
         armed.last_s = until_s;
         armed.sequence += 1;
-        self.beat(until_s);
+        self.send_heartbeat(until_s);
         // If the controller does not answer, the sample has no readings, and the guards count how long that lasts.
         let readings = self.controller.read(until_s);
         let column = |channel: Channel| {
@@ -283,14 +286,14 @@ impl<C: Controller> Backend for Rig<C> {
             };
             ChannelColumn { channel, values: vec![value] }
         };
-        let doubts = self.doubts(&readings);
+        let report_bad_readings = self.report_bad_readings(&readings);
         let note = |message| Event { t_s: until_s, kind: EventKind::Note, message };
         Ok(SampleBatch {
             first_sequence,
             t_s: vec![until_s],
             columns: self.channels().into_iter().map(column).collect(),
             provenance: provenance(&readings, until_s),
-            events: self.controller.remark().into_iter().chain(doubts).map(note).collect(),
+            events: self.controller.remark().into_iter().chain(report_bad_readings).map(note).collect(),
             ..SampleBatch::default()
         })
     }

@@ -14,7 +14,7 @@ pub fn address<'de, D: Deserializer<'de>>(from: D) -> Result<SocketAddr, D::Erro
 }
 
 fn remedy(text: &str) -> String {
-    let wants = "an address is written in numbers with its port, as 192.168.0.7:502";
+    let wants = "write a numeric address with its port, such as 192.168.0.7:502";
     match text.rsplit_once(':') {
         Some(("localhost", port)) => format!("`{text}` is a name; {wants}: here 127.0.0.1:{port}"),
         Some((host, port))
@@ -32,7 +32,7 @@ mod tests {
     use serde_json::{Value, json};
 
     #[test]
-    fn an_address_is_numbers_and_a_name_is_refused_with_what_to_write() {
+    fn an_address_is_numeric_and_a_name_is_refused_with_a_remedy() {
         let read = |value: Value| address(value).map_err(|error: serde_json::Error| error.to_string());
         assert_eq!(read(json!("127.0.0.1:5020")).unwrap(), SocketAddr::from(([127, 0, 0, 1], 5020)));
         assert!(read(json!("[::1]:5020")).unwrap().is_ipv6());
@@ -41,7 +41,7 @@ mod tests {
             ("localhost:5021", "here 127.0.0.1:5021"),
             ("plc.cell3:502", "`getent hosts plc.cell3`"),
             ("127.0.0.1", "`127.0.0.1` is not an address"),
-            ("127.0.0.1:99999", "with its port, as 192.168.0.7:502"),
+            ("127.0.0.1:99999", "192.168.0.7:502"),
         ] {
             let message = read(json!(text)).unwrap_err();
             assert!(message.contains(words), "{message}");

@@ -1,4 +1,4 @@
-//! Settings by channel, whose errors name their channel.
+//! Settings by channel, with error paths that contain the channel.
 
 use mapper_core::Channel;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
@@ -41,7 +41,7 @@ where
             while let Some(symbol) = map.next_key::<String>()? {
                 let (channel, value) = map.next_value_seed(At(symbol, PhantomData))?;
                 if found.insert(channel, value).is_some() {
-                    return Err(A::Error::custom(format!("{channel} is given twice")));
+                    return Err(A::Error::custom(format!("the channel {channel} appears twice")));
                 }
             }
             Ok(found)

@@ -1,4 +1,4 @@
-//! The safe trajectory, flown by the driver without its host.
+//! The safe trajectory, which the driver executes when its host is gone.
 
 use mapper_core::{Backend, BackendError, RigDescription, Setpoints};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 pub(crate) const STEP_S: f64 = 0.1;
 /// Pressure of the cell, below which no gas flows, Pa.
 const ATMOSPHERE_PA: f64 = 105e3;
-/// How long a driver without a host keeps trying after the longest trajectory, s.
-const PATIENCE_S: f64 = 20.0;
+/// Time after the end of the trajectory at which a driver without a host stops repeating the command, s.
+const GIVE_UP_AFTER_S: f64 = 20.0;
 
 /// A safe trajectory in progress.
 #[derive(Debug, Clone, Copy)]
@@ -22,15 +22,15 @@ pub(crate) struct Descent {
 
 /// Progress of the trajectory.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Flight {
+pub(crate) enum DescentState {
     /// No command is due.
-    Waits,
+    NothingDue,
     /// The due command was sent.
-    GoesOn,
+    CommandSent,
     /// The rig has confirmed its safe state.
     Safe,
     /// The rig does not confirm its safe state; the command is repeated.
-    Doubt(String),
+    NotConfirmed(String),
 }
 
 impl Descent {
@@ -40,10 +40,15 @@ impl Descent {
     }
 
     /// Sends the command that is due at this run time, s.
-    pub(crate) fn fly(&mut self, rig: &mut dyn Backend, description: &RigDescription, now_s: f64) -> Flight {
-        // Half a millionth of a step is rounding.
+    pub(crate) fn execute_step(
+        &mut self,
+        rig: &mut dyn Backend,
+        description: &RigDescription,
+        now_s: f64,
+    ) -> DescentState {
+        // The tolerance covers rounding.
         if now_s < self.due_s - 5e-7 * STEP_S {
-            return Flight::Waits;
+            return DescentState::NothingDue;
         }
         self.due_s = now_s + STEP_S;
         let RigDescription { safe, accepts, .. } = description;
@@ -53,18 +58,18 @@ impl Descent {
             next.and_then(|from| safe.setpoints(&from, after_s, ATMOSPHERE_PA, accepts.as_ref()))
             && matches!(catch_unwind(AssertUnwindSafe(|| rig.set(&next))), Ok(Ok(())))
         {
-            return Flight::GoesOn;
+            return DescentState::CommandSent;
         }
         self.cut = true;
         match make_safe(rig) {
-            Ok(()) => Flight::Safe,
-            Err(error) => Flight::Doubt(error),
+            Ok(()) => DescentState::Safe,
+            Err(error) => DescentState::NotConfirmed(error),
         }
     }
 
     /// Whether a driver without a host may end although the rig has not confirmed its safe state.
-    pub(crate) fn is_hopeless(&self, description: &RigDescription, now_s: f64) -> bool {
-        now_s - self.begun_s > description.safe.within_s + PATIENCE_S
+    pub(crate) fn may_give_up(&self, description: &RigDescription, now_s: f64) -> bool {
+        now_s - self.begun_s > description.safe.within_s + GIVE_UP_AFTER_S
     }
 }
 

@@ -1,5 +1,6 @@
-//! The common part of every driver. An author writes a [`Backend`] and calls [`About::serve`], or [`serve`] if it is never started by hand.
-//! Frames, hello, lease and the safe trajectory without a host are done here, over pipes or a socket; docs/reference/protocol.md describes the messages.
+//! The common part of every driver written in Rust. An author implements a [`Backend`] and calls [`About::serve`], or [`serve`] if users
+//! never start the program by hand. This crate handles frames, hello, lease and the safe shutdown without a host, over pipes or a socket;
+//! docs/reference/protocol.md describes the messages.
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
@@ -14,11 +15,12 @@
 //! # fn my_rig(_: &serde_json::Value) -> Result<Box<dyn mapper_core::Backend>, mapper_core::BackendError> { unimplemented!() }
 //! ```
 //!
-//! A rig in real time is polled here at its own rate, each time for the newest due sample; a simulated rig is polled when the host
-//! asks. A call that hangs keeps the rig from becoming safe: every read or write of a backend needs its own deadline.
+//! A rig in real time is polled at its own rate, each time for the newest due sample; a simulated rig is polled when the host requests
+//! it. A call that hangs prevents the safe shutdown, so every read or write of a backend needs its own deadline.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod about;
 mod address;
 mod armed;
 mod by_channel;
@@ -31,19 +33,18 @@ mod server;
 mod serving;
 #[cfg(unix)]
 mod socket;
-mod words;
 
+pub use about::{About, SOCKET};
 pub use address::address;
 pub use by_channel::by_channel;
 pub use pipes::serve;
 pub use secret::{SecretError, secret};
 #[cfg(unix)]
 pub use socket::serve_at;
-pub use words::{About, SOCKET};
 
 use mapper_core::{Backend, BackendError};
 
-/// Makes the rig from the driver's settings in the campaign, `null` if there are none. It does not touch the rig yet.
+/// Creates the rig from the driver's settings in the campaign, `null` if there are none, without touching it.
 /// A driver at a socket makes one rig for each host that connects.
 pub trait Open: Fn(&serde_json::Value) -> Result<Box<dyn Backend>, BackendError> {}
 

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 
 /// Queue for a host that does not read: some seconds of samples. Further samples are dropped, which the host detects.
-const WAITING: usize = 256;
+const QUEUE_LENGTH: usize = 256;
 /// Extra places for answers and remarks, more than a host requests at a time. A rig that was made safe is in doubt until
 /// its answer arrives.
-const KEPT: usize = 64;
+const RESERVED: usize = 64;
 
 /// The queue before the pipe to the host.
 pub(crate) struct Outlet {
@@ -21,7 +21,7 @@ pub(crate) struct Outlet {
 impl Outlet {
     /// Writes to `pipe` on a thread of its own, which ends with the pipe.
     pub(crate) fn into_pipe(mut pipe: impl Write + Send + 'static) -> std::io::Result<Outlet> {
-        let (to_write, bodies) = sync_channel::<Vec<u8>>(WAITING + KEPT);
+        let (to_write, bodies) = sync_channel::<Vec<u8>>(QUEUE_LENGTH + RESERVED);
         let waiting = Arc::new(AtomicUsize::new(0));
         let counted = waiting.clone();
         std::thread::Builder::new().name("to host".to_owned()).spawn(move || {
@@ -38,9 +38,9 @@ impl Outlet {
     /// Sends without waiting. A message is dropped if the queue is full or the frame exceeds this limit. The loss shows as a
     /// missing number, or as a timeout of the request.
     pub(crate) fn send(&self, message: &Message, limit_bytes: usize) {
-        let comes_again = matches!(message.method.as_deref(), Some("samples" | "lost"));
+        let is_droppable = matches!(message.method.as_deref(), Some("samples" | "lost"));
         // No other thread adds to the queue, so it can only shrink meanwhile.
-        if comes_again && self.waiting.load(Ordering::Relaxed) >= WAITING {
+        if is_droppable && self.waiting.load(Ordering::Relaxed) >= QUEUE_LENGTH {
             return;
         }
         let Ok(body) = encode(message, Encoding::MessagePack) else { return };

@@ -3,7 +3,9 @@
 use crate::Open;
 use crate::outlet::Outlet;
 use crate::server::Server;
-use crate::serving::{Came, WAITING, heed_signals, listen, serve_one, session, wait};
+use crate::serving::{
+    DriverEvent, QUEUE_LENGTH, forward_messages, forward_signals, new_session_name, serve_one, wait_for_event,
+};
 use mapper_driver_host::protocol::{
     Code, Encoding, FIRST_FRAME_LIMIT_BYTES, Failure, Message, decode, encode, read_frame, write_frame,
 };
@@ -19,8 +21,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::Duration;
 
-/// How long a refused host has for its first message and for reading the refusal.
-const AT_THE_DOOR: Duration = Duration::from_secs(1);
+/// Time in which a refused host must send its first message and read the refusal.
+const REFUSAL_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Serves hosts that connect to the socket at `path`, one after the other and each with its own rig, until a signal ends it. A host
 /// that connects while another is served, or while its rig becomes safe, is refused. Only the user can access the socket.
@@ -30,14 +32,14 @@ pub fn serve_at(
     version: &'static str,
     open: impl Open + 'static,
 ) -> ExitCode {
-    let (sender, news) = sync_channel(WAITING);
+    let (sender, events) = sync_channel(QUEUE_LENGTH);
     let busy = Arc::new(AtomicBool::new(false));
     let begun = bind(path).and_then(|(listener, file)| {
-        heed_signals(sender.clone())?;
+        forward_signals(sender.clone())?;
         let (sender, busy) = (sender.clone(), busy.clone());
         std::thread::Builder::new()
             .name("door".to_owned())
-            .spawn(move || open_the_door(&listener, &sender, &busy))
+            .spawn(move || accept_hosts(&listener, &sender, &busy))
             .map(|_| file)
     });
     // The socket file is removed when the driver ends.
@@ -51,14 +53,14 @@ pub fn serve_at(
     };
     let open = Rc::new(open);
     loop {
-        let host = match wait(&news, None) {
-            Some(Came::Connected(host)) => host,
-            Some(Came::Terminate) => return ExitCode::SUCCESS,
+        let host = match wait_for_event(&events, None) {
+            Some(DriverEvent::Connected(host)) => host,
+            Some(DriverEvent::Terminate) => return ExitCode::SUCCESS,
             _ => continue,
         };
         let open = open.clone();
-        let server = Server::new(name, version, session(), Box::new(move |settings| open(settings)));
-        let served = attend(server, &host, sender.clone(), &news);
+        let server = Server::new(name, version, new_session_name(), Box::new(move |settings| open(settings)));
+        let served = serve_host(server, &host, sender.clone(), &events);
         // Discards unread data: the host has disconnected or sent an invalid frame.
         let _ = host.shutdown(Shutdown::Both);
         busy.store(false, Ordering::SeqCst);
@@ -68,23 +70,23 @@ pub fn serve_at(
     }
 }
 
-fn attend(
+fn serve_host(
     server: Server,
     host: &UnixStream,
-    sender: SyncSender<Came>,
-    news: &std::sync::mpsc::Receiver<Came>,
+    sender: SyncSender<DriverEvent>,
+    events: &std::sync::mpsc::Receiver<DriverEvent>,
 ) -> std::io::Result<bool> {
     let outlet = Outlet::into_pipe(host.try_clone()?)?;
-    listen(host.try_clone()?, sender)?;
-    Ok(serve_one(server, news, &outlet))
+    forward_messages(host.try_clone()?, sender)?;
+    Ok(serve_one(server, events, &outlet))
 }
 
-fn open_the_door(listener: &UnixListener, sender: &SyncSender<Came>, busy: &AtomicBool) {
+fn accept_hosts(listener: &UnixListener, sender: &SyncSender<DriverEvent>, busy: &AtomicBool) {
     loop {
         match listener.accept() {
-            Ok((host, _)) if busy.swap(true, Ordering::SeqCst) => turn_away(host),
+            Ok((host, _)) if busy.swap(true, Ordering::SeqCst) => refuse_host(host),
             Ok((host, _)) => {
-                if sender.send(Came::Connected(host)).is_err() {
+                if sender.send(DriverEvent::Connected(host)).is_err() {
                     return;
                 }
             }
@@ -95,16 +97,16 @@ fn open_the_door(listener: &UnixListener, sender: &SyncSender<Came>, busy: &Atom
 }
 
 /// Answers the first request with a refusal.
-fn turn_away(mut host: UnixStream) {
-    let timed =
-        host.set_read_timeout(Some(AT_THE_DOOR)).and_then(|()| host.set_write_timeout(Some(AT_THE_DOOR)));
+fn refuse_host(mut host: UnixStream) {
+    let timed = host
+        .set_read_timeout(Some(REFUSAL_TIMEOUT))
+        .and_then(|()| host.set_write_timeout(Some(REFUSAL_TIMEOUT)));
     if timed.is_err() {
         return;
     }
     let Ok(Some(body)) = read_frame(&mut host, FIRST_FRAME_LIMIT_BYTES) else { return };
     let Some(id) = decode(&body).ok().and_then(|message| message.id) else { return };
-    let words =
-        "this driver serves another host, or its rig is still being made safe; wait until that is over";
+    let words = "this driver serves another host, or is still making its rig safe; try again later";
     let refusal = Message::answer(id, Err(Box::new(Failure::new(Code::Refused, words))));
     if let Ok(body) = encode(&refusal, Encoding::MessagePack) {
         // If this fails, the host has disconnected.
@@ -113,9 +115,9 @@ fn turn_away(mut host: UnixStream) {
 }
 
 /// The socket's file, removed when the driver ends.
-struct OwnFile(PathBuf);
+struct SocketFile(PathBuf);
 
-impl Drop for OwnFile {
+impl Drop for SocketFile {
     fn drop(&mut self) {
         // Another process may have removed it.
         let _ = std::fs::remove_file(&self.0);
@@ -123,21 +125,21 @@ impl Drop for OwnFile {
 }
 
 /// Listens at `path`. Removes the socket of a killed driver, but neither a socket in use nor another kind of file.
-fn bind(path: &Path) -> std::io::Result<(UnixListener, OwnFile)> {
+fn bind(path: &Path) -> std::io::Result<(UnixListener, SocketFile)> {
     if let Some(directory) = path.parent().filter(|directory| !directory.as_os_str().is_empty()) {
         std::fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
     }
     if let Ok(there) = path.symlink_metadata() {
         if !there.file_type().is_socket() {
-            return Err(Error::new(ErrorKind::AlreadyExists, "there is a file that is not a socket"));
+            return Err(Error::new(ErrorKind::AlreadyExists, "the file exists and is not a socket"));
         }
         if UnixStream::connect(path).is_ok() {
-            return Err(Error::new(ErrorKind::AddrInUse, "another driver listens there"));
+            return Err(Error::new(ErrorKind::AddrInUse, "another driver listens on this socket"));
         }
         std::fs::remove_file(path)?;
     }
     let listener = UnixListener::bind(path)?;
-    let file = OwnFile(path.to_owned());
+    let file = SocketFile(path.to_owned());
     std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
     Ok((listener, file))
 }
@@ -147,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_killed_driver_left_is_taken_away_and_nothing_else() {
+    fn only_the_socket_of_a_killed_driver_is_removed() {
         let directory = std::env::temp_dir().join(format!("mapper-socket-{}", std::process::id()));
         let path = directory.join("below/rig.socket");
         let (listener, file) = bind(&path).unwrap();

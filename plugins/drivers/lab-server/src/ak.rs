@@ -2,7 +2,7 @@
 //! registers, `AKON Kn` the n-th; `ASTZ` reports whether it is remote and whether it has tripped. A missing reading is marked by `#`.
 
 use crate::stand::{Stand, measured};
-use mapper_backend_ak::telegram::{Assembler, asked, reply};
+use mapper_backend_ak::telegram::{Assembler, parse_request, write_answer};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -20,21 +20,21 @@ fn number(reading: Option<f64>) -> String {
 
 /// The answer to the text between STX and ETX.
 fn answer(stand: &Stand, body: &[u8]) -> Vec<u8> {
-    let Ok((code, channel, _)) = asked(body) else { return reply(None, &[]) };
+    let Ok((code, channel, _)) = parse_request(body) else { return write_answer(None, &[]) };
     let channels = measured();
     let words = match (code.to_string().as_str(), usize::from(channel)) {
         ("AKON", 0) => channels.iter().map(|channel| number(stand.reading(*channel))).collect(),
         ("AKON", n) => match channels.get(n - 1) {
             Some(channel) => vec![number(stand.reading(*channel))],
-            None => return reply(None, &[]),
+            None => return write_answer(None, &[]),
         },
         ("ASTZ", _) => {
             let state = if stand.tripped().is_some() { "TRIP" } else { "READY" };
             vec!["SREM".to_owned(), state.to_owned()]
         }
-        _ => return reply(None, &[]),
+        _ => return write_answer(None, &[]),
     };
-    reply(Some(code), &words)
+    write_answer(Some(code), &words)
 }
 
 async fn talk(mut stream: TcpStream, stand: Arc<Mutex<Stand>>) -> std::io::Result<()> {

@@ -64,7 +64,7 @@ struct Arguments {
 enum LabError {
     #[error("{0}")]
     Campaign(String),
-    #[error("{0} is not of this computer alone; write 127.0.0.1, or --public where that is meant")]
+    #[error("other computers can reach {0}; use 127.0.0.1, or add --public if that is intended")]
     Public(SocketAddr),
     #[error("--speed {0} is outside 0.1 to 100")]
     Speed(f64),
@@ -143,7 +143,9 @@ fn serve(
         serving.push(runtime.spawn(async { Ok(served.await?) }));
         writeln!(out, "modbus {at}")?;
         let [own, other] = modbus::UNITS;
-        notes.push(format!("modbus: `unit: {own}` (or {other}), no other; every client that reaches it may write, without a password"));
+        notes.push(format!(
+            "modbus: `unit: {own}` or {other}; every client that reaches it may write, without a password"
+        ));
     }
     if let Some(at) = arguments.opcua {
         let (listener, at) = listen(runtime, arguments, at)?;
@@ -153,7 +155,7 @@ fn serve(
         drop(entered);
         serving.push(runtime.spawn(async { server.run_with(listener).await.map_err(LabError::OpcUa) }));
         writeln!(out, "opcua opc.tcp://{at}")?;
-        notes.push(format!("opcua: {}", opcua_nodes::who(protection)?));
+        notes.push(format!("opcua: {}", opcua_nodes::describe_users(protection)?));
     }
     if let Some(at) = arguments.ak {
         let (listener, at) = listen(runtime, arguments, at)?;

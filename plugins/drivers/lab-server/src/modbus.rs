@@ -69,7 +69,7 @@ impl Registers {
                 }
                 _ => return Err(ExceptionCode::IllegalDataAddress),
             };
-            stand.tell(target, value).map_err(|_| ExceptionCode::IllegalDataValue)?;
+            stand.write(target, value).map_err(|_| ExceptionCode::IllegalDataValue)?;
             (at, rest) = (at + used, rest.get(usize::from(used)..).unwrap_or_default());
         }
         Ok(())

@@ -30,13 +30,13 @@ const USER: (&str, &str) = ("PLC_USER", "PLC_PASSWORD");
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     #[error("{} is set and {} is not: set both, or neither for anonymous sessions", .0, .1)]
-    HalfAUser(&'static str, &'static str),
+    IncompleteUser(&'static str, &'static str),
     #[error("set MAPPER_STATE_DIR or HOME: the server's certificate has no directory")]
-    NoPlace,
+    NoDirectory,
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
-    #[error("the server cannot be made: {0}")]
-    Made(String),
+    #[error("the server cannot be created: {0}")]
+    NotBuilt(String),
 }
 
 /// The stand and the clock of its readings.
@@ -84,7 +84,7 @@ impl Shared {
             _ => return StatusCode::BadTypeMismatch,
         };
         let Ok(mut stand) = self.stand.lock() else { return StatusCode::BadInternalError };
-        match stand.tell(target, number) {
+        match stand.write(target, number) {
             Ok(()) => {
                 drop(stand);
                 if target != Target::Heartbeat {
@@ -102,7 +102,7 @@ fn directory() -> Result<PathBuf, ServeError> {
     let state = variable("MAPPER_STATE_DIR")
         .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
         .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")));
-    let path = state.ok_or(ServeError::NoPlace)?.join("lab-server");
+    let path = state.ok_or(ServeError::NoDirectory)?.join("lab-server");
     let mut made = std::fs::DirBuilder::new();
     made.recursive(true);
     #[cfg(unix)]
@@ -117,8 +117,8 @@ fn user() -> Result<Option<(String, String)>, ServeError> {
     match (variable(USER.0), variable(USER.1)) {
         (Some(name), Some(password)) => Ok(Some((name, password))),
         (None, None) => Ok(None),
-        (Some(_), None) => Err(ServeError::HalfAUser(USER.0, USER.1)),
-        (None, Some(_)) => Err(ServeError::HalfAUser(USER.1, USER.0)),
+        (Some(_), None) => Err(ServeError::IncompleteUser(USER.0, USER.1)),
+        (None, Some(_)) => Err(ServeError::IncompleteUser(USER.1, USER.0)),
     }
 }
 
@@ -134,11 +134,11 @@ pub enum Protection {
 /// Describes the permitted users, without name or password.
 ///
 /// # Errors
-/// [`ServeError::HalfAUser`]
-pub fn who(protection: Protection) -> Result<String, ServeError> {
+/// [`ServeError::IncompleteUser`]
+pub fn describe_users(protection: Protection) -> Result<String, ServeError> {
     Ok(match (protection, user()?) {
         (Protection::Clear, _) => {
-            "in the clear (`security: none`), for every client, without user and password".to_owned()
+            "unencrypted (`security: none`), for every client, without user and password".to_owned()
         }
         (Protection::Encrypted, Some(_)) => {
             format!("signed and encrypted, for the user in ${} with the password in ${}", USER.0, USER.1)
@@ -159,7 +159,7 @@ fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerB
         }
         _ => BTreeMap::new(),
     };
-    let who: Vec<String> = match users.is_empty() {
+    let describe_users: Vec<String> = match users.is_empty() {
         true => vec![ANONYMOUS_USER_TOKEN_ID.to_owned()],
         false => users.keys().cloned().collect(),
     };
@@ -184,11 +184,17 @@ fn builder(at: SocketAddr, pki: &Path, protection: Protection) -> Result<ServerB
         builder = builder.add_user_token(name, token);
     }
     let endpoints = match protection {
-        Protection::Clear => vec![("clear", ServerEndpoint::new_none("/", &who))],
+        Protection::Clear => vec![("clear", ServerEndpoint::new_none("/", &describe_users))],
         Protection::Encrypted => vec![
-            ("basic256_sha256", ServerEndpoint::new_basic256sha256_sign_encrypt("/", &who)),
-            ("aes128_sha256_rsa_oaep", ServerEndpoint::new_aes128_sha256_rsaoaep_sign_encrypt("/", &who)),
-            ("aes256_sha256_rsa_pss", ServerEndpoint::new_aes256_sha256_rsapss_sign_encrypt("/", &who)),
+            ("basic256_sha256", ServerEndpoint::new_basic256sha256_sign_encrypt("/", &describe_users)),
+            (
+                "aes128_sha256_rsa_oaep",
+                ServerEndpoint::new_aes128_sha256_rsaoaep_sign_encrypt("/", &describe_users),
+            ),
+            (
+                "aes256_sha256_rsa_pss",
+                ServerEndpoint::new_aes256_sha256_rsapss_sign_encrypt("/", &describe_users),
+            ),
         ],
     };
     for (name, endpoint) in endpoints {
@@ -219,15 +225,15 @@ fn variant(kind: DataTypeId, value: f64) -> Variant {
     }
 }
 
-fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
-    let wrong = |words: &str| ServeError::Made(words.to_owned());
+fn add_nodes(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
+    let wrong = |words: &str| ServeError::NotBuilt(words.to_owned());
     let manager = handle.node_managers().get_of_type::<SimpleNodeManager>();
     let manager = manager.ok_or_else(|| wrong("it has no nodes"))?;
     if handle.get_namespace_index(NAMESPACE) != Some(INDEX) {
-        return Err(wrong("the nodes have another namespace than ns=2"));
+        return Err(wrong("the namespace of the nodes is not ns=2"));
     }
     let folder = NodeId::new(INDEX, "stand");
-    let put = |name: &str, kind: DataTypeId, first: Variant, writes: bool| {
+    let add_variable = |name: &str, kind: DataTypeId, first: Variant, writes: bool| {
         let id = NodeId::new(INDEX, name);
         let builder =
             VariableBuilder::new(&id, name, name).value(first).data_type(kind).organized_by(&folder);
@@ -237,7 +243,7 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
     };
     manager.address_space().write().add_folder(&folder, "Stand", "Stand", &ObjectId::ObjectsFolder.into());
     for channel in measured() {
-        let id = put(channel.symbol(), DataTypeId::Double, Variant::Double(f64::NAN), false);
+        let id = add_variable(channel.symbol(), DataTypeId::Double, Variant::Double(f64::NAN), false);
         let shared = shared.clone();
         let read = move |stand: &Stand| stand.reading(channel).map(Variant::Double);
         manager.inner().add_read_callback(id, move |_, _, _| {
@@ -250,12 +256,12 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
             value
         });
     }
-    let id = put("tripped", DataTypeId::Boolean, Variant::Boolean(false), false);
+    let id = add_variable("tripped", DataTypeId::Boolean, Variant::Boolean(false), false);
     let stand = shared.clone();
     let tripped = |stand: &Stand| Some(Variant::Boolean(stand.tripped().is_some()));
     manager.inner().add_read_callback(id, move |_, _, _| stand.value(tripped));
     for (name, kind, target) in writable() {
-        let id = put(name, kind, variant(kind, 0.0), true);
+        let id = add_variable(name, kind, variant(kind, 0.0), true);
         let (reads, writes) = (shared.clone(), shared.clone());
         let read = move |stand: &Stand| Some(variant(kind, stand.commanded(target)));
         manager.inner().add_read_callback(id.clone(), move |_, _, _| reads.value(read));
@@ -269,7 +275,7 @@ fn fill(handle: &ServerHandle, shared: &Shared) -> Result<(), ServeError> {
 /// # Errors
 /// [`ServeError`]
 pub fn make(at: SocketAddr, shared: &Shared, protection: Protection) -> Result<Server, ServeError> {
-    let (server, handle) = builder(at, &directory()?, protection)?.build().map_err(ServeError::Made)?;
-    fill(&handle, shared)?;
+    let (server, handle) = builder(at, &directory()?, protection)?.build().map_err(ServeError::NotBuilt)?;
+    add_nodes(&handle, shared)?;
     Ok(server)
 }

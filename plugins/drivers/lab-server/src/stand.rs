@@ -41,7 +41,7 @@ pub enum Target {
 /// A value that the stand refuses.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("{value} is outside {low} to {high}")]
-pub struct Refused {
+pub struct RefusedValue {
     value: f64,
     low: f64,
     high: f64,
@@ -56,7 +56,7 @@ pub struct Stand {
     sent: Option<Setpoints>,
     heartbeat: f64,
     /// Time of its last change, s of wall time.
-    beaten_s: f64,
+    last_heartbeat_s: f64,
     tripped: Option<String>,
     readings: BTreeMap<Channel, f64>,
     speed: f64,
@@ -87,7 +87,7 @@ impl Stand {
             setpoints,
             sent: None,
             heartbeat: 0.0,
-            beaten_s: 0.0,
+            last_heartbeat_s: 0.0,
             tripped: None,
             readings: BTreeMap::new(),
             speed,
@@ -99,7 +99,7 @@ impl Stand {
     ///
     /// # Errors
     /// [`Refused`] if the stand refuses the value; its state is unchanged then.
-    pub fn tell(&mut self, target: Target, value: f64) -> Result<(), Refused> {
+    pub fn write(&mut self, target: Target, value: f64) -> Result<(), RefusedValue> {
         let switch = SetpointRange { low: 0.0, high: 1.0 };
         let range = match target {
             Target::P3 => self.accepts.p3_pa,
@@ -110,7 +110,7 @@ impl Stand {
             Target::Heartbeat => SetpointRange { low: 0.0, high: f64::MAX },
         };
         if !(range.low..=range.high).contains(&value) {
-            return Err(Refused { value, low: range.low, high: range.high });
+            return Err(RefusedValue { value, low: range.low, high: range.high });
         }
         match target {
             Target::P3 => self.setpoints.p3_pa = value,
@@ -120,11 +120,11 @@ impl Stand {
             // A tripped stand refuses air.
             Target::Air if value >= 0.5 && self.tripped.is_none() => {
                 self.setpoints.mode = RigMode::Running;
-                self.beaten_s = self.wall_s;
+                self.last_heartbeat_s = self.wall_s;
             }
             Target::Air => self.setpoints.mode = RigMode::Standstill,
             Target::Heartbeat if value != self.heartbeat => {
-                (self.heartbeat, self.beaten_s) = (value, self.wall_s);
+                (self.heartbeat, self.last_heartbeat_s) = (value, self.wall_s);
             }
             Target::Heartbeat => {}
             Target::Acknowledge if value >= 0.5 && self.setpoints.mode == RigMode::Standstill => {
@@ -174,7 +174,7 @@ impl Stand {
     /// An error of the lab.
     pub fn advance(&mut self, wall_s: f64) -> Result<(), BackendError> {
         self.wall_s = wall_s;
-        let silent_s = wall_s - self.beaten_s;
+        let silent_s = wall_s - self.last_heartbeat_s;
         if self.setpoints.mode == RigMode::Running && silent_s > WATCHDOG_S {
             self.trip(format!("no heartbeat for {silent_s:.1} s"));
         }
@@ -219,7 +219,7 @@ mod tests {
         let tenths = ((to_s - from_s) * 10.0).round() as u32;
         for tenth in 1..=tenths {
             if beats {
-                stand.tell(Target::Heartbeat, f64::from(tenth)).unwrap();
+                stand.write(Target::Heartbeat, f64::from(tenth)).unwrap();
             }
             stand.advance(from_s + f64::from(tenth) / 10.0).unwrap();
         }
@@ -229,21 +229,21 @@ mod tests {
     fn the_air_is_cut_without_a_heartbeat_and_above_the_speed_until_it_is_acknowledged() {
         let mut stand = stand();
         for (target, value) in [(Target::P3, 180e3), (Target::T3, 700.0), (Target::Air, 1.0)] {
-            stand.tell(target, value).unwrap();
+            stand.write(target, value).unwrap();
         }
         run(&mut stand, 0.0, 4.0, true);
         let rpm = stand.reading(Channel::ShaftSpeed).unwrap();
         assert!(rpm > 50_000.0 && stand.tripped().is_none(), "{rpm}");
-        assert!(stand.tell(Target::P3, 1e9).is_err());
+        assert!(stand.write(Target::P3, 1e9).is_err());
         assert_eq!(stand.commanded(Target::P3), 180e3);
         run(&mut stand, 4.0, 7.0, false);
         assert!(stand.tripped().unwrap().contains("no heartbeat"));
-        stand.tell(Target::Air, 1.0).unwrap();
+        stand.write(Target::Air, 1.0).unwrap();
         assert_eq!(stand.commanded(Target::Air), 0.0);
-        stand.tell(Target::Acknowledge, 1.0).unwrap();
-        stand.tell(Target::Air, 1.0).unwrap();
+        stand.write(Target::Acknowledge, 1.0).unwrap();
+        stand.write(Target::Air, 1.0).unwrap();
         assert_eq!(stand.commanded(Target::Air), 1.0);
-        stand.tell(Target::P3, 380e3).unwrap();
+        stand.write(Target::P3, 380e3).unwrap();
         run(&mut stand, 7.0, 12.0, true);
         assert!(stand.tripped().unwrap().contains("overspeed"), "{:?}", stand.reading(Channel::ShaftSpeed));
     }

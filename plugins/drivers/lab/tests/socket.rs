@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, RigMode, Setpoints};
-use mapper_driver_host::{At, Driver, PATIENCE, Places};
+use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver, Endpoint, SearchPath};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -21,19 +21,19 @@ const SETPOINTS: Setpoints = Setpoints {
 };
 
 /// A directory of files that the tests poll.
-struct Scratch {
+struct CommandFiles {
     directory: tempfile::TempDir,
     news: Receiver<notify::Result<notify::Event>>,
     _watcher: RecommendedWatcher,
 }
 
-impl Scratch {
-    fn new() -> Scratch {
+impl CommandFiles {
+    fn new() -> CommandFiles {
         let directory = tempfile::tempdir().unwrap();
         let (sender, news) = channel();
         let mut watcher = notify::recommended_watcher(sender).unwrap();
         watcher.watch(directory.path(), RecursiveMode::NonRecursive).unwrap();
-        Scratch { directory, news, _watcher: watcher }
+        CommandFiles { directory, news, _watcher: watcher }
     }
 
     fn file(&self, name: &str) -> PathBuf {
@@ -70,7 +70,7 @@ impl Drop for Listening {
 }
 
 impl Listening {
-    fn at(socket: &Path, scratch: &Scratch) -> Listening {
+    fn at(socket: &Path, scratch: &CommandFiles) -> Listening {
         let child = Command::new(PROGRAM).arg("--socket").arg(socket).spawn().unwrap();
         scratch.until(|| std::os::unix::net::UnixStream::connect(socket).is_ok());
         Listening(child)
@@ -78,7 +78,7 @@ impl Listening {
 }
 
 /// A host that connects as soon as the previous one has disconnected completely.
-fn come(places: &Places, settings: &Value) -> Driver {
+fn connect(places: &SearchPath, settings: &Value) -> Driver {
     loop {
         match Driver::find(places, "lab", settings, "", "") {
             Ok(driver) => return driver,
@@ -88,20 +88,21 @@ fn come(places: &Places, settings: &Value) -> Driver {
 }
 
 #[test]
-fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
-    let scratch = Scratch::new();
+fn hosts_are_served_one_after_the_other_and_a_lost_host_leaves_a_safe_rig() {
+    let scratch = CommandFiles::new();
     let socket = scratch.file("lab.socket");
     let mut listening = Listening::at(&socket, &scratch);
-    let places = Places { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
-    assert_eq!(places.find("lab"), Some(At::Socket(socket.clone())));
+    let places = SearchPath { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
+    assert_eq!(places.find("lab"), Some(Endpoint::Socket(socket.clone())));
 
-    let mut first = come(&places, &scratch.settings("first"));
+    let mut first = connect(&places, &scratch.settings("first"));
     first.arm().unwrap();
     first.set(&SETPOINTS).unwrap();
     first.hold().unwrap();
     assert!(!first.poll(1.0).unwrap().t_s.is_empty());
     // A second host is refused before a rig exists.
-    let refused = Driver::at_socket(&socket, "lab", &scratch.settings("second"), PATIENCE).err().unwrap();
+    let refused =
+        Driver::connect_socket(&socket, "lab", &scratch.settings("second"), DEFAULT_TIMEOUTS).err().unwrap();
     assert!(refused.to_string().contains("this driver serves another host"), "{refused}");
     // As if a runner is killed: the connection ends without a message. The rig runs down and is disarmed, and the next host is served.
     drop(first);
@@ -112,7 +113,7 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
         "{commands}"
     );
 
-    let mut second = come(&places, &scratch.settings("second"));
+    let mut second = connect(&places, &scratch.settings("second"));
     second.arm().unwrap();
     second.set(&SETPOINTS).unwrap();
     assert!(!second.poll(1.0).unwrap().t_s.is_empty());
@@ -129,13 +130,13 @@ fn hosts_come_one_after_the_other_and_one_that_is_gone_leaves_a_safe_rig() {
 /// The socket of a killed driver is reported as such, and the next driver replaces it.
 #[test]
 fn a_socket_without_a_listener_is_reported_and_can_be_reused() {
-    let scratch = Scratch::new();
+    let scratch = CommandFiles::new();
     let socket = scratch.file("lab.socket");
     drop(Listening::at(&socket, &scratch));
     assert!(socket.exists());
-    let places = Places { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
+    let places = SearchPath { programs: Vec::new(), sockets: Some(scratch.directory.path().to_owned()) };
     let away = Driver::find(&places, "lab", &Value::Null, "", "").err().unwrap().to_string();
     assert!(away.contains("no driver listens at the socket") && away.contains("--socket"), "{away}");
     let _again = Listening::at(&socket, &scratch);
-    come(&places, &scratch.settings("third"));
+    connect(&places, &scratch.settings("third"));
 }

@@ -1,9 +1,9 @@
 //! Groups registers into few read requests, since each request costs a round trip.
 
 /// Maximum registers per read request.
-const MAX: u16 = 125;
+const MAX_REGISTERS: u16 = 125;
 /// Maximum gap of unused registers that is read along: cheaper than another request.
-const GAP: u16 = 8;
+const MAX_GAP: u16 = 8;
 
 /// Neighbouring registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub(crate) struct Block {
 }
 
 /// Blocks that cover all these pieces without splitting one. A piece is at most 4 registers.
-pub(crate) fn blocks(pieces: &[Block]) -> Vec<Block> {
+pub(crate) fn group_registers(pieces: &[Block]) -> Vec<Block> {
     let mut pieces = pieces.to_vec();
     pieces.sort_by_key(|piece| (piece.start, piece.count));
     let mut blocks: Vec<Block> = Vec::new();
@@ -24,8 +24,9 @@ pub(crate) fn blocks(pieces: &[Block]) -> Vec<Block> {
         if let Some(last) = blocks.last_mut() {
             let last_end = u32::from(last.start) + u32::from(last.count);
             let together = end.max(last_end) - u32::from(last.start);
-            if u32::from(piece.start) <= last_end + u32::from(GAP) && together <= u32::from(MAX) {
-                last.count = u16::try_from(together).unwrap_or(MAX);
+            if u32::from(piece.start) <= last_end + u32::from(MAX_GAP) && together <= u32::from(MAX_REGISTERS)
+            {
+                last.count = u16::try_from(together).unwrap_or(MAX_REGISTERS);
                 continue;
             }
         }
@@ -44,9 +45,9 @@ mod tests {
         #[test]
         fn blocks_cover_all_pieces(starts in prop::collection::vec((0u16..65_532, 1u16..=4), 1..40)) {
             let pieces: Vec<Block> = starts.iter().map(|(start, count)| Block { start: *start, count: *count }).collect();
-            let blocks = blocks(&pieces);
+            let blocks = group_registers(&pieces);
             for block in &blocks {
-                prop_assert!(block.count <= MAX && u32::from(block.start) + u32::from(block.count) <= 65_536);
+                prop_assert!(block.count <= MAX_REGISTERS && u32::from(block.start) + u32::from(block.count) <= 65_536);
             }
             for piece in &pieces {
                 let whole = blocks.iter().any(|block| {
@@ -62,7 +63,7 @@ mod tests {
     #[test]
     fn neighbours_share_a_request_and_far_ones_do_not() {
         let piece = |start| Block { start, count: 2 };
-        let found = blocks(&[piece(200), piece(0), piece(2), piece(10)]);
+        let found = group_registers(&[piece(200), piece(0), piece(2), piece(10)]);
         assert_eq!(found, [Block { start: 0, count: 12 }, Block { start: 200, count: 2 }]);
     }
 }

@@ -15,7 +15,7 @@ use tokio_modbus::prelude::{ExceptionCode, Reader, Request, Response, Slave};
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LinkError {
     /// The answer is late.
-    #[error("{address} did not answer within {} ms (`timeout`, at most 800 ms: a controller that needs longer cannot be driven from here)", within.as_millis())]
+    #[error("{address} did not answer within {} ms (`timeout`, at most 800 ms; slower controllers are not supported)", within.as_millis())]
     Late { address: SocketAddr, within: Duration },
     /// The connection failed.
     #[error("{address}: {words}")]
@@ -27,7 +27,7 @@ pub(crate) enum LinkError {
 
 impl LinkError {
     /// Whether the controller asks for a retry (Modbus Application Protocol 1.1b3, sect. 7: acknowledge, server device busy).
-    fn asks_for_patience(&self) -> bool {
+    fn is_busy(&self) -> bool {
         matches!(
             self,
             LinkError::Refused { code: ExceptionCode::Acknowledge | ExceptionCode::ServerDeviceBusy, .. }
@@ -36,7 +36,7 @@ impl LinkError {
 }
 
 /// Delay before a busy controller is asked for a second time.
-const AGAIN: Duration = Duration::from_millis(40);
+const RETRY_DELAY: Duration = Duration::from_millis(40);
 
 /// A table of registers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Deserialize)]
@@ -73,7 +73,7 @@ impl Link {
 
     /// Makes a group of writes with one deadline, retries and new connections included, since the caller of the
     /// group waits no longer.
-    pub(crate) fn together<T>(&mut self, within: Duration, writes: impl FnOnce(&mut Link) -> T) -> T {
+    pub(crate) fn write_group<T>(&mut self, within: Duration, writes: impl FnOnce(&mut Link) -> T) -> T {
         self.until = Instant::now().checked_add(within);
         let done = writes(self);
         self.until = None;
@@ -81,7 +81,7 @@ impl Link {
     }
 
     /// Time left for a request, at most its own timeout.
-    fn left(&self) -> Duration {
+    fn time_left(&self) -> Duration {
         let left = self.until.map(|until| until.saturating_duration_since(Instant::now()));
         left.map_or(self.within, |left| left.min(self.within))
     }
@@ -91,7 +91,7 @@ impl Link {
         let was_kept = self.connection.is_some();
         match self.read_once(table, block) {
             Err(LinkError::Failed { .. }) if was_kept => self.read_once(table, block),
-            Err(busy) if busy.asks_for_patience() => {
+            Err(busy) if busy.is_busy() => {
                 self.pause();
                 self.read_once(table, block)
             }
@@ -110,16 +110,16 @@ impl Link {
             return Ok(registers);
         }
         self.connection = None;
-        let words = format!("{} registers came where {count} were asked for", registers.len());
+        let words = format!("{} registers received, {count} requested", registers.len());
         Err(LinkError::Failed { address: self.address, words })
     }
 
     /// Writes registers; retries once, if necessary on a new connection, since writing the same value twice does no harm. A busy
     /// controller is retried until the timeout of the request.
     pub(crate) fn write(&mut self, start: u16, registers: &[u16]) -> Result<(), LinkError> {
-        let until = Instant::now() + self.left();
+        let until = Instant::now() + self.time_left();
         let mut answer = self.write_once(start, registers);
-        while answer.as_ref().is_err_and(LinkError::asks_for_patience) && Instant::now() + AGAIN < until {
+        while answer.as_ref().is_err_and(LinkError::is_busy) && Instant::now() + RETRY_DELAY < until {
             self.pause();
             answer = self.write_once(start, registers);
         }
@@ -152,7 +152,7 @@ impl Link {
 
     /// A short delay for a busy controller.
     fn pause(&self) {
-        let pause = AGAIN.min(self.left());
+        let pause = RETRY_DELAY.min(self.time_left());
         self.runtime.block_on(async { tokio::time::sleep(pause).await });
     }
 
@@ -161,7 +161,7 @@ impl Link {
         let number = u8::from(code);
         match code {
             ExceptionCode::GatewayPathUnavailable | ExceptionCode::GatewayTargetDevice => {
-                format!("exception {number}, {code}: it has no unit {}; look at `unit`", self.unit)
+                format!("exception {number}, {code}: it has no unit {}; check `unit`", self.unit)
             }
             code => format!("exception {number}, {code}"),
         }
@@ -172,7 +172,7 @@ impl Link {
         what: String,
         request: impl AsyncFnOnce(&mut Context) -> tokio_modbus::Result<T>,
     ) -> Result<T, LinkError> {
-        let (address, within) = (self.address, self.left());
+        let (address, within) = (self.address, self.time_left());
         let late = LinkError::Late { address, within };
         let mut connection = match self.connection.take() {
             Some(connection) => connection,
@@ -182,7 +182,7 @@ impl Link {
                 made.map_err(|error| LinkError::Failed { address, words: error.to_string() })?
             }
         };
-        let within = self.left();
+        let within = self.time_left();
         let answer = self.runtime.block_on(in_time(within, request(&mut connection)));
         match answer {
             None => Err(LinkError::Late { address, within }),
@@ -208,11 +208,11 @@ mod tests {
     /// A controller that accepts connections and stays silent, at the maximum timeout: the writes of the safe state
     /// end before their host stops waiting, at 2 s.
     #[test]
-    fn writes_that_belong_together_end_in_their_time_whatever_the_controller_does() {
+    fn a_group_of_writes_keeps_its_deadline() {
         let mute = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let mut link = Link::new(mute.local_addr().unwrap(), 255, Duration::from_millis(800)).unwrap();
         let begun = Instant::now();
-        let failed = link.together(Duration::from_millis(1500), |link| {
+        let failed = link.write_group(Duration::from_millis(1500), |link| {
             (0..3).filter(|register| link.write(*register, &[0]).is_err()).count()
         });
         assert_eq!(failed, 3);
@@ -220,10 +220,10 @@ mod tests {
         // Six separate attempts would take 4.8 s; the rest is for a busy machine.
         assert!((1.4..4.0).contains(&took_s), "{took_s} s");
         // The next request has its full timeout.
-        assert_eq!(link.left(), Duration::from_millis(800));
+        assert_eq!(link.time_left(), Duration::from_millis(800));
         // One that is always too slow: the message gives the range of the setting.
         let mut quick = Link::new(mute.local_addr().unwrap(), 255, Duration::from_millis(20)).unwrap();
         let message = quick.read(Table::Holding, Block { start: 0, count: 1 }).unwrap_err().to_string();
-        assert!(message.contains("within 20 ms (`timeout`, at most 800 ms"), "{message}");
+        assert!(message.contains("20 ms") && message.contains("800 ms"), "{message}");
     }
 }

@@ -115,7 +115,7 @@ mod tests {
 
     /// 123456.0 as a single is 0x47F12000 (IEEE 754); the four orders of manuals: ABCD, CDAB, BADC, DCBA.
     #[test]
-    fn the_four_orders_of_manuals() {
+    fn the_four_word_and_byte_orders_are_read_and_written() {
         for (words, bytes, registers) in [
             (Order::Big, Order::Big, [0x47f1, 0x2000]),
             (Order::Little, Order::Big, [0x2000, 0x47f1]),
@@ -134,7 +134,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_written_is_read(value in -30_000i16..30_000, little_words in any::<bool>(), little_bytes in any::<bool>()) {
+        fn written_numbers_are_read_back(value in -30_000i16..30_000, little_words in any::<bool>(), little_bytes in any::<bool>()) {
             let order = |little| if little { Order::Little } else { Order::Big };
             let (words, bytes) = (order(little_words), order(little_bytes));
             for form in [Form::I16, Form::I32, Form::F32, Form::F64] {

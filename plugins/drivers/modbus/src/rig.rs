@@ -1,10 +1,10 @@
 //! The registers of the rig.
 
-use crate::blocks::{Block, blocks};
+use crate::blocks::{Block, group_registers};
 use crate::link::{Link, LinkError, Table};
 use crate::registers::Order;
 use crate::settings::{Place, SettingError, Settings, wrong};
-use mapper_controller::{Controller, Reading, Target, can_be_read, rig};
+use mapper_controller::{Controller, Reading, Target, is_plausible, rig};
 use mapper_core::{Backend, BackendError, Channel};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
     let pieces = |table: Table| {
         let of_table = settings.read.values().filter(move |place| place.table == table);
         let pieces = of_table.map(|place| Block { start: place.register, count: place.form.count() });
-        blocks(&pieces.collect::<Vec<_>>()).into_iter().map(move |block| (table, block))
+        group_registers(&pieces.collect::<Vec<_>>()).into_iter().map(move |block| (table, block))
     };
     let blocks = tables.into_iter().flat_map(pieces).collect();
     Ok(rig(
@@ -68,13 +68,13 @@ impl Registers {
     }
 
     /// An order that makes all readings of the last read plausible.
-    fn order_that_fits(&self) -> Option<(Order, Order)> {
+    fn find_plausible_order(&self) -> Option<(Order, Order)> {
         let both = [Order::Big, Order::Little];
         let orders = both.into_iter().flat_map(|words| both.map(|bytes| (words, bytes)));
         let fits = |(words, bytes): &(Order, Order)| {
             self.settings.read.iter().all(|(channel, place)| {
                 let value = place.value(&self.words(place), *words, *bytes);
-                value.is_finite() && can_be_read(*channel, value)
+                value.is_finite() && is_plausible(*channel, value)
             })
         };
         orders.into_iter().find(fits)
@@ -92,8 +92,8 @@ enum RegisterError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     #[error(
-        "{source}. It was {key} = {value} (SI), which goes over the wire as {registers}: look at `words` and `bytes`, at `type`, `scale` and `offset` \
-         of `write.{key}`, and at what the controller itself takes there"
+        "{source}. The value was {key} = {value} (SI), written as {registers}: check `words` and `bytes`, `type`, `scale` and `offset` of \
+                 `write.{key}`, and the range that the controller accepts"
     )]
     Written { source: Box<LinkError>, key: &'static str, value: f64, registers: String },
 }
@@ -150,7 +150,7 @@ impl Controller for Registers {
 
     fn write(&mut self, values: &[(Target, f64)]) -> Result<(), RegisterError> {
         let settings = &self.settings;
-        self.link.together(WRITES_WITHIN, |link| {
+        self.link.write_group(WRITES_WITHIN, |link| {
             for (target, value) in values {
                 let place = settings.place(*target);
                 let registers = settings.registers(&place, *value);
@@ -178,15 +178,13 @@ impl Controller for Registers {
     }
 
     fn remedy(&self) -> String {
-        match self.order_that_fits() {
+        match self.find_plausible_order() {
             Some((words, bytes)) => {
                 let (words, bytes) = (words.key(), bytes.key());
-                format!("With `words: {words}` and `bytes: {bytes}` every channel could be")
+                format!("With `words: {words}` and `bytes: {bytes}` all channels are plausible")
             }
-            None => {
-                "Look at `words` and `bytes`, and at `register`, `type`, `scale` and `offset` of the channel"
-                    .to_owned()
-            }
+            None => "Check `words` and `bytes`, and `register`, `type`, `scale` and `offset` of the channel"
+                .to_owned(),
         }
     }
 

@@ -2,7 +2,9 @@
 
 use crate::link::Table;
 use crate::registers::{Form, Order};
-use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, fine_enough, scale, within};
+use mapper_controller::{
+    Accepts, LimitError, Safe, Stand, Target, check_range, check_resolution, check_scale,
+};
 use mapper_core::{BackendError, Channel};
 use mapper_yaml::units::{Duration, Frequency, Quantity};
 use serde::Deserialize;
@@ -96,17 +98,15 @@ pub(crate) enum SettingError {
     Limit(#[from] LimitError),
     #[error("the register cannot hold {value} (SI) with this type, scale and offset")]
     DoesNotFit { value: f64 },
-    #[error("a setpoint is written to holding registers; leave `table` out")]
+    #[error("a setpoint is written to holding registers; remove `table`")]
     NotWritten,
     #[error("two values are written to register {0}")]
     Shared(u16),
     #[error(
-        "register {register} is read as {other} already; one of the two is not there. Give it its own register, or leave it out"
+        "{other} reads register {register} too; give each channel its own register, or remove one of them"
     )]
     ReadTwice { register: u16, other: Channel },
-    #[error(
-        "register {register} is the one that `write.{key}` goes to: what was asked for would be read in place of what is measured"
-    )]
+    #[error("`write.{key}` writes register {register}: the setpoint would be read instead of a measurement")]
     ReadsSetpoint { register: u16, key: &'static str },
 }
 
@@ -115,7 +115,7 @@ pub(crate) fn wrong(path: impl Into<String>, error: SettingError) -> BackendErro
 }
 
 fn bound(path: &str, value: f64, unit: &'static str, low: f64, high: f64) -> Result<f64, BackendError> {
-    within(value, unit, low, high).map_err(|error| wrong(path, error.into()))
+    check_range(value, unit, low, high).map_err(|error| wrong(path, error.into()))
 }
 
 impl Settings {
@@ -167,7 +167,7 @@ impl Settings {
         for (channel, place) in &self.read {
             self.check_place(&format!("read.{channel}"), place)?;
         }
-        self.check_what_is_read()?;
+        self.check_read_registers()?;
         let mut taken: Vec<u16> = Vec::new();
         for target in Target::ALL {
             let (path, place) = (format!("write.{}", target.key()), self.place(target));
@@ -177,7 +177,8 @@ impl Settings {
             self.check_place(&path, &place)?;
             let range = self.accepts.range(target);
             if place.form.is_whole() {
-                fine_enough(target, place.scale, range).map_err(|error| wrong(path.clone(), error.into()))?;
+                check_resolution(target, place.scale, range)
+                    .map_err(|error| wrong(path.clone(), error.into()))?;
             }
             for value in [range.low, range.high] {
                 if self.registers(&place, value).is_none() {
@@ -195,7 +196,7 @@ impl Settings {
     }
 
     /// Each channel has its own register, which is not a written one.
-    fn check_what_is_read(&self) -> Result<(), BackendError> {
+    fn check_read_registers(&self) -> Result<(), BackendError> {
         let mut taken: BTreeMap<(Table, u16), Channel> = BTreeMap::new();
         for (channel, place) in &self.read {
             let at = |error| wrong(format!("read.{channel}.register"), error);
@@ -217,7 +218,7 @@ impl Settings {
     }
 
     fn check_place(&self, path: &str, place: &Place) -> Result<(), BackendError> {
-        scale(place.scale).map_err(|error| wrong(format!("{path}.scale"), error.into()))?;
+        check_scale(place.scale).map_err(|error| wrong(format!("{path}.scale"), error.into()))?;
         bound(&format!("{path}.register"), f64::from(place.register), "", 0.0, f64::from(u16::MAX - 4))
             .map(drop)
     }
@@ -277,23 +278,13 @@ mod tests {
 
     /// Settings that would silently cause wrong reads or writes.
     #[test]
-    fn what_cannot_be_meant_is_refused_at_its_place() {
+    fn contradictory_settings_are_refused_with_their_path() {
         assert!(Settings::read(&settings()).is_ok());
         for (at, value, path, words) in [
             // The same register, one of its two words, and a written one.
-            (
-                ["read", "T2"],
-                json!({"register": 16}),
-                "read.P3.register",
-                "register 16 is read as T2 already",
-            ),
-            (
-                ["read", "T2"],
-                json!({"register": 17}),
-                "read.P3.register",
-                "register 17 is read as T2 already",
-            ),
-            (["read", "P3"], json!({"register": 100}), "read.P3.register", "`write.p3` goes to"),
+            (["read", "T2"], json!({"register": 16}), "read.P3.register", "T2 reads register 16"),
+            (["read", "T2"], json!({"register": 17}), "read.P3.register", "T2 reads register 17"),
+            (["read", "P3"], json!({"register": 100}), "read.P3.register", "`write.p3`"),
             (
                 ["read", "P3"],
                 json!({"register": 16, "scale": 0}),
@@ -306,7 +297,7 @@ mod tests {
                 ["write", "valve"],
                 json!({"register": 104, "type": "u16"}),
                 "write.valve",
-                "in steps of 1 from 0.1 to 2.5",
+                "steps of 1 from 0.1 to 2.5",
             ),
             (["write", "p3"], json!({"register": 100, "type": "u16"}), "write.p3", "cannot hold 105000"),
             (["write", "t3"], json!({"register": 101}), "write.t3", "written to register 101"),

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, BackendError, Channel, RigMode, SampleBatch, Setpoints};
-use mapper_driver_host::{Driver, PATIENCE, Patience};
+use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver, Timeouts};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -64,7 +64,7 @@ impl Stand {
 
     fn driver(settings: &Value) -> Driver {
         let program = env!("CARGO_BIN_EXE_mapper-backend-modbus").as_ref();
-        Driver::of_program(program, "modbus", settings, PATIENT).unwrap()
+        Driver::start_program(program, "modbus", settings, SLOW_TIMEOUTS).unwrap()
     }
 
     /// Holding registers on the wire (Modbus Application Protocol 1.1b3, 6.3), read without the driver.
@@ -108,7 +108,7 @@ const SETPOINTS: Setpoints = Setpoints {
 };
 
 /// Polls every half second until `reached`; returns the duration.
-fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
+fn poll_until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
     let begun = Instant::now();
     loop {
         *t_s += 0.5;
@@ -124,7 +124,7 @@ fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool
 /// parallel here. Without the driver's own reconnection it would take half a minute, or fail.
 const AGAIN_S: f64 = 10.0;
 /// For tests of the driver's own deadlines: on an idle computer they end within 2 s.
-const PATIENT: Patience = Patience { call: Duration::from_secs(20), ..PATIENCE };
+const SLOW_TIMEOUTS: Timeouts = Timeouts { call: Duration::from_secs(20), ..DEFAULT_TIMEOUTS };
 
 fn reads(batch: &SampleBatch) -> bool {
     batch.last(Channel::T2).is_some_and(f64::is_finite)
@@ -139,22 +139,22 @@ fn reads_nothing(batch: &SampleBatch) -> bool {
 fn a_server_that_restarts_or_stops_is_read_again_soon() {
     let mut stand = Stand::new("0");
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
-    until(&mut rig, &mut t_s, reads);
+    poll_until(&mut rig, &mut t_s, reads);
     stand.kill();
-    until(&mut rig, &mut t_s, reads_nothing);
+    poll_until(&mut rig, &mut t_s, reads_nothing);
     // The server starts in some seconds; polls alone renew the lease.
     let port = stand.port.clone();
     let starting = std::thread::spawn(move || Stand::new(&port));
-    until(&mut rig, &mut t_s, |_| starting.is_finished());
+    poll_until(&mut rig, &mut t_s, |_| starting.is_finished());
     let stand = starting.join().unwrap();
-    let took_s = until(&mut rig, &mut t_s, reads);
+    let took_s = poll_until(&mut rig, &mut t_s, reads);
     assert!(took_s < AGAIN_S, "{took_s} s after a restart");
     stand.signal("STOP");
-    until(&mut rig, &mut t_s, reads_nothing);
+    poll_until(&mut rig, &mut t_s, reads_nothing);
     let back_s = t_s + 5.0;
-    until(&mut rig, &mut t_s, |batch| batch.t_s.last().is_some_and(|t_s| *t_s >= back_s));
+    poll_until(&mut rig, &mut t_s, |batch| batch.t_s.last().is_some_and(|t_s| *t_s >= back_s));
     stand.signal("CONT");
-    let took_s = until(&mut rig, &mut t_s, reads);
+    let took_s = poll_until(&mut rig, &mut t_s, reads);
     assert!(took_s < AGAIN_S, "{took_s} s after a pause");
     rig.set(&SETPOINTS).unwrap();
     rig.make_safe().unwrap();
@@ -167,14 +167,14 @@ fn a_server_that_restarts_or_stops_is_read_again_soon() {
 fn a_server_that_is_gone_for_good_is_reported_in_time() {
     let mut stand = Stand::new("0");
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
-    until(&mut rig, &mut t_s, reads);
+    poll_until(&mut rig, &mut t_s, reads);
     stand.kill();
     // The driver reports it: the host's deadline is longer here.
     let begun = Instant::now();
     let lost = rig.make_safe().unwrap_err();
     assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
-    assert!(begun.elapsed() < PATIENT.call / 2, "{:?}", begun.elapsed());
-    until(&mut rig, &mut t_s, reads_nothing);
+    assert!(begun.elapsed() < SLOW_TIMEOUTS.call / 2, "{:?}", begun.elapsed());
+    poll_until(&mut rig, &mut t_s, reads_nothing);
     // A rig is not disarmed until its safe state is confirmed.
     assert!(matches!(rig.disarm(), Err(BackendError::Lost { .. })));
 }
@@ -183,7 +183,7 @@ fn a_server_that_is_gone_for_good_is_reported_in_time() {
 /// registers stay unchanged, to the bit.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn readings_that_cannot_be_are_refused_before_anything_is_written() {
+fn implausible_readings_are_refused_before_anything_is_written() {
     let stand = Stand::new("0");
     let before = stand.registers(100, 12);
     let refused = |change: &dyn Fn(&mut Value)| {
@@ -195,11 +195,9 @@ fn readings_that_cannot_be_are_refused_before_anything_is_written() {
         error.to_string()
     };
     let words = refused(&|settings| settings["words"] = json!("little"));
-    assert!(words.contains("With `words: big` and `bytes: big` every channel could be"), "{words}");
+    assert!(words.contains("`words: big`") && words.contains("`bytes: big`"), "{words}");
     // The speed at rest is noise: with swapped words it is sometimes the first implausible reading.
-    for part in
-        ["at `read.", " reads ", " from register ", "(0x", "`words: little`", "T2", "; nor can ", "P3 be as"]
-    {
+    for part in ["at `read.", " reads ", " from register ", "(0x", "`words: little`", "T2", "P3"] {
         assert!(words.contains(part), "{part}: {words}");
     }
     let scaled = refused(&|settings| settings["read"]["P3"]["scale"] = json!(1000.0));
@@ -235,7 +233,7 @@ const EXCEPTIONS: [u8; 8] = [1, 2, 3, 4, 8, 10, 11, 42];
 /// the message gives the number of an exception.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn only_what_was_written_counts_as_acknowledged() {
+fn a_wrong_acknowledgement_is_an_error() {
     let stand = Stand::new("0");
     let mut rig = stand.armed();
     let lost = |result: Result<(), BackendError>| match result {
@@ -258,13 +256,13 @@ fn only_what_was_written_counts_as_acknowledged() {
     for code in [2, 11] {
         let noted = std::cell::Cell::new(false);
         stand.misbehave(READS_REFUSED + code);
-        until(&mut rig, &mut t_s, |batch| {
+        poll_until(&mut rig, &mut t_s, |batch| {
             let number = format!("exception {code}");
             noted.set(noted.get() || batch.events.iter().any(|event| event.message.contains(&number)));
             reads_nothing(batch) && noted.get()
         });
         stand.misbehave(HONEST);
-        until(&mut rig, &mut t_s, reads);
+        poll_until(&mut rig, &mut t_s, reads);
     }
     stand.misbehave(BUSY_ONCE);
     rig.set(&SETPOINTS).unwrap();
@@ -278,7 +276,7 @@ fn only_what_was_written_counts_as_acknowledged() {
 fn a_server_that_closes_after_each_answer_costs_no_sample() {
     let stand = Stand::new("0");
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
-    until(&mut rig, &mut t_s, reads);
+    poll_until(&mut rig, &mut t_s, reads);
     stand.misbehave(CLOSES);
     for _ in 0..12 {
         t_s += 0.5;

@@ -1,9 +1,9 @@
 //! The session with a server. It is polled with Read; the library reconnects by itself, within a second of the server's return.
 
-use crate::login::{reach, try_login};
+use crate::login::{check_reachable, try_login};
 use crate::settings::{Security, User};
 use crate::store::{APPLICATION_URI, Store, StoreError, fingerprint, server};
-use crate::value::{is_written, words};
+use crate::value::{describe_status, is_written};
 use futures::{StreamExt, pin_mut};
 use mapper_controller::Target;
 use opcua::client::services::Read;
@@ -22,45 +22,45 @@ use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
 /// Time for each of endpoint list, first login and session.
-const CONNECTING: Duration = Duration::from_secs(4);
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(4);
 /// Total time for opening: shorter than the 10 s that a host waits for arming.
-const OPENING: Duration = Duration::from_secs(9);
+const OPEN_TIMEOUT: Duration = Duration::from_secs(9);
 /// Time for a write, including a reconnection: shorter than the 2 s that a host waits.
-const WRITING: Duration = Duration::from_millis(1500);
+const WRITE_TIMEOUT: Duration = Duration::from_millis(1500);
 /// Initial and maximum pause between two attempts to connect.
 const RETRY: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(1));
 /// A server that is silent for this many seconds gets a new connection.
-const SILENT_S: u64 = 4;
+const MAX_SILENCE_S: u64 = 4;
 
 /// Why a call failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum LinkError {
     #[error("{server} did not answer within {} ms", within.as_millis())]
     Late { server: String, within: Duration },
-    #[error("{server} did not answer a read within {} ms (`timeout`, at most 800 ms: a controller that needs longer cannot be driven from here)", within.as_millis())]
+    #[error("{server} did not answer a read within {} ms (`timeout`, at most 800 ms; slower controllers are not supported)", within.as_millis())]
     Slow { server: String, within: Duration },
     #[error("{server}: {words}")]
     Failed { server: String, words: String },
     #[error(
-        "{server} does not let this program in: {words}. Look at user and password, and whether the server trusts {own}"
+        "{server} refuses the login: {words}. Check user and password, and whether the server trusts {own}"
     )]
-    NotLetIn { server: String, words: String, own: String },
+    LoginRefused { server: String, words: String, own: String },
     #[error(
-        "no server answers at {server}: {source}. Is the server on, and is this its address and port? (`mapper-lab-server` with --opcua prints where it is)"
+        "no server answers at {server}: {source}. Check that the server runs, and its address and port (`mapper-lab-server --opcua` prints its own)"
     )]
-    Away { server: String, source: std::io::Error },
+    NotReachable { server: String, source: std::io::Error },
     #[error(
-        "{server} has no session left: {words}. Other programs hold them, or left them behind: close those, wait until the server drops them \
-         (often a minute, up to an hour), or start it again"
+        "{server} has no session left: {words}. Close the programs that use its sessions, wait until the server drops abandoned ones (a minute \
+                 to an hour), or restart it"
     )]
-    Full { server: String, words: String },
+    NoSessionLeft { server: String, words: String },
     #[error("{server} has no endpoint with {policy}; it offers {offered}")]
     NoEndpoint { server: String, policy: String, offered: String },
     #[error("the node {node} {words}")]
     Node { node: NodeId, words: String },
     #[error(
-        "{server} refuses {value} for the node {node}: {words}. Look at its `unit`, or `scale` and `offset`, below `write`, and at what the server \
-         itself takes there"
+        "{server} refuses {value} for the node {node}: {words}. Check its `unit`, or `scale` and `offset`, below `write`, and the range that the \
+                 server accepts"
     )]
     Refused { server: String, node: NodeId, value: f64, words: String },
     #[error("the node {node} cannot hold {value}")]
@@ -102,7 +102,7 @@ pub(crate) struct Link {
     within: Duration,
     open: Option<Open>,
     /// Time at which the connection was lost.
-    away: Option<Instant>,
+    lost_at: Option<Instant>,
     remark: Option<String>,
 }
 
@@ -131,7 +131,7 @@ fn client(store: &Store, tries: i32) -> Result<Client, String> {
         .session_retry_initial(RETRY.0)
         .session_retry_max(RETRY.1)
         .keep_alive_interval(Duration::from_secs(1))
-        .max_failed_keep_alive_count(SILENT_S)
+        .max_failed_keep_alive_count(MAX_SILENCE_S)
         .request_timeout(Duration::from_secs(1))
         .recreate_subscriptions(false);
     built.client().map_err(|errors| errors.join("; "))
@@ -141,10 +141,10 @@ fn client(store: &Store, tries: i32) -> Result<Client, String> {
 pub(crate) async fn endpoints(store: &Store, endpoint: &str) -> Result<Vec<EndpointDescription>, LinkError> {
     let failed = |words: String| LinkError::Failed { server: server(endpoint).to_owned(), words };
     let client = client(store, 0).map_err(failed)?;
-    let late = || LinkError::Late { server: server(endpoint).to_owned(), within: CONNECTING };
-    let away = |source| LinkError::Away { server: server(endpoint).to_owned(), source };
-    timeout(CONNECTING, reach(server(endpoint))).await.map_err(|_| late())?.map_err(away)?;
-    let asked = timeout(CONNECTING, client.get_server_endpoints_from_url(endpoint));
+    let late = || LinkError::Late { server: server(endpoint).to_owned(), within: CONNECT_TIMEOUT };
+    let away = |source| LinkError::NotReachable { server: server(endpoint).to_owned(), source };
+    timeout(CONNECT_TIMEOUT, check_reachable(server(endpoint))).await.map_err(|_| late())?.map_err(away)?;
+    let asked = timeout(CONNECT_TIMEOUT, client.get_server_endpoints_from_url(endpoint));
     asked.await.map_err(|_| late())?.map_err(|error| failed(error.to_string()))
 }
 
@@ -175,7 +175,7 @@ impl Link {
     ) -> std::io::Result<Link> {
         // The session has its own thread: keep-alives and reconnections do not wait for the next sample.
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
-        Ok(Link { runtime, endpoint, security, user, within, open: None, away: None, remark: None })
+        Ok(Link { runtime, endpoint, security, user, within, open: None, lost_at: None, remark: None })
     }
 
     fn server(&self) -> String {
@@ -226,7 +226,7 @@ impl Link {
     /// Makes the session.
     pub(crate) fn open(&mut self) -> Result<(), LinkError> {
         self.close();
-        let until = Instant::now() + OPENING;
+        let until = Instant::now() + OPEN_TIMEOUT;
         let store = Store::of_environment()?;
         let own = match self.security {
             Security::None => None,
@@ -238,11 +238,11 @@ impl Link {
         let identity = self.user.as_ref().map_or(IdentityToken::Anonymous, |user| {
             IdentityToken::new_user_name(user.name.as_str(), user.password.as_str())
         });
-        let left = CONNECTING.min(until.saturating_duration_since(Instant::now()));
+        let left = CONNECT_TIMEOUT.min(until.saturating_duration_since(Instant::now()));
         let tried = try_login(&client, &endpoint, identity.clone());
         match self.runtime.block_on(async { timeout(left, tried).await }) {
             Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(self.not_let_in(error.status(), own)),
+            Ok(Err(error)) => return Err(self.login_error(error.status(), own)),
             Err(_) => return Err(LinkError::Late { server: self.server(), within: left }),
         }
         let built = client
@@ -268,25 +268,25 @@ impl Link {
             }
         });
         self.open = Some(Open { session, state, task });
-        let left = CONNECTING.min(until.saturating_duration_since(Instant::now()));
+        let left = CONNECT_TIMEOUT.min(until.saturating_duration_since(Instant::now()));
         let connected = self.wait(left);
         connected.map_err(|error| {
             self.close();
             match error {
-                Some(status) => self.not_let_in(status, own),
+                Some(status) => self.login_error(status, own),
                 None => LinkError::Late { server: self.server(), within: left },
             }
         })
     }
 
     /// Why the session was refused.
-    fn not_let_in(&self, status: StatusCode, own: Option<PathBuf>) -> LinkError {
-        let (server, words) = (self.server(), words(status));
+    fn login_error(&self, status: StatusCode, own: Option<PathBuf>) -> LinkError {
+        let (server, words) = (self.server(), describe_status(status));
         match status {
-            StatusCode::BadTooManySessions => LinkError::Full { server, words },
+            StatusCode::BadTooManySessions => LinkError::NoSessionLeft { server, words },
             status if is_refusal(status) => {
                 let own = own.map_or_else(|| "it".to_owned(), |own| own.display().to_string());
-                LinkError::NotLetIn { server, words, own }
+                LinkError::LoginRefused { server, words, own }
             }
             _ => LinkError::Failed { server, words },
         }
@@ -345,22 +345,21 @@ impl Link {
                 match values.len() == nodes.len() {
                     true => Ok(Answer { values, sent: answer.response_header.timestamp }),
                     false => {
-                        let words =
-                            format!("{} values came where {} were asked for", values.len(), nodes.len());
+                        let words = format!("{} values received, {} requested", values.len(), nodes.len());
                         Err(self.failed(words))
                     }
                 }
             }
         };
-        self.notice(answer.is_ok());
+        self.update_connection(answer.is_ok());
         answer
     }
 
-    fn notice(&mut self, there: bool) {
-        match (there, self.away) {
-            (false, None) => self.away = Some(Instant::now()),
+    fn update_connection(&mut self, there: bool) {
+        match (there, self.lost_at) {
+            (false, None) => self.lost_at = Some(Instant::now()),
             (true, Some(since)) => {
-                self.away = None;
+                self.lost_at = None;
                 let words =
                     format!("{} answers again after {:.1} s", self.server(), since.elapsed().as_secs_f64());
                 self.remark = Some(words);
@@ -392,29 +391,33 @@ impl Link {
         loop {
             let left = until.saturating_duration_since(Instant::now());
             self.wait(left).map_err(|status| match status {
-                Some(status) => self.failed(words(status)),
-                None => LinkError::Late { server: self.server(), within: WRITING },
+                Some(status) => self.failed(describe_status(status)),
+                None => LinkError::Late { server: self.server(), within: WRITE_TIMEOUT },
             })?;
             let Some(open) = &self.open else { return Err(self.failed("no session is open")) };
             let session = open.session.clone();
             let left = until.saturating_duration_since(Instant::now());
             let answer = self.runtime.block_on(async { timeout(left, session.write(&write)).await });
             match answer {
-                Err(_) => return Err(LinkError::Late { server: self.server(), within: WRITING }),
+                Err(_) => return Err(LinkError::Late { server: self.server(), within: WRITE_TIMEOUT }),
                 // Writing the same value twice does no harm. The state reports a lost connection a moment later.
-                Ok(Err(error)) if is_passing(&error) && !left.is_zero() => {
+                Ok(Err(error)) if is_temporary(&error) && !left.is_zero() => {
                     self.runtime.block_on(async { tokio::time::sleep(Duration::from_millis(20)).await });
                 }
                 Ok(Err(error)) => return Err(self.failed(error.to_string())),
-                Ok(Ok(answers)) => return self.refusal(values, &answers),
+                Ok(Ok(answers)) => return self.check_statuses(values, &answers),
             }
         }
     }
 
-    fn refusal(&self, values: &[(NodeId, Variant, f64)], answers: &[StatusCode]) -> Result<(), LinkError> {
+    fn check_statuses(
+        &self,
+        values: &[(NodeId, Variant, f64)],
+        answers: &[StatusCode],
+    ) -> Result<(), LinkError> {
         if answers.len() != values.len() {
             return Err(self.failed(format!(
-                "{} values were written, {} answers came",
+                "{} values written, {} answers received",
                 values.len(),
                 answers.len()
             )));
@@ -425,14 +428,14 @@ impl Link {
                 server: self.server(),
                 node: node.clone(),
                 value: *value,
-                words: words(*status),
+                words: describe_status(*status),
             }),
         }
     }
 
     /// Deadline of a write that starts now. A heartbeat does not wait: the next one comes soon, and samples would be delayed.
     pub(crate) fn deadline(&self, is_heartbeat: bool) -> Instant {
-        Instant::now() + if is_heartbeat { self.within } else { WRITING }
+        Instant::now() + if is_heartbeat { self.within } else { WRITE_TIMEOUT }
     }
 
     /// Closes the session.
@@ -443,7 +446,7 @@ impl Link {
                 .block_on(async { timeout(Duration::from_secs(1), open.session.disconnect()).await });
             open.task.abort();
         }
-        self.away = None;
+        self.lost_at = None;
     }
 }
 
@@ -454,7 +457,7 @@ impl Drop for Link {
 }
 
 /// Whether a new connection may succeed.
-fn is_passing(error: &Error) -> bool {
+fn is_temporary(error: &Error) -> bool {
     [
         StatusCode::BadNotConnected,
         StatusCode::BadConnectionClosed,

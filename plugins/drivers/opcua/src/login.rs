@@ -14,7 +14,7 @@ use tokio::net::TcpStream;
 /// For each request.
 const REQUEST: Duration = Duration::from_secs(1);
 /// Session timeout on the server, if the close request is lost, ms.
-const KEPT_MS: f64 = 10_000.0;
+const SESSION_TIMEOUT_MS: f64 = 10_000.0;
 /// Default port of an OPC UA server (IANA).
 const PORT: u16 = 4840;
 
@@ -22,7 +22,7 @@ const PORT: u16 = 4840;
 ///
 /// # Errors
 /// An error of the connection.
-pub(crate) async fn reach(server: &str) -> std::io::Result<()> {
+pub(crate) async fn check_reachable(server: &str) -> std::io::Result<()> {
     let has_port = server.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
     let place = if has_port { server.to_owned() } else { format!("{server}:{PORT}") };
     TcpStream::connect(place).await.map(drop)
@@ -58,8 +58,8 @@ pub(crate) async fn try_login(
             .client_description(description)
             .client_cert_from_store(store)
             .session_name("mapper, first login")
-            .session_timeout(KEPT_MS);
-    let created = meanwhile(&mut events, create.send(&channel)).await;
+            .session_timeout(SESSION_TIMEOUT_MS);
+    let created = await_answer(&mut events, create.send(&channel)).await;
     let done = match created {
         Err(error) => Err(error),
         Ok(created) => {
@@ -72,10 +72,10 @@ pub(crate) async fn try_login(
             if let Ok(key) = store.read().read_own_pkey() {
                 activate = activate.private_key(key);
             }
-            let activated = meanwhile(&mut events, activate.send(&channel)).await;
+            let activated = await_answer(&mut events, activate.send(&channel)).await;
             let close = CloseSession::new_manual(0, REQUEST, token, channel.request_handle());
             // The answer does not matter: the channel is closed too.
-            let _ = meanwhile(&mut events, close.send(&channel)).await;
+            let _ = await_answer(&mut events, close.send(&channel)).await;
             activated.map(drop)
         }
     };
@@ -85,7 +85,7 @@ pub(crate) async fn try_login(
 }
 
 /// Waits for an answer while the channel's events are processed.
-async fn meanwhile<T: Transport + Send + Sync + 'static, A>(
+async fn await_answer<T: Transport + Send + Sync + 'static, A>(
     events: &mut SecureChannelEventLoop<T>,
     request: impl Future<Output = Result<A, Error>>,
 ) -> Result<A, Error> {

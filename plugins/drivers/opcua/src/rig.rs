@@ -1,9 +1,9 @@
 //! The nodes of the rig.
 
 use crate::link::{Link, LinkError};
-use crate::settings::{Checked, SettingError, Settings, Timestamps, wrong};
-use crate::value::{is_number, is_whole, kind, like, number, quality, words};
-use mapper_controller::{Controller, Reading, Target, fine_enough, rig};
+use crate::settings::{CheckedSettings, SettingError, Settings, Timestamps, wrong};
+use crate::value::{describe_status, is_number, is_whole, number, quality, same_type, type_name};
+use mapper_controller::{Controller, Reading, Target, check_resolution, rig};
 use mapper_core::{Backend, BackendError, Channel, Quality};
 use opcua::types::{AttributeId, DataValue, DateTime, NodeId, StatusCode, Variant};
 use serde_json::Value;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Clock difference above which a message is given, s.
-const CLOCK_SAID_S: f64 = 1.0;
+const MAX_CLOCK_DIFFERENCE_S: f64 = 1.0;
 /// Write bit of an access level.
 const WRITABLE: u8 = 2;
 
@@ -27,7 +27,7 @@ pub(crate) fn open(value: &Value) -> Result<Box<dyn Backend>, BackendError> {
 }
 
 struct Nodes {
-    checked: Checked,
+    checked: CheckedSettings,
     link: Link,
     /// Nodes to read, in the order of `checked.reads`.
     nodes: Vec<NodeId>,
@@ -38,7 +38,7 @@ struct Nodes {
 
 /// Maximum lead of a source timestamp over the answer, s: clocks of controllers on one network agree within milliseconds to some tenths
 /// (NTP), and a reading must not be older than 3 s.
-const FUTURE_S: f64 = 1.0;
+const MAX_LEAD_S: f64 = 1.0;
 
 fn between_s(earlier: &DateTime, later: &DateTime) -> f64 {
     // A tick is 100 ns.
@@ -46,7 +46,7 @@ fn between_s(earlier: &DateTime, later: &DateTime) -> f64 {
 }
 
 /// Whether the status means that the node is missing permanently.
-fn is_for_good(status: StatusCode) -> bool {
+fn is_permanent(status: StatusCode) -> bool {
     [
         StatusCode::BadNodeIdUnknown,
         StatusCode::BadNodeIdInvalid,
@@ -61,10 +61,12 @@ impl Nodes {
     /// Reports a difference of the server's clock.
     fn compare_clocks(&mut self, sent: &DateTime) {
         let off_s = between_s(&DateTime::now(), sent);
-        if off_s.abs() > CLOCK_SAID_S && !sent.is_null() {
+        if off_s.abs() > MAX_CLOCK_DIFFERENCE_S && !sent.is_null() {
             let side = if off_s > 0.0 { "ahead" } else { "behind" };
-            self.remark =
-                Some(format!("the server's clock is {:.1} s {side}; ages are by its own clock", off_s.abs()));
+            self.remark = Some(format!(
+                "the server's clock is {:.1} s {side}; the age of readings is taken from its clock",
+                off_s.abs()
+            ));
         }
     }
 
@@ -77,15 +79,15 @@ impl Nodes {
     /// Whether a value is stamped later than the server's own answer; its age is unknown then.
     fn is_from_the_future(&self, value: &DataValue, sent: &DateTime) -> bool {
         let age_s = self.source_t_s(value, sent, 0.0).map_or(0.0, |source_t_s| -source_t_s);
-        age_s < -FUTURE_S
+        age_s < -MAX_LEAD_S
     }
 
     /// The type of a node that is written: values of another type would be refused.
     fn type_of(&mut self, node: &NodeId, value: &DataValue) -> Result<Variant, LinkError> {
-        if let Some(status) = value.status.filter(|status| is_for_good(*status)) {
+        if let Some(status) = value.status.filter(|status| is_permanent(*status)) {
             return Err(LinkError::Node {
                 node: node.clone(),
-                words: format!("cannot be read: {}", words(status)),
+                words: format!("cannot be read: {}", describe_status(status)),
             });
         }
         match &value.value {
@@ -127,43 +129,38 @@ impl Nodes {
     }
 
     /// Whether this type can hold every accepted setpoint.
-    fn holds_what_is_accepted(
-        &self,
-        target: Target,
-        node: &NodeId,
-        there: &Variant,
-    ) -> Result<(), LinkError> {
+    fn check_node_range(&self, target: Target, node: &NodeId, there: &Variant) -> Result<(), LinkError> {
         let wrong = |words: String| Err(LinkError::Node { node: node.clone(), words });
         let Some((_, scale)) = self.checked.write(target) else { return Err(LinkError::Unknown(target)) };
         let range = self.checked.settings.accepts.range(target);
         let key = target.key();
-        let name = kind(there);
+        let name = type_name(there);
         // Only air may be a Boolean.
         let is_bool = matches!(there, Variant::Boolean(_)) && target != Target::Air;
         if let Some(value) = [range.high, range.low]
             .into_iter()
-            .find(|value| is_bool || like(there, scale.outside(*value)).is_none())
+            .find(|value| is_bool || same_type(there, scale.outside(*value)).is_none())
         {
             return wrong(format!(
-                "({name}) cannot hold {} for `write.{key}`; look at the node, and at its `unit`, or `scale` and `offset`",
+                "({name}) cannot hold {} for `write.{key}`; check the node and its `unit`, or `scale` and `offset`",
                 scale.outside(value)
             ));
         }
-        match fine_enough(target, scale.step(), range) {
+        match check_resolution(target, scale.step(), range) {
             Err(error) if is_whole(there) => wrong(format!("({name}, `write.{key}`) {error}")),
             _ => Ok(()),
         }
     }
 
     /// Learns types and access of the written nodes.
-    fn learn_types(&mut self) -> Result<(), LinkError> {
+    fn read_types(&mut self) -> Result<(), LinkError> {
         let written: Vec<(Target, NodeId)> =
             self.checked.written().map(|(target, node)| (target, node.clone())).collect();
         let nodes: Vec<NodeId> = written.iter().map(|(_, node)| node.clone()).collect();
         let values = self.link.read(&nodes, AttributeId::Value)?.values;
         for ((target, node), value) in written.into_iter().zip(values) {
             let there = self.type_of(&node, &value)?;
-            self.holds_what_is_accepted(target, &node, &there)?;
+            self.check_node_range(target, &node, &there)?;
             self.types.insert(target, there);
         }
         let levels = self.link.read(&nodes, AttributeId::UserAccessLevel)?.values;
@@ -174,7 +171,7 @@ impl Nodes {
         match locked {
             None => Ok(()),
             Some((node, _)) => {
-                let words = "may not be written by this user".to_owned();
+                let words = "is not writable for this user".to_owned();
                 Err(LinkError::Node { node: node.clone(), words })
             }
         }
@@ -199,8 +196,8 @@ impl Controller for Nodes {
         let answer = self.link.read(&self.nodes, AttributeId::Value)?;
         self.compare_clocks(&answer.sent);
         for ((channel, node, _), value) in self.checked.reads.iter().zip(answer.values) {
-            if let Some(status) = value.status.filter(|status| is_for_good(*status)) {
-                let words = format!("cannot be read: {}", words(status));
+            if let Some(status) = value.status.filter(|status| is_permanent(*status)) {
+                let words = format!("cannot be read: {}", describe_status(status));
                 return Err(LinkError::Node { node: node.clone(), words });
             }
             if let Some(there) = value.value.filter(|there| !there.is_empty() && !is_number(there)) {
@@ -208,7 +205,7 @@ impl Controller for Nodes {
                 return Err(LinkError::Node { node: node.clone(), words });
             }
         }
-        self.learn_types()
+        self.read_types()
     }
 
     fn read(&mut self, t_s: f64) -> BTreeMap<Channel, Reading> {
@@ -216,7 +213,7 @@ impl Controller for Nodes {
         let reading =
             |((channel, _, scale), value): (&(Channel, NodeId, crate::settings::Scale), DataValue)| {
                 let mut quality = quality(&value);
-                let mut why =
+                let mut reason =
                     value.status.map(words).filter(|_| quality != Quality::Good).unwrap_or_default();
                 // A node may change its type at run time: a Boolean is not a reading.
                 let there = value.value.as_ref().filter(|there| is_number(there));
@@ -225,12 +222,12 @@ impl Controller for Nodes {
                 if inside.is_nan() || from_the_future {
                     quality = Quality::Bad;
                 }
-                if why.is_empty() && from_the_future {
-                    why = "its source timestamp is later than the server's clock".to_owned();
+                if reason.is_empty() && from_the_future {
+                    reason = "its source timestamp is later than the server's clock".to_owned();
                 } else if let Some(there) =
-                    value.value.as_ref().filter(|there| why.is_empty() && !is_number(there))
+                    value.value.as_ref().filter(|there| reason.is_empty() && !is_number(there))
                 {
-                    why = format!("no number: {}", kind(there));
+                    reason = format!("no number: {}", type_name(there));
                 }
                 (
                     *channel,
@@ -238,7 +235,7 @@ impl Controller for Nodes {
                         value: inside,
                         source_t_s: self.source_t_s(&value, &answer.sent, t_s),
                         quality,
-                        why,
+                        reason,
                     },
                 )
             };
@@ -256,7 +253,7 @@ impl Controller for Nodes {
                     return Err(LinkError::Unknown(*target));
                 };
                 let outside = scale.outside(*value);
-                let fits = like(there, outside);
+                let fits = same_type(there, outside);
                 let fits =
                     fits.ok_or_else(|| LinkError::DoesNotFit { node: node.clone(), value: outside })?;
                 request.push((node.clone(), fits, outside));
@@ -277,7 +274,7 @@ impl Controller for Nodes {
     }
 
     fn remedy(&self) -> String {
-        "Look at `node` and `unit`, or `scale` and `offset`, of the channel".to_owned()
+        "Check `node` and `unit`, or `scale` and `offset`, of the channel".to_owned()
     }
 
     fn close(&mut self) {

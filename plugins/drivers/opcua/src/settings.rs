@@ -1,6 +1,6 @@
 //! The settings of the driver as a campaign writes them below `opcua`.
 
-use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, scale, within};
+use mapper_controller::{Accepts, LimitError, Safe, Stand, Target, check_range, check_scale};
 use mapper_core::{BackendError, Channel, Dimension};
 use mapper_driver::{SecretError, secret};
 use mapper_yaml::units::{Duration, Frequency, Kind, Quantity};
@@ -130,18 +130,16 @@ pub(crate) enum SettingError {
     TwoScales,
     #[error("two values are written to the node {0}")]
     Shared(NodeId),
-    #[error(
-        "the node {node} is read as {other} already; one of the two is not there. Give it its own node, or leave it out"
-    )]
+    #[error("{other} reads the node {node} too; give each channel its own node, or remove one of them")]
     ReadTwice { node: NodeId, other: Channel },
-    #[error(
-        "the node {node} is the one that `write.{key}` goes to: what was asked for would be read in place of what is measured"
-    )]
+    #[error("`write.{key}` writes the node {node}: the setpoint would be read instead of a measurement")]
     ReadsSetpoint { node: NodeId, key: &'static str },
-    #[error("a user has a password, and a password a user")]
-    HalfAUser,
-    #[error("with `security: none` the password would go over the wire in the clear")]
-    Exposed,
+    #[error("give `user` and `password`, or neither")]
+    IncompleteUser,
+    #[error(
+        "with `security: none` the password would be sent unencrypted; choose another `security`, or remove user and password"
+    )]
+    PasswordInClear,
     #[error("{0}")]
     Store(String),
 }
@@ -187,8 +185,8 @@ impl Place {
     /// Conversion of a node's number to the value of a channel.
     fn scale(&self, channel: Channel) -> Result<Scale, SettingError> {
         let Some(unit) = &self.unit else {
-            let scale = scale(self.scale.unwrap_or(1.0))?;
-            let offset = within(self.offset.unwrap_or(0.0), "", -1e12, 1e12)?;
+            let scale = check_scale(self.scale.unwrap_or(1.0))?;
+            let offset = check_range(self.offset.unwrap_or(0.0), "", -1e12, 1e12)?;
             return Ok(Scale { scale, offset });
         };
         if self.scale.is_some() || self.offset.is_some() {
@@ -211,7 +209,7 @@ pub(crate) struct User {
 }
 
 /// Checked settings.
-pub(crate) struct Checked {
+pub(crate) struct CheckedSettings {
     pub(crate) settings: Settings,
     pub(crate) user: Option<User>,
     pub(crate) reads: Vec<(Channel, NodeId, Scale)>,
@@ -220,7 +218,7 @@ pub(crate) struct Checked {
 
 impl Settings {
     /// Reads and checks them.
-    pub(crate) fn read(value: &Value) -> Result<Checked, BackendError> {
+    pub(crate) fn read(value: &Value) -> Result<CheckedSettings, BackendError> {
         let settings: Settings = serde_path_to_error::deserialize(value).map_err(|error| {
             let path = error.path().to_string();
             wrong(path.trim_start_matches('.'), SettingError::Form(error.into_inner()))
@@ -228,21 +226,21 @@ impl Settings {
         settings.check()
     }
 
-    fn check(self) -> Result<Checked, BackendError> {
+    fn check(self) -> Result<CheckedSettings, BackendError> {
         if !is_endpoint(&self.endpoint) {
             return Err(wrong("endpoint", SettingError::Endpoint(self.endpoint.clone())));
         }
-        within(self.timeout_s(), "s", 0.01, 0.8).map_err(|error| wrong("timeout", error))?;
+        check_range(self.timeout_s(), "s", 0.01, 0.8).map_err(|error| wrong("timeout", error))?;
         self.stand().check().map_err(|(path, error)| wrong(path, error))?;
         let user = secret(&self.user).map_err(|error| wrong("user", error))?;
         let password = secret(&self.password).map_err(|error| wrong("password", error))?;
         let user = match (user, password) {
             (None, None) => None,
             (Some(name), Some(password)) => Some(User { name, password }),
-            _ => return Err(wrong("user", SettingError::HalfAUser)),
+            _ => return Err(wrong("user", SettingError::IncompleteUser)),
         };
         if user.is_some() && self.security == Security::None {
-            return Err(wrong("security", SettingError::Exposed));
+            return Err(wrong("security", SettingError::PasswordInClear));
         }
         let mut reads: Vec<(Channel, NodeId, Scale)> = Vec::new();
         for (channel, place) in &self.read {
@@ -269,7 +267,7 @@ impl Settings {
             }
             writes.insert(target, (place.node.clone(), scale));
         }
-        Ok(Checked { settings: self, user, reads, writes })
+        Ok(CheckedSettings { settings: self, user, reads, writes })
     }
 
     /// Time for a read, s.
@@ -306,7 +304,7 @@ impl Writes {
     }
 }
 
-impl Checked {
+impl CheckedSettings {
     /// Unit of a channel, as written in the campaign.
     pub(crate) fn unit(&self, channel: Channel) -> String {
         let Some(place) = self.settings.read.get(&channel) else { return String::new() };
@@ -349,7 +347,7 @@ mod tests {
 
     /// 300 kPa are 300 000 Pa, 26.85 degC are 300 K; writes use the inverse conversion.
     #[test]
-    fn units_and_scales_lead_to_si_and_back() {
+    fn units_and_scales_convert_to_si_and_back() {
         let checked = Settings::read(&settings()).ok().unwrap();
         let scale = |channel| checked.reads.iter().find(|(one, ..)| *one == channel).unwrap().2;
         assert_eq!(scale(Channel::P3).inside(300.0), 300e3);
@@ -359,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_at_its_place() {
+    fn wrong_settings_are_refused_with_their_path() {
         let path = |change: &dyn Fn(&mut Value)| {
             let mut value = settings();
             change(&mut value);
@@ -390,12 +388,9 @@ mod tests {
         });
         assert_eq!(exposed.0, "security");
         let (at, message) = path(&|value| value["read"]["T3"] = json!({"node": "ns=2;i=3"}));
-        assert!(
-            at == "read.T3.node" && message.contains("the node ns=2;i=3 is read as P3 already"),
-            "{at}: {message}"
-        );
+        assert!(at == "read.T3.node" && message.contains("P3 reads the node ns=2;i=3"), "{at}: {message}");
         let (at, message) = path(&|value| value["read"]["P3"] = json!({"node": "ns=2;s=p3"}));
-        assert!(at == "read.P3.node" && message.contains("`write.p3` goes to"), "{at}: {message}");
+        assert!(at == "read.P3.node" && message.contains("`write.p3`"), "{at}: {message}");
         let (at, message) = path(&|value| value["write"]["p3"]["scale"] = json!(0.0));
         assert!(at == "write.p3" && message.contains("a scale of 0 loses the value"), "{at}: {message}");
         let unmeasured = path(&|value| drop(value["read"].as_object_mut().unwrap().remove("P3")));

@@ -14,18 +14,18 @@ const KEY_BITS: u32 = 2048;
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StoreError {
     #[error("set MAPPER_STATE_DIR or HOME: the certificates have no directory")]
-    NoPlace,
+    NoDirectory,
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: std::io::Error },
     #[error("failed to make a certificate: {0}")]
-    Made(String),
+    NotCreated(String),
     #[error("{} is not a certificate", .0.display())]
-    Garbage(PathBuf),
+    NotACertificate(PathBuf),
     #[error("the certificate of {0} is not trusted yet: `mapper-backend-opcua trust {0}`")]
     NotTrusted(String),
     #[error(
-        "{server} has another certificate than the trusted one: {found} where {pinned} was pinned. If the server was given a \
-         new one, `mapper-backend-opcua trust {server} --replace`; if not, another server answers"
+        "{server} has another certificate than the trusted one: {found} instead of {pinned}. If the server was given a new one, run \
+                 `mapper-backend-opcua trust {server} --replace`; otherwise another server answers"
     )]
     Changed { server: String, found: String, pinned: String },
     #[error("the certificate of {server} {words}; give the server a new one and trust it")]
@@ -49,7 +49,7 @@ impl Store {
         let state = variable("MAPPER_STATE_DIR")
             .or_else(|| variable("XDG_STATE_HOME").map(|state| state.join("mapper")))
             .or_else(|| variable("HOME").map(|home| home.join(".local/state/mapper")));
-        Ok(Store { root: state.ok_or(StoreError::NoPlace)?.join(DIRECTORY) })
+        Ok(Store { root: state.ok_or(StoreError::NoDirectory)?.join(DIRECTORY) })
     }
 
     /// Its directory.
@@ -68,7 +68,7 @@ impl Store {
             self.directory(directory)?;
         }
         CertificateStore::create_certificate_and_key(&about(VALID_DAYS), true, &certificate, &key)
-            .map_err(StoreError::Made)?;
+            .map_err(StoreError::NotCreated)?;
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
@@ -109,7 +109,7 @@ impl Store {
             return Ok(None);
         }
         let der = std::fs::read(&path).map_err(|source| StoreError::File { path: path.clone(), source })?;
-        X509::from_der(&der).map(Some).map_err(|_| StoreError::Garbage(path))
+        X509::from_der(&der).map(Some).map_err(|_| StoreError::NotACertificate(path))
     }
 
     /// Trusts this certificate from now on. Returns its file.
@@ -174,7 +174,7 @@ mod tests {
 
     /// One that is never valid, and ours.
     #[test]
-    fn a_certificate_that_has_expired_is_not_talked_to() {
+    fn an_expired_certificate_is_refused() {
         let scratch = tempfile::tempdir().unwrap();
         let (store, endpoint) = (Store { root: scratch.path().join("opcua") }, "opc.tcp://plc:4840");
         assert!(matches!(store.pinned(endpoint), Err(StoreError::NotTrusted(_))));

@@ -22,7 +22,7 @@ pub(crate) fn number(value: &Variant) -> f64 {
 }
 
 /// The specification's name of a value's type.
-pub(crate) fn kind(value: &Variant) -> String {
+pub(crate) fn type_name(value: &Variant) -> String {
     match value.type_id() {
         VariantTypeId::Empty => "empty".to_owned(),
         VariantTypeId::Scalar(one) => format!("{one:?}"),
@@ -42,7 +42,7 @@ pub(crate) fn is_whole(value: &Variant) -> bool {
 }
 
 /// The number as a value of the same type as `there`; `None` if it does not fit.
-pub(crate) fn like(there: &Variant, number: f64) -> Option<Variant> {
+pub(crate) fn same_type(there: &Variant, number: f64) -> Option<Variant> {
     let whole = number.round();
     let within = |low: f64, high: f64| (low..=high).contains(&whole).then_some(whole);
     // Each cast is of a whole number within the range of its type.
@@ -102,7 +102,7 @@ pub(crate) fn is_written(status: StatusCode) -> bool {
 }
 
 /// A status with its code, for look-up: `BadOutOfRange (0x803C0000)`.
-pub(crate) fn words(status: StatusCode) -> String {
+pub(crate) fn describe_status(status: StatusCode) -> String {
     format!("{status} (0x{:08X})", status.bits())
 }
 
@@ -125,22 +125,22 @@ mod tests {
             Variant::Float(0.0),
             Variant::Double(0.0),
         ] {
-            let value = like(&there, 101.0).unwrap();
+            let value = same_type(&there, 101.0).unwrap();
             assert_eq!(value.type_id(), there.type_id());
             assert_eq!(number(&value), 101.0);
-            assert_eq!(like(&there, f64::NAN), None, "{there:?}");
+            assert_eq!(same_type(&there, f64::NAN), None, "{there:?}");
         }
-        assert_eq!(like(&Variant::Boolean(false), 1.0), Some(Variant::Boolean(true)));
-        assert_eq!(like(&Variant::Boolean(false), 2.0), None);
-        assert_eq!(like(&Variant::UInt16(0), 65_536.0), None);
-        assert_eq!(like(&Variant::Byte(0), -1.0), None);
-        assert_eq!(like(&Variant::Float(0.0), 1e300), None);
-        assert_eq!(like(&Variant::Empty, 1.0), None);
+        assert_eq!(same_type(&Variant::Boolean(false), 1.0), Some(Variant::Boolean(true)));
+        assert_eq!(same_type(&Variant::Boolean(false), 2.0), None);
+        assert_eq!(same_type(&Variant::UInt16(0), 65_536.0), None);
+        assert_eq!(same_type(&Variant::Byte(0), -1.0), None);
+        assert_eq!(same_type(&Variant::Float(0.0), 1e300), None);
+        assert_eq!(same_type(&Variant::Empty, 1.0), None);
         assert!(number(&Variant::from("101")).is_nan());
     }
 
     #[test]
-    fn a_status_is_a_quality() {
+    fn each_status_has_its_quality() {
         let with = |status| quality(&DataValue { status, ..DataValue::null() });
         assert_eq!(with(None), Quality::Good);
         assert_eq!(with(Some(StatusCode::GoodClamped)), Quality::Uncertain);

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_core::{Backend, BackendError, Channel, Quality, RigMode, SampleBatch, Setpoints};
-use mapper_driver_host::{Driver, PATIENCE, Patience};
+use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver, Timeouts};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
@@ -108,7 +108,7 @@ impl Stand {
     }
 
     fn driver(&self, password: &str) -> Driver {
-        Driver::of_program(&self.program(password), "opcua", &self.settings(), PATIENT).unwrap()
+        Driver::start_program(&self.program(password), "opcua", &self.settings(), SLOW_TIMEOUTS).unwrap()
     }
 
     fn armed(&self) -> Driver {
@@ -158,7 +158,7 @@ fn setpoints(p3_pa: f64) -> Setpoints {
 }
 
 /// Polls every half second until `reached`; returns the duration.
-fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
+fn poll_until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool) -> f64 {
     let begun = Instant::now();
     loop {
         *t_s += 0.5;
@@ -174,7 +174,7 @@ fn until(rig: &mut Driver, t_s: &mut f64, reached: impl Fn(&SampleBatch) -> bool
 /// parallel here. Without the driver's own reconnection it would take half a minute, or fail.
 const AGAIN_S: f64 = 10.0;
 /// For tests of the driver's own deadlines: on an idle computer they end within 2 s.
-const PATIENT: Patience = Patience { call: Duration::from_secs(20), ..PATIENCE };
+const SLOW_TIMEOUTS: Timeouts = Timeouts { call: Duration::from_secs(20), ..DEFAULT_TIMEOUTS };
 
 fn reads(batch: &SampleBatch) -> bool {
     batch.last(Channel::T2).is_some_and(f64::is_finite)
@@ -202,7 +202,7 @@ fn a_trusted_server_is_read_and_written() {
     stand.trust();
     let mut rig = stand.armed();
     let mut t_s = 0.0;
-    until(&mut rig, &mut t_s, |batch| batch.last(Channel::ShaftSpeed).is_some_and(|rpm| rpm > 10_000.0));
+    poll_until(&mut rig, &mut t_s, |batch| batch.last(Channel::ShaftSpeed).is_some_and(|rpm| rpm > 10_000.0));
     let batch = rig.poll(t_s + 1.0).unwrap();
     let from = batch.provenance_of(Channel::T2).unwrap();
     assert!(from.quality.iter().all(|quality| *quality == Quality::Good), "{from:?}");
@@ -224,7 +224,7 @@ fn a_trusted_server_is_read_and_written() {
 /// An expired certificate is neither pinned nor accepted, even if pinned while valid; the message gives the day.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_whose_certificate_has_expired_is_not_talked_to() {
+fn a_server_with_an_expired_certificate_is_refused() {
     let mut stand = Stand::new();
     stand.restart_valid("expired", "0");
     let refused = stand.command(&["trust", &stand.endpoint()]);
@@ -266,15 +266,15 @@ fn a_server_that_restarts_is_read_again_soon() {
     let mut stand = Stand::new();
     stand.trust();
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
-    until(&mut rig, &mut t_s, reads);
+    poll_until(&mut rig, &mut t_s, reads);
     stand.kill();
-    until(&mut rig, &mut t_s, reads_nothing);
+    poll_until(&mut rig, &mut t_s, reads_nothing);
     // The server starts in some seconds; polls alone renew the lease.
     let (certificate, port) = (stand.scratch.path().join("pki"), stand.port.clone());
     let starting = std::thread::spawn(move || serve(&port, &certificate, "365"));
-    until(&mut rig, &mut t_s, |_| starting.is_finished());
+    poll_until(&mut rig, &mut t_s, |_| starting.is_finished());
     (stand.server, stand.port) = starting.join().unwrap();
-    let took_s = until(&mut rig, &mut t_s, reads);
+    let took_s = poll_until(&mut rig, &mut t_s, reads);
     assert!(took_s < AGAIN_S, "{took_s} s");
     rig.set(&setpoints(160e3)).unwrap();
     rig.make_safe().unwrap();
@@ -289,16 +289,16 @@ fn a_stopped_server_is_read_again_soon() {
     stand.trust();
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
     for pause_s in [2.0, 12.0] {
-        until(&mut rig, &mut t_s, reads);
+        poll_until(&mut rig, &mut t_s, reads);
         stand.signal("STOP");
-        until(&mut rig, &mut t_s, reads_nothing);
+        poll_until(&mut rig, &mut t_s, reads_nothing);
         let back_s = t_s + pause_s;
         while t_s < back_s {
             t_s += 0.5;
             assert!(!reads(&rig.poll(t_s).unwrap()), "a stopped server gives no readings");
         }
         stand.signal("CONT");
-        let took_s = until(&mut rig, &mut t_s, reads);
+        let took_s = poll_until(&mut rig, &mut t_s, reads);
         assert!(took_s < AGAIN_S, "{took_s} s after {pause_s} s");
     }
     rig.make_safe().unwrap();
@@ -312,14 +312,14 @@ fn a_server_that_is_gone_for_good_is_reported_in_time() {
     let mut stand = Stand::new();
     stand.trust();
     let (mut rig, mut t_s) = (stand.armed(), 0.0);
-    until(&mut rig, &mut t_s, reads);
+    poll_until(&mut rig, &mut t_s, reads);
     stand.kill();
     // The driver reports it: the host's deadline is longer here.
     let begun = Instant::now();
     let lost = rig.make_safe().unwrap_err();
     assert!(matches!(lost, BackendError::Lost { .. }), "{lost}");
-    assert!(begun.elapsed() < PATIENT.call / 2, "{:?}", begun.elapsed());
-    until(&mut rig, &mut t_s, reads_nothing);
+    assert!(begun.elapsed() < SLOW_TIMEOUTS.call / 2, "{:?}", begun.elapsed());
+    poll_until(&mut rig, &mut t_s, reads_nothing);
     // A rig is not disarmed until its safe state is confirmed.
     assert!(matches!(rig.disarm(), Err(BackendError::Lost { .. })));
 }
@@ -327,18 +327,19 @@ fn a_server_that_is_gone_for_good_is_reported_in_time() {
 /// A wrong unit is detected before any write.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn readings_that_cannot_be_are_refused_with_their_node_and_unit() {
+fn implausible_readings_are_refused_with_their_node_and_unit() {
     let stand = Stand::new();
     stand.trust();
     let mut settings = stand.settings();
     settings["read"]["P2"]["unit"] = json!("kPa");
-    let mut rig = Driver::of_program(&stand.program(PASSWORD), "opcua", &settings, PATIENCE).unwrap();
+    let mut rig =
+        Driver::start_program(&stand.program(PASSWORD), "opcua", &settings, DEFAULT_TIMEOUTS).unwrap();
     let refused = words(rig.arm().unwrap_err());
     // 1 bar within its noise, a thousand times: few digits, and the plausible range.
     let (_, message) = refused.split_once("at `read.P2`: P2 reads ").unwrap();
     let (number, rest) = message.split_once(" Pa from the node ns=2;s=P2 (with `unit: kPa`)").unwrap();
     assert!((9e7..1.1e8).contains(&number.parse::<f64>().unwrap()) && number.len() < 9, "{refused}");
-    assert!(rest.contains("1000 to 5000000 Pa") && rest.contains("Look at `node` and `unit`"), "{refused}");
+    assert!(rest.contains("1000 to 5000000 Pa") && rest.contains("`node` and `unit`"), "{refused}");
     stand.armed().disarm().unwrap();
 }
 
@@ -355,24 +356,21 @@ fn nodes_of_another_type_are_refused_before_anything_is_written() {
         ("write", "valve", "flag", ["ns=2;s=flag (Boolean) cannot hold 2.5 for `write.valve`", "`scale`"]),
         ("write", "p3", "whole", ["ns=2;s=whole (Int16) cannot hold 900000 for `write.p3`", "`unit`"]),
         // An opening of 0.7 would be written as 1.
-        (
-            "write",
-            "valve",
-            "whole",
-            ["ns=2;s=whole (Int16, `write.valve`) holds whole numbers", "steps of 1 from 0.1 to 2.5"],
-        ),
+        ("write", "valve", "whole", ["ns=2;s=whole (Int16, `write.valve`)", "steps of 1 from 0.1 to 2.5"]),
         ("read", "T2", "absent", ["ns=2;s=absent cannot be read", "BadNodeIdUnknown"]),
     ] {
         let mut settings = stand.settings();
         settings[of][key]["node"] = json!(format!("ns=2;s={node}"));
-        let mut rig = Driver::of_program(&stand.program(PASSWORD), "opcua", &settings, PATIENCE).unwrap();
+        let mut rig =
+            Driver::start_program(&stand.program(PASSWORD), "opcua", &settings, DEFAULT_TIMEOUTS).unwrap();
         let refused = words(rig.arm().unwrap_err());
         assert!(parts.iter().all(|part| refused.contains(part)), "{node}: {refused}");
     }
     // Integers are accepted if they are fine enough.
     let mut settings = stand.settings();
     settings["write"]["valve"] = json!({"node": "ns=2;s=whole", "scale": 0.01});
-    let mut rig = Driver::of_program(&stand.program(PASSWORD), "opcua", &settings, PATIENCE).unwrap();
+    let mut rig =
+        Driver::start_program(&stand.program(PASSWORD), "opcua", &settings, DEFAULT_TIMEOUTS).unwrap();
     rig.arm().unwrap();
     rig.set(&setpoints(150e3)).unwrap();
     rig.hold().unwrap();
@@ -407,7 +405,7 @@ fn wrong_passwords_use_up_no_sessions() {
 /// Typical first mistakes of users, and a server that is off: the messages contain no status code and no internal error.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_server_is_trusted_by_its_whole_address_and_only_where_it_is() {
+fn trust_needs_the_whole_address_of_a_running_server() {
     let mut stand = Stand::new();
     let trust_error = |stand: &Stand, endpoint: &str| {
         let output = stand.command(&["trust", endpoint]);
@@ -420,13 +418,13 @@ fn a_server_is_trusted_by_its_whole_address_and_only_where_it_is() {
     stand.kill();
     let words = trust_error(&stand, &stand.endpoint());
     assert!(words.contains(&format!("no server answers at {place}: Connection refused")), "{words}");
-    assert!(!words.contains("Os {") && words.contains("Is the server on"), "{words}");
+    assert!(!words.contains("Os {"), "{words}");
 }
 
 /// Only `Good` confirms a write.
 #[test]
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
-fn a_write_that_is_not_simply_good_is_lost() {
+fn only_the_status_good_confirms_a_write() {
     for code in ["GoodClamped", "GoodCompletesAsynchronously"] {
         let stand = Stand::with(&["--answers", code]);
         stand.trust();
@@ -459,7 +457,7 @@ fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
             noted.get() && marked.get()
         };
         assert!(
-            (0..CONNECTIONS).any(|_| over_a_connection(&stand, seen)),
+            (0..CONNECTIONS).any(|_| observe_over_a_connection(&stand, seen)),
             "{misdeed}: neither marked nor noted"
         );
     }
@@ -469,7 +467,7 @@ fn bad_readings_are_dropped_and_uncertain_ones_are_reported() {
 const CONNECTIONS: usize = 5;
 
 /// Polls every half second until `seen`; `false` if the connection broke or nothing was seen in ten seconds of the rig's time.
-fn over_a_connection(stand: &Stand, seen: impl Fn(&SampleBatch) -> bool) -> bool {
+fn observe_over_a_connection(stand: &Stand, seen: impl Fn(&SampleBatch) -> bool) -> bool {
     let mut rig = stand.driver(PASSWORD);
     if rig.arm().and_then(|()| rig.set(&setpoints(150e3))).is_err() {
         return false;

@@ -72,7 +72,7 @@ impl<'a> Schedule<'a> {
         settings.take(rig);
         settings.sensors = self.sensors(case.seed);
         if self.laboratory == Laboratory::OtherLab {
-            other_lab::turn_into(&mut settings, OtherStructure::default());
+            other_lab::apply_structure(&mut settings, OtherStructure::default());
         }
         Ok(VirtualLab::new(settings))
     }

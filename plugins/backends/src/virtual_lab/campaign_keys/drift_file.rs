@@ -1,7 +1,7 @@
 //! `drift:` below `virtual_lab`: drifts during the campaign.
 
 use crate::virtual_lab::campaign_keys::setting_problem::SettingProblem;
-use crate::virtual_lab::rig::drift::{Drifting, LabDrift};
+use crate::virtual_lab::rig::drift::{DriftTarget, LabDrift};
 use mapper_core::{BackendError, Channel};
 use mapper_yaml::units::{Kind, Quantity};
 use serde::Deserialize;
@@ -24,25 +24,25 @@ pub(crate) struct DriftFile {
 
 /// Drifts with their units resolved.
 pub(crate) fn read(files: &[DriftFile]) -> Result<Vec<LabDrift>, BackendError> {
-    files.iter().enumerate().map(|(index, file)| one(index, file)).collect()
+    files.iter().enumerate().map(|(index, file)| read_one(index, file)).collect()
 }
 
-fn one(index: usize, file: &DriftFile) -> Result<LabDrift, BackendError> {
+fn read_one(index: usize, file: &DriftFile) -> Result<LabDrift, BackendError> {
     let key = |key: &str| format!("drift[{index}].{key}");
-    let what = match file.cause.as_str() {
-        "fouling" => Drifting::Fouling,
-        "bearing_friction" => Drifting::BearingFriction,
+    let target = match file.cause.as_str() {
+        "fouling" => DriftTarget::Fouling,
+        "bearing_friction" => DriftTarget::BearingFriction,
         name => match serde_json::from_value::<Channel>(serde_json::json!(name)) {
-            Ok(channel) if !is_command(channel) => Drifting::Sensor(channel),
+            Ok(channel) if !is_command(channel) => DriftTarget::Sensor(channel),
             _ => return Err(SettingProblem::UnknownDrift { cause: name.to_owned() }.at(key("cause"))),
         },
     };
-    let change = change(what, &file.change).map_err(|problem| problem.at(key("change")))?;
+    let change = parse_change(target, &file.change).map_err(|problem| problem.at(key("change")))?;
     let over_s = file.over.map(|over| over.inside);
     if let Some(over_s) = over_s.filter(|over_s| *over_s <= 0.0) {
         return Err(SettingProblem::NoDuration { over_s }.at(key("over")));
     }
-    Ok(LabDrift { what, change, over_s, from_s: file.from.map_or(0.0, |from| from.inside) })
+    Ok(LabDrift { target, change, over_s, from_s: file.from.map_or(0.0, |from| from.inside) })
 }
 
 fn is_command(channel: Channel) -> bool {
@@ -50,19 +50,19 @@ fn is_command(channel: Channel) -> bool {
 }
 
 /// Beyond this limit the machine, or the air supply behind a sensor, would be unphysical.
-const LARGEST_CHANGE_RATIO: f64 = 0.3;
+const MAX_CHANGE_RATIO: f64 = 0.3;
 
-fn change(what: Drifting, text: &str) -> Result<f64, SettingProblem> {
+fn parse_change(target: DriftTarget, text: &str) -> Result<f64, SettingProblem> {
     const FRICTION: &str = "W s2/rad2";
-    let kind = match what {
-        Drifting::Sensor(channel) => match channel.info().dimension {
+    let kind = match target {
+        DriftTarget::Sensor(channel) => match channel.info().dimension {
             mapper_core::Dimension::RotationalSpeed => Kind::Speed,
             mapper_core::Dimension::MassFlow | mapper_core::Dimension::Ratio => Kind::Fraction,
             mapper_core::Dimension::Pressure => Kind::PressureDifference,
             mapper_core::Dimension::Temperature => Kind::TemperatureDifference,
         },
-        Drifting::Fouling => Kind::Fraction,
-        Drifting::BearingFriction => {
+        DriftTarget::Fouling => Kind::Fraction,
+        DriftTarget::BearingFriction => {
             let number = text.trim().strip_suffix(FRICTION).map(|number| number.trim().parse());
             return match number {
                 Some(Ok(value)) if f64::is_finite(value) => Ok(value),
@@ -72,11 +72,8 @@ fn change(what: Drifting, text: &str) -> Result<f64, SettingProblem> {
     };
     let value =
         mapper_yaml::units::parse(kind, text).map_err(|source| SettingProblem::Quantity { kind, source })?;
-    if kind == Kind::Fraction && value.abs() > LARGEST_CHANGE_RATIO {
-        return Err(SettingProblem::DriftTooLarge {
-            text: text.to_owned(),
-            limit_ratio: LARGEST_CHANGE_RATIO,
-        });
+    if kind == Kind::Fraction && value.abs() > MAX_CHANGE_RATIO {
+        return Err(SettingProblem::DriftTooLarge { text: text.to_owned(), limit_ratio: MAX_CHANGE_RATIO });
     }
     Ok(value)
 }

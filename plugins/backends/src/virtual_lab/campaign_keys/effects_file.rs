@@ -26,7 +26,7 @@ pub(crate) enum ValueText {
 }
 
 /// Applies the effects to a rig.
-pub(crate) fn put_in(
+pub(crate) fn apply_effects(
     rig: &mut Rig,
     wanted: &BTreeMap<String, EffectValues>,
     known: &[Arc<dyn Effect>],
@@ -39,7 +39,7 @@ pub(crate) fn put_in(
         };
         let parameters = &effect.info().parameters;
         if let Some(name) = values.unknown_name(parameters) {
-            return Err(form(parameters).at(format!("{key}.{name}")));
+            return Err(form_problem(parameters).at(format!("{key}.{name}")));
         }
         read_all(parameters, values)
             .and_then(|values| Ok(effect::add(rig, effect.as_ref(), &values)?))
@@ -63,16 +63,16 @@ fn read_all(parameters: &[EffectParameter], values: &EffectValues) -> Result<Vec
             EffectValues::Number(number) if parameters.len() == 1 => &ValueText::Number(*number),
             EffectValues::Text(text) if parameters.len() == 1 => &ValueText::Text(text.clone()),
             EffectValues::Named(values) => {
-                values.get(parameter.name.as_ref()).ok_or_else(|| form(parameters))?
+                values.get(parameter.name.as_ref()).ok_or_else(|| form_problem(parameters))?
             }
-            EffectValues::Number(_) | EffectValues::Text(_) => return Err(form(parameters)),
+            EffectValues::Number(_) | EffectValues::Text(_) => return Err(form_problem(parameters)),
         };
         read(parameter, value)
     };
     parameters.iter().map(read_one).collect()
 }
 
-fn form(parameters: &[EffectParameter]) -> SettingProblem {
+fn form_problem(parameters: &[EffectParameter]) -> SettingProblem {
     let names: Vec<String> =
         parameters.iter().map(|one| format!("{}: a value in {}", one.name, one.unit)).collect();
     SettingProblem::EffectForm { form: format!("{{{}}}", names.join(", ")) }

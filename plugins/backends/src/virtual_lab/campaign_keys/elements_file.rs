@@ -42,59 +42,60 @@ pub(crate) fn read(
     let mut lab: BTreeMap<Channel, LabElements> = nominal
         .redundant
         .keys()
-        .filter_map(|channel| Some((*channel, of_channel(*channel, nominal, draws)?)))
+        .filter_map(|channel| Some((*channel, make_elements(*channel, nominal, draws)?)))
         .collect();
     // Settings of a channel apply to each of its sensors.
     for (channel, offset) in offset_of {
         let members = lab.get_mut(channel).map(|elements| &mut elements.elements);
-        members.into_iter().flatten().for_each(|member| member.errors.offset = *offset);
+        members.into_iter().flatten().for_each(|element| element.errors.offset = *offset);
     }
     for (index, file) in files.iter().enumerate() {
-        put_in(&mut lab, index, file)?;
+        apply_fault(&mut lab, index, file)?;
     }
     Ok(lab)
 }
 
-fn of_channel(channel: Channel, nominal: &NominalRig, draws: &Draws) -> Option<LabElements> {
+fn make_elements(channel: Channel, nominal: &NominalRig, draws: &Draws) -> Option<LabElements> {
     let declared = nominal.redundant.get(&channel)?.clone();
     let common = declared.common_offset_sigma * draws.of(channel as u64).0;
     // Probes of equal diameter are the machine's own, whose true diameter may differ from the declared one.
     let first_m = declared.elements.first().map(|element| element.probe_diameter_m);
-    let alike = declared.elements.iter().all(|element| Some(element.probe_diameter_m) == first_m);
-    let of_element = |(index, element): (usize, &DeclaredElement)| {
+    let have_equal_tips = declared.elements.iter().all(|element| Some(element.probe_diameter_m) == first_m);
+    let make_element = |(index, element): (usize, &DeclaredElement)| {
         let errors = draws.errors(&element.declared, stream(Element { channel, number: index + 1 }));
         LabElement {
             errors: SensorErrors { offset: errors.offset + common, ..errors },
-            probe_diameter_m: (channel == Channel::T2 && !alike).then_some(element.probe_diameter_m),
+            probe_diameter_m: (channel == Channel::T2 && !have_equal_tips)
+                .then_some(element.probe_diameter_m),
             lag_s: 0.0,
             stuck_after_s: f64::INFINITY,
         }
     };
-    let elements = declared.elements.iter().enumerate().map(of_element).collect();
+    let elements = declared.elements.iter().enumerate().map(make_element).collect();
     Some(LabElements { declared, elements })
 }
 
-fn put_in(
+fn apply_fault(
     lab: &mut BTreeMap<Channel, LabElements>,
     index: usize,
     file: &FaultFile,
 ) -> Result<(), BackendError> {
     let key = |key: &str| format!("faults[{index}].{key}");
     let count = lab.get(&file.channel).map_or(0, |elements| elements.elements.len());
-    let member = lab
+    let element = lab
         .get_mut(&file.channel)
         .and_then(|elements| elements.elements.get_mut(file.element.checked_sub(1)?));
-    let Some(member) = member else {
+    let Some(element) = element else {
         let problem = SettingProblem::NoElement { channel: file.channel, count };
         return Err(problem.at(key(if count == 0 { "channel" } else { "element" })));
     };
     if let Some(text) = &file.offset {
         let kind = offset_kind(file.channel);
-        member.errors.offset = mapper_yaml::units::parse(kind, text)
+        element.errors.offset = mapper_yaml::units::parse(kind, text)
             .map_err(|source| SettingProblem::Quantity { kind, source }.at(key("offset")))?;
     }
     if let Some(stuck_after) = file.stuck_after {
-        member.stuck_after_s = stuck_after.inside;
+        element.stuck_after_s = stuck_after.inside;
     }
     if let Some(diameter) = file.probe_diameter {
         if file.channel != Channel::T2 {
@@ -102,11 +103,11 @@ fn put_in(
         }
         within(1e3 * diameter.inside, "mm", 0.0..=20.0)
             .map_err(|problem| problem.at(key("probe_diameter")))?;
-        member.probe_diameter_m = Some(diameter.inside);
+        element.probe_diameter_m = Some(diameter.inside);
     }
     if let Some(lag) = file.lag {
         within(lag.inside, "s", 0.0..=3600.0).map_err(|problem| problem.at(key("lag")))?;
-        member.lag_s = lag.inside;
+        element.lag_s = lag.inside;
     }
     Ok(())
 }

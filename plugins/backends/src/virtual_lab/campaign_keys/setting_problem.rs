@@ -12,7 +12,7 @@ pub enum SettingProblem {
     /// An unknown key, or a value of the wrong type.
     #[error(transparent)]
     Form(#[from] serde_json::Error),
-    /// A value without meaning.
+    /// A value outside its range.
     #[error("{} is not between {low} and {}", with_unit(value, unit), with_unit(high, unit))]
     OutOfRange {
         /// The value.
@@ -57,7 +57,7 @@ pub enum SettingProblem {
         unit: String,
     },
     /// A bare number without its unit.
-    #[error("{value} lacks its unit: write `{value} {unit}`")]
+    #[error("{value} has no unit: write `{value} {unit}`")]
     BareNumber {
         /// The number.
         value: f64,
@@ -86,14 +86,14 @@ pub enum SettingProblem {
         cause: String,
     },
     /// A change of zero duration.
-    #[error("{over_s} s is not a duration for a change; leave `over` out for a step")]
+    #[error("the duration {over_s} s must be above 0; remove `over` for a step")]
     NoDuration {
         /// The written duration, s.
         over_s: f64,
     },
     /// A fault of a sensor number that the channel does not have.
     #[error(
-        "{channel} has {count} sensors of which one could fail: name one of several that the campaign declares"
+        "the campaign declares {count} redundant sensors of {channel}: write the number of one of them, from 1"
     )]
     NoElement {
         /// The channel.
@@ -102,13 +102,13 @@ pub enum SettingProblem {
         count: usize,
     },
     /// A probe diameter of a channel without a simulated probe.
-    #[error("only the probes of T2 have a tip here: write `lag` for {channel}")]
+    #[error("only T2 probes have a simulated tip: write `lag` for {channel}")]
     NoProbe {
         /// The channel.
         channel: Channel,
     },
     /// A drift that makes the machine unphysical.
-    #[error("{text} is beyond {} %", 100.0 * limit_ratio)]
+    #[error("{text} is too large: at most {} %", 100.0 * limit_ratio)]
     DriftTooLarge {
         /// The written text.
         text: String,

@@ -1,7 +1,7 @@
 //! The lab's settings as a campaign writes them below `backend: {virtual_lab: ...}`.
 
 use crate::virtual_lab::campaign_keys::drift_file::{self, DriftFile};
-use crate::virtual_lab::campaign_keys::effects_file::{EffectValues, put_in};
+use crate::virtual_lab::campaign_keys::effects_file::{EffectValues, apply_effects};
 use crate::virtual_lab::campaign_keys::elements_file::{self, FaultFile};
 use crate::virtual_lab::campaign_keys::setting_problem::{SettingProblem, within};
 use crate::virtual_lab::rig::actuator::ActuatorDynamics;
@@ -56,7 +56,7 @@ struct SettingsFile {
     tolerances_seed: Option<u64>,
     /// Deviations of the machine within its tolerances, in place of a draw.
     deviations: DeviationsFile,
-    /// How the actuators follow.
+    /// Dynamics of the actuators.
     actuators: ActuatorsFile,
     /// Differences of the true machine from the declared one.
     machine: MachineFile,
@@ -135,7 +135,7 @@ struct DeviationsFile {
 
 impl DeviationsFile {
     /// Applies them to a rig.
-    fn put_into(&self, rig: &mut Rig) -> Result<(), BackendError> {
+    fn apply(&self, rig: &mut Rig) -> Result<(), BackendError> {
         let scale = |key: &str, deviation: &Option<Quantity<Fraction>>| {
             let ratio = deviation.as_ref().map_or(0.0, |deviation| deviation.inside);
             within(100.0 * ratio, "%", -90.0..=900.0)
@@ -206,7 +206,7 @@ pub fn read_settings(
         })?,
     };
     let params = &nominal.model.params;
-    let model = Model { params: true_params(*params, &file.machine)?, ..nominal.model.clone() };
+    let model = Model { params: apply_true_params(*params, &file.machine)?, ..nominal.model.clone() };
     let sample_rate_hz = file.sample_rate.map_or(10.0, |rate| rate.inside);
     within(sample_rate_hz, "Hz", 0.1..=1000.0).map_err(|problem| problem.at("sample_rate"))?;
     let surge_swing_ratio = file.surge_swing.map_or(0.08, |swing| swing.inside);
@@ -215,15 +215,15 @@ pub fn read_settings(
     if file.tolerances == TolerancesName::Drawn {
         draw_tolerances(&mut rig, &nominal.tolerances, file.tolerances_seed.unwrap_or(nominal.seed));
     }
-    file.deviations.put_into(&mut rig)?;
-    put_in(&mut rig, &file.effects, &nominal.effects)?;
+    file.deviations.apply(&mut rig)?;
+    apply_effects(&mut rig, &file.effects, &nominal.effects)?;
     let actuators = &file.actuators;
     let draws = Draws {
         seed: nominal.seed,
         noise_ratio: if file.noise == NoiseName::Declared { 1.0 } else { 0.0 },
         drawn: file.offsets == OffsetsName::Drawn,
     };
-    let offset_of = offsets_of(&file)?;
+    let offset_of = parse_offsets(&file)?;
     let mut lab = LabSettings {
         model: rig.model.clone(),
         instruments: Instruments::default(),
@@ -242,10 +242,10 @@ pub fn read_settings(
         t3_actuator: actuators.turbine_inlet_temperature.dynamics("turbine_inlet_temperature", 20.0, 10.0)?,
         valve_actuator: actuators.valve.dynamics("valve", 0.2, 1.0)?,
         oil_actuator: actuators.oil_temperature.dynamics("oil_temperature", 30.0, 1.0)?,
-        sensors: sensors(&offset_of, nominal, &draws),
+        sensors: draw_sensors(&offset_of, nominal, &draws),
         redundant: elements_file::read(&file.faults, nominal, &draws, &offset_of)?,
         uneven_at_rest: match file.offsets {
-            OffsetsName::Drawn => uneven_at_rest(nominal),
+            OffsetsName::Drawn => draw_nonuniformity(nominal),
             OffsetsName::None => BTreeMap::new(),
         },
         drifts: drift_file::read(&file.drift)?,
@@ -291,7 +291,7 @@ impl PrecursorFile {
     }
 }
 
-fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, BackendError> {
+fn apply_true_params(mut params: Params, file: &MachineFile) -> Result<Params, BackendError> {
     if let Some(alpha) = file.alpha_area {
         within(alpha, "", 0.0..=1.0).map_err(|problem| problem.at("machine.alpha_area"))?;
         params.compressor.alpha_area_ratio = alpha;
@@ -312,7 +312,7 @@ fn true_params(mut params: Params, file: &MachineFile) -> Result<Params, Backend
 }
 
 /// Offsets of single channels, in their units.
-fn offsets_of(file: &SettingsFile) -> Result<BTreeMap<Channel, f64>, BackendError> {
+fn parse_offsets(file: &SettingsFile) -> Result<BTreeMap<Channel, f64>, BackendError> {
     let parse = |(channel, text): (&Channel, &String)| {
         let kind = offset_kind(*channel);
         let offset = mapper_yaml::units::parse(kind, text)
@@ -322,7 +322,7 @@ fn offsets_of(file: &SettingsFile) -> Result<BTreeMap<Channel, f64>, BackendErro
     file.offset_of.iter().map(parse).collect()
 }
 
-fn sensors(
+fn draw_sensors(
     offset_of: &BTreeMap<Channel, f64>,
     nominal: &NominalRig,
     draws: &Draws,
@@ -337,7 +337,7 @@ fn sensors(
 }
 
 /// Drawn from the declared non-uniformity of the soak; empty without a declaration.
-fn uneven_at_rest(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
+fn draw_nonuniformity(nominal: &NominalRig) -> BTreeMap<Channel, f64> {
     let Some(soak) = nominal.soak else { return BTreeMap::new() };
     // A separate stream from that of the offsets.
     let seed = nominal.seed ^ 0x6A09_E667_F3BC_C908;
@@ -377,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn effects_are_put_in_by_their_ids_and_values_with_units() {
+    fn effects_are_applied_by_their_ids_and_values_with_units() {
         let settings = json!({
             "start": "settled", "weather": "wandering",
             "effects": {
@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_say_how_the_lab_differs_from_the_declared_rig() {
+    fn settings_change_the_lab_from_the_declared_rig() {
         let settings = json!({
             "sample_rate": "20 Hz", "start": "settled", "noise": "none", "offset_of": {"T2": "0.3 K"},
             "actuators": {"turbine_inlet_pressure": {"lag": "0.5 s", "slew": "20 kPa/s"}},
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn drifts_have_units_and_may_have_begun_before_the_run() {
+    fn drifts_have_units_and_may_begin_before_the_run() {
         let settings = json!({"drift": [
             {"cause": "T2", "change": "0.5 K", "over": "4 h"},
             {"cause": "m_c", "change": "1 %", "over": "10 h", "from": "-10 h"},
@@ -431,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn drawn_offsets_scatter_as_declared_and_belong_to_seed_and_channel() {
+    fn drawn_offsets_have_the_declared_scatter_for_each_seed_and_channel() {
         let offsets: Vec<f64> = (0..2000)
             .map(|seed| {
                 let lab = read_settings(&json!({}), &NominalRig { seed, ..nominal() }).unwrap();
@@ -445,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_name_their_key() {
+    fn an_error_contains_its_key() {
         for (settings, expected) in [
             (json!({"sampel_rate": "10 Hz"}), "`sampel_rate`"),
             (json!({"actuators": {"valve": {"lag": "1 K"}}}), "actuators.valve.lag"),
@@ -458,11 +458,11 @@ mod tests {
             (json!({"actuators": {"valve": {"slew": "0 1/s"}}}), "actuators.valve.slew"),
             (json!({"drift": [{"cause": "T9", "change": "1 K"}]}), "drift[0].cause"),
             (json!({"drift": [{"cause": "T2", "change": "1 kPa"}]}), "drift[0].change"),
-            (json!({"drift": [{"cause": "T2", "change": "1 K", "over": "0 s"}]}), "leave `over` out"),
-            (json!({"drift": [{"cause": "fouling", "change": "-150 %"}]}), "beyond 30 %"),
+            (json!({"drift": [{"cause": "T2", "change": "1 K", "over": "0 s"}]}), "`over`"),
+            (json!({"drift": [{"cause": "fouling", "change": "-150 %"}]}), "30 %"),
             (json!({"effects": {"area_spilt": 0.1}}), "area_split"),
             (json!({"effects": {"area_split": 2.0}}), "is not between 0 and 0.6"),
-            (json!({"effects": {"tip_diameter": 1.5}}), "lacks its unit"),
+            (json!({"effects": {"tip_diameter": 1.5}}), "effects.tip_diameter"),
             (json!({"effects": {"inner_node": {"phi": 0.3}}}), "G: a value in W/K"),
             (json!({"effects": {"inner_node": {"psi": 0.3}}}), "effects.inner_node.psi"),
         ] {

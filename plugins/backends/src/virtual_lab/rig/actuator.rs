@@ -1,6 +1,6 @@
 //! An actuator that follows its command with a first-order lag and a limited rate, in closed form.
 
-/// How an actuator follows.
+/// Dynamics of an actuator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ActuatorDynamics {
     /// Time constant of the lag, s; 0 without lag.

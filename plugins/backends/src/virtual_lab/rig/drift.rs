@@ -5,7 +5,7 @@ use mapper_physics::machine::params::Params;
 
 /// The drifting quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Drifting {
+pub enum DriftTarget {
     /// A sensor's reading; for a flow meter, its gain.
     Sensor(Channel),
     /// Efficiency of the compressor, relative, and the flow of its map by 0.6 of it.
@@ -18,7 +18,7 @@ pub enum Drifting {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LabDrift {
     /// The drifting quantity.
-    pub what: Drifting,
+    pub target: DriftTarget,
     /// Step, or change over [`LabDrift::over_s`]; K, Pa, rpm, ratio or W s^2/rad^2.
     pub change: f64,
     /// Duration of the change, s; `None` is a step.
@@ -30,7 +30,7 @@ pub struct LabDrift {
 /// Change of the map's flow by fouling, as a share of its change of efficiency.
 const FOULING_FLOW_SHARE: f64 = 0.6;
 /// Interval between updates of a drifting machine, s.
-pub const MACHINE_HOLDS_S: f64 = 5.0;
+pub const MACHINE_UPDATE_S: f64 = 5.0;
 
 impl LabDrift {
     /// The change at a time.
@@ -44,13 +44,13 @@ impl LabDrift {
 
     /// Whether the machine itself drifts.
     pub fn is_machine(&self) -> bool {
-        !matches!(self.what, Drifting::Sensor(_))
+        !matches!(self.target, DriftTarget::Sensor(_))
     }
 }
 
 /// The reading of a sensor with its drifts.
 pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading: f64) -> f64 {
-    let own = drifts.iter().filter(|drift| drift.what == Drifting::Sensor(channel));
+    let own = drifts.iter().filter(|drift| drift.target == DriftTarget::Sensor(channel));
     own.fold(reading, |reading, drift| match channel.info().dimension {
         Dimension::MassFlow => reading * (1.0 + drift.at(t_s)),
         _ => reading + drift.at(t_s),
@@ -61,13 +61,13 @@ pub fn drifted_reading(drifts: &[LabDrift], channel: Channel, t_s: f64, reading:
 pub fn drifted_machine(drifts: &[LabDrift], mut params: Params, t_s: f64) -> Params {
     for drift in drifts {
         let now = drift.at(t_s);
-        match drift.what {
-            Drifting::Fouling => {
+        match drift.target {
+            DriftTarget::Fouling => {
                 params.compressor.efficiency_scale_ratio *= 1.0 + now;
                 params.compressor.flow_scale_ratio *= 1.0 + FOULING_FLOW_SHARE * now;
             }
-            Drifting::BearingFriction => params.bearing_friction_w_s2 += now,
-            Drifting::Sensor(_) => {}
+            DriftTarget::BearingFriction => params.bearing_friction_w_s2 += now,
+            DriftTarget::Sensor(_) => {}
         }
     }
     params
@@ -78,9 +78,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_change_over_a_time_goes_on_at_its_rate_and_a_step_stays() {
+    fn a_drift_continues_at_its_rate_and_a_step_stays() {
         let ramp = LabDrift {
-            what: Drifting::Sensor(Channel::T2),
+            target: DriftTarget::Sensor(Channel::T2),
             change: 0.5,
             over_s: Some(4.0 * 3600.0),
             from_s: 600.0,
@@ -93,9 +93,9 @@ mod tests {
     }
 
     #[test]
-    fn flows_drift_by_their_gain_and_machines_by_their_parameters() {
-        let drift = |what| LabDrift { what, change: -0.02, over_s: None, from_s: 0.0 };
-        let drifts = [drift(Drifting::Sensor(Channel::CompressorFlow)), drift(Drifting::Fouling)];
+    fn flow_meters_drift_in_gain_and_machines_in_their_parameters() {
+        let drift = |target| LabDrift { target, change: -0.02, over_s: None, from_s: 0.0 };
+        let drifts = [drift(DriftTarget::Sensor(Channel::CompressorFlow)), drift(DriftTarget::Fouling)];
         assert!((drifted_reading(&drifts, Channel::CompressorFlow, 1.0, 0.1) - 0.098).abs() < 1e-15);
         assert_eq!(drifted_reading(&drifts, Channel::T2, 1.0, 400.0), 400.0);
         let params = Params::default();

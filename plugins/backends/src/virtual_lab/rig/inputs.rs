@@ -6,7 +6,7 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::inputs::Inputs;
 
 /// Minimum ratio of air supply to P4 while the model runs: the model divides by the turbine's flow.
-pub const LOWEST_EXPANSION_RATIO: f64 = 1.0005;
+pub const MIN_EXPANSION_RATIO: f64 = 1.0005;
 
 /// Actuators over the conditions of the cell.
 #[derive(Debug, Clone)]
@@ -57,7 +57,7 @@ impl Inputs for LabInputs {
         if !self.weather.is_calm() {
             boundary = self.weather.over(boundary, t_s);
         }
-        boundary.p3_pa = boundary.p3_pa.max(boundary.p4_pa * LOWEST_EXPANSION_RATIO);
+        boundary.p3_pa = boundary.p3_pa.max(boundary.p4_pa * MIN_EXPANSION_RATIO);
         boundary
     }
 

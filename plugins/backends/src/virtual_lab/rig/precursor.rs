@@ -31,14 +31,14 @@ impl SurgePrecursor {
     pub const USUAL: SurgePrecursor = SurgePrecursor { size_ratio: 3e-3, ..SurgePrecursor::NONE };
 
     /// Root mean square of the flow fluctuation, ratio: at most `most_ratio`, at which the swing limits itself.
-    fn rms_ratio(&self, margin_ratio: f64, most_ratio: f64) -> f64 {
+    fn rms_ratio(&self, margin_ratio: f64, max_rms_ratio: f64) -> f64 {
         if margin_ratio >= self.onset_margin_ratio {
             return 0.0;
         }
         // Its value at the onset is already part of the sensors' noise.
         let over = |margin_ratio: f64| (self.onset_margin_ratio / margin_ratio).powf(self.growth) - 1.0;
         let variance = over(margin_ratio.max(1e-4)) / over(0.5 * self.onset_margin_ratio);
-        (self.size_ratio * variance.max(0.0).sqrt()).min(most_ratio)
+        (self.size_ratio * variance.max(0.0).sqrt()).min(max_rms_ratio)
     }
 }
 
@@ -95,9 +95,9 @@ impl Resonator {
         sample_s: f64,
         params: &Params,
         gas_k: f64,
-        most_ratio: f64,
+        max_rms_ratio: f64,
     ) -> Swing {
-        let rms_ratio = self.settings.rms_ratio(margin_ratio, most_ratio);
+        let rms_ratio = self.settings.rms_ratio(margin_ratio, max_rms_ratio);
         if rms_ratio <= 0.0 {
             return Swing::default();
         }

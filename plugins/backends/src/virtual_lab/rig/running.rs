@@ -9,7 +9,7 @@ use mapper_physics::simulation::simulate::{
 };
 use mapper_physics::simulation::steady;
 
-/// Why a machine cannot be settled.
+/// Failure to find a steady state.
 pub type StructureError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A running machine: the lab's interface to its equations.
@@ -43,7 +43,7 @@ pub trait Structure: std::fmt::Debug + Send + Sync {
     fn name(&self) -> &'static str;
 
     /// A machine that starts at `state` at `t_s`.
-    fn started(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine>;
+    fn start(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine>;
 
     /// A machine in steady state under `boundary`.
     ///
@@ -67,7 +67,7 @@ impl Structure for Lumped {
         NAME
     }
 
-    fn started(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine> {
+    fn start(&self, model: &Model, t_s: f64, state: State, watch: Watch) -> Box<dyn RunningMachine> {
         Box::new(Simulator::new(model, t_s, state, DEFAULT_RELATIVE_TOLERANCE, watch))
     }
 
@@ -79,7 +79,7 @@ impl Structure for Lumped {
         watch: Watch,
     ) -> Result<Box<dyn RunningMachine>, StructureError> {
         let rest = steady::settle_under(model, boundary)?;
-        Ok(self.started(model, t_s, rest.state, watch))
+        Ok(self.start(model, t_s, rest.state, watch))
     }
 }
 

@@ -106,7 +106,7 @@ mod tests {
     use mapper_physics::simulation::model::Model;
 
     #[test]
-    fn draws_scatter_as_declared() {
+    fn draws_have_the_declared_scatter() {
         let tolerances = ModelTolerances::default();
         let nominal = Rig::new(Model::nominal());
         let (mut efficiency, mut shape) = (0.0, 0.0);

@@ -106,7 +106,7 @@ impl ElementBank {
         drifted: impl Fn(f64) -> f64,
     ) -> (&[f64], f64) {
         for (member, reading) in self.members.iter_mut().zip(&mut self.readings) {
-            let seen = truth + member.behind_the_probe_k(t_s, outputs, pipe_diameter_m);
+            let seen = truth + member.offset_from_probe_k(t_s, outputs, pipe_diameter_m);
             let read = drifted(member.sensor.read(member.follower.read(t_s, seen)));
             if t_s < member.of.stuck_after_s || member.last.is_nan() {
                 member.last = read;
@@ -119,7 +119,7 @@ impl ElementBank {
 
 impl Member {
     /// Temperature of its own tip minus that of the machine's probe, K; 0 for all but T2 probes of another diameter.
-    fn behind_the_probe_k(&mut self, t_s: f64, outputs: Option<&Outputs>, pipe_diameter_m: f64) -> f64 {
+    fn offset_from_probe_k(&mut self, t_s: f64, outputs: Option<&Outputs>, pipe_diameter_m: f64) -> f64 {
         let Some((diameter_m, outputs)) = self.of.probe_diameter_m.zip(outputs) else {
             // At rest all tips have settled to one temperature.
             self.tip = None;

@@ -5,7 +5,7 @@ use mapper_core::{Channel, GuardName, Reaction, SampleBatch};
 
 /// A channel of an auxiliary instrument.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ReadChannel {
+pub struct InstrumentChannel {
     /// Display name of the instrument.
     pub reader: String,
     /// The channel.
@@ -14,24 +14,24 @@ pub struct ReadChannel {
     pub age_s: f64,
 }
 
-/// See the module. Loss of a channel that identification requires ends the run; loss of any other channel is noted.
+/// Reports a channel of an instrument without readings. If identification requires the channel, the run ends.
 #[derive(Debug, Clone)]
-pub struct ReaderWatch {
-    channels: Vec<(ReadChannel, Option<f64>, bool)>,
-    first_look_s: Option<f64>,
+pub struct InstrumentWatch {
+    channels: Vec<(InstrumentChannel, Option<f64>, bool)>,
+    first_poll_s: Option<f64>,
 }
 
-impl ReaderWatch {
+impl InstrumentWatch {
     /// Creates a guard for these channels.
-    pub fn new(channels: Vec<ReadChannel>) -> Self {
+    pub fn new(channels: Vec<InstrumentChannel>) -> Self {
         let channels = channels.into_iter().map(|channel| (channel, None, false)).collect();
-        ReaderWatch { channels, first_look_s: None }
+        InstrumentWatch { channels, first_poll_s: None }
     }
 }
 
-impl Guard for ReaderWatch {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
-        let first_s = *self.first_look_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
+impl Guard for InstrumentWatch {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
+        let first_s = *self.first_poll_s.get_or_insert(batch.t_s.first().copied().unwrap_or(now_s));
         let mut trip: Option<Trip> = None;
         for (of, last_s, reported) in &mut self.channels {
             let readings = batch.column(of.channel).unwrap_or_default().iter().zip(&batch.t_s);
@@ -43,7 +43,7 @@ impl Guard for ReaderWatch {
                 continue;
             }
             *reported = true;
-            let needed = crate::guards::first_look::NEEDED.contains(&of.channel);
+            let needed = crate::guards::start_check::REQUIRED_CHANNELS.contains(&of.channel);
             let reaction = if needed { Reaction::Safe } else { Reaction::Note };
             let (reader, channel) = (&of.reader, of.channel);
             let reason = format!("the reader `{reader}` has given no {channel} since {since_s:.1} s");
@@ -63,8 +63,8 @@ mod tests {
     use mapper_core::ChannelColumn;
 
     #[test]
-    fn a_channel_that_is_needed_ends_the_run_and_another_is_noted_once() {
-        let of = |channel| ReadChannel { reader: "bench".to_owned(), channel, age_s: 3.0 };
+    fn loss_of_a_required_channel_ends_the_run_and_of_another_is_noted_once() {
+        let of = |channel| InstrumentChannel { reader: "bench".to_owned(), channel, age_s: 3.0 };
         let batch = |t_s: f64, flow: f64, air: f64| SampleBatch {
             t_s: vec![t_s],
             columns: vec![
@@ -73,9 +73,9 @@ mod tests {
             ],
             ..SampleBatch::default()
         };
-        let mut guard = ReaderWatch::new(vec![of(Channel::CompressorFlow), of(Channel::TAmb)]);
+        let mut guard = InstrumentWatch::new(vec![of(Channel::CompressorFlow), of(Channel::TAmb)]);
         let nan = f64::NAN;
-        let mut look = |t_s, flow, air| guard.look(&batch(t_s, flow, air), t_s, &Commanded::default());
+        let mut look = |t_s, flow, air| guard.check(&batch(t_s, flow, air), t_s, &Commanded::default());
         assert_eq!(look(0.0, 0.1, 298.0), None);
         assert_eq!(look(3.0, 0.1, nan), None);
         let trip = look(3.1, 0.1, nan).unwrap();

@@ -1,6 +1,6 @@
 //! Queue of samples that have arrived but have not been polled.
 
-use crate::protocol::Unusable;
+use crate::protocol::InvalidData;
 use mapper_core::{Channel, ChannelColumn, Event, EventKind, SampleBatch};
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ const MAX_NOTES: usize = 100;
 
 /// Checked batches in order of arrival, without gaps.
 #[derive(Default)]
-pub(crate) struct Pending {
+pub(crate) struct SampleQueue {
     batches: VecDeque<SampleBatch>,
     events: Vec<Event>,
     /// Index of the next sample to arrive and of the next sample to return.
@@ -23,16 +23,16 @@ pub(crate) struct Pending {
     next: u64,
     last_s: Option<f64>,
     /// Time of the last returned sample, s.
-    taken_s: Option<f64>,
+    returned_until_s: Option<f64>,
     values: usize,
 }
 
-impl Pending {
+impl SampleQueue {
     /// Adds a batch.
     ///
     /// # Errors
-    /// [`Unusable`] if the samples do not follow the previous ones, or are too many.
-    pub(crate) fn push(&mut self, mut batch: SampleBatch) -> Result<(), Unusable> {
+    /// [`InvalidData`] if the samples do not follow the previous ones, or are too many.
+    pub(crate) fn push(&mut self, mut batch: SampleBatch) -> Result<(), InvalidData> {
         // An event from another clock might never be due. That must not happen to a trip of the rig.
         let latest_s = batch.t_s.last().copied().or(self.last_s).unwrap_or(0.0);
         for event in &mut batch.events {
@@ -41,18 +41,18 @@ impl Pending {
         self.events.append(&mut batch.events);
         let words: usize = self.events.iter().map(|event| event.message.len()).sum();
         if self.events.len() > MAX_EVENTS || self.values + words / 8 > MAX_VALUES {
-            return Err(Unusable::TooMany);
+            return Err(InvalidData::TooMany);
         }
         let Some(first_s) = batch.t_s.first().copied() else { return Ok(()) };
         if batch.first_sequence != self.expected {
-            return Err(Unusable::Sequence { expected: self.expected, found: batch.first_sequence });
+            return Err(InvalidData::Sequence { expected: self.expected, found: batch.first_sequence });
         }
         if let Some(before_s) = self.last_s.filter(|last_s| first_s <= *last_s) {
-            return Err(Unusable::Time { before_s, t_s: first_s });
+            return Err(InvalidData::Time { before_s, t_s: first_s });
         }
-        self.values += batch.t_s.len() * width(&batch) + names(&batch);
+        self.values += batch.t_s.len() * values_per_sample(&batch) + name_values(&batch);
         if self.values > MAX_VALUES {
-            return Err(Unusable::TooMany);
+            return Err(InvalidData::TooMany);
         }
         self.expected += batch.t_s.len() as u64;
         self.last_s = batch.t_s.last().copied();
@@ -68,7 +68,7 @@ impl Pending {
     }
 
     /// Whether a sample at or after `t_s` has arrived.
-    pub(crate) fn reaches(&self, t_s: f64) -> bool {
+    pub(crate) fn has_reached(&self, t_s: f64) -> bool {
         self.last_s.is_some_and(|last_s| last_s >= t_s)
     }
 
@@ -81,7 +81,8 @@ impl Pending {
         };
         while let Some(mut batch) = self.batches.pop_front() {
             let mut due = batch.t_s.partition_point(|t_s| *t_s <= until_s);
-            let before_s = due.checked_sub(1).and_then(|last| batch.t_s.get(last).copied()).or(self.taken_s);
+            let before_s =
+                due.checked_sub(1).and_then(|last| batch.t_s.get(last).copied()).or(self.returned_until_s);
             if let Some(t_s) = batch.t_s.get_mut(due)
                 && *t_s <= until_s + rounding_s
                 && before_s.is_none_or(|before_s| before_s < until_s)
@@ -89,12 +90,12 @@ impl Pending {
                 (*t_s, due) = (until_s, due + 1);
             }
             if due > 0 {
-                self.taken_s = batch.t_s.get(due - 1).copied();
+                self.returned_until_s = batch.t_s.get(due - 1).copied();
             }
-            self.values = self.values.saturating_sub(due * width(&batch));
+            self.values = self.values.saturating_sub(due * values_per_sample(&batch));
             let later = batch.split_off(due);
             if later.t_s.is_empty() {
-                self.values = self.values.saturating_sub(names(&batch));
+                self.values = self.values.saturating_sub(name_values(&batch));
             }
             whole.append(batch);
             if !later.t_s.is_empty() {
@@ -111,12 +112,12 @@ impl Pending {
     }
 }
 
-fn width(batch: &SampleBatch) -> usize {
+fn values_per_sample(batch: &SampleBatch) -> usize {
     1 + batch.columns.len() + batch.elements.len() + batch.truth.len() + 2 * batch.provenance.len()
 }
 
 /// Memory of the names in a batch, in values.
-fn names(batch: &SampleBatch) -> usize {
+fn name_values(batch: &SampleBatch) -> usize {
     batch.truth.iter().map(|column| column.name.len() + column.unit.len()).sum::<usize>() / 8
 }
 
@@ -136,21 +137,21 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_twice_late_or_backward_is_refused_and_what_was_good_stays() {
+    fn repeated_missing_and_backward_batches_are_refused_and_valid_ones_stay() {
         use Channel::{T1, T2};
-        let mut pending = Pending::default();
+        let mut pending = SampleQueue::default();
         pending.push(batch(0, &[0.0, 0.1], &[T1, T2])).unwrap();
         let again = pending.push(batch(0, &[0.0, 0.1], &[T1, T2]));
-        assert_eq!(again, Err(Unusable::Sequence { expected: 2, found: 0 }));
+        assert_eq!(again, Err(InvalidData::Sequence { expected: 2, found: 0 }));
         let missing = pending.push(batch(3, &[0.3], &[T1, T2]));
-        assert_eq!(missing, Err(Unusable::Sequence { expected: 2, found: 3 }));
+        assert_eq!(missing, Err(InvalidData::Sequence { expected: 2, found: 3 }));
         let backward = pending.push(batch(2, &[0.05], &[T1, T2]));
-        assert_eq!(backward, Err(Unusable::Time { before_s: 0.1, t_s: 0.05 }));
+        assert_eq!(backward, Err(InvalidData::Time { before_s: 0.1, t_s: 0.05 }));
         let mut worse = batch(2, &[0.2, 0.3], &[T1]);
         worse.provenance =
             vec![Provenance { channel: T1, source_t_s: vec![0.1, 0.1], quality: vec![Quality::Bad; 2] }];
         pending.push(worse).unwrap();
-        assert!(pending.reaches(0.3) && !pending.reaches(0.31));
+        assert!(pending.has_reached(0.3) && !pending.has_reached(0.31));
         let whole = pending.take(0.25, 0.0, &[T1, T2]);
         assert_eq!((whole.first_sequence, &whole.t_s[..]), (0, &[0.0, 0.1, 0.2][..]));
         assert_eq!(whole.column(T1), Some(&[0.0, 0.1, 0.2][..]));
@@ -165,7 +166,7 @@ mod tests {
     /// Seven times 0.1 added up is slightly less than 0.7. Without the tolerance, a sample would reach its guard one poll later.
     #[test]
     fn a_sample_is_not_late_by_rounding() {
-        let mut pending = Pending::default();
+        let mut pending = SampleQueue::default();
         let (sum_s, multiple_s) = ([0.1; 7].iter().sum::<f64>(), 7.0 * 0.1);
         assert!(sum_s < multiple_s);
         pending.push(batch(0, &[multiple_s], &[Channel::T1])).unwrap();
@@ -175,8 +176,8 @@ mod tests {
     }
 
     #[test]
-    fn an_event_with_the_time_of_another_clock_is_reported_with_its_samples() {
-        let mut pending = Pending::default();
+    fn an_event_with_an_unsynchronised_time_is_returned_with_its_samples() {
+        let mut pending = SampleQueue::default();
         let tripped = Event { t_s: 1.8e9, kind: EventKind::RigTripped, message: "overspeed".to_owned() };
         let with_it = SampleBatch { events: vec![tripped], ..batch(0, &[0.0, 0.1], &[Channel::T1]) };
         pending.push(with_it).unwrap();
@@ -184,23 +185,23 @@ mod tests {
     }
 
     #[test]
-    fn words_and_names_count_too() {
-        let mut pending = Pending::default();
+    fn texts_and_names_count_towards_the_limit() {
+        let mut pending = SampleQueue::default();
         let long = Event { t_s: 0.0, kind: EventKind::Note, message: "x".repeat(1 << 20) };
         let flood = (0..100).try_for_each(|_| {
             pending.push(SampleBatch { events: vec![long.clone()], ..SampleBatch::default() })
         });
-        assert_eq!(flood, Err(Unusable::TooMany));
+        assert_eq!(flood, Err(InvalidData::TooMany));
     }
 
     #[test]
-    fn no_more_is_kept_than_a_poll_may_request() {
-        let mut pending = Pending::default();
+    fn the_queue_is_limited() {
+        let mut pending = SampleQueue::default();
         let t_s: Vec<f64> = (0..100_000).map(f64::from).collect();
         let flood = (0..50).try_for_each(|i| {
             let later: Vec<f64> = t_s.iter().map(|t_s| t_s + f64::from(i) * 1e5).collect();
             pending.push(batch(i as u64 * 100_000, &later, &[Channel::T1]))
         });
-        assert_eq!(flood, Err(Unusable::TooMany));
+        assert_eq!(flood, Err(InvalidData::TooMany));
     }
 }

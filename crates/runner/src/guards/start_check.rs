@@ -4,11 +4,11 @@ use crate::guards::guard::{Commanded, Guard, Trip};
 use mapper_core::{Channel, GuardName, Reaction, SampleBatch, measurable, with_unit};
 
 /// Duration of the check, s.
-const LOOK_S: f64 = 5.0;
+const CHECK_DURATION_S: f64 = 5.0;
 /// Allowed offset of a source's clock, s.
-const CLOCK_S: f64 = 1.0;
+const MAX_CLOCK_OFFSET_S: f64 = 1.0;
 /// Channels that identification requires: a fault in one ends the run, faults in others are noted.
-pub(crate) const NEEDED: [Channel; 7] = [
+pub(crate) const REQUIRED_CHANNELS: [Channel; 7] = [
     Channel::ShaftSpeed,
     Channel::CompressorFlow,
     Channel::P1,
@@ -20,7 +20,7 @@ pub(crate) const NEEDED: [Channel; 7] = [
 
 /// Trips once, after the first seconds, if a channel does not behave like its sensor.
 #[derive(Debug, Clone)]
-pub struct FirstLook {
+pub struct StartCheck {
     channels: Vec<Channel>,
     /// Last finite reading of each channel.
     seen: Vec<Option<f64>>,
@@ -28,18 +28,18 @@ pub struct FirstLook {
     over: bool,
 }
 
-impl FirstLook {
+impl StartCheck {
     /// Creates a check of these channels.
     pub fn new(channels: Vec<Channel>) -> Self {
         let seen = vec![None; channels.len()];
-        FirstLook { channels, seen, clock_off_s: 0.0, over: false }
+        StartCheck { channels, seen, clock_off_s: 0.0, over: false }
     }
 
     /// Describes the faults, and whether they affect a required channel.
-    fn faults(&self) -> Vec<(bool, String)> {
+    fn list_faults(&self) -> Vec<(bool, String)> {
         let mut faults: Vec<(bool, String)> = Vec::new();
         for (channel, seen) in self.channels.iter().zip(&self.seen) {
-            let needed = NEEDED.contains(channel);
+            let needed = REQUIRED_CHANNELS.contains(channel);
             let range = measurable(channel.info().dimension);
             match seen {
                 None => faults.push((needed, format!("{channel} gives no reading"))),
@@ -47,16 +47,16 @@ impl FirstLook {
                     let (low, high, unit) = (range.start(), range.end(), channel.unit());
                     let words = format!(
                         "{channel} reads {}, where a sensor reads {} to {}",
-                        with_unit(digits(*value), unit),
-                        digits(*low),
-                        with_unit(digits(*high), unit)
+                        with_unit(format_bound(*value), unit),
+                        format_bound(*low),
+                        with_unit(format_bound(*high), unit)
                     );
                     faults.push((needed, words));
                 }
                 Some(_) => {}
             }
         }
-        if self.clock_off_s > CLOCK_S {
+        if self.clock_off_s > MAX_CLOCK_OFFSET_S {
             faults.push((true, format!("the source's clock is off by {:.1} s", self.clock_off_s)));
         }
         faults
@@ -64,7 +64,7 @@ impl FirstLook {
 }
 
 /// Formats a value with enough digits to distinguish it from the bounds of its range.
-fn digits(value: f64) -> String {
+fn format_bound(value: f64) -> String {
     match value.abs() {
         size if size >= 1e7 => format!("{value:.2e}"),
         size if size >= 10.0 => format!("{value:.0}"),
@@ -72,8 +72,8 @@ fn digits(value: f64) -> String {
     }
 }
 
-impl Guard for FirstLook {
-    fn look(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
+impl Guard for StartCheck {
+    fn check(&mut self, batch: &SampleBatch, now_s: f64, _: &Commanded) -> Option<Trip> {
         if self.over {
             return None;
         }
@@ -86,11 +86,11 @@ impl Guard for FirstLook {
                 self.clock_off_s = self.clock_off_s.max((source_s - t_s).abs());
             }
         }
-        if now_s < LOOK_S {
+        if now_s < CHECK_DURATION_S {
             return None;
         }
         self.over = true;
-        let faults = self.faults();
+        let faults = self.list_faults();
         let needed = faults.iter().any(|(needed, _)| *needed);
         let words: Vec<&str> = faults.iter().map(|(_, words)| words.as_str()).collect();
         (!words.is_empty()).then(|| Trip {
@@ -108,7 +108,7 @@ mod tests {
     use mapper_core::{ChannelColumn, Provenance, Quality};
 
     #[test]
-    fn what_is_dead_out_of_range_or_of_another_time_is_named_at_the_start() {
+    fn missing_implausible_and_old_readings_are_detected_at_the_start() {
         let look = |t2: f64, t4: f64, source_s: f64| {
             let column = |channel, value| ChannelColumn { channel, values: vec![value; 60] };
             let t_s: Vec<f64> = (0..60).map(|i| 0.1 * f64::from(i)).collect();
@@ -123,7 +123,7 @@ mod tests {
                 t_s,
                 ..SampleBatch::default()
             };
-            FirstLook::new(vec![Channel::T2, Channel::T4]).look(&batch, 5.9, &Commanded::default())
+            StartCheck::new(vec![Channel::T2, Channel::T4]).check(&batch, 5.9, &Commanded::default())
         };
         assert_eq!(look(300.0, 600.0, 0.0), None);
         let trip = look(f64::NAN, 600.0, 0.0).unwrap();

@@ -43,7 +43,7 @@ pub enum Fault {
     /// The rig cuts its air by itself, with or without a report.
     Trips {
         /// Whether an event reports it.
-        says_so: bool,
+        is_reported: bool,
     },
     /// The connection is lost permanently.
     Lost,
@@ -55,18 +55,18 @@ pub enum Fault {
 
 /// An injected fault, as the backend's own error.
 #[derive(Debug)]
-struct Demanded(&'static str);
+struct InjectedFault(&'static str);
 
-impl std::fmt::Display for Demanded {
+impl std::fmt::Display for InjectedFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.0)
     }
 }
 
-impl std::error::Error for Demanded {}
+impl std::error::Error for InjectedFault {}
 
 /// Wraps another backend, and injects faults at their start times.
-pub struct Misbehaving<B> {
+pub struct FaultyBackend<B> {
     inner: B,
     /// Start time, s of run time, and fault.
     faults: Vec<(f64, Fault)>,
@@ -84,10 +84,10 @@ pub struct Misbehaving<B> {
     pub commands: Vec<(f64, Setpoints)>,
 }
 
-impl<B: Backend> Misbehaving<B> {
+impl<B: Backend> FaultyBackend<B> {
     /// Wraps `inner` with these faults.
     pub fn new(inner: B, faults: Vec<(f64, Fault)>) -> Self {
-        Misbehaving {
+        FaultyBackend {
             inner,
             faults,
             now_s: 0.0,
@@ -100,16 +100,16 @@ impl<B: Backend> Misbehaving<B> {
         }
     }
 
-    fn active(&self) -> Vec<(f64, Fault)> {
+    fn active_faults(&self) -> Vec<(f64, Fault)> {
         self.faults.iter().filter(|(begin_s, _)| *begin_s <= self.now_s).cloned().collect()
     }
 
-    fn lost(&self) -> BackendError {
-        BackendError::Lost { t_s: self.now_s, source: Box::new(Demanded("the connection is gone")) }
+    fn lost_error(&self) -> BackendError {
+        BackendError::Lost { t_s: self.now_s, source: Box::new(InjectedFault("the connection is lost")) }
     }
 
     /// Applies a sensor fault to a batch.
-    fn on_sensor(&mut self, begin_s: f64, fault: &Fault, batch: &mut SampleBatch) {
+    fn apply_sensor_fault(&mut self, begin_s: f64, fault: &Fault, batch: &mut SampleBatch) {
         let (Fault::Frozen(channel)
         | Fault::Nan(channel)
         | Fault::Reads(channel, _)
@@ -169,7 +169,7 @@ impl<B: Backend> Misbehaving<B> {
     }
 
     /// Applies a stream fault to a batch. A fault that affects a single batch ends with it.
-    fn on_stream(&mut self, begin_s: f64, fault: &Fault, batch: SampleBatch) -> SampleBatch {
+    fn apply_stream_fault(&mut self, begin_s: f64, fault: &Fault, batch: SampleBatch) -> SampleBatch {
         match fault {
             Fault::Mute(duration_s) if self.now_s < begin_s + duration_s => SampleBatch::default(),
             Fault::Late(duration_s) if self.now_s < begin_s + duration_s => {
@@ -206,7 +206,7 @@ impl<B: Backend> Misbehaving<B> {
     }
 }
 
-impl<B: Backend> Backend for Misbehaving<B> {
+impl<B: Backend> Backend for FaultyBackend<B> {
     fn describe(&self) -> RigDescription {
         self.inner.describe()
     }
@@ -218,9 +218,9 @@ impl<B: Backend> Backend for Misbehaving<B> {
 
     fn set(&mut self, setpoints: &Setpoints) -> Result<(), BackendError> {
         self.commands.push((self.now_s, *setpoints));
-        for (_, fault) in self.active() {
+        for (_, fault) in self.active_faults() {
             match fault {
-                Fault::Lost => return Err(self.lost()),
+                Fault::Lost => return Err(self.lost_error()),
                 Fault::Refuses => {
                     let (quantity, value, unit) = ("P3", setpoints.p3_pa, "Pa");
                     return Err(BackendError::SetpointOutOfRange {
@@ -243,9 +243,9 @@ impl<B: Backend> Backend for Misbehaving<B> {
 
     #[allow(clippy::panic, reason = "a panic on demand is what it is for")]
     fn poll(&mut self, until_s: f64) -> Result<SampleBatch, BackendError> {
-        for (_, fault) in self.active() {
+        for (_, fault) in self.active_faults() {
             match fault {
-                Fault::Lost => return Err(self.lost()),
+                Fault::Lost => return Err(self.lost_error()),
                 Fault::Panics => panic!("a backend that panics on demand"),
                 Fault::Trips { .. } if !self.tripped => self.inner.make_safe()?,
                 _ => {}
@@ -253,16 +253,16 @@ impl<B: Backend> Backend for Misbehaving<B> {
         }
         let mut batch = self.inner.poll(until_s)?;
         self.now_s = self.now_s.max(until_s);
-        for (begin_s, fault) in self.active() {
-            if let Fault::Trips { says_so } = fault {
-                if says_so && !self.tripped {
+        for (begin_s, fault) in self.active_faults() {
+            if let Fault::Trips { is_reported } = fault {
+                if is_reported && !self.tripped {
                     let message = "the rig has tripped by itself: emergency stop".to_owned();
                     batch.events.push(Event { t_s: self.now_s, kind: EventKind::RigTripped, message });
                 }
                 self.tripped = true;
             }
-            self.on_sensor(begin_s, &fault, &mut batch);
-            batch = self.on_stream(begin_s, &fault, batch);
+            self.apply_sensor_fault(begin_s, &fault, &mut batch);
+            batch = self.apply_stream_fault(begin_s, &fault, batch);
             if fault == Fault::Doubled && batch.first_sequence > 0 {
                 // The batch looks like a repeat of the previous one.
                 batch.first_sequence -= 1;
@@ -272,8 +272,8 @@ impl<B: Backend> Backend for Misbehaving<B> {
     }
 
     fn hold(&mut self) -> Result<(), BackendError> {
-        if self.active().iter().any(|(_, fault)| *fault == Fault::Lost) {
-            return Err(self.lost());
+        if self.active_faults().iter().any(|(_, fault)| *fault == Fault::Lost) {
+            return Err(self.lost_error());
         }
         self.held_at_s.push(self.now_s);
         self.inner.hold()
@@ -287,12 +287,12 @@ impl<B: Backend> Backend for Misbehaving<B> {
                 *left -= 1;
                 return Err(BackendError::Lost {
                     t_s: self.now_s,
-                    source: Box::new(Demanded("the valve of the air supply does not answer")),
+                    source: Box::new(InjectedFault("the valve of the air supply does not answer")),
                 });
             }
         }
-        if self.active().iter().any(|(_, fault)| *fault == Fault::Lost) {
-            return Err(self.lost());
+        if self.active_faults().iter().any(|(_, fault)| *fault == Fault::Lost) {
+            return Err(self.lost_error());
         }
         self.safe_at_s.push(self.now_s);
         self.inner.make_safe()

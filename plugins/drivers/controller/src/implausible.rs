@@ -7,13 +7,13 @@ use mapper_core::{Channel, measurable};
 /// Readings that no sensor can deliver.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{channel} reads {} {unit} from {place}; what a stand can read is {} to {} {unit}{}. {remedy}. No setpoint was written",
-    short(*.value),
-    short(*.low),
-    short(*.high),
-    also(.others)
+    "{channel} reads {} {unit} from {place}; plausible are {} to {} {unit}{}. {remedy}. No setpoint was written",
+    format_short(*.value),
+    format_short(*.low),
+    format_short(*.high),
+    describe_others(.others)
 )]
-pub(crate) struct Absurd {
+pub(crate) struct ImplausibleReading {
     /// The first implausible channel.
     pub(crate) channel: Channel,
     value: f64,
@@ -26,18 +26,18 @@ pub(crate) struct Absurd {
     remedy: String,
 }
 
-fn also(others: &[Channel]) -> String {
+fn describe_others(others: &[Channel]) -> String {
     match others {
         [] => String::new(),
         _ => {
             let symbols: Vec<_> = others.iter().map(|channel| channel.symbol()).collect();
-            format!("; nor can {} be as they read", symbols.join(", "))
+            format!("; {} are implausible too", symbols.join(", "))
         }
     }
 }
 
 /// Four significant digits; a power of ten for very large or small values.
-pub fn short(value: f64) -> String {
+pub fn format_short(value: f64) -> String {
     match value.abs() {
         0.0 => "0".to_owned(),
         size if (1e-3..1e7).contains(&size) => {
@@ -54,7 +54,7 @@ pub fn short(value: f64) -> String {
 }
 
 /// Whether a sensor can read this value, SI. NaN passes: the guards count how long it lasts.
-pub fn can_be_read(channel: Channel, value: f64) -> bool {
+pub fn is_plausible(channel: Channel, value: f64) -> bool {
     !value.is_finite() || measurable(channel.info().dimension).contains(&value)
 }
 
@@ -62,11 +62,11 @@ pub fn can_be_read(channel: Channel, value: f64) -> bool {
 pub(crate) fn check(
     controller: &impl Controller,
     readings: impl Iterator<Item = (Channel, f64)>,
-) -> Result<(), Box<Absurd>> {
-    let mut found = readings.filter(|(channel, value)| !can_be_read(*channel, *value));
+) -> Result<(), Box<ImplausibleReading>> {
+    let mut found = readings.filter(|(channel, value)| !is_plausible(*channel, *value));
     let Some((channel, value)) = found.next() else { return Ok(()) };
     let range = measurable(channel.info().dimension);
-    Err(Box::new(Absurd {
+    Err(Box::new(ImplausibleReading {
         channel,
         value,
         unit: channel.unit(),
@@ -94,7 +94,7 @@ mod tests {
             (0.5, "0.5"),
             (0.0, "0"),
         ] {
-            assert_eq!(short(value), words);
+            assert_eq!(format_short(value), words);
         }
     }
 }

@@ -28,7 +28,7 @@ impl About {
     pub fn serve(self, open: impl Open + 'static) -> ExitCode {
         let Some(argument) = std::env::args_os().nth(1) else {
             if std::io::stdin().is_terminal() {
-                // A terminal does not speak the protocol, so serving would wait forever.
+                // A terminal does not send frames, so serving would wait forever.
                 print(&mut std::io::stderr(), &self.help());
                 return ExitCode::from(WRONG_ARGUMENTS);
             }
@@ -66,14 +66,14 @@ impl About {
         let About { name, summary, settings, .. } = self;
         format!(
             "{}\n{summary}\n\n\
-             This is a driver: `mapper` starts it by itself where a campaign says `backend: {{{name}: ...}}`, and talks to it over\n\
-             standard input and output. There is nothing to start by hand. It must be next to `mapper` or on PATH:\n\
-             `mapper backend list` shows whether it is found.\n\n\
-             With --socket it is there before a run and after it: another user, or a service, has started it. `mapper` looks for it at\n\
+             This is a driver: `mapper` starts it for a campaign with `backend: {{{name}: ...}}` and communicates with it over standard\n\
+             input and output; do not start it by hand. It must be in the directory of `mapper` or on PATH: `mapper backend list` shows\n\
+             whether it is found.\n\n\
+             With --socket it runs before and after a run, started by another user or by a service. `mapper` expects the socket at\n\
              `drivers/{name}.socket` below $MAPPER_STATE_DIR or ~/.local/state/mapper.\n\n\
              Settings: {settings}\n\
-             To look at those of a campaign: mapper check CAMPAIGN\n\n\
-             Options:\n  --socket PATH  Serve the hosts that come to this socket, one after the other, until a signal ends it\n  \
+             To show those of a campaign: mapper check CAMPAIGN\n\n\
+             Options:\n  --socket PATH  Serve the hosts that connect to this socket, one after the other, until a signal ends it\n  \
              -h, --help     Print this\n  -V, --version  Print the version",
             self.title()
         )

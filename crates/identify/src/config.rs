@@ -41,6 +41,8 @@ pub struct IdentifyConfig {
     pub air: Air,
     /// One standard deviation of its humidity, kg/kg: part of the intervals of the joint method.
     pub humidity_sigma_kg_kg: f64,
+    /// Pressure at which an isothermal zero has compared the pressure sensors, Pa: their gain errors count from there; 0 without a zero.
+    pub rest_pressure_pa: f64,
     /// Error that all absolute pressures share, one standard deviation, Pa: of the barometer to which gauge pressures are added.
     pub barometer_sigma_pa: f64,
     /// Type of the P1 tap.
@@ -74,6 +76,7 @@ impl Default for IdentifyConfig {
             reference: ReferenceState::SAE,
             air: Air::PAPER,
             humidity_sigma_kg_kg: 0.0,
+            rest_pressure_pa: 0.0,
             barometer_sigma_pa: 0.0,
             inlet_tap: PressureTap::Total,
             outlet_tap: PressureTap::Total,

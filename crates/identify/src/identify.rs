@@ -19,6 +19,7 @@ use mapper_core::{
     PointBudgets, Recording, StepMarker, ThermalModel, Warning, WindowRule, confidence_interval_95,
 };
 use mapper_inference::hypotheses::{Likelihood, Priors};
+use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Identifies every step of a recording, in order. Steps without a known position on the map are left out; [`identify_each`] names them with
 /// the reason.
@@ -161,7 +162,7 @@ pub fn identify_with_rig(
     }
     if let (Some(fitted), Some(balances), true) = (&fitted, &balances, nominal.is_some() && faults.is_empty())
     {
-        let readings = faults::all_readings(recording, &ends).unwrap_or_default();
+        let readings = faults::all_readings(recording, &ends, config.rest_pressure_pa).unwrap_or_default();
         // Without a density of the balances nothing is known of faults.
         let _ = faults::possible::widen(&mut estimates, fitted, &readings, balances, config);
     }
@@ -319,7 +320,9 @@ pub(crate) fn point(
 fn common_errors(state: &EndState, estimate: &Estimate, config: &IdentifyConfig) -> CommonErrors {
     let relative = |channel: Channel, reading: f64| {
         let declared = config.declared.get(&channel).copied().unwrap_or_default();
-        let relative = (declared.offset_sigma / reading).hypot(declared.gain_sigma_ratio);
+        let relative = (declared.offset_sigma / reading).hypot(
+            declared.gain_sigma_ratio * gain_error(channel, reading, config.rest_pressure_pa) / reading,
+        );
         // A reading of 0 has no relative error and no position on a map.
         if relative.is_finite() { relative } else { 0.0 }
     };

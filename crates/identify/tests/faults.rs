@@ -69,7 +69,7 @@ fn with(recording: &Recording, suspect: &Suspect, size: f64) -> Recording {
         for (t_s, value) in series.t_s.iter().zip(&mut series.values) {
             let share = (t_s - start_s) / (end_s - start_s);
             let housing_k = housing.interpolate(*t_s).unwrap();
-            *value += size * fault.error_per_unit(*channel, *value, housing_k, share);
+            *value += size * fault.error_per_unit(*channel, *value, housing_k, share, 0.0);
         }
     }
     doctored

@@ -55,12 +55,25 @@ pub struct CommonOffset {
     pub channels: Vec<Channel>,
     /// One standard deviation, K or Pa.
     pub sigma: f64,
+    /// Their common reading at rest, K or Pa.
+    #[serde(default)]
+    pub reading: f64,
+}
+
+/// Pressure at which an isothermal zero has compared the pressure sensors, Pa; 0 if it has not.
+pub fn rest_pressure_pa(common: &[CommonOffset]) -> f64 {
+    common.iter().find(|common| common.channels.contains(&Channel::P1)).map_or(0.0, |common| common.reading)
 }
 
 impl Declared {
     /// The declaration of a channel; zero if there is none.
     pub fn of(&self, channel: Channel) -> DeclaredUncertainty {
         self.sensors.get(&channel).copied().unwrap_or_default()
+    }
+
+    /// Pressure from which gain errors of the pressure sensors count, Pa.
+    pub fn rest_pressure_pa(&self) -> f64 {
+        rest_pressure_pa(&self.common_offsets)
     }
 
     /// Noise of one sample, in the channel's unit: as declared, otherwise that of a usual sensor.

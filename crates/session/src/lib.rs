@@ -83,7 +83,7 @@ pub use plan::rehearsal::{Rehearsal, rehearse};
 pub use plan::stored_plan::stored_plan;
 pub use plan::surge::{SurgeForecast, surge_forecast};
 pub use recording::files::{Existing, json_text, write_file, write_new};
-pub use recording::identification_config::identification;
+pub use recording::identification_config::{declared, identification};
 pub use recording::log_inspection::{LogInspection, inspect_log};
 pub use recording::program::{PROGRAM, program_and_commit};
 pub use recording::recording_file::{Recorded, channel_map};

@@ -1,13 +1,15 @@
 //! The plug-ins of a session, passed in by its creator.
 
 use crate::SessionError;
+use crate::recording::identification_config::declared;
 use mapper_campaign::Campaign;
 use mapper_campaign::campaign::BackendChoice;
-use mapper_core::{Backend, BackendError, MapFormats, SetpointRanges};
+use mapper_core::{Backend, BackendError, Channel, DeclaredUncertainty, MapFormats, SetpointRanges};
 use mapper_physics::rig::backend_plugin::BackendPlugin;
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::rig::nominal_rig::NominalRig;
 use mapper_physics::simulation::model::Model;
+use mapper_recording::ChannelMap;
 use mapper_recording::logs::LogFormats;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -109,17 +111,28 @@ impl Registry {
 /// Nominal machine and rig data for a backend.
 fn nominal_rig(campaign: &Campaign, model: &Model, effects: &[Arc<dyn Effect>]) -> NominalRig {
     let sensors = || campaign.sensors.iter();
+    // The errors that identification assumes are drawn too.
+    let declared = declared(campaign, &ChannelMap::native());
+    let assumed_gain = |channel: &Channel, sensor: &mut DeclaredUncertainty| {
+        if sensor.gain_sigma_ratio == 0.0 {
+            sensor.gain_sigma_ratio = declared.get(channel).map_or(0.0, |declared| declared.gain_sigma_ratio);
+        }
+    };
     NominalRig {
         model: model.clone(),
         boundary: campaign.boundary,
         speed_max_rpm: campaign.limits.speed_max_rpm,
-        sensors: sensors().map(|(channel, sensor)| (*channel, sensor.declared)).collect(),
         redundant: sensors()
-            .filter_map(|(channel, sensor)| Some((*channel, sensor.redundant.clone()?)))
+            .filter_map(|(channel, sensor)| {
+                let mut several = sensor.redundant.clone()?;
+                several.elements.iter_mut().for_each(|one| assumed_gain(channel, &mut one.declared));
+                Some((*channel, several))
+            })
             .collect(),
         static_tap_pipe_diameters_m: sensors()
             .filter_map(|(channel, sensor)| Some((*channel, sensor.static_tap_pipe_diameter_m?)))
             .collect(),
+        sensors: declared,
         tolerances: campaign.tolerances,
         soak: campaign.zero,
         effects: effects.to_vec(),

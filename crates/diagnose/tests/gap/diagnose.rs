@@ -98,7 +98,7 @@ fn a_common_offset_is_all_of_the_single_ones() {
     let recording = record(&[], 3);
     let channels = vec![Channel::T1, Channel::T2, Channel::Tc, Channel::TOil];
     let mut declared = declared();
-    declared.common_offsets = vec![CommonOffset { channels: channels.clone(), sigma: 0.15 }];
+    declared.common_offsets = vec![CommonOffset { channels: channels.clone(), sigma: 0.15, reading: 298.0 }];
     let study =
         Study::new(&recording, Table::new(&recording).unwrap(), declared, Model::nominal(), Vec::new());
     let shifted = |kinds: &[NuisanceKind], by_k: f64| {

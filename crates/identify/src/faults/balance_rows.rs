@@ -62,7 +62,8 @@ impl Rows {
                 return 0.0;
             }
             let housing_k = readings.values[TC];
-            fault.error_per_unit(CHANNELS[channel], readings.values[channel], housing_k, readings.run_ratio)
+            let Readings { values, run_ratio, rest_pressure_pa, .. } = readings;
+            fault.error_per_unit(CHANNELS[channel], values[channel], housing_k, *run_ratio, *rest_pressure_pa)
         });
         fault
             .channels
@@ -90,7 +91,9 @@ impl Rows {
         let offsets =
             (0..CHANNELS.len()).map(|channel| self.column(|other, _| f64::from(u8::from(other == channel))));
         let gains = (0..CHANNELS.len()).map(|channel| {
-            let error = |readings: &Readings| gain_error(CHANNELS[channel], readings.values[channel]);
+            let error = |readings: &Readings| {
+                gain_error(CHANNELS[channel], readings.values[channel], readings.rest_pressure_pa)
+            };
             self.column(|other, readings| if other == channel { error(readings) } else { 0.0 })
         });
         let pressure = |channel: usize| matches!(CHANNELS[channel], Channel::P1 | Channel::P2);

@@ -120,12 +120,16 @@ pub(crate) fn suspect(index: usize) -> Suspect {
 }
 
 /// The readings of all steps, by position; at most [`MAX_STEPS`] of them.
-pub(crate) fn all_readings(recording: &Recording, ends: &[Option<Ends>]) -> Option<Vec<Option<Readings>>> {
+pub(crate) fn all_readings(
+    recording: &Recording,
+    ends: &[Option<Ends>],
+    rest_pressure_pa: f64,
+) -> Option<Vec<Option<Readings>>> {
     let (first_s, last_s) = span_s(recording)?;
     let every = ends.len().div_ceil(MAX_STEPS).max(1);
     let of = |(position, end): (usize, &Option<Ends>)| {
         let used = end.as_ref().filter(|_| position.is_multiple_of(every))?;
-        Some(Readings::of(used, first_s, last_s))
+        Some(Readings::of(used, first_s, last_s, rest_pressure_pa))
     };
     Some(ends.iter().enumerate().map(of).collect())
 }
@@ -137,7 +141,7 @@ fn balances(
     config: &IdentifyConfig,
     nominal: Option<&NominalRig<'_>>,
 ) -> Option<Vec<Rows>> {
-    let all = all_readings(recording, ends)?;
+    let all = all_readings(recording, ends, config.rest_pressure_pa)?;
     let readings: Vec<Readings> = all.iter().flatten().copied().collect();
     let used = ends.iter().zip(&all).filter_map(|(end, readings)| Some((end.as_ref()?, (*readings)?)));
     let opened: Vec<(f64, Readings)> =

@@ -12,8 +12,9 @@ use crate::single_step::expected::DECLARED_INTERVAL_S;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
 use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::statistics::mean;
-use mapper_observe::declared::CommonOffset;
+use mapper_observe::declared::{CommonOffset, rest_pressure_pa};
 use mapper_observe::plausible::is_reading;
+use mapper_physics::rig::sensor_fault::gain_error;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -189,7 +190,9 @@ fn zero_of(
             {
                 (mean, own) = (limit, sigma.hypot(error));
             }
-            readings.push(Reading { channel: *channel, mean, own, total: own.hypot(declared.offset_sigma) });
+            let gain_sigma = declared.gain_sigma_ratio * gain_error(*channel, mean, 0.0);
+            let total = own.hypot(declared.offset_sigma).hypot(gain_sigma);
+            readings.push(Reading { channel: *channel, mean, own, total });
         }
         let mut common = common(&readings);
         if readings.len() < 2 || !common.is_finite() {
@@ -228,6 +231,7 @@ fn zero_of(
         zero.common.push(CommonOffset {
             channels: readings.iter().map(|reading| reading.channel).collect(),
             sigma: weight.sqrt().recip(),
+            reading: common,
         });
         for reading in readings {
             zero.offsets.insert(reading.channel, reading.mean - common);
@@ -244,6 +248,7 @@ pub fn zeroed(
     mut config: IdentifyConfig,
     zero: &IsothermalZero,
 ) -> (Recording, IdentifyConfig) {
+    config.rest_pressure_pa = rest_pressure_pa(&zero.common);
     for (channel, offset) in &zero.offsets {
         if let Some(series) = recording.series.get_mut(channel) {
             series.values.iter_mut().for_each(|value| *value -= offset);
@@ -256,12 +261,14 @@ pub fn zeroed(
     (recording, config)
 }
 
-/// Predicts the remaining offset uncertainty after a zero of `soak_s`.
+/// Predicts the remaining offset uncertainty after a zero of `soak_s` at this pressure.
 pub fn expected_after_zero(
     mut config: IdentifyConfig,
     settings: &ZeroSettings,
     soak_s: f64,
+    pressure_pa: f64,
 ) -> IdentifyConfig {
+    config.rest_pressure_pa = pressure_pa;
     let stretch_s = soak_s.min(settings.longest_s);
     for (channels, sigma) in groups(settings) {
         for channel in channels {

@@ -6,6 +6,7 @@ use crate::single_step::dynamic::Estimate;
 use mapper_core::{
     BudgetRow, Channel, EstimateUncertainty, IdentifiedPoint, PointBudgets, UncertaintyBudget, half_width_95,
 };
+use mapper_physics::rig::sensor_fault::gain_error;
 
 /// A source that is known in the unit of the number only.
 pub(crate) fn own_row(source: &str, contribution: f64, unit: &str) -> BudgetRow {
@@ -73,7 +74,12 @@ fn pressure_ratio(
     {
         let declared = config.declared.get(&channel).copied().unwrap_or_default();
         push(format!("offset of {channel}"), declared.offset_sigma, "Pa", by_reading);
-        push(format!("gain of {channel}"), declared.gain_sigma_ratio, "1", by_reading * reading_pa);
+        push(
+            format!("gain of {channel}"),
+            declared.gain_sigma_ratio,
+            "1",
+            by_reading * gain_error(channel, reading_pa, config.rest_pressure_pa),
+        );
         let colour = coloured(config.noise_colour);
         let mean = colour.variance_of_mean(samples(channel), config.thresholds.end_mean_s).sqrt();
         push(format!("noise of {channel}"), declared.noise_sigma * mean, "Pa", by_reading);

@@ -16,7 +16,7 @@ pub struct NominalRig {
     pub boundary: BoundaryConditions,
     /// The campaign's speed limit, rpm.
     pub speed_max_rpm: f64,
-    /// Declared one-sigma uncertainty of each sensor, in the channel's unit.
+    /// One-sigma uncertainty of each sensor, in the channel's unit, as declared or as identification assumes it.
     pub sensors: BTreeMap<Channel, DeclaredUncertainty>,
     /// Each sensor of the channels that have several; `sensors` has the combined values.
     pub redundant: BTreeMap<Channel, RedundantSensors>,

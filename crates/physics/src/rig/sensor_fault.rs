@@ -152,10 +152,14 @@ pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
     })
 }
 
-/// Error of a reading by a gain error of 1.
-pub fn gain_error(channel: Channel, reading: f64) -> f64 {
-    let is_temperature = matches!(channel, Channel::T1 | Channel::T2 | Channel::Tc);
-    if is_temperature { reading - CALIBRATED_AT_K } else { reading }
+/// Error of a reading by a gain error of 1. `rest_pressure_pa`: where an isothermal zero has compared the pressure sensors, so that their
+/// gain errors count from there; 0 without one.
+pub fn gain_error(channel: Channel, reading: f64, rest_pressure_pa: f64) -> f64 {
+    match channel {
+        Channel::T1 | Channel::T2 | Channel::Tc => reading - CALIBRATED_AT_K,
+        Channel::P1 | Channel::P2 => reading - rest_pressure_pa,
+        _ => reading,
+    }
 }
 
 /// All drifts, of both sides.
@@ -188,15 +192,22 @@ fn searched_for() -> impl Iterator<Item = SensorFault> {
 
 impl SensorFault {
     /// Error of a channel's reading by a fault of size 1; 0 for kinds that do not add to a reading. `housing_k`: Tc. `run_ratio`: time since
-    /// the start of the run over its length.
-    pub fn error_per_unit(&self, channel: Channel, reading: f64, housing_k: f64, run_ratio: f64) -> f64 {
+    /// the start of the run over its length. `rest_pressure_pa`: as for [`gain_error`].
+    pub fn error_per_unit(
+        &self,
+        channel: Channel,
+        reading: f64,
+        housing_k: f64,
+        run_ratio: f64,
+        rest_pressure_pa: f64,
+    ) -> f64 {
         if !self.channels.contains(&channel) {
             return 0.0;
         }
         let relative = matches!(channel, Channel::CompressorFlow | Channel::ShaftSpeed);
         match self.kind {
             FaultKind::Offset => 1.0,
-            FaultKind::Gain => gain_error(channel, reading),
+            FaultKind::Gain => gain_error(channel, reading, rest_pressure_pa),
             FaultKind::Drift if relative => run_ratio * reading,
             FaultKind::Drift => run_ratio,
             FaultKind::TowardsWall => housing_k - reading,

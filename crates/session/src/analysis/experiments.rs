@@ -52,7 +52,9 @@ fn soak(campaign: &Campaign, map: &ChannelMap) -> Option<Experiment> {
         return None;
     }
     let settings = ZeroSettings::default();
-    let left = expected_after_zero(identification_with(campaign, map), &settings, SOAK_S).declared;
+    let left =
+        expected_after_zero(identification_with(campaign, map), &settings, SOAK_S, campaign.boundary.p1_pa)
+            .declared;
     let left_sigma =
         |channel| left.get(&channel).map_or(settings.temperature_sigma_k, |left| left.offset_sigma);
     let soak = AtRest {

@@ -119,7 +119,9 @@ fn predicted_method(campaign: &Campaign) -> Option<Box<dyn PredictedMethod>> {
 fn identification_after_zero(campaign: &Campaign) -> IdentifyConfig {
     let config = identification(campaign);
     match campaign.zero {
-        Some(soak) => expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s),
+        Some(soak) => {
+            expected_after_zero(config, &ZeroSettings::from(soak), soak.duration_s, campaign.boundary.p1_pa)
+        }
         None => config,
     }
 }

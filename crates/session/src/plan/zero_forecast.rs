@@ -17,7 +17,9 @@ const WORTH_IT_RATIO: f64 = 0.3;
 pub(crate) fn zero_remark(campaign: &Campaign) -> Option<PlanRemark> {
     let soak = campaign.zero?;
     let left_after = |soak_s: f64| -> BTreeMap<Channel, f64> {
-        let left = expected_after_zero(identification(campaign), &ZeroSettings::from(soak), soak_s).declared;
+        let settings = ZeroSettings::from(soak);
+        let left = expected_after_zero(identification(campaign), &settings, soak_s, campaign.boundary.p1_pa)
+            .declared;
         CHANNELS.into_iter().filter_map(|channel| Some((channel, left.get(&channel)?.offset_sigma))).collect()
     };
     let longer_soak_s = LONGER_RATIO * soak.duration_s;

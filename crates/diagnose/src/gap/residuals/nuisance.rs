@@ -7,6 +7,7 @@ use mapper_observe::channels::{self, DRIVERS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Outputs of the model that sensors measure, in the order of the residuals.
 pub const OUTPUTS: [Channel; 9] = {
@@ -24,8 +25,8 @@ pub enum NuisanceKind {
     Offset(Channel),
     /// Common offset of all sensors of one dimension that were compared at rest.
     CommonOffset(Dimension),
-    /// Gain of the compressor's flow meter.
-    FlowMeterGain,
+    /// Gain of a sensor.
+    Gain(Channel),
     /// One quantity of machine, cell or initial state.
     Perturbation(Perturbation),
     /// Gas temperature drop through the turbine relative to the shaft power.
@@ -43,7 +44,8 @@ impl std::fmt::Display for NuisanceKind {
             NuisanceKind::Offset(channel) => write!(f, "{OFFSET_PREFIX}{channel}"),
             NuisanceKind::CommonOffset(Dimension::Pressure) => f.write_str("common offset of the pressures"),
             NuisanceKind::CommonOffset(_) => f.write_str("common offset of the temperatures"),
-            NuisanceKind::FlowMeterGain => f.write_str("flow_meter_gain"),
+            NuisanceKind::Gain(Channel::CompressorFlow) => f.write_str("flow_meter_gain"),
+            NuisanceKind::Gain(channel) => write!(f, "gain of {channel}"),
             NuisanceKind::Perturbation(Perturbation::Flow) => f.write_str("flow_map"),
             NuisanceKind::Perturbation(Perturbation::Efficiency) => f.write_str("compressor_efficiency"),
             NuisanceKind::Perturbation(Perturbation::TurbineEfficiency) => f.write_str("turbine_efficiency"),
@@ -90,7 +92,6 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     let t = &declared.tolerances;
     let knob = |knob: Perturbation| (K::Perturbation(knob), knob.tolerance(t));
     let mut all: Vec<(NuisanceKind, f64)> = vec![
-        (K::FlowMeterGain, declared.of(Channel::CompressorFlow).gain_sigma_ratio),
         knob(Perturbation::Flow),
         knob(Perturbation::Efficiency),
         knob(Perturbation::TurbineEfficiency),
@@ -106,7 +107,8 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
     // Each has the declared size, although the root mean square of all is then 1.7 of it: a deviation of one corner of the map is plausible.
     all.extend((0..SHAPES).map(|i| (K::Shape(i), t.efficiency_shape_ratio)));
     let sensors = DRIVERS.iter().chain(OUTPUTS.iter().filter(|channel| !DRIVERS.contains(channel)));
-    all.extend(sensors.map(|channel| (K::Offset(*channel), declared.offset_sigma(*channel))));
+    all.extend(sensors.clone().map(|channel| (K::Offset(*channel), declared.offset_sigma(*channel))));
+    all.extend(sensors.map(|channel| (K::Gain(*channel), declared.of(*channel).gain_sigma_ratio)));
     all.extend(declared.common_offsets.iter().filter_map(|common| {
         Some((K::CommonOffset(common.channels.first()?.info().dimension), common.sigma))
     }));
@@ -147,7 +149,11 @@ pub fn apply(
             }
         }
         K::Offset(channel) => rig.instruments.path_mut(channel).offset += value,
-        K::FlowMeterGain => rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *= 1.0 + value,
+        K::Gain(channel) => {
+            let path = rig.instruments.path_mut(channel);
+            path.gain_ratio *= 1.0 + value;
+            path.offset += value * gain_error(channel, 0.0, declared.rest_pressure_pa());
+        }
         // The cell sensor reads too high by this amount, so the model is driven with less.
         K::Perturbation(Perturbation::Ambient) => circumstances.knobs.push((Perturbation::Ambient, -value)),
         K::Perturbation(knob @ (Perturbation::StartTc | Perturbation::StartTt)) => {

@@ -288,10 +288,12 @@ impl Study {
             rig.model.map =
                 Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
         }
-        // A sensor that reads too high drives the model too high, so its offset is subtracted.
-        let read =
-            DRIVERS.map(|channel| (Perturbation::Input(channel), -rig.instruments.path(channel).offset));
-        circumstances.knobs.extend(read);
+        // A sensor that reads too high drives the model too high, so its error is subtracted.
+        for channel in DRIVERS {
+            let path = rig.instruments.path(channel);
+            circumstances.knobs.push((Perturbation::Input(channel), -path.offset));
+            circumstances.knobs.push((Perturbation::InputGain(channel), 1.0 / path.gain_ratio - 1.0));
+        }
         Ok((rig, circumstances))
     }
 

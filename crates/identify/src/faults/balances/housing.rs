@@ -130,7 +130,12 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
             Channel::T2 | Channel::Tc => part.tc_k,
             _ => f64::NAN,
         });
-        Readings { values, run_ratio: run_ratio(part), air: config.air }
+        Readings {
+            values,
+            run_ratio: run_ratio(part),
+            rest_pressure_pa: config.rest_pressure_pa,
+            air: config.air,
+        }
     };
     Some(Rows {
         residual: column(&|part| part.conductance_w_k * (part.t2_k - part.tc_k)),

@@ -132,6 +132,7 @@ pub(crate) fn problem<'a>(
     };
     let ln_reference = steps.iter().map(|step| reynolds(step).ln()).sum::<f64>() / steps.len() as f64;
     let setting = Setting {
+        rest_pressure_pa: config.rest_pressure_pa,
         air: config.air,
         internal_area_m2: config.internal_area_m2,
         outlet_diameter_m: config.outlet_diameter_m,

@@ -22,6 +22,8 @@ pub(crate) struct Setting {
     pub(crate) internal_area_m2: f64,
     pub(crate) outlet_diameter_m: f64,
     pub(crate) inlet_diameter_m: f64,
+    /// Pressure from which gain errors of P1 and P2 count, Pa.
+    pub(crate) rest_pressure_pa: f64,
     /// The compressed air.
     pub(crate) air: Air,
     /// Reynolds number at which the law's coefficient is defined.
@@ -191,7 +193,7 @@ impl Setting {
     fn gas(&self, row: &Row, terms: &[f64; TERM_COUNT], shared: &SharedVector, local: &LocalVector) -> Gas {
         let offset = |index: usize| shared[OFFSETS + index];
         let t1_k = row.t1_k - offset(0);
-        let [p1_pa, p2_pa] = pressures_pa(row, shared);
+        let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
         let pressure_ratio = p2_pa / p1_pa;
         let air = Air { humidity_kg_kg: self.air.humidity_kg_kg + shared[HUMIDITY], ..self.air };
         let slope = if self.shaped { local[SLOPE] * dot(terms, surface_of(shared)) } else { 0.0 };
@@ -332,7 +334,7 @@ impl Setting {
             }
             if active[OFFSETS] {
                 let (step, t1_k) = (gas.t1_k * STEP_RATIO, gas.t1_k * (1.0 + STEP_RATIO));
-                let [p1_pa, p2_pa] = pressures_pa(row, shared);
+                let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
                 let moved =
                     Gas { t1_k, rise_ratio: isentropic_rise_ratio(p2_pa / p1_pa, t1_k, gas.air), ..gas };
                 let convection = self.h(&moved, shared, deviation);
@@ -350,12 +352,12 @@ impl Setting {
             {
                 let by_rise = full(Gas { rise_ratio: gas.rise_ratio + STEP_RATIO, ..gas }, STEP_RATIO);
                 let by_ln_ratio = by_rise * rise_ratio_by_ln_pressure(gas.rise_ratio, gas.t1_k, gas.air);
-                let [p1_pa, p2_pa] = pressures_pa(row, shared);
+                let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
                 let (by_p1, by_p2) = (by_ln_ratio / p1_pa, -by_ln_ratio / p2_pa);
                 put(OFFSETS + 3, by_p1);
                 put(OFFSETS + 4, by_p2);
-                put(GAINS + 2, by_p1 * row.p1_pa);
-                put(GAINS + 3, by_p2 * row.p2_pa);
+                put(GAINS + 2, by_p1 * (row.p1_pa - self.rest_pressure_pa));
+                put(GAINS + 3, by_p2 * (row.p2_pa - self.rest_pressure_pa));
                 put(BAROMETER, by_p1 + by_p2);
             }
             if active[FLOW_GAIN] {
@@ -364,7 +366,7 @@ impl Setting {
                 put(FLOW_GAIN, -by_flow * gas.flow_kg_s / (1.0 + shared[FLOW_GAIN]));
             }
             if active[HUMIDITY] {
-                let [p1_pa, p2_pa] = pressures_pa(row, shared);
+                let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
                 let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + STEP_RATIO, ..gas.air };
                 let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, gas.t1_k, air);
                 put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, STEP_RATIO));
@@ -421,9 +423,12 @@ impl Setting {
 }
 
 /// P1 and P2 without their errors, Pa.
-fn pressures_pa(row: &Row, shared: &SharedVector) -> [f64; 2] {
+fn pressures_pa(row: &Row, shared: &SharedVector, rest_pa: f64) -> [f64; 2] {
     let corrected = |reading_pa: f64, offset: usize, gain: usize| {
-        reading_pa - shared[OFFSETS + offset] - shared[GAINS + gain] * reading_pa - shared[BAROMETER]
+        reading_pa
+            - shared[OFFSETS + offset]
+            - shared[GAINS + gain] * (reading_pa - rest_pa)
+            - shared[BAROMETER]
     };
     [corrected(row.p1_pa, 3, 2), corrected(row.p2_pa, 4, 3)]
 }

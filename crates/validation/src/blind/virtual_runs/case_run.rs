@@ -14,8 +14,9 @@ use mapper_campaign::Campaign;
 use mapper_core::{Channel, NoiseColour, PlanStep, Recording, UnpacedClock};
 use mapper_physics::rig::effect::{self, Rig};
 use mapper_physics::simulation::model::Model;
-use mapper_recording::{RecordingHeader, RecordingWriter};
+use mapper_recording::{ChannelMap, RecordingHeader, RecordingWriter};
 use mapper_runner::{RunObserver, Runner};
+use mapper_session::declared;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -84,10 +85,9 @@ impl<'a> Schedule<'a> {
         // A stream that nothing else of the lab uses.
         let mut random = Pcg64::seed_from_u64(seed ^ 0x5851_F42D_4C95_7F2D);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let sensors = self.campaign.sensors.iter();
-        sensors
-            .map(|(channel, sensor)| {
-                let declared = sensor.declared;
+        declared(self.campaign, &ChannelMap::native())
+            .into_iter()
+            .map(|(channel, declared)| {
                 let errors = SensorErrors {
                     white_sigma: white_share * declared.noise_sigma,
                     coloured_sigma: colour.first_order_share_ratio * declared.noise_sigma,
@@ -95,7 +95,7 @@ impl<'a> Schedule<'a> {
                     offset: declared.offset_sigma * normal(),
                     gain_ratio: declared.gain_sigma_ratio * normal(),
                 };
-                (*channel, errors)
+                (channel, errors)
             })
             .collect()
     }

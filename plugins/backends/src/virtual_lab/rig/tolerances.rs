@@ -16,7 +16,6 @@ pub fn draw_tolerances(rig: &mut Rig, tolerances: &ModelTolerances, seed: u64) {
         1.0 + sigma_ratio * normal
     };
     let params = &mut rig.model.params;
-    rig.instruments.path_mut(Channel::CompressorFlow).gain_ratio *= scale(tolerances.flow_meter_gain_ratio);
     params.compressor.flow_scale_ratio *= scale(tolerances.flow_map_ratio);
     params.compressor.efficiency_scale_ratio *= scale(tolerances.compressor_efficiency_ratio);
     params.turbine.peak_efficiency *= scale(tolerances.turbine_efficiency_ratio);

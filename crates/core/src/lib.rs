@@ -30,7 +30,7 @@ pub use identification::joint_settings::{
 pub use identification::model_tolerances::ModelTolerances;
 pub use identification::settle_bands::SettleBands;
 pub use identification::thermal_model::{
-    ConvectionLaw, CorrelatedPair, IdentifiedInlet, Origin, ProfilePoint, SharedValue, ThermalModel,
+    ConvectionLaw, CorrelatedPair, IdentifiedInlet, Origin, SharedValue, ThermalModel,
 };
 pub use identification::uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
 pub use identification::warning::{
@@ -77,7 +77,7 @@ pub use rig::speed_response::{SpeedControlSettings, SpeedResponse};
 pub use rig::surge::{SurgeFoundBy, SurgeMark, SurgeNotFound, SurgeSeek};
 pub use test_plan::jump::{Jump, Repeats};
 pub use test_plan::operating_point::OperatingPoint;
-pub use test_plan::plan::{PlanInputHashes, Plan, PlanBound, PlanFigures, PlanStep, Predicted, StepKind};
+pub use test_plan::plan::{Plan, PlanBound, PlanFigures, PlanInputHashes, PlanStep, Predicted, StepKind};
 pub use test_plan::plan_remark::{NoBound, PlanRemark};
 pub use test_plan::step_number::step_number;
 pub use test_plan::timing::{Dwell, Timing};

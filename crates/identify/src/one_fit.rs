@@ -1,9 +1,8 @@
 //! A single least-squares fit of all steps, for timing comparisons with another program.
 
-use crate::joint::fit::input_noise_spline::Explained;
 use crate::joint::fit::solve::{FULLY, Problem};
 use crate::joint::fit::start;
-use crate::joint::step_model::parameters::{ALPHA, ETA, LN_DEVIATION, PROBE_MM2};
+use crate::joint::step_model::parameters::{ALPHA, ETA, PROBE_MM2};
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::end_state;
 use crate::step_outcome::findings::Findings;
@@ -21,9 +20,6 @@ pub struct OneFit {
     /// Efficiency of each step, fraction.
     pub etas: Vec<f64>,
 }
-
-/// Start values for the spreads of the points about surface (fraction) and law (ratio).
-const SPREADS: (f64, f64) = (0.005, 0.01);
 
 /// Prepares rows, weights and start values, and returns a function that fits once from there; `None` if there is nothing to fit. The weights
 /// are those of the declared noise, without re-estimation, checks or corrections.
@@ -44,12 +40,7 @@ pub fn one_fit<R>(
     let steps = start::steps(recording, &states, config, &mut findings);
     let nothing_known = vec![Estimate::default(); recording.steps.len()];
     let mut prepared: Problem<'_> = start::problem(&steps, &nothing_known, config)?;
-    start::refine(&mut prepared, &steps, config);
-    prepared.explained = Explained::default();
-    prepared.surface_sigma = SPREADS.0;
-    for member in &mut prepared.members {
-        member.priors[LN_DEVIATION].sigma = SPREADS.1;
-    }
+    start::set_weights(&mut prepared, &steps, config);
     Some(measure(&mut || {
         let mut problem = prepared.clone();
         problem.minimise(FULLY)?;

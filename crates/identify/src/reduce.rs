@@ -6,6 +6,7 @@ use crate::config::coloured;
 use crate::identify::point;
 use crate::single_step::dynamic::{Estimate, judge_assumption};
 use crate::single_step::expected::DECLARED_INTERVAL_S;
+use crate::single_step::fit::ETA_BOUNDS;
 use crate::step_data::end_state::EndState;
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, IdentifyError, single_step::budgets, step_outcome::interval_width};
@@ -21,9 +22,6 @@ use mapper_physics::machine::boundary::BoundaryConditions;
 use mapper_physics::machine::params::Params;
 use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
 use std::sync::Arc;
-
-/// Efficiencies between which the adiabatic one is searched for.
-const EFFICIENCIES: (f64, f64) = (0.05, 1.5);
 
 /// A machine whose heat transfer is known.
 #[derive(Debug, Clone, Copy)]
@@ -206,7 +204,7 @@ impl Inputs {
             None => apparent_efficiency(p2_pa / p1_pa, t1_k, self.t2_k, self.air),
             Some(params) => {
                 let excess_k = |eta: f64| self.outputs(params, eta).t2_probe_target_k - self.t2_k;
-                root_between(EFFICIENCIES.0, EFFICIENCIES.1, 1e-10, excess_k)?
+                root_between(ETA_BOUNDS.0, ETA_BOUNDS.1, 1e-10, excess_k)?
             }
         };
         (eta.is_finite() && eta > 0.0 && p2_pa > p1_pa).then_some(eta)
@@ -251,7 +249,7 @@ impl Inputs {
             (Some(above), None) => above - eta,
             (None, Some(below)) => eta - below,
             // An error that leaves no efficiency says nothing of it.
-            (None, None) => EFFICIENCIES.1,
+            (None, None) => ETA_BOUNDS.1,
         }
     }
 

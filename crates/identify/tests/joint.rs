@@ -143,13 +143,6 @@ fn with_noise_on_t2_the_share_is_found() {
         config.declared.insert(Channel::T2, noise);
         let (points, thermal) = found(&recording, &config);
         alpha_squares += (value(&thermal.alpha_area_ratio) - 0.2).powi(2);
-        // With a standard error of 0.006, 0.1 is significant by some 17 of them; three are required, as squares.
-        let profile = &thermal.alpha_area_profile;
-        assert_eq!(profile.len(), 9);
-        for point in profile {
-            let at_truth = (point.value - 0.2).abs() < 1e-9;
-            assert!(if at_truth { point.square == 0.0 } else { point.square > 9.0 }, "{profile:?}");
-        }
         for (point, truth) in points.iter().zip(&campaign.truth) {
             eta_squares += (point.eta.unwrap() - truth.eta).powi(2);
             honesty.add(point.eta, point.eta_low, point.eta_high, truth.eta);
@@ -366,14 +359,12 @@ fn a_missing_channel_is_named() {
     }
 }
 
-/// Two steps with ten times the noise of a good rig: any alpha_A fits, so the profile shows it and no number is given.
+/// Two steps with ten times the noise of a good rig: any alpha_A fits, so no number is given.
 #[test]
 fn a_share_that_the_recording_cannot_determine_gets_no_number() {
     let campaign = campaign(&eighteen()[..3], 120.0, Machine { alpha: 0.2, ..Machine::default() });
     let (recording, declared) = measured(&campaign.recording, 10.0, 0.0, &mut Pcg64::seed_from_u64(31));
     let (_, thermal) = found(&recording, &IdentifyConfig { declared, ..joint() });
-    let allowed = thermal.alpha_area_profile.iter().filter(|point| point.square < 3.84).count();
-    assert!(allowed >= 3, "{:?}", thermal.alpha_area_profile);
     assert_eq!(thermal.alpha_area_ratio.value, None, "{:?}", thermal.alpha_area_ratio);
 }
 

@@ -1,5 +1,6 @@
 //! The most probable values of the unknowns of a nonlinear model: Gauss-Newton within bounds.
 
+use mapper_numerics::ROUNDING;
 use nalgebra::{DMatrix, DVector};
 
 /// A model whose whitened residuals depend on unknowns. Its cost is their sum of squares and that of the unknowns' distances from their
@@ -166,9 +167,6 @@ impl Normal {
         Some(inverse.view((first, first), (count, count)).into_owned())
     }
 }
-
-/// What a step may be beyond its room.
-const ROUNDING: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {

@@ -11,6 +11,7 @@
 //! wrong that is the sum of all priors, by Markov's inequality, for a Bayes factor has mean 1 there. In fact far less: it takes some 4.5
 //! standard errors, and 30 hypotheses have that in one of 5,000.
 
+use mapper_numerics::ROUNDING;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::collections::BTreeMap;
 
@@ -21,8 +22,6 @@ pub const MAX_MEMBERS: usize = 4;
 const MAX_CHANGES: usize = 4 * MAX_MEMBERS;
 /// Sets from which the search starts, in addition to the empty one: bounds its time. Judgement.
 const MAX_STARTS: usize = 6;
-/// Gain, ln of odds, that is none: rounding.
-const NO_GAIN: f64 = 1e-9;
 
 /// Residuals with what may move them.
 #[derive(Debug, Clone, PartialEq)]
@@ -295,7 +294,7 @@ impl Search<'_> {
     /// The set that gains most by one member more, one less, or another one in a place; `None` where none gains.
     fn better(&self, members: &[usize]) -> Option<Vec<usize>> {
         let places = (members.len() + 1).min(MAX_MEMBERS);
-        let mut best: (f64, Option<Vec<usize>>) = (NO_GAIN, None);
+        let mut best: (f64, Option<Vec<usize>>) = (ROUNDING, None);
         let mut try_set = |gain: f64, set: Vec<usize>| {
             if gain > best.0 {
                 best = (gain, Some(set));

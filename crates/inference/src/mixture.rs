@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 /// Draws of each set: means and probabilities are then within some thousandths of sums over a grid, as the test shows.
 const DRAWS: usize = 128;
 /// Weight of a set below which it is not drawn from: what it could add to a 95 % interval is a fiftieth of what lies beyond it.
-const MIN_WEIGHT: f64 = 1e-3;
+pub const MIN_WEIGHT: f64 = 1e-3;
 /// Bases of the Halton sequence, one for each parameter.
 const BASES: [usize; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
 

@@ -6,6 +6,11 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+/// Relative tolerance of an iteration: the square root of the rounding error of f64 (Press et al., Numerical Recipes, ch. 10.1).
+pub const ROUNDING: f64 = 1.490_116_119_384_765_6e-8;
+/// Relative step of a difference: the cube root of that error, at which rounding and curvature are equal in a two-sided one (ibid., ch. 5.7).
+pub const SLOPE_STEP: f64 = 6.055_454_452_393_343e-6;
+
 pub mod coloured_noise;
 pub mod least_squares;
 pub mod minimise;

@@ -87,8 +87,8 @@ impl Declared {
     }
 }
 
-/// Noise of one sample of a gas stand's usual sensor.
-fn usual_noise_sigma(channel: Channel) -> f64 {
+/// Noise of one sample of a gas stand's usual sensor, in the channel's unit.
+pub fn usual_noise_sigma(channel: Channel) -> f64 {
     match channel.info().dimension {
         Dimension::RotationalSpeed => 30.0,
         Dimension::MassFlow => 1.5e-4,

@@ -182,7 +182,6 @@ fn the_thermal_model_of_a_run_removes_the_heat() {
             }),
             internal_area_m2: compressor.internal_area_m2,
             alpha_area_ratio: shared(compressor.alpha_area_ratio, 0.0),
-            alpha_area_profile: Vec::new(),
             inlet: None,
             probe_diameter_m: shared(0.0, 0.0),
             direction_factor: shared(1.0, 0.0),

@@ -75,16 +75,6 @@ pub struct CorrelatedPair {
     pub correlation: f64,
 }
 
-/// One point of a profile: a parameter fixed at a value, all others fitted again.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ProfilePoint {
-    /// The value, unit of the parameter.
-    pub value: f64,
-    /// Sum of squared residuals in standard deviations, minus that of the best point of the profile: below 3.84 the
-    /// recording allows the value at 95 %.
-    pub square: f64,
-}
-
 /// The assumed model of the heat-transfer coefficient before the wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct IdentifiedInlet {
@@ -111,9 +101,6 @@ pub struct ThermalModel {
     pub internal_area_m2: f64,
     /// Share of the internal area before compression, alpha_A.
     pub alpha_area_ratio: SharedValue,
-    /// Loss of fit quality with alpha_A fixed at a value; empty if it was not fitted.
-    #[serde(default)]
-    pub alpha_area_profile: Vec<ProfilePoint>,
     /// Model of h before the wheel; `None` if it has no effect, since no area lies there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inlet: Option<IdentifiedInlet>,

@@ -1,6 +1,6 @@
 //! The rows of one balance, and the columns of all parameters that affect them.
 
-use crate::faults::end_readings::{CHANNELS, PerChannel, Readings, TC};
+use crate::faults::end_readings::{CHANNELS, PerChannel, Readings};
 use mapper_core::Channel;
 use mapper_inference::hypotheses::Balance;
 use mapper_physics::rig::sensor_fault::{FaultKind, SensorFault, additive, gain_error};
@@ -61,7 +61,7 @@ impl Rows {
             if own(CHANNELS[channel]).is_some() {
                 return 0.0;
             }
-            let housing_k = readings.values[TC];
+            let housing_k = readings.tc_k();
             let Readings { values, run_ratio, rest_pressure_pa, .. } = readings;
             fault.error_per_unit(CHANNELS[channel], values[channel], housing_k, *run_ratio, *rest_pressure_pa)
         });

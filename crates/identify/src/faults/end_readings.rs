@@ -17,9 +17,6 @@ pub(crate) const CHANNELS: [Channel; 7] = [
     Channel::ShaftSpeed,
 ];
 
-/// Position of the housing temperature in [`CHANNELS`].
-pub(crate) const TC: usize = 2;
-
 /// One number for each of [`CHANNELS`].
 pub(crate) type PerChannel = [f64; CHANNELS.len()];
 
@@ -75,6 +72,10 @@ impl Readings {
 
     pub(crate) fn t2_k(&self) -> f64 {
         self.values[1]
+    }
+
+    pub(crate) fn tc_k(&self) -> f64 {
+        self.values[2]
     }
 
     pub(crate) fn p1_pa(&self) -> f64 {

@@ -23,6 +23,8 @@ use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
 use mapper_core::{Channel, Method, Recording, SuspectedFault, Warning};
 use mapper_inference::hypotheses::{Likelihood, Member, Priors};
+use mapper_inference::interval::COVERAGE;
+use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_physics::rig::sensor_fault::additive;
 
 /// Prior probability of a fault: one recording in ten has one. Judgement; docs/validation/faults.md uses the same value.
@@ -34,12 +36,8 @@ const OTHER_CONVECTION_RATIO: f64 = 0.2;
 /// The same of the conditions: weather and altitude, a cell that is hot, another test.
 const OTHER_PRESSURE_PA: f64 = 3e3;
 const OTHER_TEMPERATURE_K: f64 = 10.0;
-/// Relative probability above which an alternative is named: one in twenty.
-const ALTERNATIVE: f64 = 0.05;
-/// Relative probability below which an alternative is excluded, if points stay good because of that: one in a thousand.
-pub(crate) const EXCLUDED: f64 = 1e-3;
 
-/// Maximum number of steps, evenly spread: the cost grows with the cube, and these take a second.
+/// Maximum number of rows of a balance, evenly spread: the cost grows with the cube, and these take a second.
 pub(crate) const MAX_STEPS: usize = 500;
 
 /// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if
@@ -70,9 +68,9 @@ pub(crate) fn find(likelihood: &Likelihood, priors: &Priors, method: Method) -> 
         suspect: suspect(member.index),
         value: member.value,
         sigma: member.sigma,
-        alternatives: likelier_than(&member, ALTERNATIVE),
+        alternatives: likelier_than(&member, 1.0 - COVERAGE),
         touches_points: touches_points(suspect(member.index), method)
-            || likelier_than(&member, EXCLUDED).into_iter().any(|other| touches_points(other, method)),
+            || likelier_than(&member, MIN_WEIGHT).into_iter().any(|other| touches_points(other, method)),
     };
     likelihood.explain(priors).unwrap_or_default().members.into_iter().map(found).collect()
 }

@@ -2,6 +2,7 @@
 
 use crate::faults::end_readings::Readings;
 use mapper_core::{Channel, ModelTolerances};
+use mapper_numerics::ROUNDING;
 use mapper_numerics::polyline::NearestOnPolyline;
 use mapper_numerics::root::bisect;
 use mapper_physics::simulation::model::Model;
@@ -20,8 +21,6 @@ pub struct NominalRig<'a> {
 
 /// Range about the measured speed in which the map's speed is searched.
 const SPEEDS: (f64, f64) = (0.4, 2.5);
-/// Relative error of that speed, far below all tolerances.
-const SPEED_ERROR: f64 = 1e-7;
 /// Number of positions on a speed line among which the nearest is searched.
 const PLACES: usize = 200;
 /// Extension beyond the surge point, share of the line's PR - 1: a rig may reach further than its map.
@@ -42,7 +41,7 @@ impl NominalRig<'_> {
         let speed_rpm = readings.speed_rpm();
         let (low, high) = (SPEEDS.0 * speed_rpm, SPEEDS.1 * speed_rpm);
         (low > 0.0 && missing_kg_s(low) < 0.0 && missing_kg_s(high) > 0.0).then_some(())?;
-        Some(bisect(low, high, SPEED_ERROR * speed_rpm, |speed_rpm| missing_kg_s(speed_rpm) < 0.0).0)
+        Some(bisect(low, high, ROUNDING * speed_rpm, |speed_rpm| missing_kg_s(speed_rpm) < 0.0).0)
     }
 
     /// Efficiency of the map at the nearest position of the speed line. Also its slope along the line, per unit of the line's largest flow and

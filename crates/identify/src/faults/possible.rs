@@ -10,7 +10,6 @@ use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::faults::end_readings::Readings;
 use crate::faults::found_fault::Suspect;
 use crate::faults::{
-    EXCLUDED,
     balances::{convection, efficiency},
     suspect,
 };
@@ -18,6 +17,7 @@ use crate::single_step::budgets::own_row;
 use crate::single_step::dynamic::Estimate;
 use mapper_core::{EstimateUncertainty, half_width_95, standard_error_of};
 use mapper_inference::hypotheses::{Likelihood, Priors};
+use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_inference::singles::Single;
 use nalgebra::DVector;
 
@@ -42,7 +42,7 @@ pub(crate) fn widen(
     let possible = |single: Single| {
         let Suspect::Sensor(fault) = suspect(single.index) else { return None };
         let effect = |rows: &Rows| rows.by_fault(&fault);
-        (single.odds > EXCLUDED).then(|| Possible {
+        (single.odds > MIN_WEIGHT).then(|| Possible {
             size: (single.value, single.sigma),
             effects: [effect(&etas), effect(&ln_hs)],
         })

@@ -11,7 +11,7 @@ use crate::isothermal_zero::relaxation;
 use crate::single_step::expected::DECLARED_INTERVAL_S;
 use mapper_core::{Channel, DeclaredUncertainty, Recording, Series, Soak, StepMarker};
 use mapper_numerics::coloured_noise::variance_of_mean;
-use mapper_numerics::statistics::mean;
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, mean};
 use mapper_observe::declared::{CommonOffset, rest_pressure_pa};
 use mapper_observe::plausible::is_reading;
 use mapper_physics::rig::sensor_fault::gain_error;
@@ -60,14 +60,8 @@ impl From<Soak> for ZeroSettings {
 
 /// Shaft speed below which the machine is at standstill, rpm: far below any idle, far above any sensor's noise.
 const AT_REST_RPM: f64 = 1000.0;
-/// Shortest soak from which the limit of a relaxing reading is estimated, s.
-const SHORTEST_RELAXATION_S: f64 = 600.0;
-/// Longest part of the soak that is used for it, s: three time constants of a heavy housing, for any sample interval.
-const LONGEST_RELAXATION_S: f64 = 3600.0;
-/// Number of segments over which readings are averaged for it.
+/// Length of the segments over which readings are averaged to estimate the limit of a relaxing one, s.
 const BLOCK_S: f64 = 30.0;
-/// Standard deviations by which readings may differ before the soak itself is doubtful.
-const UNEVEN_SIGMAS: f64 = 5.0;
 
 /// The estimated offsets and their segment.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -186,7 +180,7 @@ fn zero_of(
             let mut own = sigma.hypot(sigma_of_mean(declared.noise_sigma, end_s - start_s, config));
             // The housing reaches the cell's temperature last, and its drift is below the threshold.
             if *channel == Channel::Tc
-                && let Some((limit, error)) = housing_limit(recording, rest, config)
+                && let Some((limit, error)) = housing_limit(recording, rest, config, settings)
             {
                 (mean, own) = (limit, sigma.hypot(error));
             }
@@ -200,7 +194,7 @@ fn zero_of(
         }
         let uneven = |common: f64, at_fault: Option<Channel>| {
             let mut fault_free = readings.iter().filter(|reading| Some(reading.channel) != at_fault);
-            fault_free.find(|reading| (reading.mean - common).abs() > UNEVEN_SIGMAS * reading.total)
+            fault_free.find(|reading| (reading.mean - common).abs() > EXCLUDE_SIGMAS * reading.total)
         };
         if let Some(first) = uneven(common, None) {
             let Reading { channel, mean, total, .. } = *first;
@@ -276,7 +270,7 @@ pub fn expected_after_zero(
             let averaged = sigma_of_mean(declared.noise_sigma, stretch_s, &config);
             let error = match channel {
                 Channel::Tc => {
-                    expected_limit_error(declared.noise_sigma, soak_s, &config).unwrap_or(averaged)
+                    expected_limit_error(declared.noise_sigma, soak_s, &config, settings).unwrap_or(averaged)
                 }
                 _ => averaged,
             };
@@ -324,10 +318,11 @@ fn housing_limit(
     recording: &Recording,
     (start_s, end_s): (f64, f64),
     config: &IdentifyConfig,
+    settings: &ZeroSettings,
 ) -> Option<(f64, f64)> {
-    let first_s = (start_s + (end_s - start_s) / 3.0).max(end_s - LONGEST_RELAXATION_S);
+    let first_s = start_s + (end_s - start_s) / 3.0;
     let noise_sigma = config.declared.get(&Channel::Tc)?.noise_sigma;
-    if end_s - start_s < SHORTEST_RELAXATION_S {
+    if end_s - start_s < settings.longest_s {
         return None;
     }
     let series = recording.series.get(&Channel::Tc)?;
@@ -347,11 +342,16 @@ fn housing_limit(
 }
 
 /// The standard error of [`housing_limit`] after a soak of `soak_s`.
-fn expected_limit_error(noise_sigma: f64, soak_s: f64, config: &IdentifyConfig) -> Option<f64> {
-    if soak_s < SHORTEST_RELAXATION_S {
+fn expected_limit_error(
+    noise_sigma: f64,
+    soak_s: f64,
+    config: &IdentifyConfig,
+    settings: &ZeroSettings,
+) -> Option<f64> {
+    if soak_s < settings.longest_s {
         return None;
     }
-    let used_s = (2.0 / 3.0 * soak_s).min(LONGEST_RELAXATION_S);
+    let used_s = 2.0 / 3.0 * soak_s;
     let t_s: Vec<f64> = (0..(used_s / BLOCK_S) as usize)
         .map(|block| soak_s - used_s + (block as f64 + 0.5) * BLOCK_S)
         .collect();

@@ -7,18 +7,12 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::joint::fit::solve::ROUGHLY;
 use crate::joint::fit::start::{self, START_S};
-use crate::joint::step_model::rows::{Row, StepRows, block_s_after, place};
+use crate::joint::step_model::rows::{COARSER, Row, StepRows, block_s_after, place};
 use crate::joint::{fit::refinements, uncertainty::smoothness};
 use crate::single_step::dynamic::Estimate;
 use crate::single_step::expected::{DECLARED_INTERVAL_S, Expected, ExpectedRow};
 use mapper_numerics::coloured_noise::BlockNoise;
-
-/// Minimum number of rows of a step.
-const MIN_ROWS: usize = 4;
-
-/// Ratio of forecast to recording block length. Blocks are half the noise correlation time at first and all of it later, which costs a few
-/// percent of the rows' information and halves the computation.
-const COARSER: f64 = 2.0;
+use mapper_numerics::statistics::MIN_VALUES;
 
 /// A forecast step.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +88,7 @@ fn condensed(position: usize, step: &ExpectedStep<'_>, config: &IdentifyConfig) 
         }
     }
     let end = row(step.rows.last()?, rows.last()?.noise, config);
-    let usable = rows.len() >= MIN_ROWS && end.place.0 > 0.0 && end.place.1 > 0.0;
+    let usable = rows.len() >= MIN_VALUES && end.place.0 > 0.0 && end.place.1 > 0.0;
     usable.then_some(StepRows { position, rows, end })
 }
 

@@ -2,10 +2,8 @@
 
 use crate::IdentifyConfig;
 use crate::joint::fit::refinements::Refinements;
-use crate::joint::fit::solve::{Covariance, Member, Problem, ROUGHLY};
-use crate::joint::step_model::parameters::{
-    ALPHA, ETA, EXPONENT, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, PROBE_MM2,
-};
+use crate::joint::fit::solve::{Member, Problem, ROUGHLY};
+use crate::joint::step_model::parameters::{ALPHA, ETA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION};
 use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::interval_width;
@@ -16,19 +14,13 @@ use mapper_numerics::statistics::{DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, mea
 const DOUBT_SQUARE: f64 = 2.0;
 /// Whitened mean square, and its ratio to the median step's, above which a step is excluded from the shared parameters.
 const EXCLUDE_SQUARE: f64 = 4.0;
-/// Whitened mean square of all steps above which the model itself is doubtful.
-const MODEL_SQUARE: f64 = 1.4;
-/// The same for the sums over [`STRETCH_ROWS`] rows: smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model fits the
+/// Mean square of the sums over [`STRETCH_ROWS`] whitened rows of all steps above which the model itself is doubtful: smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model fits the
 /// rig.
 const SLOW_SQUARE: f64 = 1.3;
 /// Rows of a segment, 5 to 10 s: model errors are slower than noise.
 const STRETCH_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which the law does not apply, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
-/// Exponents of the Reynolds number possible in pipe-like flow: 0.33 is laminar, 0.8 turbulent, and Burke et al. have 1.13.
-const EXPONENT_RANGE: (f64, f64) = (0.5, 1.5);
-/// Largest practical probe tip in a compressor outlet, mm.
-const LARGEST_PROBE_MM: f64 = 4.0;
 /// Isentropic efficiency, total to total, above that of any turbocharger compressor (the best stay below 0.85).
 const HIGHEST_EFFICIENCY: f64 = 0.88;
 
@@ -106,19 +98,11 @@ pub(crate) fn judge_step(
 /// Arguments against the model as a whole.
 pub(crate) fn doubts(
     problem: &Problem<'_>,
-    covariance: &Covariance,
     smoothed: &Smoothed,
     refinements: Option<&Refinements>,
     config: &IdentifyConfig,
 ) -> Vec<ModelDoubt> {
     let mut doubts = Vec::new();
-    let squares: Vec<f64> = problem
-        .members
-        .iter()
-        .filter(|member| member.shares)
-        .map(|member| mean_square(problem, member))
-        .collect();
-    let overall = mean(&squares).unwrap_or(0.0);
     let slow: Vec<f64> = problem
         .members
         .iter()
@@ -126,25 +110,8 @@ pub(crate) fn doubts(
         .filter_map(|m| slow_square(problem, m))
         .collect();
     let slow = mean(&slow).unwrap_or(0.0);
-    if !config.declared.is_empty() && overall > MODEL_SQUARE {
-        doubts.push(ModelEvidence::Residual { residual_ratio: overall.sqrt() });
-    }
     if !config.declared.is_empty() && slow > SLOW_SQUARE {
         doubts.push(ModelEvidence::SlowResidual { residual_ratio: slow.sqrt() });
-    }
-    let error = |index: usize| covariance.error_of(index);
-    if let Some(sigma) = error(EXPONENT) {
-        let exponent = problem.shared[EXPONENT];
-        let outside = (EXPONENT_RANGE.0 - exponent).max(exponent - EXPONENT_RANGE.1);
-        if outside > HINT_SIGMAS * sigma {
-            doubts.push(ModelEvidence::Exponent { exponent, exponent_sigma: sigma });
-        }
-    }
-    if let Some(sigma) = error(PROBE_MM2) {
-        let square = problem.shared[PROBE_MM2];
-        if square - HINT_SIGMAS * sigma > LARGEST_PROBE_MM * LARGEST_PROBE_MM {
-            doubts.push(ModelEvidence::Probe { diameter_m: 1e-3 * square.sqrt() });
-        }
     }
     let scatter = rms(problem.members.iter().map(|member| member.local[LN_DEVIATION])).unwrap_or(0.0);
     if problem.setting.with_law && scatter > LAW_SCATTER_RATIO {

@@ -23,8 +23,8 @@ use crate::step_outcome::findings::Findings;
 use crate::step_outcome::two_parameter::TwoParameter;
 use crate::{IdentifyConfig, step_data::commands};
 use mapper_core::{
-    Choice, EstimateUncertainty, FitFailure, JointSettings, LeftOut, ModelDoubt, ModelEvidence, Recording,
-    ThermalModel, Verdict, Warning, Window, confidence_interval_95,
+    EstimateUncertainty, FitFailure, JointSettings, LeftOut, Recording, ThermalModel, Verdict, Warning,
+    Window, confidence_interval_95,
 };
 use mapper_numerics::statistics::{DOUBT_SIGMAS, rms};
 
@@ -73,19 +73,11 @@ pub(crate) fn estimate(
         return Joint { estimates: alone, thermal: None, two_parameter: Vec::new(), fitted: None };
     }
     let steps = fit::start::steps(recording, end_states, config, findings);
-    let careful = carefully(config);
-    let late: Vec<step_model::rows::StepRows> =
-        steps.iter().map(step_model::rows::StepRows::settled).collect();
     let attempt = match Attempt::new(&steps, &alone, config, &[]) {
-        Some(attempt) if condemned || attempt.thermal.doubts.is_empty() => Some(attempt),
-        first => match first.as_ref().and_then(|first| first.without_a_region(&steps, &alone, config)) {
-            Some(other) => Some(other),
-            None if careful.joint == config.joint => first,
-            None => match Attempt::new(&late, &alone, &careful, &[]) {
-                Some(other) => Some(other.instead_of(first)),
-                None => first,
-            },
-        },
+        Some(first) if !condemned && !first.thermal.doubts.is_empty() => {
+            Some(first.without_a_region(&steps, &alone, config).unwrap_or(first))
+        }
+        first => first,
     };
     let Some(attempt) = attempt else {
         // Single-step results are better than none.
@@ -235,27 +227,6 @@ impl<'a> Attempt<'a> {
             Some(rest)
         })
     }
-
-    /// This fit after another one had warnings: the warnings remain.
-    fn instead_of(mut self, doubted: Option<Attempt<'_>>) -> Self {
-        let none = ModelDoubt { evidence: ModelEvidence::NotConverged, parameters_held: false };
-        let doubts = doubted.map_or(vec![none], |doubted| doubted.thermal.doubts).into_iter();
-        let held = doubts.map(|doubt| ModelDoubt { parameters_held: true, ..doubt });
-        self.thermal.doubts.splice(0..0, held);
-        self
-    }
-}
-
-/// The parameters with a prior, fixed as declared.
-fn carefully(config: &IdentifyConfig) -> IdentifyConfig {
-    let held = JointSettings {
-        alpha_area: Choice::Fixed,
-        probe: Choice::Fixed,
-        direction: Choice::Fixed,
-        inlet_h: Choice::Fixed,
-        ..config.joint
-    };
-    IdentifyConfig { joint: held, ..config.clone() }
 }
 
 /// A problem at its minimum.

@@ -10,12 +10,10 @@ use crate::joint::step_model::parameters::{ALPHA, EXPONENT, LN_COEFFICIENT, LN_D
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::SurfaceScale;
 use mapper_core::{MapRegion, ReferenceState};
-use mapper_numerics::statistics::EXCLUDE_SIGMAS;
+use mapper_numerics::statistics::{EXCLUDE_SIGMAS, MIN_VALUES};
 
 /// Shares of the steps in a region; the smallest one that helps is left out.
 const SHARES: [f64; 2] = [1.0 / 6.0, 1.0 / 3.0];
-/// Minimum number of steps for leaving any out.
-const MIN: usize = 9;
 /// Minimum standard error of the difference of each parameter: the effect of small smooth model errors.
 const FLOORS: [(Place, f64); 4] =
     [(ALPHA, 0.02), (EXPONENT, 0.02), (LN_COEFFICIENT, 0.02), (LN_DIRECTION, 0.01)];
@@ -34,7 +32,7 @@ type Rank = fn(&(f64, f64)) -> f64;
 /// All regions, the small ones first; those of equal size are adjacent.
 pub(crate) fn regions(steps: &[StepRows], reference: ReferenceState) -> Vec<Vec<Region>> {
     let places: Vec<(f64, f64)> = steps.iter().map(|step| step.end.place).collect();
-    let Some(scale) = SurfaceScale::of(&places, reference).filter(|_| steps.len() >= MIN) else {
+    let Some(scale) = SurfaceScale::of(&places, reference).filter(|_| steps.len() > MIN_VALUES) else {
         return Vec::new();
     };
     let coordinates: Vec<(f64, f64)> = places.iter().map(|place| scale.coordinates(*place)).collect();

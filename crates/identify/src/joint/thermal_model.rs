@@ -9,7 +9,6 @@ use crate::joint::step_model::parameters::{
     PROBE_MM2, SURFACE, symbol,
 };
 use crate::joint::step_model::rows::StepRows;
-use crate::joint::uncertainty::profile;
 use crate::joint::uncertainty::quantity::is_offset;
 use crate::joint::uncertainty::smoothness::Smoothed;
 use mapper_core::{ConvectionLaw, CorrelatedPair, EstimateUncertainty, Origin, SharedValue, ThermalModel};
@@ -67,7 +66,6 @@ pub(crate) fn thermal_model(
         convection,
         internal_area_m2: problem.setting.internal_area_m2,
         alpha_area_ratio: of(ALPHA, &|x| x),
-        alpha_area_profile: profile::alpha_area(problem),
         inlet: problem.inlet,
         probe_diameter_m: probe(problem, covariance),
         direction_factor: of(LN_DIRECTION, &f64::exp),
@@ -78,7 +76,7 @@ pub(crate) fn thermal_model(
             .map(|(i, channel)| (*channel, of(OFFSETS + i, &|x| x)))
             .collect(),
         entangled,
-        doubts: judge::doubts(problem, covariance, smoothed, refinements, config),
+        doubts: judge::doubts(problem, smoothed, refinements, config),
     }
 }
 

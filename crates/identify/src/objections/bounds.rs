@@ -15,17 +15,13 @@ const MIN_RISE_K: f64 = 20.0;
 /// Apparent efficiency of the median point, and of any point.
 const MIDDLE: std::ops::RangeInclusive<f64> = 0.35..=1.0;
 const ANY: std::ops::RangeInclusive<f64> = 0.2..=1.6;
-/// Minimum number of points for a share.
-const MIN: usize = 3;
-/// Share of points with P2 below P1 above which the whole recording is concerned.
-const BELOW_SHARE: f64 = 1.0 / 3.0;
 
 pub(crate) fn objections(ends: &[Option<Ends>]) -> Vec<Objection> {
     let known: Vec<&Ends> = ends.iter().flatten().collect();
     let all = || (0..ends.len()).collect::<Vec<usize>>();
     let mut found = Vec::new();
     let below = known.iter().filter(|end| end.p2_pa < end.p1_pa).count();
-    if known.len() >= MIN && below as f64 > BELOW_SHARE * known.len() as f64 {
+    if 2 * below > known.len() {
         let middle = |read: fn(&Ends) -> f64| median(known.iter().map(|end| read(end))).unwrap_or(f64::NAN);
         let swapped = Swapped::P2BelowP1 {
             points: below,

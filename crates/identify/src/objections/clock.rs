@@ -14,10 +14,8 @@ const LEVEL_S: f64 = 2.0;
 const SLOPE_S: f64 = 4.0;
 /// Range of moments around the jump, s.
 const BEFORE_S: f64 = 10.0;
-const AFTER_S: f64 = 45.0;
+const AFTER_S: f64 = 40.0;
 const EVERY_S: f64 = 0.5;
-/// Time span needed after a moment, including a second for a jump that begins early, s.
-const AHEAD_S: f64 = SLOPE_S + 1.0;
 /// Lag behind the others above which a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
 /// Minimum number of jumps for an average.
@@ -37,7 +35,7 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let jumps_s: Vec<f64> = (0..steps.len())
         .filter(|position| begins_with_jump(steps, *position))
         // The window after the last moment must not include the next jump.
-        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + AHEAD_S)
+        .filter(|position| steps[*position].end_s - steps[*position].start_s > AFTER_S + BEFORE_S)
         .map(|position| steps[position].start_s)
         .collect();
     if jumps_s.len() < MIN {

@@ -8,10 +8,9 @@ use crate::needs::needs;
 use crate::objections::ends::Ends;
 use crate::objections::objection::Objection;
 use mapper_core::{Channel, Recording, Series, Warning};
+use mapper_numerics::statistics::MIN_VALUES;
 use mapper_physics::rig::sensor_fault::repeats_s;
 
-/// Minimum number of equal samples.
-const MIN: usize = 8;
 /// Share of equal neighbours outside the long runs above which a logger counts as coarse.
 const COARSE_SHARE: f64 = 0.3;
 /// Time after a jump within which every channel but those of the inlet has moved, s.
@@ -98,7 +97,7 @@ fn runs(series: &Series, shortest_s: f64) -> Vec<Run> {
     let mut first = 0;
     for stretch in series.values.chunk_by(|a, b| a == b) {
         let last = first + stretch.len() - 1;
-        if stretch.len() >= MIN && series.t_s[last] - series.t_s[first] >= shortest_s {
+        if stretch.len() >= MIN_VALUES && series.t_s[last] - series.t_s[first] >= shortest_s {
             runs.push(Run { first, last });
         }
         first = last + 1;

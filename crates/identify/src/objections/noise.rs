@@ -6,13 +6,12 @@
 use crate::IdentifyConfig;
 use crate::needs::needs;
 use crate::objections::objection::Objection;
+use crate::step_data::samples::LONGEST_BRIDGE_S;
 use mapper_core::{Recording, Warning};
 use mapper_numerics::statistics::robust_sigma;
 
 /// Ratio of a sample's standard deviation to the declared one. Noise with a time constant only reduces the difference between samples.
 const MAX_RATIO: f64 = 3.0;
-/// Sample spacing above which differences are more than noise, s.
-const NEIGHBOUR_S: f64 = 1.5;
 
 pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<Objection> {
     needs(config.method)
@@ -20,7 +19,7 @@ pub(crate) fn objections(recording: &Recording, config: &IdentifyConfig) -> Vec<
         .filter_map(|channel| {
             let declared = config.declared.get(&channel)?.noise_sigma;
             let series = recording.series.get(&channel)?;
-            let close = |pair: &[f64]| pair[1] - pair[0] <= NEIGHBOUR_S;
+            let close = |pair: &[f64]| pair[1] - pair[0] <= LONGEST_BRIDGE_S;
             let differences: Vec<f64> = series
                 .t_s
                 .windows(2)

@@ -5,10 +5,8 @@ use mapper_core::{Recording, StepConflict, Warning, step_number};
 
 /// Overlap that rounded times of other loggers explain, s.
 const ROUNDED_S: f64 = 0.5;
-/// Maximum number of steps in a plan: a year of steps of 20 s has 1.6 million.
-const MAX_STEPS: usize = 10_000_000;
 
-/// Steps that overlap in time, share a number, or exceed the maximum number.
+/// Steps that overlap in time or share a number.
 pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
     let steps = &recording.steps;
     let mut found = Vec::new();
@@ -39,14 +37,6 @@ pub(crate) fn objections(recording: &Recording) -> Vec<Objection> {
         let shared =
             StepConflict::SharedNumber { number: step_number(steps[same[0]].index), steps: same.len() };
         found.push(Objection::new(Warning::StepsContradict(shared), same.to_vec()));
-    }
-    for (position, step) in steps.iter().enumerate().filter(|(_, step)| step_number(step.index) > MAX_STEPS) {
-        let large = StepConflict::LargeNumber {
-            number: step_number(step.index),
-            start_s: step.start_s,
-            max_number: MAX_STEPS,
-        };
-        found.push(Objection::new(Warning::StepsContradict(large), vec![position]));
     }
     found
 }

@@ -1,10 +1,11 @@
 //! The dynamic method (Burke et al., section 3): efficiency and heat-transfer coefficient from the transient.
 
+use crate::config::coloured;
 use crate::single_step::bias::{DeclaredEffect, declared_effect};
 use crate::single_step::covariance::{Correlation, NoiseVariances};
 use crate::single_step::fit::{Fit, Geometry, fit};
 use crate::single_step::flow_drift::{FlowDrift, flow_drift};
-use crate::step_data::cleaning::{SPIKE_SIGMAS, without_spikes};
+use crate::step_data::cleaning::without_spikes;
 use crate::step_data::samples::Samples;
 use crate::step_data::window;
 use crate::step_outcome::findings::Findings;
@@ -12,20 +13,14 @@ use crate::{IdentifyConfig, step_data::commands, step_outcome::interval_width};
 use mapper_core::{
     BudgetRow, EstimateUncertainty, FitFailure, NoCompression, PoorFit, Recording, TooFew, Warning, Window,
 };
+use mapper_numerics::coloured_noise::variance_of_mean;
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::{mean, median, robust_sigma};
+use mapper_numerics::statistics::{DOUBT_SIGMAS, mean};
 
 /// Ratio of isentropic temperature rise to inlet temperature below which the machine does not compress.
 const SMALLEST_RISE_RATIO: f64 = 1e-3;
-/// Number of neighbours of an outlier on either side: a lag of the probe moves them all, a spike only a few.
-const OUTLIER_NEIGHBOURS: usize = 10;
-/// Distance below which a sample is never taken for an outlier, K.
-const OUTLIER_K: f64 = 1.0;
 /// Block length over which the residual is averaged to detect a trend, s.
 const STRUCTURE_BLOCK_S: f64 = 10.0;
-
-/// Maximum share of the noise that remains in block means (first-order part, 2 s): four tenths of 0.6, twice.
-const STRUCTURE_OVER_NOISE_RATIO: f64 = 0.75;
 
 /// Result of a method for one step.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -93,7 +88,7 @@ pub(crate) fn estimate(
         return estimate;
     }
     let geometry = Geometry::of(config);
-    let Some((samples, fit)) = fit_without_outliers(samples, geometry, findings) else {
+    let Some(fit) = fit(&samples, geometry) else {
         findings.refuse(Warning::FitFailed(FitFailure::Step));
         return estimate;
     };
@@ -135,37 +130,6 @@ pub(crate) fn enough(samples: &Samples, config: &IdentifyConfig, findings: &mut 
         }
     }
     true
-}
-
-/// Fits, removes outliers if they are few, and fits again.
-fn fit_without_outliers(
-    samples: Samples,
-    geometry: Geometry,
-    findings: &mut Findings,
-) -> Option<(Samples, Fit)> {
-    let first = fit(&samples, geometry)?;
-    let limit_k = (SPIKE_SIGMAS * robust_sigma(&first.residual_k)?).max(OUTLIER_K);
-    let last = samples.len().saturating_sub(1);
-    let kept: Vec<bool> = (0..samples.len())
-        .map(|i| {
-            let residual_k = first.residual_k[i];
-            if residual_k.abs() <= limit_k {
-                return true;
-            }
-            let nearby = i.saturating_sub(OUTLIER_NEIGHBOURS)..=(i + OUTLIER_NEIGHBOURS).min(last);
-            median(&first.residual_k[nearby]).is_some_and(|middle_k| (residual_k - middle_k).abs() <= limit_k)
-        })
-        .collect();
-    let inlier = |i: usize| kept.get(i).copied().unwrap_or(false);
-    let outliers = (0..samples.len()).filter(|i| !inlier(*i)).count();
-    // Many outliers are not accidental: the fit is then poor and gets a finding.
-    if outliers == 0 || outliers * 20 > samples.len() {
-        return Some((samples, first));
-    }
-    let samples = samples.filtered(inlier);
-    let second = fit(&samples, geometry)?;
-    findings.remark(Warning::Outliers { count: outliers, limit_k: Some(limit_k) });
-    Some((samples, second))
 }
 
 fn uncertainties(
@@ -240,9 +204,14 @@ fn judge_residual(view: &View<'_>, dt2_k: Option<f64>, findings: &mut Findings) 
         findings.refuse(Warning::PoorFit(PoorFit::Eta { eta: fit.eta }));
     }
     let (rms_k, slow_k) = (fit.residual_rms_k(), slow_rms_k(fit, view.samples));
+    // Three standard deviations of the noise that remains in block means.
+    let colour = coloured(view.config.noise_colour);
+    let remains =
+        variance_of_mean(colour.first_order_variance_ratio(), STRUCTURE_BLOCK_S, colour.time_constant_s);
+    let structure_k = DOUBT_SIGMAS * remains.sqrt() * noise_k;
     if noise_k > 0.0 && rms_k > limits.residual_over_noise_ratio * noise_k {
         findings.doubt(Warning::PoorFit(PoorFit::Noise { residual_k: rms_k, noise_k }));
-    } else if slow_k > (limits.structure_ratio * dt2_k.abs()).max(STRUCTURE_OVER_NOISE_RATIO * noise_k) {
+    } else if slow_k > (limits.structure_ratio * dt2_k.abs()).max(structure_k) {
         let shape = PoorFit::Shape { residual_k: slow_k, block_s: STRUCTURE_BLOCK_S, dt2_k };
         findings.doubt(Warning::PoorFit(shape));
     }

@@ -5,6 +5,7 @@ use crate::IdentifyConfig;
 use crate::single_step::probe_reading::{Followed, Probe};
 use crate::step_data::samples::Samples;
 use mapper_core::{Bound, InletConvection};
+use mapper_numerics::SLOPE_STEP;
 use mapper_physics::gas::air::Air;
 use mapper_physics::laws::compression::{CompressionInputs, compress, compressed_k};
 use mapper_physics::laws::inlet_convection::InletLaw;
@@ -15,8 +16,6 @@ use rmpfit::{MPConfig, MPFitter, MPPar, MPResult, MPSide};
 pub(crate) const ETA_BOUNDS: (f64, f64) = (0.05, 2.0);
 /// Search range of the heat-transfer coefficient, W/(m2 K).
 pub(crate) const H_BOUNDS_W_M2K: (f64, f64) = (0.0, 1e5);
-/// Relative step of the two-sided derivatives: rounding and curvature are both below 1e-9 there.
-const DERIVATIVE_STEP_RATIO: f64 = 1e-5;
 /// Scale of steps and bounds for h near zero, W/(m2 K).
 const DERIVATIVE_STEP_H_W_M2K: f64 = 1e-2;
 
@@ -218,7 +217,7 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
         followed: followed.as_ref(),
         config: MPConfig { ftol: 1e-15, xtol: 1e-13, gtol: 1e-14, max_iter: 100, ..MPConfig::new() },
         parameters: [
-            parameter(ETA_BOUNDS, 0.0, DERIVATIVE_STEP_RATIO),
+            parameter(ETA_BOUNDS, 0.0, SLOPE_STEP),
             parameter(H_BOUNDS_W_M2K, DERIVATIVE_STEP_H_W_M2K, 0.0),
         ],
     };
@@ -238,8 +237,8 @@ fn judged(
     [eta, h_w_m2k]: [f64; 2],
     residual_k: Vec<f64>,
 ) -> Option<Fit> {
-    let step_eta = DERIVATIVE_STEP_RATIO * eta;
-    let step_h = DERIVATIVE_STEP_H_W_M2K.max(DERIVATIVE_STEP_RATIO * h_w_m2k);
+    let step_eta = SLOPE_STEP * eta;
+    let step_h = DERIVATIVE_STEP_H_W_M2K.max(SLOPE_STEP * h_w_m2k);
     let mut jacobian = [Vec::with_capacity(samples.len()), Vec::with_capacity(samples.len())];
     for row in rows(samples) {
         let by_eta = (t2_k(geometry, row, eta + step_eta, h_w_m2k)

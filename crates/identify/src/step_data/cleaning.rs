@@ -4,11 +4,9 @@ use crate::IdentifyConfig;
 use crate::step_data::samples::Samples;
 use crate::step_outcome::findings::Findings;
 use mapper_core::{Channel, Warning};
-use mapper_numerics::statistics::{median_of_sorted, robust_sigma};
+use mapper_numerics::statistics::{MIN_VALUES, median_of_sorted, robust_sigma};
 use mapper_physics::rig::sensor_fault::repeats_s;
 
-/// Number of samples on either side whose median a spike is compared with.
-const NEIGHBOURS: usize = 7;
 /// Robust standard deviations beyond which a sample is a spike.
 pub(crate) const SPIKE_SIGMAS: f64 = 8.0;
 
@@ -63,18 +61,18 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
 }
 
 fn spikes_of(column: &[f64], smallest: f64) -> Vec<usize> {
-    // The sorted neighbours; from one sample to the next, one enters and one leaves.
-    let mut sorted: Vec<f64> = Vec::with_capacity(2 * NEIGHBOURS + 2);
+    // The sorted neighbours on either side; from one sample to the next, one enters and one leaves.
+    let mut sorted: Vec<f64> = Vec::with_capacity(2 * MIN_VALUES + 2);
     let place = |sorted: &[f64], value: f64| sorted.partition_point(|other| other.total_cmp(&value).is_lt());
-    for value in column.iter().take(NEIGHBOURS) {
+    for value in column.iter().take(MIN_VALUES) {
         sorted.insert(place(&sorted, *value), *value);
     }
     let mut off = Vec::with_capacity(column.len());
     for (i, value) in column.iter().enumerate() {
-        if let Some(coming) = column.get(i + NEIGHBOURS) {
+        if let Some(coming) = column.get(i + MIN_VALUES) {
             sorted.insert(place(&sorted, *coming), *coming);
         }
-        if let Some(going) = i.checked_sub(NEIGHBOURS + 1).and_then(|before| column.get(before)) {
+        if let Some(going) = i.checked_sub(MIN_VALUES + 1).and_then(|before| column.get(before)) {
             sorted.remove(place(&sorted, *going));
         }
         off.push(value - median_of_sorted(&sorted).unwrap_or(*value));

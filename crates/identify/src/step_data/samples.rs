@@ -7,11 +7,8 @@ use mapper_numerics::statistics::mean;
 use mapper_observe::plausible::is_reading;
 use mapper_physics::laws::compression::isentropic_rise_ratio;
 
-/// Longest gap between two samples of a channel that is interpolated, s: slower loggers have 1 Hz.
-const LONGEST_BRIDGE_S: f64 = 2.5;
-
-/// Flow below which eqs. 1-3 are not evaluated (they divide by it), kg/s.
-const SMALLEST_FLOW_KG_S: f64 = 1e-6;
+/// Longest gap between neighbouring samples of a channel, s: slow loggers have 1 Hz.
+pub(crate) const LONGEST_BRIDGE_S: f64 = 2.5;
 
 /// Complete rows on the times of T2, as columns of equal length.
 #[derive(Debug, Clone, Default)]
@@ -62,7 +59,7 @@ impl Samples {
                 (Channel::CompressorFlow, flow_kg_s),
             ];
             let complete = readings.into_iter().all(|(channel, value)| is_reading(channel, value))
-                && flow_kg_s > SMALLEST_FLOW_KG_S
+                && flow_kg_s > 0.0
                 && (!with_housing || is_reading(Channel::Tc, tc_k));
             let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, t1_k, config.air);
             if !complete || !rise_ratio.is_finite() {

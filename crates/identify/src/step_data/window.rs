@@ -6,9 +6,6 @@ use mapper_core::{Channel, Recording, Series, SettleBands, StepMarker, Warning, 
 use mapper_numerics::statistics::median;
 use mapper_physics::operating_point::settled::{BLOCK_S, noise_spread, settled_count, with_bands};
 
-/// Maximum number of blocks checked, from the step's end backwards: bounds the work on absurd step times.
-const MAX_BLOCKS: usize = 20_000;
-
 /// The window of a step; `None` if the step is too short for one.
 pub(crate) fn choose(
     recording: &Recording,
@@ -75,7 +72,9 @@ pub(crate) fn rest(recording: &Recording, step: &StepMarker, bands: &SettleBands
     if end_s.is_nan() || earliest_s.is_nan() || earliest_s >= end_s {
         return None;
     }
-    let block_count = (((end_s - earliest_s) / BLOCK_S).floor() as usize).clamp(1, MAX_BLOCKS);
+    // Absurd step times have no more blocks than samples.
+    let samples = recording.series.get(&Channel::ShaftSpeed).map_or(1, |series| series.t_s.len());
+    let block_count = (((end_s - earliest_s) / BLOCK_S).floor() as usize).clamp(1, samples.max(1));
     let blocks = |channel| block_medians(recording.series.get(&channel), end_s, block_count);
     let (p1_pa, p2_pa) = (blocks(Channel::P1), blocks(Channel::P2));
     let pressure_ratio: Vec<f64> = p2_pa.iter().zip(&p1_pa).map(|(p2, p1)| p2 / p1).collect();

@@ -16,6 +16,9 @@ pub const DOUBT_SIGMAS: f64 = 3.0;
 /// Threshold to exclude one number of hundreds: exceeded by chance once in 16,000 times.
 pub const EXCLUDE_SIGMAS: f64 = 4.0;
 
+/// Fewest values that give a mean and its scatter: the standard deviation of so many is known to a quarter, 1 / sqrt(2 (n - 1)).
+pub const MIN_VALUES: usize = 8;
+
 /// 95 % quantile of chi-square with one degree of freedom: the square of [`NORMAL_975`].
 pub const CHI_SQUARE_1_95: f64 = 3.841_458_820_694_124;
 

@@ -44,21 +44,6 @@ pub fn thermal_text(thermal: &ThermalModel) -> String {
             100.0 * law.deviation_ratio
         );
     }
-    // Values within the 95 % profile interval; three or more of them are not an answer.
-    let allowed: Vec<f64> = thermal
-        .alpha_area_profile
-        .iter()
-        .filter(|point| point.square < 3.84)
-        .map(|point| point.value)
-        .collect();
-    if let [first, _, .., last] = allowed.as_slice()
-        && last - first > 0.15
-    {
-        let _ = writeln!(
-            text,
-            "  the profile of alpha_A is flat: {first:.1} to {last:.1} fit the recording equally well"
-        );
-    }
     if let Some(inlet) = &thermal.inlet {
         let _ = writeln!(text, "  {}", inlet_text(inlet));
     }
@@ -103,7 +88,7 @@ pub(crate) fn inlet_text(inlet: &IdentifiedInlet) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mapper_core::{CorrelatedPair, ProfilePoint};
+    use mapper_core::CorrelatedPair;
 
     #[test]
     fn the_correlation_of_h_before_the_wheel_and_its_evidence_are_reported() {
@@ -134,9 +119,6 @@ mod tests {
             convection: None,
             internal_area_m2: 29e-3,
             alpha_area_ratio: unknown,
-            alpha_area_profile: [(0.0, 0.0), (0.1, 0.5), (0.2, 1.1), (0.3, 9.0)]
-                .map(|(value, square)| ProfilePoint { value, square })
-                .to_vec(),
             inlet: None,
             probe_diameter_m: SharedValue::assumed(0.0),
             direction_factor: SharedValue::assumed(1.0),
@@ -151,10 +133,8 @@ mod tests {
         let text = thermal_text(&thermal);
         assert!(!text.contains("before the wheel"), "what makes no difference is not reported: {text}");
         assert!(text.contains("not identifiable from the recording"), "{text}");
-        assert!(text.contains("flat: 0.0 to 0.2"), "{text}");
         assert!(text.contains("alpha_A and direction factor are hardly distinguishable"), "{text}");
         let json = serde_json::to_value(&thermal).unwrap_or_default();
-        assert_eq!(json["alpha_area_profile"][3]["value"], 0.3);
         assert_eq!(json["entangled"][0]["correlation"], 0.97);
         assert_eq!(json["alpha_area_ratio"]["value"], serde_json::Value::Null);
     }

@@ -2,12 +2,11 @@
 
 use crate::driven::log_rows::Rows;
 use mapper_core::Channel;
+use mapper_numerics::statistics::MIN_VALUES;
 use std::ops::Range;
 
 /// Minimum length of a phase, s.
 const SHORTEST_S: f64 = 1.0;
-/// Minimum number of rows.
-const MIN_ROWS: usize = 8;
 /// Two neighbours are merged if one line for both costs less than this share of the total variation.
 const ALIKE_RATIO: f64 = 0.01;
 /// Minimum and maximum number of phases; each is predicted by fits to the others.
@@ -22,7 +21,7 @@ pub(crate) fn phases(rows: &Rows, count: usize, drives: &[Channel]) -> Vec<Range
     let mut phases: Vec<Range<usize>> = Vec::new();
     let mut from = 0;
     for i in 0..count {
-        if rows.t_s[i] - rows.t_s[from] >= SHORTEST_S && i - from >= MIN_ROWS {
+        if rows.t_s[i] - rows.t_s[from] >= SHORTEST_S && i - from >= MIN_VALUES {
             phases.push(from..i);
             from = i;
         }

@@ -7,8 +7,9 @@
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::{Machine, Rows, common, own};
 use crate::faults::balances::efficiency::{FittedEfficiencies, compressed};
-use crate::faults::end_readings::{CHANNELS, Readings, TC};
+use crate::faults::end_readings::{CHANNELS, Readings};
 use crate::faults::nominal_rig::NominalRig;
+use crate::single_step::fit::ETA_BOUNDS;
 use mapper_core::Channel;
 use mapper_physics::laws::nusselt;
 use mapper_physics::rig::sensor_fault::FaultKind;
@@ -16,8 +17,6 @@ use nalgebra::DMatrix;
 
 /// Scatter of the points about the declared law, ratio: its shape over the map.
 const SHAPE_RATIO: f64 = 0.01;
-/// Efficiencies at which the properties of the gas are taken: an absurd one must not give a negative temperature.
-const EFFICIENCIES: (f64, f64) = (0.2, 0.95);
 
 /// ln h itself, with the effects of errors on it. `readings`: of all steps, by position.
 pub(crate) fn measured(
@@ -73,7 +72,7 @@ pub(crate) fn rows(
     let compressor = &nominal.model.params.compressor;
     let known = fitted.positions.iter().zip(&fitted.eta);
     let etas = known.filter(|(position, _)| readings.get(**position).is_some_and(Option::is_some));
-    let etas: Vec<f64> = etas.map(|(_, eta)| eta.clamp(EFFICIENCIES.0, EFFICIENCIES.1)).collect();
+    let etas: Vec<f64> = etas.map(|(_, eta)| eta.clamp(ETA_BOUNDS.0, ETA_BOUNDS.1)).collect();
     for (i, (readings, eta)) in rows.readings.iter().zip(etas).enumerate() {
         let declared = |readings: &Readings| {
             let h_w_m2k = nusselt::coefficient_w_m2k(
@@ -82,7 +81,7 @@ pub(crate) fn rows(
                 compressor.outlet_diameter_m,
                 readings.flow_kg_s(),
                 compressed(readings, eta),
-                readings.values[TC],
+                readings.tc_k(),
             );
             h_w_m2k.ln()
         };

@@ -5,10 +5,12 @@
 //! does not depend on the map position.
 
 use crate::faults::balance_rows::{Machine, Rows, common, own};
+use crate::faults::balances::head::ROUGHNESS;
 use crate::faults::end_readings::{PerChannel, Readings};
 use crate::faults::nominal_rig::NominalRig;
 use crate::faults::places::{Places, is_on_a_map};
 use crate::faults::smooth::{ANY_ROUGHNESS, At, Smooth};
+use crate::single_step::fit::ETA_BOUNDS;
 use mapper_core::{Channel, ReferenceState};
 use mapper_physics::laws::compression::{actual_rise_k, compressed_k, isentropic_rise_ratio};
 use mapper_physics::rig::sensor_fault::FaultKind;
@@ -63,17 +65,12 @@ const ANY_MAP: Smooth = Smooth {
 };
 /// Shape of a declared map's error, in units of its tolerance.
 const DECLARED_MAP: Smooth = Smooth { terms: &[], slow: 0.0, amplitude: 1.0, lengths: (0.7, 0.7) };
-/// Deviation of the rig from a declared map, ratio: a tenth of a point of efficiency.
-const ROUGHNESS: f64 = 1.5e-3;
 /// Relative error of the heat between gas and housing in eqs. 1-3, one standard deviation. Judgement: the fitted convection law contains most
 /// of the heat.
 const HEAT_RATIO: f64 = 0.05;
 /// Position error of a point along its speed line due to the tolerances of flow map and valve, one standard deviation. Unit: the line's
 /// largest flow and largest PR - 1.
 const PLACE_RATIO: f64 = 0.01;
-
-/// Range of usable efficiencies: outside it a point carries no information about the work.
-const USED: std::ops::RangeInclusive<f64> = 0.05..=3.0;
 
 /// `readings`: of all steps, by position.
 pub(crate) fn rows(
@@ -94,7 +91,7 @@ pub(crate) fn rows(
         .filter_map(|(row, position)| {
             let readings = (*readings.get(*position)?).filter(is_on_a_map)?;
             let (ln_work, slope) = expected(&readings)?;
-            (USED.contains(&fitted.eta[row]) && ln_work.is_finite()).then_some((
+            ((ETA_BOUNDS.0..=ETA_BOUNDS.1).contains(&fitted.eta[row]) && ln_work.is_finite()).then_some((
                 row,
                 readings,
                 (ln_work, slope),

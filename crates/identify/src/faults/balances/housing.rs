@@ -12,33 +12,25 @@
 //! uncertainty.
 
 use crate::IdentifyConfig;
+use crate::config::coloured;
+use crate::faults::MAX_STEPS;
 use crate::faults::balance_rows::{Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, PerChannel, Readings, span_s};
 use crate::step_data::samples::Samples;
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
-use mapper_numerics::statistics::mean;
+use mapper_numerics::statistics::{MIN_VALUES, mean};
 use mapper_physics::rig::sensor_fault::FaultKind;
 
 /// Start of the evaluation after the step's start, s: speed, flow and probe have settled.
 const AFTER_S: f64 = 10.0;
 /// Length of a part over which the housing's slope is taken, s.
 const PART_S: f64 = 18.0;
-/// Maximum number of parts of a step, and of all together: the cost grows with the cube.
+/// Maximum number of parts of a step.
 const MAX_PARTS: usize = 8;
-const MAX_PARTS_IN_ALL: usize = 1000;
-/// Shortest usable length after that start, s: three correlation times of noise determine neither slope nor share.
-const SHORTEST_S: f64 = 27.0;
-/// Minimum number of points that determine the balance. Repeats do not count.
-const MIN_POINTS: usize = 8;
-/// Minimum number of rows of a part and of a step.
-const MIN_ROWS: usize = 10;
 /// Usable range of the share of T2 that follows the housing.
 const SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.95;
-/// Number of correlated samples at 10 Hz, for noise of 2 s.
-const ALIKE: f64 = 20.0;
-/// Closure error of a balance, W, and as a share of the conductance.
+/// Closure error of a balance, W.
 const LACKS_W: f64 = 10.0;
-const LACKS_RATIO: f64 = 0.05;
 /// Difference of T2 and Tc in a housing with more than one temperature, one standard deviation, K: 1 K is three of it.
 const UNEVEN_K: f64 = 0.35;
 /// The same for the part that develops over the run as it warms up, K: a housing of two walls makes up to 3 K.
@@ -73,7 +65,7 @@ impl Part {
 
 pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]) -> Option<Rows> {
     let count = used.iter().filter(|used| **used).count();
-    let most = (MAX_PARTS_IN_ALL / count.max(1)).clamp(1, MAX_PARTS);
+    let most = (MAX_STEPS / count.max(1)).clamp(1, MAX_PARTS);
     let steps: Vec<Vec<Part>> = recording
         .steps
         .iter()
@@ -88,7 +80,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
         .collect();
     let is_point =
         |(step, parts): &(&StepMarker, &Vec<Part>)| step.kind == StepKind::Point && !parts.is_empty();
-    if recording.steps.iter().zip(&steps).filter(is_point).count() < MIN_POINTS {
+    if recording.steps.iter().zip(&steps).filter(is_point).count() < MIN_VALUES {
         return None;
     }
     let parts: Vec<&Part> = steps.iter().flatten().collect();
@@ -109,9 +101,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
     let covariance = any
         .iter()
         .map(|(column, sigma)| common(column, *sigma))
-        .fold(own(parts.iter().map(|part| LACKS_W + LACKS_RATIO * part.conductance_w_k)), |sum, one| {
-            sum + one
-        });
+        .fold(own(parts.iter().map(|_| LACKS_W)), |sum, one| sum + one);
     let by_conductance = column(&|part| part.conductance_error_w_k * (part.t2_k - part.tc_k));
     let of_the_same_step = common(&by_conductance, 1.0)
         .map_with_location(|i, j, shared| if step_of[i] == step_of[j] { shared } else { 0.0 });
@@ -150,11 +140,11 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
 
 /// At most `most` parts of a step; none if T2 does not determine how far it follows the housing.
 fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfig, most: usize) -> Vec<Part> {
-    if end_s - start_s < SHORTEST_S {
+    if end_s - start_s < PART_S {
         return Vec::new();
     }
     let samples = Samples::of(recording, Window { start_s, end_s }, config, true);
-    let Some((kept, error)) = kept_ratio(&samples) else { return Vec::new() };
+    let Some((kept, error)) = kept_ratio(&samples, config) else { return Vec::new() };
     if !SHARES.contains(&(1.0 - kept)) {
         return Vec::new();
     }
@@ -162,7 +152,7 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
     let whole = samples.len();
     let part = |place: usize| {
         let range = place * whole / count..(place + 1) * whole / count;
-        if range.len() < MIN_ROWS {
+        if range.len() < MIN_VALUES {
             return None;
         }
         let of = |column: &[f64]| mean(&column[range.clone()]);
@@ -192,9 +182,9 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
 
 /// Share of its temperature after compression that the gas keeps, and its error: by least squares of `T2 - Tc = kept (T1 - Tc) + (kept/eta)
 /// dT_is`.
-fn kept_ratio(samples: &Samples) -> Option<(f64, f64)> {
+fn kept_ratio(samples: &Samples, config: &IdentifyConfig) -> Option<(f64, f64)> {
     let count = samples.len();
-    if count < 2 * MIN_ROWS {
+    if count < 2 * MIN_VALUES {
         return None;
     }
     let row = |i: usize| {
@@ -207,6 +197,10 @@ fn kept_ratio(samples: &Samples) -> Option<(f64, f64)> {
     let determinant = aa * bb - ab * ab;
     let (kept, of_rise) = ((bb * ay - ab * by) / determinant, (aa * by - ab * ay) / determinant);
     let left: f64 = (0..count).map(row).map(|(a, b, y)| (y - kept * a - of_rise * b).powi(2)).sum();
-    let variance = ALIKE * left / count as f64 * bb / determinant;
+    // Samples that count as one: twice the correlation time of the coloured part of the noise.
+    let interval_s = (samples.t_s.last()? - samples.t_s.first()?) / (count - 1) as f64;
+    let colour = coloured(config.noise_colour);
+    let alike = 1.0 + 2.0 * colour.first_order_variance_ratio() * colour.time_constant_s / interval_s;
+    let variance = alike * left / count as f64 * bb / determinant;
     (kept.is_finite() && variance.is_finite() && variance > 0.0).then(|| (kept, variance.sqrt()))
 }

@@ -6,11 +6,10 @@
 use crate::faults::balance_rows::{Machine, Rows, common, errors, own};
 use crate::faults::end_readings::{PerChannel, Readings};
 use crate::faults::nominal_rig::NominalRig;
+use mapper_numerics::statistics::EXCLUDE_SIGMAS;
 use mapper_physics::laws::orifice;
 use nalgebra::DMatrix;
 
-/// Pressure difference over the valve below which its flow carries no information about it, Pa.
-const MIN_DIFFERENCE_PA: f64 = 5e3;
 /// Difference between the pressure behind the valve, which is not measured, and the inlet pressure, one standard deviation, Pa. Judgement:
 /// filters, silencers and exhaust lines have some hundred.
 const BEHIND_PA: f64 = 300.0;
@@ -31,7 +30,7 @@ pub(crate) fn rows(
     let known = |step: &&(f64, Readings)| {
         let (opening, readings) = step;
         *opening > 0.0
-            && readings.p2_pa() - readings.p1_pa() > MIN_DIFFERENCE_PA
+            && readings.p2_pa() - readings.p1_pa() > EXCLUDE_SIGMAS * BEHIND_PA
             && ln_area(readings).is_finite()
     };
     let known: Vec<&(f64, Readings)> = steps.iter().filter(known).collect();

@@ -10,6 +10,7 @@
 use crate::joint::fit::solve::{Covariance, FULLY, Problem};
 use crate::joint::step_model::parameters::{ALPHA, INLET, LN_COEFFICIENT, PROBE_MM2, Prior};
 use mapper_core::{IdentifiedInlet, InletConvection, Origin};
+use mapper_inference::interval::COVERAGE;
 use mapper_numerics::statistics::{HINT_SIGMAS, mean};
 use nalgebra::DMatrix;
 
@@ -18,11 +19,6 @@ const PASSES_FOR_ALPHA: f64 = 0.025;
 /// Minimum spread of the points about the efficiency surface when the models are compared, fraction. A true map steeper than the surface
 /// favours the wrong model. The surface misses the nominal map by as much at eighteen points without noise (`tests/inlet.rs`).
 const MIN_SURFACE_SIGMA: f64 = 3e-3;
-/// Probability of the other model below which the recording has decided.
-const DECIDED: f64 = 0.05;
-/// Minimum standard deviation if the recording has not decided, as a share of the distance between the models: the 95 % interval then reaches
-/// from one to the other and a quarter beyond, for the noise of the other.
-const OPEN_SIGMA: f64 = 0.65;
 
 /// Maximum ratio of the distance to its linear estimate: beyond it the linearisation is not valid.
 const LARGEST_STRETCH: f64 = 2.0;
@@ -76,11 +72,11 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let seen = 0.5 * (problem.square() - other.square()) * share_of_noise(problem)?;
     let mut left = 1.0 / (1.0 + (-seen).exp());
     // Keep the declared model unless the recording decides against it: the other one has other efficiencies.
-    if left > 1.0 - DECIDED {
+    if left > COVERAGE {
         std::mem::swap(problem, &mut other);
         left = 1.0 - left;
     }
-    let decided = left < DECIDED;
+    let decided = left < 1.0 - COVERAGE;
     problem.inlet = Some(IdentifiedInlet {
         convection: convection_of(problem.shared[INLET]),
         origin: if decided { Origin::Fitted } else { Origin::NotIdentifiable },
@@ -88,7 +84,8 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
         alpha_area_otherwise_ratio: problem.active[ALPHA].then_some(other.shared[ALPHA]),
         ..declared
     });
-    let sigma = if decided { left.sqrt() } else { left.sqrt().max(OPEN_SIGMA) };
+    // Root mean square of the distance of the truth, in units of that between the models.
+    let sigma = left.sqrt();
     problem.priors[INLET] = Prior { mean: problem.shared[INLET], sigma };
     problem.active[INLET] = true;
     let stretched = sigma * stretch(problem, &other, &problem.covariance()?);

@@ -23,7 +23,8 @@ use mapper_core::{
 };
 use mapper_numerics::coloured_noise::{BlockNoise, WhiteningFilter};
 use mapper_numerics::parallel;
-use mapper_numerics::statistics::{DOUBT_SIGMAS, mean, median};
+use mapper_numerics::statistics::{DOUBT_SIGMAS, mean};
+use mapper_observe::declared::usual_noise_sigma;
 use mapper_physics::gas::air;
 use nalgebra::DVector;
 
@@ -38,18 +39,12 @@ pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
 const SURFACE_SIGMA: f64 = 1e-3;
 /// Relative error of the surface's effect on a prediction: surfaces through a few points bend differently from maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
-/// Residual of a single step, relative to the median step and in K, above which the step is excluded until it is shown to fit the others.
-const SUSPECT_RATIO: f64 = 6.0;
-const SUSPECT_K: f64 = 0.5;
 /// Expected spread of the points' h about the law, ratio. The recordings of `benches/identification.py` have 0.0022 to 0.003.
 const LAW_SIGMA: f64 = 3e-3;
 /// Weight of the expected spread, in points: small next to the dozens of points of a campaign, sufficient without any.
 const PRIOR_WEIGHT: f64 = 4.0;
-/// Number of spreads tried on either side of the expected one, and their distance in logarithms: from a thirtieth to thirty times.
-const SPREADS: i32 = 34;
-const SPREAD_STEP: f64 = 0.1;
-/// Standard deviation of a T2 sample without a declaration, K; refined from the residual.
-const UNDECLARED_NOISE_K: f64 = 0.1;
+/// Logarithms, in tenths, of the spreads that are tried over the expected one: from a thirtieth to thirty times.
+const SPREAD_RATIOS_LN: std::ops::RangeInclusive<i32> = -34..=34;
 
 /// Condenses every step that has a window with enough samples.
 pub(crate) fn steps(
@@ -202,17 +197,8 @@ pub(crate) fn problem<'a>(
         active[SURFACE + k] = shaped;
     }
 
-    let residuals_k = steps.iter().filter_map(|step| alone.get(step.position)?.residual_rms_k);
-    let suspect_k =
-        median(residuals_k).map_or(f64::INFINITY, |middle| (SUSPECT_RATIO * middle).max(SUSPECT_K));
-    let members = steps
-        .iter()
-        .map(|step| {
-            let found = alone.get(step.position);
-            let shares = found.and_then(|found| found.residual_rms_k).is_none_or(|rms_k| rms_k <= suspect_k);
-            Member { shares, ..member(step, found, &scale, mean_eta, config) }
-        })
-        .collect();
+    let members =
+        steps.iter().map(|step| member(step, alone.get(step.position), &scale, mean_eta, config)).collect();
     let surface_sigma = if shaped { 0.005 } else { NO_SURFACE_SIGMA };
     Some(Problem {
         setting,
@@ -262,10 +248,12 @@ pub(crate) fn member<'a>(
     own[FIRST_READING] = Prior { mean: first_k, sigma: 5.0 };
     local[SLOPE] = 1.0;
     own[SLOPE] = Prior { mean: 1.0, sigma: 0.05 };
+    // Refined from the residual.
+    let noise_k = usual_noise_sigma(Channel::T2);
     Member {
         course: Course { rows: &step.rows, terms },
         measured_k: step.rows.iter().map(|row| row.t2_k).collect(),
-        whitening: whitening(step, config, UNDECLARED_NOISE_K, UNDECLARED_NOISE_K, |_| 0.0),
+        whitening: whitening(step, config, noise_k, noise_k, |_| 0.0),
         coupling: std::array::from_fn(|i| {
             i.checked_sub(SURFACE).and_then(|k| end_terms.get(k)).copied().unwrap_or(0.0)
         }),
@@ -344,8 +332,9 @@ fn spread(posteriors: &[(f64, f64)], under_sigma: f64, expected: f64) -> f64 {
         let prior = -PRIOR_WEIGHT * (sigma.ln() + 0.5 * (expected / sigma).powi(2));
         seen.iter().map(of_point).sum::<f64>() + prior
     };
-    (-SPREADS..=SPREADS)
-        .map(|k| expected * (f64::from(k) * SPREAD_STEP).exp())
+    // Bad steps give the density several maxima.
+    SPREAD_RATIOS_LN
+        .map(|tenths| expected * (0.1 * f64::from(tenths)).exp())
         .max_by(|a, b| ln_density(*a).total_cmp(&ln_density(*b)))
         .unwrap_or(expected)
 }

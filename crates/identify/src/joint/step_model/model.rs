@@ -7,6 +7,7 @@ use crate::joint::step_model::parameters::{
 use crate::joint::step_model::rows::Row;
 use crate::joint::step_model::surface::{TERM_COUNT, dot};
 use crate::single_step::probe::{self, Lag, follow};
+use mapper_numerics::SLOPE_STEP;
 use mapper_physics::gas::air::{self, Air};
 use mapper_physics::laws::compression::{
     CompressionInputs, actual_rise_k, compress, compressed_k, isentropic_rise_ratio,
@@ -47,9 +48,6 @@ pub(crate) struct Prediction {
     pub(crate) t2_k: Vec<f64>,
     pub(crate) columns: Vec<Vec<f64>>,
 }
-
-/// Relative step of one-sided derivatives: it keeps both rounding and curvature errors below 1e-6.
-const STEP_RATIO: f64 = 1e-6;
 
 /// Gas properties along the flow path, one row.
 #[derive(Debug, Clone, Copy)]
@@ -106,12 +104,12 @@ impl Answer {
 impl Setting {
     /// Sensitivities of convection, which is `here` at `gas`.
     fn answer(&self, gas: &Gas, here: &Convection, shared: &SharedVector, ln_deviation: f64) -> Answer {
-        let step_k = here.bulk_k * STEP_RATIO;
+        let step_k = here.bulk_k * SLOPE_STEP;
         // In the law, pressure changes only the bulk temperature.
         let rise_ratio = gas.eta * actual_rise_k(gas.t1_k, here.bulk_k + step_k, gas.air) / gas.t1_k;
         let hotter = self.h(&Gas { rise_ratio, ..*gas }, shared, ln_deviation);
         let by_k = hotter.bulk_k - here.bulk_k;
-        let metal_k = gas.tc_k * (1.0 + STEP_RATIO);
+        let metal_k = gas.tc_k * (1.0 + SLOPE_STEP);
         let viscosity_ratio = air::viscosity_pa_s(gas.tc_k) / air::viscosity_pa_s(metal_k);
         let law = if self.with_law { 1.0 } else { 0.0 };
         Answer {
@@ -250,7 +248,7 @@ impl Setting {
             let gas = self.gas(end, &[0.0; TERM_COUNT], shared, &moved);
             self.t2_k(&gas, self.h(&gas, shared, moved[LN_DEVIATION]), shared[ALPHA], shared[LN_DIRECTION])
         };
-        (at(local[ETA] + STEP_RATIO) - at(local[ETA] - STEP_RATIO)) / (2.0 * STEP_RATIO)
+        (at(local[ETA] + SLOPE_STEP) - at(local[ETA] - SLOPE_STEP)) / (2.0 * SLOPE_STEP)
     }
 
     /// Predicts T2, with derivatives by the parameters in `active` and by those of the step if `derivatives` is set.
@@ -285,14 +283,14 @@ impl Setting {
             let full = |to: Gas, step: f64| {
                 (self.t2_k(&to, answer.moved(&h, &gas, &to), alpha, ln_direction) - t2_k) / step
             };
-            let by_eta = full(Gas { eta: gas.eta + STEP_RATIO, ..gas }, STEP_RATIO);
+            let by_eta = full(Gas { eta: gas.eta + SLOPE_STEP, ..gas }, SLOPE_STEP);
             let by_ln_h = (self.t2_k(
                 &gas,
-                Convection { h_w_m2k: h.h_w_m2k * (1.0 + STEP_RATIO), ..h },
+                Convection { h_w_m2k: h.h_w_m2k * (1.0 + SLOPE_STEP), ..h },
                 alpha,
                 ln_direction,
             ) - t2_k)
-                / STEP_RATIO;
+                / SLOPE_STEP;
             let mut put = |index: usize, value: f64| {
                 if let Some(cell) = columns[index].get_mut(i) {
                     *cell = value;
@@ -312,8 +310,8 @@ impl Setting {
                 put(EXPONENT, by_ln_h * ln_reynolds);
             }
             if active[INLET] || shared[INLET] != 0.0 {
-                let moved = Convection { inlet_h_ratio: h.inlet_h_ratio * (1.0 + STEP_RATIO), ..h };
-                let by_ln_inlet = (self.t2_k(&gas, moved, alpha, ln_direction) - t2_k) / STEP_RATIO;
+                let moved = Convection { inlet_h_ratio: h.inlet_h_ratio * (1.0 + SLOPE_STEP), ..h };
+                let by_ln_inlet = (self.t2_k(&gas, moved, alpha, ln_direction) - t2_k) / SLOPE_STEP;
                 put(INLET, by_ln_inlet * self.ln_inlet_ratio(&gas, shared, h.bulk_k));
                 if self.with_law {
                     // The exponent applies to the Reynolds numbers on both sides.
@@ -325,15 +323,15 @@ impl Setting {
                 }
             }
             if active[ALPHA] {
-                put(ALPHA, (self.t2_k(&gas, h, alpha + STEP_RATIO, ln_direction) - t2_k) / STEP_RATIO);
+                put(ALPHA, (self.t2_k(&gas, h, alpha + SLOPE_STEP, ln_direction) - t2_k) / SLOPE_STEP);
             }
             if active[LN_DIRECTION] {
                 // Stay away from 0, where the factor is switched off.
-                let step = if ln_direction == -STEP_RATIO { -STEP_RATIO } else { STEP_RATIO };
+                let step = if ln_direction == -SLOPE_STEP { -SLOPE_STEP } else { SLOPE_STEP };
                 put(LN_DIRECTION, (self.t2_k(&gas, h, alpha, ln_direction + step) - t2_k) / step);
             }
             if active[OFFSETS] {
-                let (step, t1_k) = (gas.t1_k * STEP_RATIO, gas.t1_k * (1.0 + STEP_RATIO));
+                let (step, t1_k) = (gas.t1_k * SLOPE_STEP, gas.t1_k * (1.0 + SLOPE_STEP));
                 let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
                 let moved =
                     Gas { t1_k, rise_ratio: isentropic_rise_ratio(p2_pa / p1_pa, t1_k, gas.air), ..gas };
@@ -343,14 +341,14 @@ impl Setting {
             put(OFFSETS + 1, 1.0);
             put(GAINS, t2_k - CALIBRATED_AT_K);
             if active[OFFSETS + 2] || active[GAINS + 1] {
-                let step = gas.tc_k * STEP_RATIO;
+                let step = gas.tc_k * SLOPE_STEP;
                 let by_reading = -full(Gas { tc_k: gas.tc_k + step, ..gas }, step);
                 put(OFFSETS + 2, by_reading);
                 put(GAINS + 1, by_reading * (row.tc_k - CALIBRATED_AT_K));
             }
             if [OFFSETS + 3, OFFSETS + 4, GAINS + 2, GAINS + 3, BAROMETER].iter().any(|index| active[*index])
             {
-                let by_rise = full(Gas { rise_ratio: gas.rise_ratio + STEP_RATIO, ..gas }, STEP_RATIO);
+                let by_rise = full(Gas { rise_ratio: gas.rise_ratio + SLOPE_STEP, ..gas }, SLOPE_STEP);
                 let by_ln_ratio = by_rise * rise_ratio_by_ln_pressure(gas.rise_ratio, gas.t1_k, gas.air);
                 let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
                 let (by_p1, by_p2) = (by_ln_ratio / p1_pa, -by_ln_ratio / p2_pa);
@@ -361,15 +359,15 @@ impl Setting {
                 put(BAROMETER, by_p1 + by_p2);
             }
             if active[FLOW_GAIN] {
-                let step = gas.flow_kg_s * STEP_RATIO;
+                let step = gas.flow_kg_s * SLOPE_STEP;
                 let by_flow = full(Gas { flow_kg_s: gas.flow_kg_s + step, ..gas }, step);
                 put(FLOW_GAIN, -by_flow * gas.flow_kg_s / (1.0 + shared[FLOW_GAIN]));
             }
             if active[HUMIDITY] {
                 let [p1_pa, p2_pa] = pressures_pa(row, shared, self.rest_pressure_pa);
-                let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + STEP_RATIO, ..gas.air };
+                let air = Air { humidity_kg_kg: gas.air.humidity_kg_kg + SLOPE_STEP, ..gas.air };
                 let rise_ratio = isentropic_rise_ratio(p2_pa / p1_pa, gas.t1_k, air);
-                put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, STEP_RATIO));
+                put(HUMIDITY, full(Gas { air, rise_ratio, ..gas }, SLOPE_STEP));
             }
         }
         self.through_probe(course.rows, gas_k, columns, shared, local, active)
@@ -435,6 +433,5 @@ fn pressures_pa(row: &Row, shared: &SharedVector, rest_pa: f64) -> [f64; 2] {
 
 /// The surface coefficients among the shared parameters.
 pub(crate) fn surface_of(shared: &SharedVector) -> &[f64; TERM_COUNT] {
-    const NONE: [f64; TERM_COUNT] = [0.0; TERM_COUNT];
-    shared.get(SURFACE..BENDS).and_then(|tail| tail.try_into().ok()).unwrap_or(&NONE)
+    shared.get(SURFACE..BENDS).and_then(|tail| tail.try_into().ok()).unwrap_or(&[0.0; TERM_COUNT])
 }

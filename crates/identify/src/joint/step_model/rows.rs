@@ -12,16 +12,11 @@ use mapper_numerics::statistics::mean;
 /// Length of the blocks over which samples are averaged before the fit, s: a quarter of the correlation time of sensor noise, and far below
 /// any time scale in a window.
 const BLOCK_S: f64 = 0.5;
-/// The same for noisy data once only the housing still changes, s: half the correlation time of sensor noise, with almost no loss of
-/// information. Without noise it would cost a thousandth of alpha_A behind a slow probe.
-const LATE_BLOCK_S: f64 = 1.0;
+/// Factor on this length for noisy data once only the housing still changes, and in a forecast: it costs a few percent of the information.
+/// Without noise it would cost a thousandth of alpha_A behind a slow probe.
+pub(crate) const COARSER: f64 = 2.0;
 /// Time from the first sample after which that applies, s: several settling times of probe and speed.
 const LATE_S: f64 = 20.0;
-
-/// Time from the first row after which lags of lines and sensors have become invisible, s.
-const SETTLED_S: f64 = 8.5;
-/// Minimum number of rows of a shortened step.
-const MIN_ROWS: usize = 20;
 
 /// Means over one block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,15 +41,6 @@ pub(crate) struct StepRows {
     pub(crate) rows: Vec<Row>,
     /// Means over the step's end: one additional row that is not fitted.
     pub(crate) end: Row,
-}
-
-impl StepRows {
-    /// Returns the step without the rows in which pressures, flow and speed still follow the jump.
-    pub(crate) fn settled(&self) -> StepRows {
-        let from_s = self.rows.first().map_or(0.0, |row| row.t_s) + SETTLED_S;
-        let rows: Vec<Row> = self.rows.iter().filter(|row| row.t_s >= from_s).copied().collect();
-        StepRows { rows: if rows.len() < MIN_ROWS { self.rows.clone() } else { rows }, ..self.clone() }
-    }
 }
 
 /// Condenses the samples of a window.
@@ -122,7 +108,7 @@ pub(crate) fn condensed(
 /// Length of a block that starts at this time after the first sample, s.
 pub(crate) fn block_s_after(elapsed_s: f64, config: &IdentifyConfig) -> f64 {
     let late = !config.declared.is_empty() && elapsed_s >= LATE_S;
-    if late { LATE_BLOCK_S } else { BLOCK_S }
+    if late { COARSER * BLOCK_S } else { BLOCK_S }
 }
 
 /// Smooths T1, Tc, P1, P2, flow and the map position.

@@ -4,12 +4,11 @@
 //! smooths the prediction and could "explain" the noise, and a smaller surface slope could too. Over ten seconds a real change in a window is
 //! at most a cubic. Noise with a correlation time of two seconds is not.
 
+use mapper_numerics::statistics::MIN_VALUES;
 use nalgebra::{Matrix4, Vector4};
 
 /// Half the width of the local cubic fit, s.
 const HALF_S: f64 = 10.0;
-/// Minimum number of rows in the local fit.
-const MIN_ROWS: usize = 6;
 /// Half the width of the local fit at the first row, s.
 const SHORTEST_HALF_S: f64 = 3.0;
 
@@ -37,7 +36,7 @@ impl Smoother {
                     let p = powers(j);
                     normal += p * p.transpose();
                 }
-                let factors = if end - start < MIN_ROWS { None } else { normal.cholesky() };
+                let factors = if end - start < MIN_VALUES { None } else { normal.cholesky() };
                 match factors {
                     None => (i, vec![1.0]),
                     Some(factors) => {

@@ -1,11 +1,10 @@
 //! The common part of the points' errors, as a few independent errors.
 
+use mapper_inference::mixture::MIN_WEIGHT;
 use nalgebra::DMatrix;
 
 /// Maximum number of common errors that describe a covariance.
 const MAX: usize = 8;
-/// Share of the common variance below which an error goes to the points' own part.
-const MIN_RATIO: f64 = 2e-3;
 
 /// Change of each quantity per standard deviation of each common error.
 ///
@@ -25,7 +24,7 @@ pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], erro
     let eigen = rest.symmetric_eigen();
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let leading = order.iter().take(MAX).filter(|k| eigen.eigenvalues[**k] > MIN_RATIO * trace);
+    let leading = order.iter().take(MAX).filter(|k| eigen.eigenvalues[**k] > MIN_WEIGHT * trace);
     let mut changes = none;
     for k in leading {
         let vector = eigen.eigenvectors.column(*k);

@@ -1,7 +1,6 @@
-//! Uncertainty of the joint fit: covariances, budgets, errors common to all points, and the profile of alpha_A.
+//! Uncertainty of the joint fit: covariances, budgets, and errors common to all points.
 
 pub(crate) mod budget;
 pub(crate) mod common_part;
-pub(crate) mod profile;
 pub(crate) mod quantity;
 pub(crate) mod smoothness;

@@ -18,6 +18,7 @@ use crate::joint::uncertainty::budget::{self, Pull, Stated};
 use crate::joint::uncertainty::common_part::common_part;
 use crate::joint::uncertainty::quantity::{Quantity, is_offset, of_shared, quantities};
 use mapper_core::{BudgetRow, Channel, EstimateUncertainty, ReferenceState, confidence_interval_95};
+use mapper_inference::mixture::MIN_WEIGHT;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::{EXCLUDE_SIGMAS, median};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -34,8 +35,6 @@ const ROUGHNESSES: [f64; 2] = [1e-3, 4e-3];
 const MEAN: (f64, f64) = (0.65, 1.0);
 /// Number of points above which the weights come from a subset: the cost grows with the cube.
 const MANY: usize = 120;
-/// Share of the weight below which a choice of amplitude and lengths is not solved.
-const MIN_WEIGHT: f64 = 0.01;
 
 /// A number with its error by origin.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

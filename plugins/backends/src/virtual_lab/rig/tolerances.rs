@@ -1,6 +1,6 @@
 //! Normal deviations of every fault-free machine: parameters and a map that differ within declared tolerances.
 
-use mapper_core::{Channel, ModelTolerances, ReferenceState};
+use mapper_core::{ModelTolerances, ReferenceState};
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
 use mapper_physics::rig::effect::Rig;
 use rand::{RngExt, SeedableRng};

@@ -13,6 +13,7 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{Rig, Submodel};
 use mapper_physics::rig::instruments::ChannelFollower;
 use mapper_physics::simulation::model::rad_s_of_rpm;
+use std::f64::consts::LN_2;
 
 const fn unknown(
     name: &'static str,
@@ -156,7 +157,7 @@ impl Side for TurbineSide {
             params.turbine.choked_flow_kg_s = choked_kg_s;
             let declared_kg_s = TurbineInlet::new(&params.turbine, &boundary).flow_kg_s;
             params.turbine.choked_flow_kg_s = choked_kg_s * flows_kg_s[i].max(1e-4) / declared_kg_s;
-            params.turbine.peak_efficiency = best + eta_ratio * ((p3_pa / p4_pa).ln() - MIDDLE_LN_RATIO);
+            params.turbine.peak_efficiency = best + eta_ratio * ((p3_pa / p4_pa).ln() - LN_2);
             let inlet = TurbineInlet::new(&params.turbine, &boundary);
             let turbine = inlet.at(tt_k, rad_s_of_rpm(speeds_rpm[i]));
             columns[0].push(t4_probe.read(rows.t_s[i], turbine.t4_k) + t4_offset_k);
@@ -191,6 +192,3 @@ impl Side for TurbineSide {
         }
     }
 }
-
-/// Logarithm of the reference expansion ratio for the efficiency's change: a ratio of 2.
-const MIDDLE_LN_RATIO: f64 = std::f64::consts::LN_2;

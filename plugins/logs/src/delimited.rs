@@ -1,13 +1,14 @@
 //! CSV and similar: cells with a separator between them.
 
 use crate::notation::encoding;
-use crate::notation::separator::{SEPARATORS, decimal, score};
+use crate::notation::separator::{SEPARATORS, decimal, score, typical_length};
 use crate::notation::table_row::Rows;
 use crate::tables::long_table::{LongForm, LongRows};
 use crate::tables::row_stream::{Dialect, RowStream};
 use crate::tables::table_log::{Origin, Table};
 use mapper_recording::logs::{Encoding, Layout, Log, LogError, LogFile, LogFormat, LogOptions, RowSink};
 use std::io::Cursor;
+use std::ops::Range;
 
 /// The format.
 pub(crate) const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
@@ -49,13 +50,17 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let rows_by = |separator: u8| -> Result<Vec<Vec<String>>, LogError> {
         let dialect = Dialect { encoding, mark, separator, decimal: b'.' };
         let mut stream = RowStream::over(file, Box::new(Cursor::new(head.clone())), dialect);
-        let mut rows = Vec::new();
+        let (mut rows, mut spans) = (Vec::new(), Vec::new());
         while rows.len() < HEAD_ROWS && stream.advance()? {
             rows.push(stream.texts());
+            spans.push(stream.spans());
         }
         // The last line of the sample may be truncated.
         if !whole && rows.len() < HEAD_ROWS && rows.len() > 1 {
             rows.pop();
+        }
+        if separator == b' ' {
+            join_names(&mut rows, &spans);
         }
         Ok(rows)
     };
@@ -69,7 +74,14 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
         }
     }
     let Some((_, separator, rows)) = best.filter(|(score, ..)| *score > 0.0) else {
-        return Err(file.content(NAME, "it is text, but no table of numbers"));
+        return Err(file.content(
+            NAME,
+            match head.trim_ascii_start().first() {
+                Some(b'{') => "it is JSON; write its values as CSV, e.g. with `pandas.read_json(FILE, lines=True).to_csv(NEW)`",
+                Some(b'<') => "it is XML, but not ATFX; export it as CSV",
+                _ => "it is text, but no table of numbers",
+            },
+        ));
     };
     let (found_decimal, seen) = decimal(&rows);
     let decimal = options.decimal.and_then(|sign| u8::try_from(sign).ok()).unwrap_or(found_decimal);
@@ -86,6 +98,28 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
     let dialect = Dialect { encoding, mark, separator, decimal };
     table.layout.findings.insert(0, dialect_words(dialect, seen || options.decimal.is_some()));
     Ok(Box::new(Delimited { file: file.clone(), dialect, table, long }))
+}
+
+/// Names of several words above columns between blanks: single blanks are within a name. If there are not as many names as columns, which
+/// name is whose is not known, and the row is text.
+fn join_names(rows: &mut [Vec<String>], spans: &[Vec<Range<usize>>]) {
+    let length = typical_length(rows);
+    for (row, spans) in rows.iter_mut().zip(spans) {
+        let is_word = |cell: &String| cell.chars().any(char::is_alphabetic) && cell.parse::<f64>().is_err();
+        if length == 0 || row.len() <= length || !row.iter().all(is_word) {
+            continue;
+        }
+        let mut names: Vec<String> = Vec::new();
+        let mut end = None;
+        for (word, span) in row.iter().zip(spans) {
+            match names.last_mut().filter(|_| end.is_some_and(|end: usize| end + 1 == span.start)) {
+                Some(name) => *name = format!("{name} {word}"),
+                None => names.push(word.clone()),
+            }
+            end = Some(span.end);
+        }
+        *row = if names.len() == length { names } else { vec![row.join(" ")] };
+    }
 }
 
 fn dialect_words(dialect: Dialect, decimal_seen: bool) -> String {

@@ -26,6 +26,7 @@ logs! {
     mdf3,
     mdf4,
     mat5,
+    atfx,
     #[cfg(feature = "tdms")]
     tdms,
     #[cfg(feature = "parquet")]

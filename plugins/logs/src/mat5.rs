@@ -4,11 +4,10 @@
 //! sparse numbers are left out.
 
 use crate::columns::table_head::COLUMN_LIMIT;
-use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
-use crate::tables::several_tables::{Part, side_by_side};
-use crate::tables::table_log::{Origin, Table};
+use crate::tables::column_log::{ColumnTable, column_log};
+use crate::tables::column_rows::Chunk;
 use mapper_recording::logs::limits::UNPACKED_BYTES;
-use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogFormat, LogOptions, Row, RowSink};
+use mapper_recording::logs::{Log, LogError, LogFile, LogFormat, LogOptions};
 use std::io::Read;
 
 /// The format.
@@ -22,9 +21,6 @@ const HEADER: usize = 128;
 const DEPTH_LIMIT: usize = 8;
 /// Elements of one array of structures.
 const ELEMENT_LIMIT: usize = 1000;
-/// Rows of a table in the sample.
-const HEAD_ROWS: usize = 400;
-
 /// Types of data elements.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
@@ -41,13 +37,6 @@ fn recognises(head: &[u8]) -> bool {
 
 /// A column and its name.
 type Named = (String, Vec<f64>);
-
-struct MatLog {
-    layout: Layout,
-    parts: Vec<Part>,
-    /// The columns of each part.
-    columns: Vec<Vec<Named>>,
-}
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     let wrong = |why: String| file.content(NAME, why);
@@ -68,61 +57,20 @@ fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> 
             None => tables.push(vec![column]),
         }
     }
-    let (mut found, mut problems, mut columns) = (Vec::new(), Vec::new(), Vec::new());
-    for mut table in tables {
-        without_common_prefix(&mut table);
-        let title = format!("{} values", table.first().map_or(0, |(_, values)| values.len()));
-        let head = rows(&table).texts(HEAD_ROWS)?;
-        match Table::look(&head, b'.', options, Origin::Columns) {
-            Ok(looked) => {
-                found.push((title, looked));
-                columns.push(table);
-            }
-            Err(problem) => problems.push(format!("vectors of {title} are passed over: {problem}")),
-        }
-    }
+    let mut problems = Vec::new();
     if reader.left_out > 0 {
         problems.push(format!(
             "{} variables are left out: texts, cells, objects, complex or single numbers",
             reader.left_out
         ));
     }
-    let (layout, parts) = side_by_side("vectors", found, problems).map_err(wrong)?;
-    Ok(Box::new(MatLog { layout, parts, columns }))
-}
-
-impl Log for MatLog {
-    fn layout(&self) -> &Layout {
-        &self.layout
-    }
-
-    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        for (part, columns) in self.parts.iter().zip(&self.columns) {
-            let own = part.own(wanted);
-            if own.is_empty() {
-                continue;
-            }
-            let mut of_file = |row: Row<'_>| part.give(row, sink);
-            self.layout.add_finding(part.table.rows(&mut rows(columns), &own, &mut of_file)?);
-        }
-        Ok(())
-    }
-}
-
-fn rows(columns: &[Named]) -> ColumnRows<Once> {
-    let names = columns.iter().map(|(name, _)| name.clone()).collect();
-    let count = columns.first().map_or(0, |(_, values)| values.len());
-    let chunks = columns.iter().map(|(_, values)| Chunk::Numbers(values.clone())).collect();
-    ColumnRows::new(vec![names], Once(Some((count, chunks))))
-}
-
-/// All rows at once.
-struct Once(Option<(usize, Vec<Chunk>)>);
-
-impl Chunks for Once {
-    fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
-        Ok(self.0.take())
-    }
+    let tables = tables.into_iter().map(|mut table| {
+        without_common_prefix(&mut table);
+        let rows = table.first().map_or(0, |(_, values)| values.len());
+        let (names, columns) = table.into_iter().map(|(name, values)| (name, Chunk::Numbers(values))).unzip();
+        ColumnTable { title: format!("{rows} values"), head: vec![names], rows, columns, clock: None }
+    });
+    column_log(file, (NAME, "vectors"), tables.collect(), problems, options)
 }
 
 /// `log.t`, `log.T2` of one structure are `t` and `T2`.

@@ -10,7 +10,7 @@ use crate::notation::table_row::{Cells, Rows};
 use crate::notation::typed_cell::Value;
 use crate::tables::several_tables::{Part, side_by_side};
 use crate::tables::table_log::{Origin, Table};
-use calamine::{Cell, DataRef, DataType, Reader, SheetVisible, Xlsx, XlsxCellReader};
+use calamine::{DataRef, DataType, Reader, SheetVisible, Xlsx};
 use mapper_recording::logs::{
     DateOrder, Layout, Log, LogError, LogFile, LogFormat, LogOptions, ReadSeek, Row, RowSink,
 };
@@ -35,10 +35,12 @@ const EXCEL_EPOCH_DAYS: i64 = 25_569;
 /// Maximum date of a log in days since Excel's origin: the year 2200.
 const LAST_DAY: f64 = 109_940.0;
 
-/// A zip file with the parts of a workbook; their contents are checked when it is opened.
+/// A zip file with the parts of a workbook, or a compound file; their contents are checked when it is opened.
 fn recognises(head: &[u8]) -> bool {
     let holds = |part: &[u8]| head.windows(part.len()).any(|window| window == part);
-    head.starts_with(b"PK\x03\x04") && (holds(b"[Content_Types]") || holds(b"xl/") || holds(b"docProps/"))
+    head.starts_with(&mapper_workbook::MAGIC)
+        || (head.starts_with(b"PK\x03\x04")
+            && (holds(b"[Content_Types]") || holds(b"xl/") || holds(b"docProps/")))
 }
 
 struct Workbook {
@@ -49,72 +51,152 @@ struct Workbook {
     decimals: Vec<u8>,
 }
 
-fn failed(file: &LogFile) -> impl Fn(calamine::XlsxError) -> LogError + '_ {
-    |error| file.content(NAME, error.to_string())
+/// A workbook.
+enum Book {
+    /// Of Excel 2007 and later, read cell by cell.
+    Xlsx(Box<Xlsx<Box<dyn ReadSeek>>>),
+    /// Of Excel 97 to 2003, whose sheets are small enough for the memory.
+    Xls(Vec<mapper_workbook::Sheet>),
 }
 
-fn book(file: &LogFile) -> Result<Xlsx<Box<dyn ReadSeek>>, LogError> {
-    Xlsx::new(file.open()?).map_err(failed(file))
+/// The next cell with its row and column.
+type NextCell<'a> = Box<dyn FnMut() -> Result<Option<(u32, usize, Value)>, LogError> + 'a>;
+
+impl Book {
+    fn open(file: &LogFile) -> Result<Book, LogError> {
+        if file.head(mapper_workbook::MAGIC.len())? == mapper_workbook::MAGIC {
+            let sheets = mapper_workbook::read_xls(file.open()?).map_err(|why| file.content(NAME, why))?;
+            return Ok(Book::Xls(sheets));
+        }
+        check::check(file)?;
+        let book = Xlsx::new(file.open()?);
+        book.map(|book| Book::Xlsx(Box::new(book))).map_err(|error| file.content(NAME, error.to_string()))
+    }
+
+    /// Names of all sheets, and whether they are hidden.
+    fn sheets(&self) -> Vec<(String, bool)> {
+        match self {
+            Book::Xlsx(book) => {
+                let sheets = book.sheets_metadata().iter();
+                sheets.map(|sheet| (sheet.name.clone(), sheet.visible != SheetVisible::Visible)).collect()
+            }
+            Book::Xls(sheets) => sheets.iter().map(|sheet| (sheet.name.clone(), sheet.is_hidden)).collect(),
+        }
+    }
+
+    /// The cells of a sheet by row; `None` if it has none, as charts do.
+    fn cells<'a>(&'a mut self, file: &'a LogFile, name: &str) -> Option<NextCell<'a>> {
+        match self {
+            Book::Xlsx(book) => {
+                let mut reader = book.worksheet_cells_reader(name).ok()?;
+                // The reader fails after the last cell.
+                let mut ended = false;
+                Some(Box::new(move || {
+                    if ended {
+                        return Ok(None);
+                    }
+                    let cell = reader.next_cell().map_err(|error| file.content(NAME, error.to_string()))?;
+                    ended = cell.is_none();
+                    Ok(cell.map(|cell| {
+                        let (row, column) = cell.get_position();
+                        (row, usize::try_from(column).unwrap_or(usize::MAX), value_of(cell.get_value()))
+                    }))
+                }))
+            }
+            Book::Xls(sheets) => {
+                let mut cells = sheets.iter().find(|sheet| sheet.name == name)?.cells.iter();
+                Some(Box::new(move || {
+                    Ok(cells.next().map(|(row, column, cell)| {
+                        let value = match cell {
+                            mapper_workbook::Cell::Number(value) => Value::Number(*value),
+                            mapper_workbook::Cell::Days(days) => instant(*days),
+                            mapper_workbook::Cell::Text(text) => Value::Text(start(text)),
+                        };
+                        (u32::from(*row), usize::from(*column), value)
+                    }))
+                }))
+            }
+        }
+    }
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     options.without(&["separator", "decimal", "encoding"]).map_err(|why| file.content(NAME, why))?;
-    check::check(file)?;
-    let mut book_of = book(file)?;
-    let names: Vec<String> = book_of.sheet_names();
-    let hidden = |name: &String| {
-        book_of
-            .sheets_metadata()
-            .iter()
-            .any(|sheet| sheet.name == *name && sheet.visible != SheetVisible::Visible)
-    };
-    // A hidden sheet is read only if it is named: it may hold an earlier state of the data.
-    let (hidden, visible): (Vec<String>, Vec<String>) = names.iter().cloned().partition(hidden);
-    let wanted = match &options.sheet {
-        Some(sheet) => names.iter().filter(|name| *name == sheet).cloned().collect(),
-        None => visible,
-    };
-    if let (Some(sheet), []) = (&options.sheet, wanted.as_slice()) {
+    let mut book = Book::open(file)?;
+    let sheets = book.sheets();
+    let names: Vec<&str> = sheets.iter().map(|(name, _)| name.as_str()).collect();
+    if let Some(sheet) = options.sheet.as_ref().filter(|sheet| !names.contains(&sheet.as_str())) {
         return Err(
             file.content(NAME, format!("it has no sheet `{sheet}`; its sheets are {}", names.join(", ")))
         );
     }
+    let is_wanted = |name: &str, of_hidden: bool, is_hidden: bool| match &options.sheet {
+        Some(sheet) => sheet == name,
+        None => of_hidden == is_hidden,
+    };
     let mut found: Vec<(String, Table, u8)> = Vec::new();
     let mut problems: Vec<String> = Vec::new();
-    for name in wanted {
-        let Ok(reader) = book_of.worksheet_cells_reader(&name) else { continue };
-        let mut rows = SheetRows::new(file, reader, b'.');
-        let mut cells: Vec<Vec<Value>> = Vec::new();
-        let mut bytes = 0;
-        while cells.len() < HEAD_ROWS && bytes < HEAD_BYTES && rows.advance()? {
-            bytes += rows.row.iter().map(Value::size).sum::<usize>();
-            cells.push(rows.row.clone());
+    let hidden: Vec<&str> =
+        sheets.iter().filter(|(_, hidden)| *hidden).map(|(name, _)| name.as_str()).collect();
+    // A hidden sheet may hold an earlier state of the data: it is read if it is named, or if no visible one has a table.
+    for of_hidden in [false, true] {
+        if !found.is_empty() {
+            break;
         }
-        if cells.is_empty() {
-            continue;
-        }
-        // Numbers that are stored as text have a decimal sign.
-        let texts = |row: &Vec<Value>| {
-            row.iter().filter(|cell| matches!(cell, Value::Text(_))).map(|cell| cell.text(b'.')).collect()
-        };
-        let (decimal, _) = decimal(&cells.iter().map(texts).collect::<Vec<Vec<String>>>());
-        let head: Vec<Vec<String>> =
-            cells.iter().map(|row| row.iter().map(|cell| cell.text(decimal)).collect()).collect();
-        match Table::look(&head, decimal, options, Origin::Rows) {
-            Ok(mut table) => {
-                note_empty_columns(&mut table, &head);
-                found.push((name, table, decimal));
+        for (name, _) in sheets.iter().filter(|(name, hidden)| is_wanted(name, of_hidden, *hidden)) {
+            let Some(cells) = book.cells(file, name) else { continue };
+            match head_of(SheetRows::new(cells, b'.'), options)? {
+                Some(Ok((table, decimal))) => found.push((name.clone(), table, decimal)),
+                Some(Err(problem)) => problems.push(format!("sheet `{name}` is passed over: {problem}")),
+                None => {}
             }
-            Err(problem) => problems.push(format!("sheet `{name}` is passed over: {problem}")),
         }
+        if options.sheet.is_some() {
+            break;
+        }
+        if of_hidden && found.len() > 1 {
+            found.clear();
+            problems.push("no visible sheet has a table, and several hidden ones have: name one".to_owned());
+        }
+    }
+    if let (None, false) = (&options.sheet, hidden.is_empty()) {
+        let is_read = found.iter().any(|(name, ..)| hidden.contains(&name.as_str()));
+        problems.push(match is_read {
+            true => format!("hidden: {}; read since no visible sheet has a table", hidden.join(", ")),
+            false => format!("hidden, and read only if named by `sheet`: {}", hidden.join(", ")),
+        });
     }
     let decimals = found.iter().map(|(.., decimal)| *decimal).collect();
     let found = found.into_iter().map(|(name, table, _)| (name, table)).collect();
-    if let (None, false) = (&options.sheet, hidden.is_empty()) {
-        problems.push(format!("hidden, and read only if named by `sheet`: {}", hidden.join(", ")));
-    }
     let (layout, sheets) = side_by_side("sheet", found, problems).map_err(|why| file.content(NAME, why))?;
     Ok(Box::new(Workbook { file: file.clone(), layout, sheets, decimals }))
+}
+
+/// The table of a sheet and the decimal sign of its texts, or why there is none; `None` for an empty sheet.
+type Found = Option<Result<(Table, u8), String>>;
+
+fn head_of(mut rows: SheetRows<'_>, options: &LogOptions) -> Result<Found, LogError> {
+    let mut cells: Vec<Vec<Value>> = Vec::new();
+    let mut bytes = 0;
+    while cells.len() < HEAD_ROWS && bytes < HEAD_BYTES && rows.advance()? {
+        bytes += rows.row.iter().map(Value::size).sum::<usize>();
+        cells.push(rows.row.clone());
+    }
+    if cells.is_empty() {
+        return Ok(None);
+    }
+    // Numbers that are stored as text have a decimal sign.
+    let texts = |row: &Vec<Value>| {
+        row.iter().filter(|cell| matches!(cell, Value::Text(_))).map(|cell| cell.text(b'.')).collect()
+    };
+    let (decimal, _) = decimal(&cells.iter().map(texts).collect::<Vec<Vec<String>>>());
+    let head: Vec<Vec<String>> =
+        cells.iter().map(|row| row.iter().map(|cell| cell.text(decimal)).collect()).collect();
+    let table = Table::look(&head, decimal, options, Origin::Rows);
+    Ok(Some(table.map(|mut table| {
+        note_empty_columns(&mut table, &head);
+        (table, decimal)
+    })))
 }
 
 impl Log for Workbook {
@@ -123,15 +205,15 @@ impl Log for Workbook {
     }
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        let mut book = book(&self.file)?;
+        let mut book = Book::open(&self.file)?;
         for (sheet, decimal) in self.sheets.iter().zip(&self.decimals) {
             let own = sheet.own(wanted);
             if own.is_empty() {
                 continue;
             }
-            let reader = book.worksheet_cells_reader(&sheet.name).map_err(failed(&self.file))?;
+            let Some(cells) = book.cells(&self.file, &sheet.name) else { continue };
             let mut of_book = |row: Row<'_>| sheet.give(row, sink);
-            let mut rows = SheetRows::new(&self.file, reader, *decimal);
+            let mut rows = SheetRows::new(cells, *decimal);
             self.layout.add_finding(sheet.table.rows(&mut rows, &own, &mut of_book)?);
         }
         Ok(())
@@ -143,7 +225,11 @@ fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
     let empty = |column: usize| {
         head.iter().skip(table.data_row()).all(|row| row.get(column).is_none_or(String::is_empty))
     };
-    let names = table.named_columns().filter(|(column, _)| empty(*column));
+    // Empty columns between tables have no name either.
+    let named = |column: usize| {
+        head.iter().take(table.data_row()).any(|row| row.get(column).is_some_and(|cell| !cell.is_empty()))
+    };
+    let names = table.named_columns().filter(|(column, _)| named(*column) && empty(*column));
     let names: Vec<String> = names.map(|(_, name)| format!("`{name}`")).collect();
     if !names.is_empty() {
         table.layout.findings.push(format!(
@@ -156,7 +242,7 @@ fn note_empty_columns(table: &mut Table, head: &[Vec<String>]) {
 /// A cell of a sheet.
 fn value_of(data: &DataRef<'_>) -> Value {
     match data {
-        DataRef::DateTime(date) => instant_of(date.as_f64()).map_or(Value::Empty, Value::Instant),
+        DataRef::DateTime(date) => instant(date.as_f64()),
         DataRef::String(text) | DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => {
             Value::Text(start(text))
         }
@@ -169,6 +255,10 @@ fn value_of(data: &DataRef<'_>) -> Value {
 fn start(text: &str) -> String {
     let text = text.trim();
     text.get(..text.floor_char_boundary(TEXT_LIMIT)).unwrap_or_default().to_owned()
+}
+
+fn instant(days: f64) -> Value {
+    instant_of(days).map_or(Value::Empty, Value::Instant)
 }
 
 /// Excel's days since its origin; a value below one is a time of day.
@@ -184,34 +274,23 @@ fn instant_of(days: f64) -> Option<Instant> {
 
 /// The rows of a sheet; rows without any cell are skipped.
 struct SheetRows<'a> {
-    file: LogFile,
-    reader: XlsxCellReader<'a, Box<dyn ReadSeek>>,
+    cells: NextCell<'a>,
     /// The first cell of the next row.
     next: Option<(u32, usize, Value)>,
-    /// Whether the last cell was read: the reader fails after it.
-    ended: bool,
     row: Vec<Value>,
     decimal: u8,
 }
 
 impl<'a> SheetRows<'a> {
-    fn new(file: &LogFile, reader: XlsxCellReader<'a, Box<dyn ReadSeek>>, decimal: u8) -> Self {
-        SheetRows { file: file.clone(), reader, next: None, ended: false, row: Vec::new(), decimal }
+    fn new(cells: NextCell<'a>, decimal: u8) -> Self {
+        SheetRows { cells, next: None, row: Vec::new(), decimal }
     }
 
     fn next_cell(&mut self) -> Result<Option<(u32, usize, Value)>, LogError> {
-        if let Some(cell) = self.next.take() {
-            return Ok(Some(cell));
+        match self.next.take() {
+            Some(cell) => Ok(Some(cell)),
+            None => (self.cells)(),
         }
-        if self.ended {
-            return Ok(None);
-        }
-        let cell: Option<Cell<DataRef<'_>>> = self.reader.next_cell().map_err(failed(&self.file))?;
-        self.ended = cell.is_none();
-        Ok(cell.map(|cell| {
-            let (row, column) = cell.get_position();
-            (row, usize::try_from(column).unwrap_or(usize::MAX), value_of(cell.get_value()))
-        }))
     }
 }
 

@@ -320,7 +320,7 @@ fn what_is_called_sure_is_right() {
         let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
         let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
         let survey = survey(log.as_mut()).unwrap();
-        let proposal = propose(log.layout(), &survey);
+        let proposal = propose(log.layout(), &survey, None);
         present += columns.iter().filter(|(_, holds)| matches!(holds, Holds::A(_))).count();
         for proposed in &proposal.channels {
             let (name, holds) = columns[proposed.column];

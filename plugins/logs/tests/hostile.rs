@@ -10,12 +10,12 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 /// Does everything that `mapper log inspect` does with a file.
-fn look(bytes: &[u8]) {
+pub(crate) fn look(bytes: &[u8]) {
     let file = LogFile::of_bytes(Path::new("log"), bytes);
     let Ok((_, mut log)) = LOG_FORMATS.open(&file, &LogOptions::default()) else { return };
     let Ok(found) = survey(log.as_mut()) else { return };
     let layout = log.layout().clone();
-    drop(channel_map_text("log", &layout, &propose(&layout, &found), &[]));
+    drop(channel_map_text("log", &layout, &propose(&layout, &found, None), &[]));
 }
 
 fn csv() -> Vec<u8> {
@@ -371,6 +371,13 @@ fn a_hidden_sheet_is_read_only_if_it_is_named() {
     assert!(findings.contains("Old"), "{findings}");
     let (value, ..) = first(&LogOptions { sheet: Some("Old".to_owned()), ..LogOptions::default() });
     assert_eq!(value, 2.25);
+    // If no visible sheet has a table, the hidden one is the log.
+    let first_sheet = with_hidden.iter_mut().find(|(name, _)| name.ends_with("sheet1.xml")).unwrap();
+    first_sheet.1 =
+        first_sheet.1.split("<sheetData>").next().unwrap().to_owned() + "<sheetData/></worksheet>";
+    let file = LogFile::of_bytes(Path::new("log.xlsx"), &workbook(&with_hidden));
+    let (_, log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+    assert!(log.layout().findings.join("; ").contains("Old"));
 }
 
 /// MATLAB data of level 5: vectors in a structure, and by themselves.

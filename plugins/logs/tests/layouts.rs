@@ -250,6 +250,24 @@ fn a_unit_that_changes_gives_no_number() {
     assert!(rows[149].1[0].is_nan() || layout.columns[0].unit.is_none());
 }
 
+/// Names of several words above columns between blanks, to the right of which the numbers end.
+#[test]
+fn names_of_several_words_between_blanks() {
+    let names = format!("{:>8}{:>22}{:>22}\n", "Time", "Comp Outlet Pressure", "Comp Outlet Temp");
+    let units = format!("{:>8}{:>22}{:>22}\n", "(s)", "(kPa)", "(degC)");
+    let line = |row: usize| format!("{row:8}{:22.2}{:22.1}", p2_kpa(row), t2_degc(row));
+    assert_measured(&text(&(names + &units), line), "Comp Outlet Pressure", "Comp Outlet Temp", true);
+    // Four names above three columns name none, the clock neither.
+    let unknown = text("Time  Outlet  Pressure of the compressor  and more\n", |row| {
+        format!("{row} {} {}", p2_kpa(row), t2_degc(row))
+    });
+    let file = LogFile::of_bytes(Path::new("log"), unknown.as_bytes());
+    let refused = LOG_FORMATS.open(&file, &LogOptions::default()).err().unwrap().to_string();
+    assert!(refused.contains("column 1, column 2, column 3"), "{refused}");
+    let named = LogOptions { time: vec!["column 1".to_owned()], ..LogOptions::default() };
+    assert_eq!(LOG_FORMATS.open(&file, &named).unwrap().1.layout().columns.len(), 2);
+}
+
 #[test]
 fn a_compressed_log_is_its_content() {
     let plain =
@@ -298,4 +316,38 @@ fn the_end_of_daylight_saving_is_remarked() {
     };
     assert_eq!(remarks(&log(rows)), (1999.0, 1));
     assert_eq!(remarks(&log(1000)), (999.0, 0));
+}
+
+/// Written by xlwt: dates over midnight, with the format of a German Excel.
+#[test]
+fn an_old_workbook_has_its_dates() {
+    let file = LogFile::of_bytes(Path::new("dates.xls"), include_bytes!("dates.xls"));
+    let (format, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
+    assert_eq!((format.name, log.layout().columns[2].unit.as_deref()), ("Excel", Some("°C")));
+    // 2025-11-18 23:59:50.
+    assert_eq!(log.layout().start_time_ns, Some(1_763_510_390_000_000_000));
+    let mut rows = Vec::new();
+    log.rows(&[0, 1, 2], &mut |row| {
+        rows.push((row.t_s, row.values.to_vec()));
+        Ok(())
+    })
+    .unwrap();
+    assert_eq!((rows.len(), &rows[39]), (40, &(39.0, vec![60_039.0, p2_kpa(39), t2_degc(39)])));
+}
+
+/// Two rates next to each other, each with its own clock; the slower one ends in the middle of the file.
+#[test]
+fn clocks_side_by_side_are_groups() {
+    let line = |row: usize| {
+        let slow = 2 * row;
+        let right = if slow < ROWS { format!("{slow},{}", t2_degc(slow)) } else { ",".to_owned() };
+        format!("{row},{},{right}", p2_kpa(row))
+    };
+    let (layout, rows) = read(&text("time_1 [s],p2 [kPa],time_2 [s],T2 [degC]\n", line));
+    let groups: Vec<usize> = layout.columns.iter().map(|column| column.group).collect();
+    assert_eq!((layout.groups.len(), groups), (2, vec![0, 1]));
+    // Pressures are at least 100 here, temperatures below.
+    let (slow, fast): (Vec<_>, Vec<_>) = rows.iter().partition(|(_, values)| values[0] < 100.0);
+    assert_eq!((fast.len(), slow.len()), (ROWS, ROWS / 2));
+    assert!(slow.iter().all(|(t_s, values)| (values[0] - (20.0 + 0.5 * t_s)).abs() < 1e-9));
 }

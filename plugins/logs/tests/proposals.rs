@@ -3,12 +3,21 @@
 
 use mapper_core::Channel;
 use mapper_log_formats::LOG_FORMATS;
-use mapper_recording::logs::proposal::{Certainty, Proposal, propose};
+use mapper_recording::logs::proposal::{Certainty, NominalFlows, Proposal, propose};
 use mapper_recording::logs::{LogFile, LogOptions, survey};
 use std::path::Path;
 
 /// A log of two minutes at 1 Hz with these headings; `row` has the values at a load of 0 to 1.
 fn proposal(headings: &str, row: impl Fn(f64) -> Vec<f64>) -> Proposal {
+    proposal_for(headings, None, row)
+}
+
+/// The same of a machine with known flows.
+fn proposal_for(
+    headings: &str,
+    nominal: Option<NominalFlows<'_>>,
+    row: impl Fn(f64) -> Vec<f64>,
+) -> Proposal {
     let mut text = format!("Time [s],{headings}\n");
     for second in 0..120 {
         let load = f64::from(second) / 119.0;
@@ -18,7 +27,7 @@ fn proposal(headings: &str, row: impl Fn(f64) -> Vec<f64>) -> Proposal {
     let file = LogFile::of_bytes(Path::new("log"), text.as_bytes());
     let (_, mut log) = LOG_FORMATS.open(&file, &LogOptions::default()).unwrap();
     let found = survey(log.as_mut()).unwrap();
-    propose(log.layout(), &found)
+    propose(log.layout(), &found, nominal)
 }
 
 fn sure(proposal: &Proposal) -> Vec<Channel> {
@@ -26,14 +35,41 @@ fn sure(proposal: &Proposal) -> Vec<Channel> {
     sure.map(|proposed| proposed.channel).collect()
 }
 
-/// The stations 2 to 5 of a gas turbine: the temperature rises from 3 to 4, where the combustor is.
+/// The stations 2 to 5 of a gas turbine: the temperature rises from 3 to 4, where the combustor is. They are renumbered, never surely.
 #[test]
-fn stations_of_a_gas_turbine_are_not_sure() {
+fn stations_of_a_gas_turbine_are_renumbered() {
     let found = proposal("P2 [kPa],T2 [K],P3 [kPa],T3 [K],P4 [kPa],T4 [K],P5 [kPa],T5 [K]", |load| {
         let ratio = 1.0 + 1.3 * load;
         vec![98.0, 295.0, 98.0 * ratio, 295.0 + 110.0 * load, 97.0 * ratio, 500.0 + 300.0 * load, 99.0, 450.0]
     });
     assert_eq!(sure(&found), []);
+    let column = |channel: Channel| found.of(channel).map(|found| (found.column, found.certainty));
+    let likely = |column: usize| Some((column, Certainty::Likely));
+    assert_eq!([Channel::P1, Channel::T1, Channel::P2, Channel::T2].map(column), [0, 1, 2, 3].map(likely));
+    assert_eq!([Channel::P3, Channel::T3, Channel::P4, Channel::T4].map(column), [4, 5, 6, 7].map(likely));
+    // Without the fifth station nothing says that it is so.
+    let found = proposal("P2 [kPa],T2 [K],P3 [kPa],T3 [K],P4 [kPa],T4 [K]", |load| {
+        let ratio = 1.0 + 1.3 * load;
+        vec![98.0, 295.0, 98.0 * ratio, 295.0 + 110.0 * load, 97.0 * ratio, 500.0 + 300.0 * load]
+    });
+    assert!(found.channels.iter().all(|proposed| proposed.certainty == Certainty::Unsure));
+    // Other names, with a shaft speed and a flow that have numbers of their own.
+    let names = "N1 [rpm],W2 [kg/s],Tt2_degC,Tt3_degC,Tt4_degC,Tt5_degC,Pt2_kPa,Pt3_kPa";
+    let found = proposal(names, |load| {
+        vec![
+            20e3 + 90e3 * load,
+            0.02 + 0.13 * load,
+            22.0,
+            22.0 + 110.0 * load,
+            500.0,
+            420.0,
+            98.0,
+            98.0 + 130.0 * load,
+        ]
+    });
+    let of = |channel: Channel| found.of(channel).map(|found| found.column);
+    assert_eq!(of(Channel::ShaftSpeed).zip(of(Channel::CompressorFlow)), Some((0, 1)));
+    assert_eq!([Channel::T1, Channel::T4, Channel::P2].map(of), [Some(2), Some(5), Some(7)]);
     // The same values under the stations of a turbocharger.
     let found = proposal("P1 [kPa],T1 [K],P2 [kPa],T2 [K],P3 [kPa],T3 [K],P4 [kPa],T4 [K]", |load| {
         let ratio = 1.0 + 1.3 * load;
@@ -71,4 +107,49 @@ fn a_flow_keeps_its_unit() {
     let found = proposal("n_TC [rpm],m_dot_C,p1_C [kPa],p2_C [kPa]", row);
     let flow = found.of(Channel::CompressorFlow).unwrap();
     assert_eq!((flow.unit, flow.certainty), (Some("kg/s"), Certainty::Likely));
+}
+
+/// `T_c` is the gas if it is hotter than an ideal compression makes it, and cannot be if it is cooler.
+#[test]
+fn a_temperature_without_a_place_is_judged_by_the_pressure() {
+    // At 2.3 bar an ideal compression from 22 degC ends at 101 degC.
+    for (top_degc, channel) in [(135.0, Channel::T2), (70.0, Channel::Tc)] {
+        let found = proposal("n [rpm],p_c [kPa],T1 [degC],T_c [degC]", |load| {
+            vec![20e3 + 90e3 * load, 99.0 + 131.0 * load, 22.0, 22.0 + (top_degc - 22.0) * load]
+        });
+        assert_eq!(found.of(channel).map(|found| found.column), Some(3), "{top_degc}");
+        assert_eq!(
+            found.of(Channel::P2).map(|found| (found.column, found.certainty)),
+            Some((1, Certainty::Likely))
+        );
+        assert!(!sure(&found).contains(&channel));
+    }
+}
+
+/// 548 without a unit may be g/s, kg/h or lb/min; the machine of the log passes 0.1 to 0.2 kg/s.
+#[test]
+fn the_machine_settles_the_unit_of_a_flow() {
+    let row = |load: f64| vec![30e3 + 90e3 * load, 548.0 * load, 99.0, 105.0 + 130.0 * load];
+    let names = "n_TC [rpm],m_dot_C,p1_C [kPa],p2_C [kPa]";
+    let unit = |flows: Option<NominalFlows<'_>>| {
+        let found = proposal_for(names, flows, row);
+        let flow = found.of(Channel::CompressorFlow).unwrap();
+        (flow.certainty, flow.unit)
+    };
+    assert_eq!(unit(None).0, Certainty::Unsure);
+    assert_eq!(unit(Some(&|_| (0.1, 0.2))), (Certainty::Likely, Some("kg/h")));
+    assert_eq!(unit(Some(&|_| (0.4, 0.7))), (Certainty::Likely, Some("g/s")));
+    assert_eq!(unit(Some(&|_| (30.0, 40.0))).0, Certainty::Unsure);
+}
+
+/// Names below a group of the machine, in German.
+#[test]
+fn a_machine_before_the_quantity_is_understood() {
+    let names = "Verdichter Druck ein [kPa],Verdichter Druck aus [kPa],Verdichter Temperatur aus [degC],Turbine Druck ein [kPa],Turbine Temperatur aus [degC]";
+    let found = proposal(names, |load| {
+        vec![98.0, 98.0 + 130.0 * load, 22.0 + 110.0 * load, 99.0 + 100.0 * load, 400.0]
+    });
+    let of = |channel: Channel| found.of(channel).map(|found| found.column);
+    let channels = [Channel::P1, Channel::P2, Channel::T2, Channel::P3, Channel::T4];
+    assert_eq!(channels.map(of), [0, 1, 2, 3, 4].map(Some));
 }

@@ -11,12 +11,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-core",      &[]),
     ("mapper-chart",     &["core"]),
     ("mapper-numerics",  &[]),
+    // Old workbooks, which logs and maps may be.
+    ("mapper-workbook",  &[]),
     // Work in many pieces, independent of its content.
     ("mapper-fleet",     &["numerics", "yaml"]),
     ("mapper-physics",   &["core", "numerics"]),
     ("mapper-fmu",       &["core", "physics"]),
     // Nominal maps of campaigns are tables of points, so maps lie below campaigns.
-    ("mapper-maps",      &["core", "numerics", "physics", "yaml"]),
+    ("mapper-maps",      &["core", "numerics", "physics", "workbook", "yaml"]),
     ("mapper-campaign",  &["core", "maps", "physics", "yaml"]),
     ("mapper-planner",   &["core", "numerics", "physics"]),
     ("mapper-sequence",  &["core", "numerics", "physics", "yaml"]),
@@ -33,7 +35,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("mapper-backends",  &["core", "numerics", "physics", "recording", "yaml"]),
     ("mapper-effects",   &["core", "physics"]),
     ("mapper-formats",   &["core", "yaml", "numerics", "physics", "chart", "maps"]),
-    ("mapper-log-formats", &["recording"]),
+    ("mapper-log-formats", &["recording", "workbook"]),
     // Text, pages and pictures, made from data.
     ("mapper-report",    &["core", "chart", "observe", "physics", "campaign", "planner", "identify", "numerics", "maps", "diagnose", "history", "recording", "sequence", "fleet"]),
     // The application as a library. The caller passes the plug-ins.

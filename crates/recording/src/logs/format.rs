@@ -84,7 +84,7 @@ impl LogFormats {
 }
 
 /// Formats that people have and that are not read, by their first bytes, with what to do.
-const OTHERS: [(&[u8], &str); 8] = [
+const OTHERS: [(&[u8], &str); 7] = [
     (
         b"\x89MCAP",
         "it is an MCAP recording, which `mapper identify` reads; topics and fields are named in a channel map",
@@ -105,7 +105,6 @@ const OTHERS: [(&[u8], &str); 8] = [
     ),
     (b"\x89HDF", "it is HDF5; export it as CSV"),
     (b"MATLAB 7.3", "it is MATLAB data of version 7.3; save it by `save -v7`, or export it as CSV"),
-    (b"\xD0\xCF\x11\xE0", "it is a workbook of Excel before 2007; save it as .xlsx"),
     (b"PK", "it is a zip archive, and no whole workbook of Excel; unpack it, or save the workbook again"),
 ];
 

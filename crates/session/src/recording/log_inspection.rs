@@ -1,7 +1,7 @@
 //! Inspects the log of another program.
 
 use crate::{Registry, SessionError};
-use mapper_recording::logs::proposal::{Proposal, channel_map_text, propose};
+use mapper_recording::logs::proposal::{NominalFlows, Proposal, channel_map_text, propose};
 use mapper_recording::logs::{Layout, LogFile, LogOptions, Survey, survey};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -23,14 +23,17 @@ pub struct LogInspection {
     pub options: Vec<(String, String)>,
 }
 
-/// Reads a log once and proposes a channel map; `options` are keys and values of the log reader.
+/// Reads a log once and proposes a channel map; `options` are keys and values of the log reader, `machine` is the campaign of the machine,
+/// whose map shows the unit of a flow.
 ///
 /// # Errors
-/// [`SessionError::LogOption`] for a wrong key or value, [`SessionError::Log`] if the file cannot be read as a log.
+/// [`SessionError::Campaign`] for a wrong campaign, [`SessionError::LogOption`] for a wrong key or value, [`SessionError::Log`] if the file
+/// cannot be read as a log.
 pub fn inspect_log(
     registry: &Registry,
     path: &Path,
     options: Vec<(String, String)>,
+    machine: Option<&Path>,
 ) -> Result<LogInspection, SessionError> {
     let mut read_by = LogOptions::default();
     for (key, value) in &options {
@@ -39,7 +42,16 @@ pub fn inspect_log(
     let (format, mut log) = registry.logs.open(&LogFile::of_path(path), &read_by)?;
     let survey = survey(log.as_mut())?;
     let layout = log.layout().clone();
-    let proposal = propose(&layout, &survey);
+    let model = match machine {
+        Some(campaign) => Some(mapper_campaign::nominal_model(&mapper_campaign::load(campaign)?)?),
+        None => None,
+    };
+    let flows = model.as_ref().map(|model| {
+        move |speed_rpm: f64| {
+            (model.map.surge_point(speed_rpm).0, model.map.choke_flow_corrected_kg_s(speed_rpm))
+        }
+    });
+    let proposal = propose(&layout, &survey, flows.as_ref().map(|flows| flows as NominalFlows<'_>));
     Ok(LogInspection { path: path.to_owned(), format: format.name, layout, survey, proposal, options })
 }
 

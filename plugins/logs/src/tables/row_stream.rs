@@ -7,6 +7,7 @@ use crate::notation::table_row::{Cells, Rows};
 use mapper_recording::logs::{DateOrder, Encoding, LogError, LogFile};
 use std::cell::Cell;
 use std::io::{self, Read};
+use std::ops::Range;
 use std::rc::Rc;
 
 /// Maximum length of a line, bytes: an unclosed quote would otherwise extend to the end of the file.
@@ -86,6 +87,19 @@ impl RowStream {
     fn cell(&self, column: usize) -> &[u8] {
         let at = if self.dialect.separator == b' ' { self.filled.get(column).copied() } else { Some(column) };
         at.and_then(|at| self.record.get(at)).unwrap_or_default()
+    }
+
+    /// Where each cell of a row between blanks begins and ends, bytes of the line.
+    pub(crate) fn spans(&self) -> Vec<Range<usize>> {
+        let mut start = 0;
+        let mut spans = Vec::new();
+        for cell in &self.record {
+            if !cell.is_empty() {
+                spans.push(start..start + cell.len());
+            }
+            start += cell.len() + 1;
+        }
+        spans
     }
 
     /// The cells of the row as text.

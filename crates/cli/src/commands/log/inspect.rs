@@ -17,6 +17,9 @@ pub struct Inspect {
     /// How to read it if automatic detection gave the wrong answer, e.g. `separator=;`, `time=TS`; may be repeated
     #[arg(long = "with", value_name = "KEY=VALUE", value_parser = key_and_value)]
     pub with: Vec<(String, String)>,
+    /// Campaign of the machine, whose map shows the unit of a flow without one
+    #[arg(long, value_name = "CAMPAIGN")]
+    pub machine: Option<PathBuf>,
     /// Write the proposed channel map to this new file
     #[arg(long, value_name = "FILE")]
     pub write_channels: Option<PathBuf>,
@@ -30,7 +33,7 @@ pub struct Inspect {
 impl Inspect {
     pub fn run(&self) -> Result<(), Failure> {
         let registry = registry::registry();
-        let found = inspect_log(&registry, &self.log, self.with.clone())?;
+        let found = inspect_log(&registry, &self.log, self.with.clone(), self.machine.as_deref())?;
         if let Some(file) = &self.write_channels {
             self.replace.write(file, found.channel_map().as_bytes())?;
         }

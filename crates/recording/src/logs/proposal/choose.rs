@@ -16,15 +16,60 @@ struct Candidate {
     fits: bool,
 }
 
-/// Suggests a channel map.
-pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
+/// Flow at surge and at choke of a machine at a shaft speed in rpm, kg/s.
+pub type NominalFlows<'a> = &'a dyn Fn(f64) -> (f64, f64);
+
+/// Suggests a channel map; `nominal` is what is known of the machine.
+pub fn propose(layout: &Layout, survey: &Survey, nominal: Option<NominalFlows<'_>>) -> Proposal {
+    let (proposal, agreement) = attempt(layout, survey, nominal, Numbers::Usual);
+    if agreement.doubts_stations {
+        let (mut renumbered, agreement) = attempt(layout, survey, nominal, Numbers::GasTurbine);
+        let has_fifth = [Channel::P4, Channel::T4].iter().any(|channel| renumbered.of(*channel).is_some());
+        if has_fifth && agreement.against == 0 && agreement.for_it >= 2 {
+            physics::remark_stations(&mut renumbered, layout);
+            return renumbered;
+        }
+    }
+    proposal
+}
+
+/// How the names of a log number the stations.
+#[derive(Clone, Copy, PartialEq)]
+enum Numbers {
+    /// Compressor 1 and 2, turbine 3 and 4.
+    Usual,
+    /// Compressor 2 and 3, turbine 4 and 5.
+    GasTurbine,
+}
+
+impl Numbers {
+    /// A name with its station as it is usual: its first digit, if it is a number by itself, less one.
+    fn usual(self, name: &str) -> String {
+        let digits: Vec<(usize, char)> =
+            name.char_indices().filter(|(_, letter)| letter.is_ascii_digit()).collect();
+        let alone = digits.first().filter(|(at, _)| digits.get(1).is_none_or(|(next, _)| *next > at + 1));
+        match alone.and_then(|(at, digit)| Some((*at, digit.to_digit(10)?.checked_sub(1)?))) {
+            Some((at, lower)) if self == Numbers::GasTurbine => {
+                format!("{}{lower}{}", &name[..at], &name[at + 1..])
+            }
+            _ => name.to_owned(),
+        }
+    }
+}
+
+fn attempt(
+    layout: &Layout,
+    survey: &Survey,
+    nominal: Option<NominalFlows<'_>>,
+    numbers: Numbers,
+) -> (Proposal, physics::Agreement) {
     let units: Vec<Option<HeaderUnit>> =
         layout.columns.iter().map(|column| column.unit.as_deref().and_then(header_unit)).collect();
     let mut proposal = Proposal::default();
     let mut taken = vec![false; layout.columns.len()];
     // The surest first, so that a column that fits two channels goes to the one that it fits best.
     let named: Vec<Vec<(Channel, Weight)>> =
-        (0..layout.columns.len()).map(|column| names_of(column, layout, &units)).collect();
+        (0..layout.columns.len()).map(|column| names_of(column, layout, &units, numbers)).collect();
     let mut wishes: Vec<(Channel, Vec<Candidate>)> = CHANNELS
         .iter()
         .map(|row| (row.channel, candidates(row.channel, &named, layout, survey, &units)))
@@ -57,13 +102,18 @@ pub fn propose(layout: &Layout, survey: &Survey) -> Proposal {
     proposal.channels.sort_by_key(|proposed| proposed.channel);
     shared_units::settle(&mut proposal, layout, survey);
     settle_gauge(&mut proposal, layout, survey, &units);
-    shared_units::settle_flow(&mut proposal, layout, survey);
-    physics::judge(&mut proposal, layout, survey);
-    proposal
+    shared_units::settle_flow(&mut proposal, layout, survey, nominal);
+    let agreement = physics::judge(&mut proposal, layout, survey);
+    (proposal, agreement)
 }
 
 /// The channels that a column may be by its description.
-fn names_of(index: usize, layout: &Layout, units: &[Option<HeaderUnit>]) -> Vec<(Channel, Weight)> {
+fn names_of(
+    index: usize,
+    layout: &Layout,
+    units: &[Option<HeaderUnit>],
+    numbers: Numbers,
+) -> Vec<(Channel, Weight)> {
     let Some(column) = layout.columns.get(index) else { return Vec::new() };
     let unit = units.get(index).copied().flatten();
     if column.unit.is_some() && unit.is_none() {
@@ -71,7 +121,9 @@ fn names_of(index: usize, layout: &Layout, units: &[Option<HeaderUnit>]) -> Vec<
     }
     let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
     let kind = unit.map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
-    channels_of(without_number(column), group, &column.description, kind)
+    // A shaft has a number too.
+    let numbers = if kind == Some(Kind::Speed) { Numbers::Usual } else { numbers };
+    channels_of(&numbers.usual(without_number(column)), group, &column.description, kind)
 }
 
 /// A name without the number by which readers distinguish equal names: `Pressure (2)` is not a pressure at station 2.

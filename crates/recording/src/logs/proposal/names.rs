@@ -64,23 +64,26 @@ const PLACES: &[Place] = &[
     Place { temperature: Some(Channel::T1), pressure: Some(Channel::P1), patterns: &[
         (6, "(^|_){q}_?0?1_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{I}(_|$)"), (6, "(^|_){B}_{D}{C}(_|$)"),
         (6, "(^|_){C}_?{I}(_|$)"), (3, "^(inlet|intake|ein|ansaug)"), (3, "(^|_){q}_?vv(_|$)"), (3, "ansaug|(^|_)(inlet|intake)(_|$)"),
-        (6, "(^|_){I}_{D}{C}(_|$)"), (4, "(^|_)ci{s}(_|$)"), (3, "(^|_){q}_?[12]1(_|$)"),
+        (6, "(^|_){I}_{D}{C}(_|$)"), (6, "(^|_){C}_{q}_{I}(_|$)"), (4, "(^|_)ci{s}(_|$)"), (3, "(^|_){q}_?[12]1(_|$)"),
     ]},
     Place { temperature: Some(Channel::T2), pressure: Some(Channel::P2), patterns: &[
         (6, "(^|_){q}_?0?2_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{O}(_|$)"), (6, "(^|_){A}_{D}{C}(_|$)"),
         (6, "(^|_){C}_?{O}(_|$)"), (3, "(^|_){q}_?nv(_|$)"), (3, "boost|ladedruck|ladeluft"), (2, "(^|_)(outlet|discharge)(_|$)"),
-        (6, "(^|_){O}_{D}{C}(_|$)"), (4, "(^|_)co{s}(_|$)"), (3, "(^|_){q}_?2[12](_|$)"),
+        (6, "(^|_){O}_{D}{C}(_|$)"), (6, "(^|_){C}_{q}_{O}(_|$)"), (4, "(^|_)co{s}(_|$)"), (3, "(^|_){q}_?2[12](_|$)"),
     ]},
     Place { temperature: Some(Channel::T3), pressure: Some(Channel::P3), patterns: &[
         (6, "(^|_){q}_?0?3_?{K}(_|$)"), (6, "(^|_){q}_?1_?t(_|$)"), (6, "(^|_){q}_?{T}_?{I}(_|$)"), (6, "(^|_){B}_{D}{T}(_|$)"),
         (6, "(^|_){T}_?{I}(_|$)"), (3, "(^|_){q}_?vt(_|$)"),
-        (6, "(^|_){I}_{D}{T}(_|$)"), (3, "(^|_)egt|abgas{q}|exhaust_gas_{q}|exhaust_{q}"), (4, "(^|_)ti{s}(_|$)"), (3, "(^|_){q}_?31(_|$)"),
+        (6, "(^|_){I}_{D}{T}(_|$)"), (6, "(^|_){T}_{q}_{I}(_|$)"), (3, "(^|_)egt|abgas{q}|exhaust_gas_{q}|exhaust_{q}"), (4, "(^|_)ti{s}(_|$)"), (3, "(^|_){q}_?31(_|$)"),
     ]},
     Place { temperature: Some(Channel::T4), pressure: Some(Channel::P4), patterns: &[
         (6, "(^|_){q}_?0?4_?{K}(_|$)"), (6, "(^|_){q}_?2_?t(_|$)"), (6, "(^|_){q}_?{T}_?{O}(_|$)"), (6, "(^|_){A}_{D}{T}(_|$)"),
         (6, "(^|_){T}_?{O}(_|$)"), (3, "(^|_){q}_?nt(_|$)"),
-        (6, "(^|_){O}_{D}{T}(_|$)"), (4, "(^|_)to{s}(_|$)"), (3, "(^|_){q}_?41(_|$)"),
+        (6, "(^|_){O}_{D}{T}(_|$)"), (6, "(^|_){T}_{q}_{O}(_|$)"), (4, "(^|_)to{s}(_|$)"), (3, "(^|_){q}_?41(_|$)"),
     ]},
+    // `p_c` and `p_t` say neither before nor after: mostly the pressure that the machine makes, and the one that drives it.
+    Place { temperature: None, pressure: Some(Channel::P2), patterns: &[(2, "^{q}_?c$")]},
+    Place { temperature: None, pressure: Some(Channel::P3), patterns: &[(2, "^{q}_?t$")]},
     Place { temperature: Some(Channel::Tc), pressure: None, patterns: &[
         (6, "^{q}_?c$"), (7, "{C}_?{H}"), (7, "{H}_?{C}(_|$)"), (3, "(^|_){H}"),
     ]},
@@ -155,7 +158,7 @@ fn rows() -> Vec<Row> {
             6,
             "(speed|drehzahl|rpm|vitesse|regime|velocidad).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor|compresseur|compresor|arbre|eje)".to_owned(),
         ),
-        (Channel::ShaftSpeed, 4, "^(n|shaft_speed|speed|drehzahl|speed_rpm|rpm|vitesse|regime|velocidad)$".to_owned()),
+        (Channel::ShaftSpeed, 4, "^(n|n1|shaft_speed|speed|drehzahl|speed_rpm|rpm|vitesse|regime|velocidad)$".to_owned()),
         (
             Channel::CompressorFlow,
             6,

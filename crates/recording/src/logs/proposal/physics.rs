@@ -22,8 +22,21 @@ const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::
 /// Gas turbines and some engine programs number the compressor 2 and 3, the turbine 4 and 5.
 const ENGINE_NUMBERS: &str = "its stations may be numbered as in a gas turbine: 2 before and 3 behind the compressor, 4 before and 5 behind the turbine";
 
+/// What the checks said.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Agreement {
+    /// Number of pairs of channels that agree.
+    pub(super) for_it: usize,
+    /// Number of pairs that contradict.
+    pub(super) against: usize,
+    /// Whether the stations may be numbered otherwise.
+    pub(super) doubts_stations: bool,
+}
+
 /// Judges the proposal and remarks what it found.
-pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -> Agreement {
+    let mut agreement = Agreement::default();
+    settle_bare_housing(proposal, layout, survey);
     let course = |proposal: &Proposal, channel: Channel| Course::of(proposal, channel, layout, survey);
     let running: Option<Course> = course(proposal, Channel::ShaftSpeed);
     let raised = [
@@ -46,6 +59,7 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
         }
         let share = pairs.iter().filter(|(high, low)| high >= low).count() as f64 / pairs.len() as f64;
         if share >= AGREEMENT {
+            agreement.for_it += 1;
             proposal.remarks.push(format!(
                 "{words} in {:.0} % of the time that the shaft turns, as it must be",
                 100.0 * share
@@ -53,7 +67,9 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
         } else {
             let message = format!("{words} in only {:.0} % of the time that the shaft turns", 100.0 * share);
             doubt(proposal, &[higher, lower], &message);
+            agreement.against += 1;
             if higher == Channel::T3 {
+                agreement.doubts_stations = true;
                 doubt(proposal, &NUMBERED, ENGINE_NUMBERS);
             }
         }
@@ -85,6 +101,71 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
             None => {}
         }
     }
+    agreement
+}
+
+/// Marks channels whose stations were renumbered.
+pub(super) fn remark_stations(proposal: &mut Proposal, layout: &Layout) {
+    for proposed in proposal.channels.iter_mut() {
+        let name = layout.columns.get(proposed.column).map_or("", |column| column.name.as_str());
+        if name.contains(char::is_numeric) && proposed.channel != Channel::ShaftSpeed {
+            proposed.certainty = proposed.certainty.min(Certainty::Likely);
+            proposed
+                .remarks
+                .push("stations are numbered 2 to 5 as in a gas turbine: only so T3 is above T4".to_owned());
+        }
+    }
+}
+
+/// (gamma - 1) / gamma of air.
+const EXPONENT: f64 = 0.2857;
+
+/// Pressure ratio from which the gas is 38 K or more above the inlet: a housing is far below it, unless the turbine heats it.
+const TELLING_RATIO: f64 = 1.5;
+
+/// Inlet of a compressor without a column for it, K: test cells are hardly warmer than 40 degC.
+const WARM_ROOM_K: f64 = 313.15;
+
+/// `T_c` without another column for the gas: what is hotter than an ideal compression makes the gas may be the gas, what is cooler cannot.
+fn settle_bare_housing(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+    let certain = |proposal: &Proposal, channel: Channel| {
+        proposal.of(channel).is_some_and(|found| found.certainty > Certainty::Unsure)
+    };
+    let range = |proposal: &Proposal, channel: Channel| {
+        let course = Course::of(proposal, channel, layout, survey)?;
+        let values = || course.samples().map(|(_, value)| value);
+        Some((values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)))
+    };
+    if certain(proposal, Channel::T2) || !certain(proposal, Channel::P2) {
+        return;
+    }
+    let (Some((_, outlet_pa)), Some((_, hottest_k))) =
+        (range(proposal, Channel::P2), range(proposal, Channel::Tc))
+    else {
+        return;
+    };
+    let inlet_pa = range(proposal, Channel::P1).map_or(STANDARD_ATMOSPHERE_PA, |(low, _)| low);
+    let inlet_k = range(proposal, Channel::T1).map_or(WARM_ROOM_K, |(_, high)| high);
+    let ideal_k = inlet_k * (outlet_pa / inlet_pa).max(1.0).powf(EXPONENT);
+    let bare = |proposed: &&mut ProposedChannel| proposed.channel == Channel::Tc && is_bare(proposed, layout);
+    if outlet_pa < TELLING_RATIO * inlet_pa || hottest_k < ideal_k {
+        return;
+    }
+    if let Some(proposed) = proposal.channels.iter_mut().find(bare) {
+        proposed.channel = Channel::T2;
+        proposed.certainty = proposed.certainty.min(Certainty::Likely);
+        proposed.remarks.push(format!(
+            "up to {hottest_k:.0} K, above the {ideal_k:.0} K of an ideal compression: taken as the gas, not as the housing"
+        ));
+        proposal.channels.retain(|other| other.channel != Channel::T2 || other.certainty > Certainty::Unsure);
+        proposal.channels.sort_by_key(|proposed| proposed.channel);
+    }
+}
+
+/// Whether a name is `T_c` or `T_t` and no more.
+fn is_bare(proposed: &ProposedChannel, layout: &Layout) -> bool {
+    let column = layout.columns.get(proposed.column);
+    column.is_some_and(|column| column.description.is_empty() && plain(&column.name).len() <= "temp_c".len())
 }
 
 /// `T_c` and `T_t` are housings here, and gas behind compressor and turbine elsewhere: without a column for the gas they may be it.
@@ -92,14 +173,8 @@ fn doubt_bare_housings(proposal: &mut Proposal, layout: &Layout) {
     for (housing, gas, place) in
         [(Channel::Tc, Channel::T2, "compressor"), (Channel::Tt, Channel::T4, "turbine")]
     {
-        let bare = |proposed: &ProposedChannel| {
-            let column = layout.columns.get(proposed.column);
-            column.is_some_and(|column| {
-                column.description.is_empty() && plain(&column.name).len() <= "temp_c".len()
-            })
-        };
         let gas_is_known = proposal.of(gas).is_some_and(|gas| gas.certainty > Certainty::Unsure);
-        if !gas_is_known && proposal.of(housing).is_some_and(bare) {
+        if !gas_is_known && proposal.of(housing).is_some_and(|proposed| is_bare(proposed, layout)) {
             let message = format!("it may be the gas behind the {place}, for which there is no other column");
             doubt(proposal, &[housing], &message);
         }

@@ -1,5 +1,6 @@
 //! Units of a log that gives none: columns of one kind share a unit, and physics settles the rest.
 
+use super::choose::NominalFlows;
 use super::proposed::{Certainty, Proposal, ProposedChannel};
 use crate::logs::plausible::{OUTER, STANDARD_ATMOSPHERE_PA, fitting_units};
 use crate::logs::units::kind_of;
@@ -75,24 +76,42 @@ const EXPONENT: f64 = 0.2857;
 const DENSITY: f64 = 1.15;
 const INLET_K: f64 = 298.0;
 
-/// Looks for the unit of a flow without one: pressure ratio and speed give the size of the wheel, and that the flow.
-pub(super) fn settle_flow(proposal: &mut Proposal, layout: &Layout, survey: &Survey) {
+/// By so much the flow may lie outside those at surge and choke: correction to the inlet, and lines between the nominal ones.
+const NOMINAL_FACTOR: f64 = 1.3;
+
+/// Looks for the unit of a flow without one: in that of the machine, if it is known; else pressure ratio and speed give the size of the
+/// wheel, and that the flow.
+pub(super) fn settle_flow(
+    proposal: &mut Proposal,
+    layout: &Layout,
+    survey: &Survey,
+    nominal: Option<NominalFlows<'_>>,
+) {
     let top = |channel: Channel, share: f64| -> Option<f64> {
         let proposed = proposal.of(channel).filter(|proposed| proposed.certainty > Certainty::Unsure)?;
         let unit = crate::logs::units::unit(kind_of(channel), proposed.unit?).ok()?;
         let over_pa = if proposed.gauge { STANDARD_ATMOSPHERE_PA } else { 0.0 };
         Some(unit.to_inside(survey.columns.get(proposed.column)?.quantile(share)) + over_pa)
     };
-    let (Some(speed_rpm), Some(outlet_pa)) =
-        (top(Channel::ShaftSpeed, 1.0 - OUTER), top(Channel::P2, 1.0 - OUTER))
-    else {
-        return;
+    let Some(speed_rpm) = top(Channel::ShaftSpeed, 1.0 - OUTER).filter(|rpm| *rpm > 0.0) else { return };
+    let (low_kg_s, high_kg_s, why) = match nominal {
+        Some(flows) => {
+            let (surge_kg_s, choke_kg_s) = flows(speed_rpm);
+            let why =
+                format!("fits the machine ({surge_kg_s:.3} to {choke_kg_s:.3} kg/s at {speed_rpm:.0} rpm)");
+            (surge_kg_s / NOMINAL_FACTOR, choke_kg_s * NOMINAL_FACTOR, why)
+        }
+        None => {
+            let Some(outlet_pa) = top(Channel::P2, 1.0 - OUTER) else { return };
+            let ratio = outlet_pa / top(Channel::P1, OUTER).unwrap_or(STANDARD_ATMOSPHERE_PA);
+            let head_j_kg = CP * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
+            let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
+            let diameter_m = 60.0 * tip_m_s / (PI * speed_rpm);
+            let flow_kg_s = FLOW_COEFFICIENT * DENSITY * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
+            let why = format!("fits speed and pressure ratio (a wheel of about {:.0} mm)", 1e3 * diameter_m);
+            (flow_kg_s / FLOW_FACTOR, flow_kg_s * FLOW_FACTOR, why)
+        }
     };
-    let ratio = outlet_pa / top(Channel::P1, OUTER).unwrap_or(STANDARD_ATMOSPHERE_PA);
-    let head_j_kg = CP * INLET_K * (ratio.max(1.0).powf(EXPONENT) - 1.0);
-    let tip_m_s = (head_j_kg / HEAD_COEFFICIENT).sqrt();
-    let diameter_m = 60.0 * tip_m_s / (PI * speed_rpm.max(1.0));
-    let flow_kg_s = FLOW_COEFFICIENT * DENSITY * tip_m_s * PI / 4.0 * diameter_m * diameter_m;
     for channel in [Channel::CompressorFlow, Channel::TurbineFlow] {
         let Some(proposed) = proposal.channels.iter_mut().find(|proposed| proposed.channel == channel) else {
             continue;
@@ -104,19 +123,12 @@ pub(super) fn settle_flow(proposal: &mut Proposal, layout: &Layout, survey: &Sur
         if !fitting.iter().any(|unit| Some(unit.symbol()) == proposed.unit) || fitting.len() < 2 {
             continue;
         }
-        let near = |unit: &&&'static Unit| {
-            let share = unit.to_inside(high) / flow_kg_s;
-            (1.0 / FLOW_FACTOR..=FLOW_FACTOR).contains(&share)
-        };
+        let near = |unit: &&&'static Unit| (low_kg_s..=high_kg_s).contains(&unit.to_inside(high));
         let near: Vec<&&'static Unit> = fitting.iter().filter(near).collect();
         if let [unit] = near.as_slice() {
             proposed.unit = Some(unit.symbol());
             proposed.certainty = Certainty::Likely;
-            proposed.remarks = vec![format!(
-                "the log gives no unit; {} fits speed and pressure ratio (a wheel of about {:.0} mm)",
-                unit.symbol(),
-                1e3 * diameter_m
-            )];
+            proposed.remarks = vec![format!("the log gives no unit; {} {why}", unit.symbol())];
         }
     }
 }

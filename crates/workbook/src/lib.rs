@@ -1,0 +1,16 @@
+//! Sheets of workbooks of Excel 97 to 2003 (`.xls`), read within limits.
+//!
+//! `calamine` reads them too, but fills the rectangle around all cells of a sheet (0.4 GB for two cells in opposite corners), follows
+//! chains of sectors without end and panics on short records. Here memory is at most six times the size of the file: a cell of a file takes at
+//! least six bytes there, and 32 here. The records are those of [MS-XLS].
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod read;
+mod records;
+mod strings;
+
+pub use read::{Cell, Sheet, read_xls};
+
+/// The first bytes of a compound file, which holds a workbook of Excel 97 to 2003.
+pub const MAGIC: [u8; 8] = *b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1";

@@ -1,0 +1,228 @@
+//! Sheets with their cells.
+
+use crate::records::{BOF, CONTINUE, EOF, Record, Records};
+use crate::strings::{Bytes, shared};
+use std::collections::HashMap;
+use std::io::{Read, Seek};
+use std::rc::Rc;
+
+/// Maximum size of the stream with the sheets, bytes: 65 536 rows, the most that such a sheet has, of 50 numbers take 59 MB.
+const STREAM_LIMIT: u64 = 64 << 20;
+
+/// Days from the first day of 1900 to that of 1904, from which some programs count.
+const DAYS_TO_1904: f64 = 1462.0;
+
+/// The content of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// A number.
+    Number(f64),
+    /// Days since the end of 1899, as Excel counts; below one a time of day.
+    Days(f64),
+    /// A text.
+    Text(Rc<str>),
+}
+
+/// A sheet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sheet {
+    /// Its name.
+    pub name: String,
+    /// Whether it is hidden.
+    pub is_hidden: bool,
+    /// Cells with row and column from 0, by row and then by column.
+    pub cells: Vec<(u16, u16, Cell)>,
+}
+
+/// The content of the records before the first sheet.
+#[derive(Default)]
+struct Globals {
+    /// Texts have flags since Excel 97.
+    has_flags: bool,
+    from_1904: bool,
+    strings: Vec<Rc<str>>,
+    /// Whether each format of a cell is one of dates.
+    is_date: Vec<bool>,
+    /// Position, name and whether it is hidden.
+    sheets: Vec<(usize, String, bool)>,
+}
+
+/// Reads all sheets with cells.
+///
+/// # Errors
+/// The reason, if it is no workbook, is encrypted, or is larger than its limit.
+pub fn read_xls(file: impl Read + Seek) -> Result<Vec<Sheet>, String> {
+    let mut file = cfb::CompoundFile::open(file).map_err(|error| error.to_string())?;
+    let mut bytes = Vec::new();
+    let stream = ["/Workbook", "/Book"].iter().find(|name| file.is_stream(name));
+    let stream =
+        stream.ok_or("it holds no workbook of Excel 95 to 2003; it may be another Office document")?;
+    let stream = file.open_stream(stream).map_err(|error| error.to_string())?;
+    stream.take(STREAM_LIMIT + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > STREAM_LIMIT {
+        return Err(format!("its sheets take more than {} MiB; save it as .xlsx", STREAM_LIMIT >> 20));
+    }
+    let globals = globals(&bytes)?;
+    // Sheets at the same place would be read as often as they are listed.
+    let mut places: Vec<usize> = globals.sheets.iter().map(|(at, ..)| *at).collect();
+    places.sort_unstable();
+    places.dedup();
+    if places.len() < globals.sheets.len() {
+        return Err("two of its sheets are at the same place".to_owned());
+    }
+    let mut sheets = Vec::new();
+    for (at, name, is_hidden) in &globals.sheets {
+        // A sheet ends where the next begins: each byte is read once.
+        let end = places.iter().find(|place| *place > at).map_or(bytes.len(), |place| *place);
+        let cells = cells(bytes.get(*at..end).unwrap_or_default(), &globals);
+        sheets.push(Sheet { name: name.clone(), is_hidden: *is_hidden, cells });
+    }
+    Ok(sheets)
+}
+
+fn globals(stream: &[u8]) -> Result<Globals, String> {
+    let mut found = Globals::default();
+    let mut formats: HashMap<u16, bool> = HashMap::new();
+    let mut format_of_cell = Vec::new();
+    let mut records = Records(stream).peekable();
+    while let Some(record) = records.next() {
+        match record.kind {
+            BOF => found.has_flags = record.u16(0) != Some(0x0500),
+            EOF => break,
+            // FilePass, DateMode
+            0x002F => return Err("it is encrypted; save it without a password".to_owned()),
+            0x0022 => found.from_1904 = record.u16(0) == Some(1),
+            // Format, XF
+            0x041E => {
+                let text = record.data.get(2..).map(|rest| Bytes::new(vec![rest]));
+                let code = text
+                    .and_then(|mut bytes| bytes.text(if found.has_flags { 2 } else { 1 }, found.has_flags));
+                formats.extend(record.u16(0).zip(code.map(|code| is_date_code(&code))));
+            }
+            0x00E0 => format_of_cell.extend(record.u16(2)),
+            // BoundSheet8
+            0x0085 => {
+                let name = record.data.get(6..).map(|rest| Bytes::new(vec![rest]));
+                let name = name.and_then(|mut bytes| bytes.text(1, found.has_flags));
+                let place = record.u32(0).and_then(|place| usize::try_from(place).ok());
+                // Charts and macros are sheets, too.
+                let is_table = record.u8(5) == Some(0);
+                if let (Some(place), Some(state), Some(name), true) = (place, record.u8(4), name, is_table) {
+                    found.sheets.push((place, name, state & 3 != 0));
+                }
+            }
+            // SST
+            0x00FC => {
+                let mut pieces = vec![record.data];
+                while let Some(next) = records.next_if(|next| next.kind == CONTINUE) {
+                    pieces.push(next.data);
+                }
+                found.strings = shared(pieces);
+            }
+            _ => {}
+        }
+    }
+    let is_date = |format: &u16| {
+        formats.get(format).copied().unwrap_or(matches!(format, 14..=22 | 27..=36 | 45..=47 | 50..=58))
+    };
+    found.is_date = format_of_cell.iter().map(is_date).collect();
+    Ok(found)
+}
+
+/// Whether a format's code shows parts of a date or of a time, outside quoted text and conditions in brackets.
+fn is_date_code(code: &str) -> bool {
+    let (mut quoted, mut bracket) = (false, false);
+    let mut letters = code.chars();
+    while let Some(letter) = letters.next() {
+        match letter {
+            '"' => quoted = !quoted,
+            '\\' | '_' | '*' if !quoted => _ = letters.next(),
+            '[' if !quoted => bracket = true,
+            ']' if !quoted => bracket = false,
+            'd' | 'D' | 'm' | 'M' | 'y' | 'Y' | 'h' | 'H' | 's' | 'S' if !quoted && !bracket => return true,
+            _ => {}
+        }
+    }
+    false
+}
+
+/// The cells of a sheet; a record that is too short for its kind holds none.
+fn cells(stream: &[u8], globals: &Globals) -> Vec<(u16, u16, Cell)> {
+    let mut cells = Vec::new();
+    // Charts within a sheet have cells too: only those between the first start and its end belong to the sheet.
+    let mut depth = 0usize;
+    let mut formula = None;
+    for record in Records(stream) {
+        match record.kind {
+            BOF => depth += 1,
+            EOF if depth <= 1 => break,
+            EOF => depth -= 1,
+            _ if depth != 1 => {}
+            // String: the text of the formula before it
+            0x0207 => {
+                let text = Bytes::new(vec![record.data]).text(2, globals.has_flags);
+                if let (Some((row, column)), Some(text)) = (formula, text) {
+                    cells.push((row, column, Cell::Text(text.into())));
+                }
+            }
+            // MulRk
+            0x00BD => {
+                let (Some(row), Some(first)) = (record.u16(0), record.u16(2)) else { continue };
+                let packed = record.data.get(4..record.data.len().saturating_sub(2)).unwrap_or_default();
+                for (column, piece) in (first..=u16::MAX).zip(packed.as_chunks::<6>().0) {
+                    let piece = Record { kind: 0, data: piece };
+                    let cell = piece
+                        .u16(0)
+                        .zip(piece.u32(2))
+                        .map(|(format, rk)| number(unpacked(rk), format, globals));
+                    cells.extend(cell.map(|cell| (row, column, cell)));
+                }
+            }
+            _ => {
+                let (Some(row), Some(column), Some(format)) = (record.u16(0), record.u16(2), record.u16(4))
+                else {
+                    continue;
+                };
+                if record.kind == 0x0006 {
+                    formula = Some((row, column));
+                }
+                cells.extend(single(record, format, globals).map(|cell| (row, column, cell)));
+            }
+        }
+    }
+    cells.sort_by_key(|(row, column, _)| (*row, *column));
+    cells
+}
+
+/// The cell in a record that holds one.
+fn single(record: Record<'_>, format: u16, globals: &Globals) -> Option<Cell> {
+    match record.kind {
+        // Number, Rk
+        0x0203 => Some(number(record.f64(6)?, format, globals)),
+        0x027E => Some(number(unpacked(record.u32(6)?), format, globals)),
+        // Formula: its value, unless the last two bytes mark a text, a truth value, an error or none
+        0x0006 => (record.u16(12)? != 0xFFFF).then_some(number(record.f64(6)?, format, globals)),
+        // LabelSst
+        0x00FD => globals.strings.get(usize::try_from(record.u32(6)?).ok()?).cloned().map(Cell::Text),
+        // Label, RString
+        0x0204 | 0x00D6 => {
+            Some(Cell::Text(Bytes::new(vec![record.data.get(6..)?]).text(2, globals.has_flags)?.into()))
+        }
+        _ => None,
+    }
+}
+
+fn number(value: f64, format: u16, globals: &Globals) -> Cell {
+    match globals.is_date.get(usize::from(format)) {
+        Some(true) if globals.from_1904 && value >= 1.0 => Cell::Days(value + DAYS_TO_1904),
+        Some(true) => Cell::Days(value),
+        _ => Cell::Number(value),
+    }
+}
+
+/// A number in four bytes: the upper half of a double or an integer of 30 bits, either of them perhaps times 100.
+fn unpacked(rk: u32) -> f64 {
+    let value =
+        if rk & 2 != 0 { f64::from(rk.cast_signed() >> 2) } else { f64::from_bits(u64::from(rk & !3) << 32) };
+    if rk & 1 != 0 { value / 100.0 } else { value }
+}

@@ -1,0 +1,89 @@
+//! A log whose columns are in memory, in one or several tables.
+
+use crate::tables::column_rows::{Chunk, Chunks, ColumnRows};
+use crate::tables::several_tables::{Part, side_by_side};
+use crate::tables::table_log::{Origin, Table};
+use mapper_recording::logs::{Layout, Log, LogError, LogFile, LogOptions, Row, RowSink};
+
+/// Rows of a table in the sample.
+const HEAD_ROWS: usize = 400;
+
+/// Columns of equal length.
+pub(crate) struct ColumnTable {
+    /// For people.
+    pub(crate) title: String,
+    /// Names, and units if any is known.
+    pub(crate) head: Vec<Vec<String>>,
+    pub(crate) rows: usize,
+    pub(crate) columns: Vec<Chunk>,
+    /// The column that the file calls the independent one.
+    pub(crate) clock: Option<String>,
+}
+
+impl ColumnTable {
+    fn rows(&self) -> ColumnRows<Once> {
+        ColumnRows::new(self.head.clone(), Once(Some((self.rows, self.columns.clone()))))
+    }
+}
+
+struct ColumnLog {
+    layout: Layout,
+    parts: Vec<Part>,
+    /// The table of each part.
+    tables: Vec<ColumnTable>,
+}
+
+/// The log of tables; `word` is the format's term for a table, `problems` says what else is in the file.
+///
+/// # Errors
+/// [`LogError`] if no table has a clock.
+pub(crate) fn column_log(
+    file: &LogFile,
+    (name, word): (&'static str, &str),
+    tables: Vec<ColumnTable>,
+    mut problems: Vec<String>,
+    options: &LogOptions,
+) -> Result<Box<dyn Log>, LogError> {
+    let (mut found, mut kept) = (Vec::new(), Vec::new());
+    for table in tables {
+        let head = table.rows().texts(HEAD_ROWS)?;
+        let own = LogOptions { time: table.clock.iter().cloned().collect(), ..options.clone() };
+        let options = if options.time.is_empty() { &own } else { options };
+        match Table::look(&head, b'.', options, Origin::Columns) {
+            Ok(looked) => {
+                found.push((table.title.clone(), looked));
+                kept.push(table);
+            }
+            Err(problem) => problems.push(format!("{word} `{}` is passed over: {problem}", table.title)),
+        }
+    }
+    let (layout, parts) = side_by_side(word, found, problems).map_err(|why| file.content(name, why))?;
+    Ok(Box::new(ColumnLog { layout, parts, tables: kept }))
+}
+
+impl Log for ColumnLog {
+    fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
+        for (part, table) in self.parts.iter().zip(&self.tables) {
+            let own = part.own(wanted);
+            if own.is_empty() {
+                continue;
+            }
+            let mut of_file = |row: Row<'_>| part.give(row, sink);
+            self.layout.add_finding(part.table.rows(&mut table.rows(), &own, &mut of_file)?);
+        }
+        Ok(())
+    }
+}
+
+/// All rows at once.
+struct Once(Option<(usize, Vec<Chunk>)>);
+
+impl Chunks for Once {
+    fn next_chunk(&mut self) -> Result<Option<(usize, Vec<Chunk>)>, LogError> {
+        Ok(self.0.take())
+    }
+}

@@ -38,6 +38,7 @@ formats! {
     simscape,
     mat,
     npss,
+    gsp,
     pycycle,
     svg,
     png,

@@ -5,7 +5,7 @@ use mapper_core::MapFormat;
 pub(crate) const FORMAT: MapFormat = MapFormat {
     name: "xlsx",
     extension: "xlsx",
-    further_extensions: &["xlsm"],
+    further_extensions: &["xlsm", "xls"],
     description: "workbook of Excel with a table of points",
     write: None,
     draw: None,

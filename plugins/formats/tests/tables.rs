@@ -352,3 +352,53 @@ fn units_below_the_names_of_any_quantity() {
     // 400 m3/h at 298 K and 100 kPa.
     assert!((flow / (400.0 / 3600.0 * 1e5 / 287.05 / 298.0) - 1.0).abs() < 1e-9);
 }
+
+/// The same points in shapes of people: columns as rows, thousands with their marks, a title for each line.
+#[test]
+fn one_map_in_further_shapes() {
+    let plain = "speed [rpm],flow [kg/s],PR,eta\n60000,0.06,1.28,0.67\n60000,0.04,1.3,0.64\n120000,0.15,2.45,0.73\n120000,0.12,2.5,0.7\n";
+    let of = |name: &str, text: &str| {
+        let found = read_bytes(name, text.as_bytes(), Some(ReferenceState::SAE));
+        let mut rows = numbers(&found.unwrap_or_else(|why| panic!("{why}\n{text}")).map);
+        rows.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        rows
+    };
+    let expected = of("x.csv", plain);
+    assert_eq!(expected.len(), 4);
+    let turned = "speed [rpm],60000,60000,120000,120000\nflow [kg/s],0.06,0.04,0.15,0.12\nPR,1.28,1.3,2.45,2.5\neta,0.67,0.64,0.73,0.7\n";
+    let german = "Drehzahl [1/min];Massenstrom [kg/s];Druckverhältnis;Wirkungsgrad\n60.000;0,06;1,28;0,67\n60.000;0,04;1,3;0,64\n120.000;0,15;2,45;0,73\n120.000;0,12;2,5;0,7\n";
+    let american = "speed [rpm];flow [kg/s];PR;eta\n60,000;0.06;1.28;0.67\n60,000;0.04;1.3;0.64\n120,000;0.15;2.45;0.73\n120,000;0.12;2.5;0.7\n";
+    let titled = "Speed line 60000 rpm\nflow [kg/s]  PR  eta\n0.06 1.28 0.67\n0.04 1.3 0.64\nSpeed line 120 krpm\nflow [kg/s]  PR  eta\n0.15 2.45 0.73\n0.12 2.5 0.7\n";
+    for (name, text) in [("x.csv", turned), ("x.csv", german), ("x.csv", american), ("x.txt", titled)] {
+        assert_eq!(of(name, text), expected, "{text}");
+    }
+}
+
+/// Gauge pressures need the ambient one: of a column, or given once.
+#[test]
+fn gauge_pressures_are_over_the_ambient_one() {
+    let text = "N [rpm],mV [kg/h],P1 (mbarG),T1 [degC],P2 (psig),T2 [degC]\n60000,161.6,-20,20,4.0,55\n60000,476.3,-20,20,1.8,43.6\n";
+    let read = |text: &str, keys: &[(&str, &str)]| {
+        let mut given = mapper_core::MapDescription::from(Some(ReferenceState::SAE));
+        keys.iter().for_each(|(key, value)| mapper_maps::table::set_key(&mut given, key, value).unwrap());
+        FORMATS.read_from("csv").unwrap().read(text.as_bytes(), given)
+    };
+    assert!(read(text, &[]).unwrap_err().to_string().contains("barometer"));
+    let first = read(text, &[("barometer", "98.4 kPa")]).unwrap().measured[0];
+    // 4 psi are 27.579 kPa.
+    assert!((first.p1_pa - 96.4e3).abs() < 1e-6 && (first.p2_pa - 125_979.0).abs() < 1.0);
+    let with_column = text
+        .replace("T2 [degC]", "T2 [degC],p_amb [hPa]")
+        .replace(",55\n", ",55,984\n")
+        .replace(",43.6\n", ",43.6,984\n");
+    let found = read(&with_column, &[]).unwrap();
+    assert!((found.measured[0].p2_pa - first.p2_pa).abs() < 1e-6);
+}
+
+/// Written by xlwt, with a cell in the last corner of the sheet.
+#[test]
+fn an_old_workbook_is_read() {
+    let found = read("old_excel.xls", Some(ReferenceState::SAE)).unwrap();
+    let rows = numbers(&found.map);
+    assert_eq!((rows.len(), rows[0]), (8, [Some(60e3), Some(0.03), Some(1.29), Some(0.6)]));
+}

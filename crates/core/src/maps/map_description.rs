@@ -15,6 +15,8 @@ pub struct MapDescription {
     pub design: DesignPoint,
     /// Diameters of the pipes in which static pressures were measured.
     pub static_taps: StaticTaps,
+    /// Ambient pressure of gauge pressures, Pa.
+    pub ambient_pa: Option<f64>,
 }
 
 /// A statement about a column: its heading, its number or its unit.

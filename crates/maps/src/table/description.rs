@@ -47,7 +47,7 @@ const fn column(name: &'static str, example: &'static str) -> DescriptionKey {
 }
 
 /// Every key.
-pub const DESCRIPTION_KEYS: [DescriptionKey; 22] = [
+pub const DESCRIPTION_KEYS: [DescriptionKey; 24] = [
     DescriptionKey {
         name: "reference",
         description: "Reference state of the corrected quantities: SAE, Garrett, BorgWarner, or temperature and pressure.",
@@ -110,6 +110,12 @@ pub const DESCRIPTION_KEYS: [DescriptionKey; 22] = [
             set(&mut given.static_taps.outlet_diameter_m, positive(Kind::Length, text))
         }),
     },
+    DescriptionKey {
+        name: "barometer",
+        description: "Ambient pressure, if P1 or P2 are gauge pressures and no column has it.",
+        example: "98.6 kPa",
+        set: Set::Value(|given, text| set(&mut given.ambient_pa, positive(Kind::Pressure, text))),
+    },
     column("speed", "N [krpm]"),
     column("reduced_speed", "N/sqrt(T) [rpm/K^0.5]"),
     column("flow", "lb/min"),
@@ -124,6 +130,7 @@ pub const DESCRIPTION_KEYS: [DescriptionKey; 22] = [
     column("t2", "T2 [degC]"),
     column("tc", "Tc [degC]"),
     column("humidity", "RH [%]"),
+    column("ambient_pressure", "p_amb [mbar]"),
 ];
 
 fn set<T>(place: &mut Option<T>, value: Option<T>) -> Option<()> {

@@ -12,6 +12,7 @@ use crate::table::rows_to_lines::{Row, map_of_rows};
 use crate::table::sheet::grid::{Grid, text_of};
 use crate::table::sheet::layout::{self, Layout};
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
+use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{
     CompressorMap, EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription,
     MeasuredPoint, ReferenceState, StaticTaps,
@@ -71,7 +72,7 @@ fn has_arrays(text: &str) -> bool {
 /// # Errors
 /// [`ImportError`] with the row of the sheet.
 pub fn read_workbook(bytes: &[u8], given: &MapDescription) -> Result<ImportedMap, ImportError> {
-    read(&Grid::of_workbook(bytes, given.sheet.as_deref())?, given)
+    read(&grid_of_workbook(bytes, given.sheet.as_deref())?, given)
 }
 
 /// Information from the rows outside the table.
@@ -84,7 +85,8 @@ pub(super) struct Notes {
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, ImportError> {
     let given = Given::of(description, Machine::Compressor)?;
-    let Some(layout) = layout::layout(grid, &given)? else { return Err(ImportError::Empty) };
+    let (grid, layout) = layout::understood(grid, &given)?;
+    let grid = grid.as_ref();
     let notes = notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
     let mut reference = reference::settle(notes.reference, description.reference);
@@ -114,7 +116,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     for point in &points {
         let mut row = row(point, &layout, reference, in_percent)?;
         if layout.is_measured() {
-            let as_measured = as_measured(point, &row, reference, taps)?;
+            let as_measured = as_measured(point, &row, reference, description)?;
             correct(&mut row, &as_measured, reference);
             measured.push(as_measured);
         }
@@ -169,13 +171,27 @@ fn as_measured(
     point: &Point<'_>,
     row: &Row,
     reference: ReferenceState,
-    taps: StaticTaps,
+    given: &MapDescription,
 ) -> Result<MeasuredPoint, ImportError> {
     let value = |quantity: Quantity| point.value(quantity, reference);
     let of = |quantity: Quantity| needed(point, quantity, value(quantity));
     let flow_kg_s = row.flow_corrected_kg_s;
     let (t1_k, t2_k) = (of(Quantity::T1)?, value(Quantity::T2));
-    let (mut p1_pa, mut p2_pa) = (of(Quantity::P1)?, of(Quantity::P2)?);
+    let ambient_pa = value(Quantity::Ambient).or(given.ambient_pa);
+    let pressure = |quantity: Quantity| {
+        match point.of(quantity).filter(|(column, _)| column.is_gauge) {
+        None => of(quantity),
+        Some((column, _)) => ambient_pa.map_or_else(
+            || {
+                let missing = "ambient pressure, over which a gauge pressure is (or give `--with \"barometer=98.6 kPa\"`)";
+                Err(ImportError::NoColumn { line: point.at, missing, found: column.heading.clone() })
+            },
+            |ambient_pa| Ok(of(quantity)? + ambient_pa),
+        ),
+    }
+    };
+    let taps = given.static_taps;
+    let (mut p1_pa, mut p2_pa) = (pressure(Quantity::P1)?, pressure(Quantity::P2)?);
     if let Some(diameter_m) = taps.inlet_diameter_m {
         p1_pa = static_to_total_pa(p1_pa, flow_kg_s, t1_k, diameter_m);
     }

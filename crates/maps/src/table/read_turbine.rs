@@ -8,6 +8,7 @@ use crate::table::reference;
 use crate::table::sheet::grid::Grid;
 use crate::table::sheet::layout;
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
+use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{
     ImportError, ImportRemark, ImportedTurbine, MapDescription, ReferenceState, TurbineMap, TurbineMapPoint,
 };
@@ -25,7 +26,7 @@ pub fn read_turbine_text(text: &str, given: &MapDescription) -> Result<ImportedT
 /// # Errors
 /// [`ImportError`] with the row of the sheet.
 pub fn read_turbine_workbook(bytes: &[u8], given: &MapDescription) -> Result<ImportedTurbine, ImportError> {
-    read(&Grid::of_workbook(bytes, given.sheet.as_deref())?, given)
+    read(&grid_of_workbook(bytes, given.sheet.as_deref())?, given)
 }
 
 /// Speed parameters are below, corrected speeds above: 200 krpm at 1000 K are 6300 rpm/K^0.5, and no turbocharger's map ends at 10 krpm.
@@ -33,7 +34,8 @@ const LARGEST_SPEED_PARAMETER: f64 = 10_000.0;
 
 fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, ImportError> {
     let given = Given::of(description, Machine::Turbine)?;
-    let Some(layout) = layout::layout(grid, &given)? else { return Err(ImportError::Empty) };
+    let (grid, layout) = layout::understood(grid, &given)?;
+    let grid = grid.as_ref();
     let notes = notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
     let all = || layout.groups.iter().flat_map(|group| &group.columns);

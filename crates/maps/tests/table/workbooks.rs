@@ -30,6 +30,12 @@ fn workbook(sheets: &[Sheet<'_>]) -> Vec<u8> {
         );
         let mut data = String::new();
         for (row, cells) in rows.iter().enumerate() {
+            if let [row] = cells
+                && row.starts_with('<')
+            {
+                data += row;
+                continue;
+            }
             data += &format!(r#"<row r="{}">"#, row + 1);
             for (column, cell) in cells.iter().enumerate() {
                 let place = format!("{}{}", char::from(b'A' + u8::try_from(column).unwrap()), row + 1);
@@ -90,14 +96,37 @@ fn speed(bytes: &[u8], sheet: Option<&str>) -> Result<f64, ImportError> {
 }
 
 #[test]
-fn a_hidden_sheet_counts_only_if_it_is_named() {
+fn a_hidden_sheet_counts_if_it_is_named_or_the_only_one() {
     let book =
         workbook(&[("Old", "hidden", OLD), ("Title", "visible", &[&["a turbo"]]), ("New", "visible", NEW)]);
     assert_eq!(speed(&book, None).unwrap(), 90e3);
     assert_eq!(speed(&book, Some("Old")).unwrap(), 60e3);
     assert!(matches!(speed(&book, Some("Other")), Err(ImportError::Workbook { .. })));
     let hidden = workbook(&[("Old", "hidden", OLD)]);
-    assert!(matches!(speed(&hidden, None), Err(ImportError::Workbook { .. })));
+    assert_eq!(speed(&hidden, None).unwrap(), speed(&hidden, Some("Old")).unwrap(), "the only table");
+    let both = workbook(&[("Old", "hidden", OLD), ("Older", "hidden", NEW)]);
+    assert!(matches!(speed(&both, None), Err(ImportError::Workbook { .. })));
+}
+
+/// A sheet for each speed line, named after its speed.
+#[test]
+fn sheets_of_speed_lines_are_one_map() {
+    let line: &[&[&str]] =
+        &[&["flow [kg/s]", "PR", "eta"], &["0.07", "1.4", "0.7"], &["0.06", "1.5", "0.71"]];
+    let book = workbook(&[("60 krpm", "visible", line), ("90000 rpm", "visible", line)]);
+    let given = MapDescription { reference: Some(ReferenceState::SAE), ..MapDescription::default() };
+    let map = read_workbook(&book, &given).unwrap().map;
+    let lines = map.lines.iter().map(|line| (line.speed_corrected_rpm, line.points.len()));
+    assert_eq!(lines.collect::<Vec<_>>(), [(60e3, 2), (90e3, 2)]);
+}
+
+/// The rectangle around the cells of a sheet has 17 thousand million cells, if one of them is in its last corner.
+#[test]
+fn a_stray_cell_takes_its_own_room_alone() {
+    let far: &[&str] = &[r#"<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>"#];
+    let rows = [NEW, &[far]].concat();
+    let stray = workbook(&[("New", "visible", &rows)]);
+    assert_eq!(speed(&stray, None).unwrap(), 90e3);
 }
 
 /// Campaigns keep the text of their map: that of a workbook is its sheet.

@@ -15,6 +15,8 @@ pub(crate) struct Column {
     pub(crate) heading: String,
     /// Its unit as written; empty if it names none.
     pub(crate) unit: String,
+    /// Whether it is a pressure over the ambient one.
+    pub(crate) is_gauge: bool,
     scale: Scale,
 }
 
@@ -28,7 +30,14 @@ enum Scale {
 impl Column {
     /// A column without a heading, in SI and rpm.
     pub(crate) fn bare(index: usize, quantity: Quantity) -> Column {
-        Column { index, quantity, heading: String::new(), unit: String::new(), scale: Scale::Factor(1.0) }
+        Column {
+            index,
+            quantity,
+            heading: String::new(),
+            unit: String::new(),
+            is_gauge: false,
+            scale: Scale::Factor(1.0),
+        }
     }
 
     /// A column with the unit of its heading, if there is one.
@@ -45,8 +54,11 @@ impl Column {
         let Some(text) = unit.filter(|unit| !says_nothing(unit)) else {
             return Ok(Column { heading, ..Column::bare(index, quantity) });
         };
-        match scale(quantity, text) {
-            Some(scale) => Ok(Column { index, quantity, heading, unit: text.to_owned(), scale }),
+        let is_measured = matches!(quantity, Quantity::P1 | Quantity::P2);
+        let gauge = header_unit(text).filter(|found| is_measured && found.reference == Reference::Gauge);
+        let is_gauge = gauge.is_some();
+        match gauge.map(|found| Scale::Unit(found.unit)).or_else(|| scale(quantity, text)) {
+            Some(scale) => Ok(Column { index, quantity, heading, unit: text.to_owned(), is_gauge, scale }),
             None => Err(ColumnError::Unit {
                 heading,
                 unit: text.chars().take(40).collect(),

@@ -33,11 +33,13 @@ pub enum Quantity {
     Tc,
     /// Humidity of the air: water per dry air, or relative.
     Humidity,
+    /// Ambient pressure, over which gauge pressures are.
+    Ambient,
 }
 
 impl Quantity {
     /// Every quantity.
-    pub(crate) const ALL: [Quantity; 14] = [
+    pub(crate) const ALL: [Quantity; 15] = [
         Quantity::Speed,
         Quantity::ReducedSpeed,
         Quantity::Flow,
@@ -52,6 +54,7 @@ impl Quantity {
         Quantity::T2,
         Quantity::Tc,
         Quantity::Humidity,
+        Quantity::Ambient,
     ];
 
     /// Its key in a map description.
@@ -71,6 +74,7 @@ impl Quantity {
             Quantity::T2 => "t2",
             Quantity::Tc => "tc",
             Quantity::Humidity => "humidity",
+            Quantity::Ambient => "ambient_pressure",
         }
     }
 
@@ -81,7 +85,7 @@ impl Quantity {
 
     /// Whether a point does not need it: a cell without a number is empty.
     pub(crate) fn is_extra(self) -> bool {
-        matches!(self, Quantity::Tc | Quantity::Humidity)
+        matches!(self, Quantity::Tc | Quantity::Humidity | Quantity::Ambient)
     }
 
     /// Whether two are forms of the same quantity.
@@ -121,6 +125,7 @@ impl Quantity {
             Quantity::T2 => "T2",
             Quantity::Tc => "housing temperature",
             Quantity::Humidity => "humidity",
+            Quantity::Ambient => "ambient pressure",
         }
     }
 
@@ -132,7 +137,7 @@ impl Quantity {
             Quantity::PressureRatio | Quantity::Efficiency | Quantity::Vane | Quantity::Humidity => {
                 Kind::Fraction
             }
-            Quantity::P1 | Quantity::P2 => Kind::Pressure,
+            Quantity::P1 | Quantity::P2 | Quantity::Ambient => Kind::Pressure,
             Quantity::T1 | Quantity::T2 | Quantity::Tc => Kind::Temperature,
         }
     }

@@ -110,8 +110,26 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
         "wccorr",
         "wckorr",
     ]) || is(&[
-        "m", "m1", "mc", "w", "wc", "mred", "mcorr", "mkorr", "mcomp", "mair", "mass", "mluft", "w1",
-        "mccorr", "wa", "ma",
+        "m",
+        "m1",
+        "mc",
+        "w",
+        "wc",
+        "mred",
+        "mcorr",
+        "mkorr",
+        "mcomp",
+        "mair",
+        "mass",
+        "mluft",
+        "w1",
+        "mccorr",
+        "wa",
+        "ma",
+        "mv",
+        "ml",
+        "mverd",
+        "mverdichter",
     ]) {
         return Some(flow);
     }
@@ -123,6 +141,11 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
         || plain.is_empty() && by_unit == Some(Quantity::Speed)
     {
         return Some(Quantity::Speed);
+    }
+    if has(&["baro", "ambientpress", "atmospher", "luftdruck", "umgebungsdruck"])
+        || is(&["pamb", "patm", "pumg"])
+    {
+        return Some(Quantity::Ambient);
     }
     if has(&["humid", "feuchte", "humedad", "umidit"]) || is(&["rh", "relhum"]) {
         return Some(Quantity::Humidity);
@@ -137,7 +160,23 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
         let rest = plain
             .strip_prefix(stem)
             .or_else(|| plain.strip_prefix(&format!("{}0{}", &stem[..1], &stem[1..])));
-        if rest.is_some_and(|rest| matches!(rest, "" | "t" | "tot" | "total" | "ges" | "c" | "abs" | "k")) {
+        if rest.is_some_and(|rest| {
+            matches!(
+                rest,
+                "" | "t"
+                    | "tot"
+                    | "total"
+                    | "ges"
+                    | "c"
+                    | "abs"
+                    | "k"
+                    | "s"
+                    | "stat"
+                    | "static"
+                    | "rel"
+                    | "gauge"
+            )
+        }) {
             return Some(quantity);
         }
     }

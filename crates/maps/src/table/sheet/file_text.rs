@@ -1,17 +1,19 @@
 //! The text of a map file that is packed: a workbook's sheet, a compressed file.
 
-use crate::table::sheet::grid::{Grid, text_of};
+use crate::table::sheet::grid::text_of;
+use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{ImportError, MAP_FILE_SIZE_LIMIT};
 use std::borrow::Cow;
 use std::io::Read;
 
-/// The text of a map file, of a workbook as CSV of its first visible sheet with numbers.
+/// The text of a map file, of a workbook as CSV of its sheet with numbers.
 ///
 /// # Errors
 /// [`ImportError`] if it is neither text nor a workbook.
 pub fn file_text(bytes: &[u8]) -> Result<String, ImportError> {
     let bytes = unpacked(bytes)?;
-    if bytes.starts_with(b"PK") { Ok(Grid::of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }
+    let is_workbook = bytes.starts_with(b"PK") || bytes.starts_with(&mapper_workbook::MAGIC);
+    if is_workbook { Ok(grid_of_workbook(&bytes, None)?.csv()) } else { text_of(&bytes) }
 }
 
 /// The content of a file compressed by gzip; any other as it is.

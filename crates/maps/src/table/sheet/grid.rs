@@ -1,7 +1,6 @@
 //! The cells of a table: text of any encoding, separator and decimal sign, or a sheet of Excel.
 
 use mapper_core::ImportError;
-use std::io::{Cursor, Read};
 
 /// A row of cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,12 +28,14 @@ pub(crate) struct Grid {
     pub(crate) decimal_comma: bool,
     /// Whether blanks separate the cells: then none can be empty.
     pub(crate) by_blanks: bool,
+    /// The mark that may be between thousands. Numbers of a workbook have none, and its texts may have another decimal sign.
+    thousands: Option<char>,
 }
 
 /// Maximum number of rows, as of points.
-const ROW_LIMIT: usize = crate::table::rows_to_lines::POINT_LIMIT;
+pub(crate) const ROW_LIMIT: usize = crate::table::rows_to_lines::POINT_LIMIT;
 /// Maximum number of cells of a row: Excel's own limit.
-const CELL_LIMIT: usize = 16_384;
+pub(crate) const CELL_LIMIT: usize = 16_384;
 
 /// Maximum length of a line, bytes, 16 for a cell, and number of lines that show the separator. They bound the time for any text.
 const LINE_LIMIT: usize = 16 * CELL_LIMIT;
@@ -66,6 +67,11 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
 }
 
 impl Grid {
+    /// The rows of a workbook.
+    pub(crate) fn of_rows(rows: Vec<GridRow>) -> Grid {
+        Grid { rows, decimal_comma: false, by_blanks: false, thousands: None }
+    }
+
     /// The cells of a text.
     ///
     /// # Errors
@@ -116,54 +122,32 @@ impl Grid {
                 rows.push(GridRow { at, cells, is_comment });
             }
         }
-        Ok(Grid {
-            rows,
-            decimal_comma: separator != ',' && decimal[1] > decimal[0],
-            by_blanks: separator == ' ',
-        })
+        let decimal_comma = separator != ',' && decimal[1] > decimal[0];
+        let thousands = Some(if decimal_comma { '.' } else { ',' });
+        Ok(Grid { rows, decimal_comma, by_blanks: separator == ' ', thousands })
     }
 
-    /// The cells of the first visible sheet with a table of numbers, or of the named one.
-    ///
-    /// # Errors
-    /// [`ImportError::Workbook`] if it is not a workbook, unpacks to more than a map needs, or has no such sheet.
-    pub(crate) fn of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid, ImportError> {
-        let failed = |error: &dyn std::fmt::Display| ImportError::Workbook { problem: error.to_string() };
-        check_size(bytes)?;
-        let mut book: calamine::Xlsx<_> =
-            calamine::Reader::new(Cursor::new(bytes)).map_err(|error: calamine::XlsxError| failed(&error))?;
-        let sheets = calamine::Reader::sheets_metadata(&book).to_vec();
-        let list: Vec<&str> = sheets.iter().map(|sheet| sheet.name.as_str()).collect();
-        let list = list.join(", ");
-        // A hidden sheet counts only if it is named: people hide what they do not want to be used.
-        let is_read = |known: &calamine::Sheet| match sheet {
-            Some(name) => known.name == name,
-            None => known.visible == calamine::SheetVisible::Visible,
+    /// The cells with rows and columns exchanged; `None` of a table with more rows than quantities.
+    pub(crate) fn turned(&self) -> Option<Grid> {
+        const MOST_QUANTITIES: usize = 100;
+        let rows: Vec<&GridRow> = self.rows.iter().filter(|row| !row.is_comment).collect();
+        let width = rows.iter().map(|row| row.cells.len()).max().filter(|_| rows.len() <= MOST_QUANTITIES)?;
+        let cell = |row: &&GridRow, column: usize| row.cells.get(column).cloned().unwrap_or_default();
+        let turned = |column: usize| GridRow {
+            at: column + 1,
+            cells: rows.iter().map(|row| cell(row, column)).collect(),
+            is_comment: false,
         };
-        for known in sheets.iter().filter(|known| is_read(known)) {
-            let range = calamine::Reader::worksheet_range(&mut book, &known.name);
-            let rows = rows_of_sheet(&range.map_err(|error| failed(&error))?);
-            if rows.iter().filter(|row| some_numbers(&row.cells, true) >= 3).count() >= 2 {
-                return Ok(Grid { rows, decimal_comma: false, by_blanks: false });
-            }
-        }
-        let hidden: Vec<&str> = sheets
-            .iter()
-            .filter(|known| known.visible != calamine::SheetVisible::Visible)
-            .map(|known| known.name.as_str())
-            .collect();
-        let which = sheet.map_or("no visible sheet".to_owned(), |name| format!("no sheet `{name}`"));
-        let mut problem = format!("{which} holds rows of three numbers and more; sheets: {list}");
-        if !hidden.is_empty() {
-            problem += &format!("; hidden: {} (name one by `--with sheet=...`)", hidden.join(", "));
-        }
-        Err(ImportError::Workbook { problem })
+        Some(Grid { rows: (0..width).map(turned).collect(), ..*self })
     }
 
     /// The cells as CSV.
     pub(crate) fn csv(&self) -> String {
         let cell = |cell: &String| {
-            let plain = cell.replace(['"', '\n', '\r'], " ");
+            // A text with a decimal comma would have thousands in a file with decimal points.
+            let number = self.number(cell).filter(|_| cell.contains(',') && !cell.contains('%'));
+            let plain =
+                number.map_or_else(|| cell.replace(['"', '\n', '\r'], " "), |number| number.to_string());
             if plain.contains(',') { format!("\"{plain}\"") } else { plain }
         };
         let line = |row: &GridRow| row.cells.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
@@ -177,6 +161,8 @@ impl Grid {
             Some(text) => (text.trim_end(), 0.01),
             None => (cell.as_str(), 1.0),
         };
+        let thousands = self.thousands.and_then(|mark| without_thousands(text, mark));
+        let text = thousands.as_deref().unwrap_or(text);
         let value = if self.decimal_comma {
             comma_number(text).or_else(|| plain_number(text))
         } else {
@@ -184,44 +170,6 @@ impl Grid {
         };
         value.or_else(|| comma_number(text)).map(|value| factor * value)
     }
-}
-
-/// The rows of a sheet that are not blank.
-fn rows_of_sheet(range: &calamine::Range<calamine::Data>) -> Vec<GridRow> {
-    let first = range.start().map_or(0, |(row, _)| row as usize);
-    let cells = |row: &[calamine::Data]| {
-        row.iter().take(CELL_LIMIT).map(|cell| cell.to_string().trim().to_owned()).collect::<Vec<String>>()
-    };
-    range
-        .rows()
-        .take(2 * ROW_LIMIT)
-        .enumerate()
-        .map(|(index, row)| GridRow { at: first + index + 1, cells: cells(row), is_comment: false })
-        .filter(|row| row.cells.iter().any(|cell| cell.contains(char::is_alphanumeric)))
-        .collect()
-}
-
-/// Largest size of everything in a workbook, bytes: 100 000 points with 20 columns of 30 bytes.
-const UNPACKED_LIMIT: u64 = 64 << 20;
-
-/// The library unpacks a workbook without a limit of its own, so the whole is unpacked once here and thrown away.
-fn check_size(bytes: &[u8]) -> Result<(), ImportError> {
-    let failed = |problem: String| ImportError::Workbook { problem };
-    let mut parts = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| failed(error.to_string()))?;
-    let mut left = UNPACKED_LIMIT;
-    for index in 0..parts.len() {
-        let part = parts.by_index(index).map_err(|error| failed(error.to_string()))?;
-        let read = std::io::copy(&mut part.take(left + 1), &mut std::io::sink());
-        let read = read.map_err(|error| failed(error.to_string()))?;
-        if read > left {
-            return Err(failed(format!(
-                "it unpacks to more than {} MB; no map needs that",
-                UNPACKED_LIMIT >> 20
-            )));
-        }
-        left -= read;
-    }
-    Ok(())
 }
 
 /// Content and comment of a line.
@@ -267,7 +215,7 @@ fn split(line: &str, separator: char) -> Vec<String> {
 }
 
 /// How many cells are numbers, among others.
-fn some_numbers(cells: &[String], decimal_comma: bool) -> usize {
+pub(crate) fn some_numbers(cells: &[String], decimal_comma: bool) -> usize {
     let is_number = |cell: &&String| numbers(std::slice::from_ref(*cell), decimal_comma) == 1;
     cells.iter().filter(is_number).count()
 }
@@ -283,6 +231,20 @@ fn numbers(cells: &[String], decimal_comma: bool) -> usize {
 
 fn plain_number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+/// A number without the marks between its thousands: `60.000` in a file with decimal commas, `60,000` in one with decimal points.
+fn without_thousands(text: &str, mark: char) -> Option<String> {
+    let decimal = if mark == '.' { ',' } else { '.' };
+    let whole = text.split(decimal).next()?;
+    let mut groups = whole.trim_start_matches(['-', '+']).split(mark);
+    let is_digits = |group: &str| group.chars().all(|c| c.is_ascii_digit());
+    let first = groups
+        .next()
+        .filter(|group| (1..=3).contains(&group.len()) && is_digits(group) && !group.starts_with('0'));
+    let mut rest = groups.peekable();
+    (first.is_some() && rest.peek().is_some() && rest.all(|group| group.len() == 3 && is_digits(group)))
+        .then(|| text.replace(mark, ""))
 }
 
 /// A number with a decimal comma.

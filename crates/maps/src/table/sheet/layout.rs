@@ -7,6 +7,7 @@ use crate::table::sheet::grid::{Grid, GridRow, is_missing};
 use crate::table::units_row::with_units_row;
 use mapper_core::{ImportError, ImportRemark};
 use mapper_yaml::units::header_unit;
+use std::borrow::Cow;
 
 /// Columns that belong together: all of a table, or those of one speed line of a table with its lines side by side.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,11 +70,29 @@ impl Layout {
     }
 }
 
+/// The layout of a table, and its cells with the columns as rows if the headings are in its first column.
+///
+/// # Errors
+/// As [`layout`], and [`ImportError::Empty`].
+pub(crate) fn understood<'a>(grid: &'a Grid, given: &Given) -> Result<(Cow<'a, Grid>, Layout), ImportError> {
+    let found = layout(grid, given);
+    if let Ok(Some(layout)) = found {
+        return Ok((Cow::Borrowed(grid), layout));
+    }
+    if let Some(turned) = grid.turned()
+        && let Ok(Some(layout)) = layout(&turned, given)
+        && layout.groups.iter().all(|group| group.bare_cells == 0)
+    {
+        return Ok((Cow::Owned(turned), layout));
+    }
+    Err(found.err().unwrap_or(ImportError::Empty))
+}
+
 /// The layout of a table; `None` if it has no rows of numbers.
 ///
 /// # Errors
 /// [`ImportError`] if the headings do not name flow and pressure ratio, or a unit is unknown, or the map is a turbine's.
-pub(crate) fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
+fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     if let Some(layout) = numbered(grid, given)? {
         return Ok(Some(layout));
     }
@@ -178,7 +197,9 @@ pub(crate) fn is_heading(given: &Given, row: &GridRow) -> bool {
     let named = |cell: &&String| {
         cell.contains(char::is_alphabetic) && !matches!(column(0, cell, given.machine), Ok(None))
     };
-    row.cells.iter().filter(named).count() >= 2
+    // `Speed line 60000 rpm` is a title.
+    let has_number = row.cells.iter().any(|cell| cell.parse::<f64>().is_ok());
+    !has_number && row.cells.iter().filter(named).count() >= 2
 }
 
 fn missing(given: &Given, row: &GridRow) -> &'static str {

@@ -4,3 +4,4 @@ pub(crate) mod file_text;
 pub(crate) mod grid;
 pub(crate) mod layout;
 pub(crate) mod points;
+pub(crate) mod workbook;

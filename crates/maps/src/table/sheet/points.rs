@@ -55,13 +55,16 @@ pub(crate) fn points<'a>(
         let (mut speed, mut last_speed) = (group.speed_rpm, None);
         for row in grid.rows.iter().skip(layout.first_row).filter(|row| !row.is_comment) {
             let cell = |index: usize| row.cells.get(index).map_or("", String::as_str);
-            if group.columns.iter().all(|column| is_missing(cell(column.index)))
-                && row.cells.iter().filter(|cell| !cell.is_empty()).count() != 1
-            {
+            let is_empty = group.columns.iter().all(|column| is_missing(cell(column.index)));
+            if is_empty && row.cells.iter().filter(|cell| !cell.is_empty()).count() != 1 {
                 continue;
             }
             if let Some(position) = layout::vane_of_title(grid, given, row) {
                 vane = Some(position);
+                continue;
+            }
+            // One number far from the table is none of its points.
+            if is_empty && group.speed_column().is_some() {
                 continue;
             }
             if let Some(title_rpm) = layout::speed_of_title(grid, given, row, group) {

@@ -1,7 +1,7 @@
 //! Which column is which channel.
 
 use super::names::{Weight, channels_of, is_ambient, is_derived, plain};
-use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+use super::proposed::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
 use super::{physics, shared_units};
 use crate::logs::plausible::{AMBIENT_PA, OUTER, fits, fitting_units, looks_like_gauge};
 use crate::logs::units::kind_of;
@@ -15,9 +15,6 @@ struct Candidate {
     weight: Weight,
     fits: bool,
 }
-
-/// Flow at surge and at choke of a machine at a shaft speed in rpm, kg/s.
-pub type NominalFlows<'a> = &'a dyn Fn(f64) -> (f64, f64);
 
 /// Suggests a channel map; `nominal` is what is known of the machine.
 pub fn propose(layout: &Layout, survey: &Survey, nominal: Option<NominalFlows<'_>>) -> Proposal {

@@ -7,6 +7,6 @@ mod proposed;
 mod shared_units;
 mod yaml;
 
-pub use choose::{NominalFlows, propose};
-pub use proposed::{Ambient, Certainty, Proposal, ProposedChannel};
+pub use choose::propose;
+pub use proposed::{Ambient, Certainty, NominalFlows, Proposal, ProposedChannel};
 pub use yaml::channel_map_text;

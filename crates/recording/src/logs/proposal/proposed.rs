@@ -3,6 +3,9 @@
 use mapper_core::Channel;
 use serde::Serialize;
 
+/// Flow at surge and at choke of a machine at a shaft speed in rpm, kg/s.
+pub type NominalFlows<'a> = &'a dyn Fn(f64) -> (f64, f64);
+
 /// How sure an entry is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]

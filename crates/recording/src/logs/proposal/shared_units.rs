@@ -1,7 +1,6 @@
 //! Units of a log that gives none: columns of one kind share a unit, and physics settles the rest.
 
-use super::choose::NominalFlows;
-use super::proposed::{Certainty, Proposal, ProposedChannel};
+use super::proposed::{Certainty, NominalFlows, Proposal, ProposedChannel};
 use crate::logs::plausible::{OUTER, STANDARD_ATMOSPHERE_PA, fitting_units};
 use crate::logs::units::kind_of;
 use crate::logs::{Layout, Survey};

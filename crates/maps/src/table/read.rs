@@ -178,17 +178,15 @@ fn as_measured(
     let flow_kg_s = row.flow_corrected_kg_s;
     let (t1_k, t2_k) = (of(Quantity::T1)?, value(Quantity::T2));
     let ambient_pa = value(Quantity::Ambient).or(given.ambient_pa);
-    let pressure = |quantity: Quantity| {
-        match point.of(quantity).filter(|(column, _)| column.is_gauge) {
+    let pressure = |quantity: Quantity| match point.of(quantity).filter(|(column, _)| column.is_gauge) {
         None => of(quantity),
         Some((column, _)) => ambient_pa.map_or_else(
             || {
-                let missing = "ambient pressure, over which a gauge pressure is (or give `--with \"barometer=98.6 kPa\"`)";
+                let missing = "ambient pressure, over which a gauge pressure is (or give the `barometer`)";
                 Err(ImportError::NoColumn { line: point.at, missing, found: column.heading.clone() })
             },
             |ambient_pa| Ok(of(quantity)? + ambient_pa),
         ),
-    }
     };
     let taps = given.static_taps;
     let (mut p1_pa, mut p2_pa) = (pressure(Quantity::P1)?, pressure(Quantity::P2)?);

@@ -26,6 +26,7 @@ CAUSES = {
     "heating/cooling ratio": {"effects": "{directional_htc: 0.6}"},
     "T2 offset": {"offset_of": "{T2: 2.5 K}"},
     "T1 offset": {"offset_of": "{T1: 2.5 K}"},
+    "T1 towards the wall": {"effects": "{t1_towards_wall: 0.05}"},
     "Tc offset": {"offset_of": "{Tc: 4 K}"},
     "P2 offset": {"offset_of": "{P2: 1500 Pa}"},
 }

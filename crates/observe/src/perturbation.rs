@@ -14,8 +14,6 @@ pub const UNINFORMATIVE: f64 = 1e4;
 pub enum Perturbation {
     /// A boundary condition, by the channel that measures it; in its unit.
     Input(Channel),
-    /// The same in proportion; ratio.
-    InputGain(Channel),
     /// Ambient temperature, K.
     Ambient,
     /// Efficiency of the compressor map, ratio.
@@ -56,7 +54,7 @@ impl Perturbation {
     /// A campaign declares no tolerance of the turbine's flow and convection: those of the compressor apply.
     pub fn tolerance(self, declared: &ModelTolerances) -> f64 {
         match self {
-            Perturbation::Input(_) | Perturbation::InputGain(_) | Perturbation::Friction => 0.0,
+            Perturbation::Input(_) | Perturbation::Friction => 0.0,
             Perturbation::Ambient => AMBIENT_SIGMA_K,
             Perturbation::Efficiency => declared.compressor_efficiency_ratio,
             Perturbation::Flow | Perturbation::TurbineFlow => declared.flow_map_ratio,
@@ -83,7 +81,6 @@ impl Perturbation {
             Perturbation::OilConductance => params.bearing.oil_conductance_w_k *= 1.0 + by,
             Perturbation::Friction => params.bearing_friction_w_s2 += by,
             Perturbation::Input(_)
-            | Perturbation::InputGain(_)
             | Perturbation::Ambient
             | Perturbation::StartTc
             | Perturbation::StartTt => {}
@@ -92,14 +89,13 @@ impl Perturbation {
 
     /// Adjusts the boundary conditions.
     pub fn shift(self, boundary: &mut BoundaryConditions, by: f64) {
-        let (channel, relative) = match self {
-            Perturbation::Input(channel) => (channel, false),
-            Perturbation::InputGain(channel) => (channel, true),
-            Perturbation::Ambient => (Channel::TAmb, false),
+        let channel = match self {
+            Perturbation::Input(channel) => channel,
+            Perturbation::Ambient => Channel::TAmb,
             _ => return,
         };
         if let Some(value) = boundary_condition(boundary, channel) {
-            *value += if relative { by * *value } else { by };
+            *value += by;
         }
     }
 

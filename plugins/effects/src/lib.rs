@@ -48,6 +48,8 @@ effects! {
     recirculation::Recirculation,
     bearing_friction::BearingFriction,
     turbine_efficiency::TurbineEfficiency,
+    turbine_capacity::TurbineCapacity,
+    turbine_leak::TurbineLeak,
     efficiency_scale::EfficiencyScale,
     flow_map_scale::FlowMapScale,
     valve_area::ValveArea,

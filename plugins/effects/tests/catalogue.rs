@@ -4,7 +4,7 @@
 use mapper_core::{CHANNELS, Channel};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::{self, Effect, EffectError, Rig};
-use mapper_physics::rig::instruments::{ChannelFollower, true_value};
+use mapper_physics::rig::instruments::ChannelFollower;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
 use mapper_physics::simulation::steady;
@@ -50,7 +50,7 @@ fn readings(rig: &Rig) -> Vec<f64> {
                 let boundary = inputs.at(t_s);
                 let prepared = rig.model.prepare(&boundary);
                 for (channel, follower) in measured.iter().zip(&mut followers) {
-                    let value = true_value(*channel, &prepared, state, outputs).unwrap();
+                    let value = rig.instruments.at_sensor(*channel, &prepared, state, outputs).unwrap();
                     readings.push(follower.read(t_s, value));
                 }
             },
@@ -181,7 +181,11 @@ type Equation = fn(f64) -> f64;
 fn a_fault_of_a_sensor_changes_its_reading_alone() {
     let without = readings(&nominal());
     let of = |channel: Channel| CHANNELS[..15].iter().position(|row| row.channel == channel).unwrap();
-    let cases: [(&str, f64, Channel, Equation); 5] = [
+    let cases: [(&str, f64, Channel, Equation); 8] = [
+        ("p1_offset", 300.0, Channel::P1, |x| x + 300.0),
+        ("turbine_flow_gain", 1.02, Channel::TurbineFlow, |x| 1.02 * x),
+        // At an opening of 0.7.
+        ("t1_with_valve", 2.0, Channel::T1, |x| x + 1.4),
         ("t1_offset", 0.8, Channel::T1, |x| x + 0.8),
         ("t2_offset", -1.5, Channel::T2, |x| x - 1.5),
         ("tc_offset", 2.0, Channel::Tc, |x| x + 2.0),

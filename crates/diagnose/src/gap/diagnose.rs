@@ -6,21 +6,22 @@ use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::additions;
 use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::place::{Gain, places};
-use crate::gap::causes::select::{Search, ranked, refit, search, search_onsets};
+use crate::gap::causes::select::{Search, ranked, refit, search, search_onsets, supported};
 use crate::gap::causes::smallest_seen::smallest_seen;
-use crate::gap::causes::weigh::{rivals, suspicions, weigh, weight};
+use crate::gap::causes::weigh::{alike, rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::report::{Diagnosis, Verdict};
 use crate::gap::gap_reduction::folds::Folds;
 use crate::gap::gap_reduction::how_far::{Compared, how_far};
+use crate::gap::gap_reduction::strain::{beyond_prior, cost_beyond_prior};
 use crate::gap::next_experiment::best_experiment::{Suggested, next, sensor_near};
+use crate::gap::preconditions::default_tolerances::assumed;
 pub use crate::gap::preconditions::gap_error::GapError;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 use crate::gap::preconditions::problem::Problem;
 use crate::gap::preconditions::usable::usable;
 use crate::gap::reference::healthy::Healthy;
 use crate::gap::residuals::actuators::Actuators;
-use crate::gap::residuals::default_tolerances::assumed;
 use crate::gap::residuals::study::{Hypothesis, Prediction, Study, members};
 use crate::gap::residuals::whiten::Linearised;
 use mapper_core::Recording;
@@ -28,7 +29,9 @@ use mapper_observe::averages::time_table::Table;
 use mapper_observe::declared::Declared;
 use mapper_observe::model_inputs::step_timing::with_command_times;
 use mapper_physics::rig::effect::Effect;
+use mapper_physics::rig::effect::Submodel;
 use mapper_physics::simulation::model::Model;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// What a diagnosis starts from.
@@ -172,6 +175,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         let again = refit(&at(at_best), &closest.iter().collect::<Vec<_>>(), effort);
         fits = ranked(&at(at_best), again.iter().chain(closest).chain(others));
     }
+    fits = supported(&at(at_best), fits);
     progress(0.75, "what one more would do");
     let mut one_more = most_gain(&study, at_best, &everywhere, fits.first().unwrap_or(&null));
     let mut left = adequacy(&study, &linearised, fits.first().unwrap_or(&null), one_more);
@@ -187,6 +191,7 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         };
         search_onsets(at, &null, &mut fits);
         fits.truncate(FINALISTS);
+        fits = supported(&at, fits);
         let best = fits.first().unwrap_or(&null);
         one_more = most_gain(&study, at_best, &everywhere, best);
         left = adequacy(&study, &linearised, best, one_more);
@@ -232,10 +237,16 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
             gains.push(Gain { fit, gain: null.cost - fit.cost });
         }
     }
+    // Causes that the data do not distinguish share the place.
+    let alike: Vec<&Fit> = if named { alike(&posterior, &calibration, &fits, &weight) } else { Vec::new() };
+    let inseparable = inseparable(&study, &alike);
+    let rank =
+        |gain: &Gain<'_>| alike.iter().position(|fit| std::ptr::eq(*fit, gain.fit)).unwrap_or(usize::MAX);
+    gains.sort_by_key(rank);
     let r#where = if verdict == Verdict::WithinTolerance {
         Vec::new()
     } else {
-        places(&study, &linearised, &null, &gains, named)
+        places(&study, &linearised, &null, &gains, named.then_some(alike.len()))
     };
     progress(0.95, "what next");
     let Suggested { next, experiments } = match verdict {
@@ -259,6 +270,8 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         verdict,
         since,
         r#where,
+        suspects: beyond_prior(&study, at_best, fits.first().filter(|_| named).unwrap_or(&null)),
+        inseparable,
         candidates: posterior.candidates,
         probability_none: posterior.none,
         probability_outside: posterior.outside,
@@ -288,9 +301,22 @@ impl Diagnosed {
     }
 }
 
-/// What one more effect would take off the cost at most.
+/// Maximum that one more effect takes off the misfit of the best. The release of a strained tolerance does not count: it is a suspect of its
+/// own, and no evidence of a cause outside the library.
 fn most_gain(study: &Study, linearised: &Linearised, selection: &Selection, base: &Fit) -> f64 {
-    additions(study, linearised, selection, base).into_iter().map(|a| a.gain).fold(0.0, f64::max)
+    let most = additions(study, linearised, selection, base).into_iter().map(|a| a.gain).fold(0.0, f64::max);
+    (most - cost_beyond_prior(base)).max(0.0)
+}
+
+/// Parts that only some of the indistinguishable causes have.
+fn inseparable(study: &Study, named: &[&Fit]) -> Vec<String> {
+    let parts = |fit: &Fit| -> BTreeSet<Submodel> {
+        members(&fit.hypothesis).iter().map(|effect| study.effects[*effect].info().submodel).collect()
+    };
+    let parts: Vec<BTreeSet<Submodel>> = named.iter().map(|fit| parts(fit)).collect();
+    let in_all = |part: &Submodel| parts.iter().all(|of_fit| of_fit.contains(part));
+    let some: BTreeSet<Submodel> = parts.iter().flatten().copied().filter(|part| !in_all(part)).collect();
+    some.into_iter().map(|part| part.name().to_owned()).collect()
 }
 
 fn without_cause(

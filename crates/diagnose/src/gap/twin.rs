@@ -54,6 +54,9 @@ pub struct Found {
     /// Covariance of the tolerances in their sigmas, followed by the effects in search coordinates (typical steps, or logarithms if they
     /// span decades).
     pub covariance: Vec<Vec<f64>>,
+    /// Why this is not the best explanation of the recording; `None` if it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<String>,
 }
 
 /// Errors that prevent the verification of a calibrated model.
@@ -89,7 +92,8 @@ impl Found {
     pub fn of(diagnosed: &Diagnosed) -> Option<Found> {
         let named = matches!(diagnosed.diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained);
         let best = diagnosed.fits.first().filter(|_| named).unwrap_or(&diagnosed.null);
-        Found::of_fit(&diagnosed.study, best)
+        let found = Found::of_fit(&diagnosed.study, best)?;
+        Some(Found { doubt: diagnosed.diagnosis.doubt(), ..found })
     }
 
     fn of_fit(study: &Study, fit: &Fit) -> Option<Found> {
@@ -112,6 +116,7 @@ impl Found {
                 .collect(),
             tolerances: study.nuisances.iter().zip(&fit.hypothesis.nuisances).map(tolerance).collect(),
             covariance: covariance.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            doubt: None,
         })
     }
 

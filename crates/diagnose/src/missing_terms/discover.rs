@@ -254,6 +254,10 @@ fn propose(
         return Vec::new();
     }
     let (channels, worse) = channels_on(study, linearised, [&before, &after], held_out);
+    // A law that makes a channel worse on steps that it has not seen closes nothing.
+    if !worse.is_empty() {
+        return Vec::new();
+    }
     let everywhere = Selection::all(study);
     let (own, own_fit) = bench.alone(study, best);
     let one_more = additions(&own, linearised, &everywhere, &own_fit)
@@ -278,7 +282,7 @@ fn propose(
         sentence,
         terms,
         probability: (1.0 - left) / weights,
-        shrink: if worse.is_empty() { shrink } else { 0.0 },
+        shrink,
         held_out_steps: held_out.len(),
         channels,
         worse,

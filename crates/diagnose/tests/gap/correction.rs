@@ -40,6 +40,28 @@ fn an_offset_changes_its_own_channel_by_its_size_and_no_other() {
     }
 }
 
+/// The error of an input's sensor is subtracted from its own reading alone: the machine never had it.
+#[test]
+fn an_input_without_the_error_of_its_sensor_is_that_of_the_machine() {
+    for (id, value, channel) in [
+        ("t1_towards_wall", 0.05, Channel::T1),
+        ("p1_with_flow_squared", 6e3, Channel::P1),
+        ("p3_offset", 2e3, Channel::P3),
+    ] {
+        let (with, without, changes) = planted(id, value);
+        let corrected = changes.subtracted_from(with.clone());
+        assert_eq!(corrected.series[&Channel::T2].values, with.series[&Channel::T2].values, "{id}");
+        let rms = |recording: &Recording| {
+            let pairs = recording.series[&channel].values.iter().zip(&without.series[&channel].values);
+            (pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / without.series[&channel].values.len() as f64)
+                .sqrt()
+        };
+        let (before, after) = (rms(&with), rms(&corrected));
+        // The walls and flows that scale it are the nominal machine's at block means.
+        assert!(before > 0.0 && after < 0.05 * before, "{id}: {before} before, {after} after");
+    }
+}
+
 /// The adaptive simulator with and without the effect has equal noise: after the subtraction both readings are equal.
 #[test]
 fn readings_without_a_cause_are_those_of_a_rig_that_never_had_it() {

@@ -58,6 +58,18 @@ pub enum Submodel {
     TcProbe,
     /// Pressure sensor behind the compressor.
     P2Sensor,
+    /// Pressure sensor before the compressor.
+    P1Sensor,
+    /// Pressure sensor before the turbine.
+    P3Sensor,
+    /// Probe before the turbine.
+    T3Probe,
+    /// Pressure sensor behind the turbine.
+    P4Sensor,
+    /// Probe of the oil's temperature.
+    OilProbe,
+    /// Sensor of the shaft speed.
+    SpeedSensor,
     /// Metal of the compressor.
     CompressorHousing,
     /// Metal of the turbine.
@@ -66,7 +78,7 @@ pub enum Submodel {
 
 impl Submodel {
     /// All of them, in the order of the flow.
-    pub const ALL: [Submodel; 13] = [
+    pub const ALL: [Submodel; 19] = [
         Submodel::Actuator,
         Submodel::TurbineFlow,
         Submodel::Shaft,
@@ -78,6 +90,12 @@ impl Submodel {
         Submodel::T2Probe,
         Submodel::TcProbe,
         Submodel::P2Sensor,
+        Submodel::P1Sensor,
+        Submodel::P3Sensor,
+        Submodel::T3Probe,
+        Submodel::P4Sensor,
+        Submodel::OilProbe,
+        Submodel::SpeedSensor,
         Submodel::CompressorHousing,
         Submodel::TurbineHousing,
     ];
@@ -96,6 +114,12 @@ impl Submodel {
             Submodel::T2Probe => "t2_probe",
             Submodel::TcProbe => "tc_probe",
             Submodel::P2Sensor => "p2_sensor",
+            Submodel::P1Sensor => "p1_sensor",
+            Submodel::P3Sensor => "p3_sensor",
+            Submodel::T3Probe => "t3_probe",
+            Submodel::P4Sensor => "p4_sensor",
+            Submodel::OilProbe => "oil_probe",
+            Submodel::SpeedSensor => "speed_sensor",
             Submodel::CompressorHousing => "compressor_housing",
             Submodel::TurbineHousing => "turbine_housing",
         }

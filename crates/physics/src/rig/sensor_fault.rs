@@ -23,6 +23,11 @@ pub enum FaultKind {
     /// Zero at the start of the run, the full size at its end, and proportional to the time between: unit of the channel, but a ratio to the
     /// reading for flow and speed.
     Drift,
+    /// An error proportional to the square of the flow, in the channel's unit at
+    /// [`FULL_FLUX_KG_M2S`](crate::rig::instruments::FULL_FLUX_KG_M2S): dynamic pressure at a tap, gas that is not mixed at a probe.
+    WithFlowSquared,
+    /// An error proportional to the opening of the valve, in the channel's unit at opening 1: flow around a tap that changes with it.
+    WithValve,
     /// The reading repeats one value, for longer than noise allows, s.
     Frozen,
 }
@@ -39,8 +44,19 @@ pub struct SensorFault {
     pub sigma: f64,
     /// Size in a search by runs of the model; empty if there is none.
     sizes: &'static [Size],
-    /// Whether only logs without steps search for it: a stand holds the inlet of the turbine constant, and declares its probes.
-    only_in_logs: bool,
+    /// Which recordings are searched for it by runs of the model.
+    searched_in: SearchedIn,
+}
+
+/// Kind of recording that is searched for a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SearchedIn {
+    /// Both.
+    All,
+    /// Only logs without steps: a stand holds the inlet of the turbine constant, and declares its probes.
+    Logs,
+    /// Only recordings of a stand, whose inputs drive a model of the whole machine.
+    Stands,
 }
 
 /// A size in a search: name and unit, range, and first step.
@@ -57,10 +73,13 @@ const RATIO: f64 = 0.05;
 const LAG_S: f64 = 2.0;
 /// Noise repeats a value in two or three samples of a coarse logger, not for seconds.
 const FROZEN_S: f64 = 5.0;
+const WALL_RATIO: f64 = 0.1;
+/// Turbine inlet pressures are twice those of the compressor.
+const TURBINE_PA: f64 = 6e3;
 const ELEMENT_LAG: Size = Size("element_lag", "s", 0.0, 30.0, 1.0);
 
 const fn fault(channels: &'static [Channel], kind: FaultKind, sigma: f64) -> SensorFault {
-    SensorFault { channels, kind, sigma, sizes: &[], only_in_logs: false }
+    SensorFault { channels, kind, sigma, sizes: &[], searched_in: SearchedIn::All }
 }
 
 const fn searched(
@@ -78,13 +97,22 @@ const fn in_logs(
     sigma: f64,
     sizes: &'static [Size],
 ) -> SensorFault {
-    SensorFault { only_in_logs: true, ..searched(channels, kind, sigma, sizes) }
+    SensorFault { searched_in: SearchedIn::Logs, ..searched(channels, kind, sigma, sizes) }
+}
+
+const fn on_stands(
+    channels: &'static [Channel],
+    kind: FaultKind,
+    sigma: f64,
+    sizes: &'static [Size],
+) -> SensorFault {
+    SensorFault { searched_in: SearchedIn::Stands, ..searched(channels, kind, sigma, sizes) }
 }
 
 /// All faults considered.
-pub const CATALOGUE: [SensorFault; 48] = {
-    use Channel::{CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, Tc, Tt, TurbineFlow};
-    use FaultKind::{Drift, Frozen, Gain, Lag, Offset, TowardsWall};
+pub const CATALOGUE: [SensorFault; 60] = {
+    use Channel::{CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, TOil, Tc, Tt, TurbineFlow};
+    use FaultKind::{Drift, Frozen, Gain, Lag, Offset, TowardsWall, WithFlowSquared, WithValve};
     [
         searched(&[T1], Offset, TEMPERATURE_K, &[Size("t1_offset", "K", -20.0, 20.0, 1.5)]),
         searched(&[T2], Offset, TEMPERATURE_K, &[Size("t2_offset", "K", -20.0, 20.0, 1.5)]),
@@ -97,7 +125,7 @@ pub const CATALOGUE: [SensorFault; 48] = {
         fault(&[T2], Drift, TEMPERATURE_K),
         fault(&[Tc], Drift, TEMPERATURE_K),
         fault(&[T1, T2, Tc], Drift, TEMPERATURE_K),
-        fault(&[P1], Offset, PRESSURE_PA),
+        on_stands(&[P1], Offset, PRESSURE_PA, &[Size("p1_offset", "Pa", -20e3, 20e3, 800.0)]),
         searched(&[P2], Offset, PRESSURE_PA, &[Size("p2_offset", "Pa", -20e3, 20e3, 800.0)]),
         fault(&[P1, P2], Offset, PRESSURE_PA),
         fault(&[P1], Gain, RATIO),
@@ -109,7 +137,7 @@ pub const CATALOGUE: [SensorFault; 48] = {
         fault(&[CompressorFlow], Offset, 2e-3),
         searched(&[CompressorFlow], Gain, RATIO, &[Size("flowmeter_gain", "1", 0.7, 1.3, 0.03)]),
         fault(&[CompressorFlow], Drift, RATIO),
-        fault(&[ShaftSpeed], Gain, RATIO),
+        on_stands(&[ShaftSpeed], Gain, RATIO, &[Size("speed_gain", "1", 0.7, 1.3, 0.03)]),
         fault(&[ShaftSpeed], Drift, RATIO),
         fault(&[ShaftSpeed], Offset, 1e3),
         fault(&[TurbineFlow], Drift, RATIO),
@@ -119,13 +147,45 @@ pub const CATALOGUE: [SensorFault; 48] = {
         fault(&[T4], Drift, TEMPERATURE_K),
         fault(&[Tt], Drift, TEMPERATURE_K),
         searched(&[CompressorFlow], Lag, LAG_S, &[Size("flowmeter_lag", "s", 0.0, 30.0, 2.0)]),
-        searched(&[T2], TowardsWall, 0.1, &[Size("stem_conduction", "1", 0.0, 0.5, 0.05)]),
+        searched(&[T2], TowardsWall, WALL_RATIO, &[Size("stem_conduction", "1", 0.0, 0.5, 0.05)]),
+        on_stands(&[T1], TowardsWall, WALL_RATIO, &[Size("t1_towards_wall", "1", 0.0, 0.5, 0.05)]),
+        on_stands(&[T3], TowardsWall, WALL_RATIO, &[Size("t3_towards_wall", "1", 0.0, 0.5, 0.05)]),
+        on_stands(
+            &[T1],
+            WithFlowSquared,
+            TEMPERATURE_K,
+            &[Size("t1_with_flow_squared", "K", -200.0, 200.0, 10.0)],
+        ),
+        on_stands(
+            &[T3],
+            WithFlowSquared,
+            HOT_GAS_K,
+            &[Size("t3_with_flow_squared", "K", -400.0, 400.0, 30.0)],
+        ),
+        on_stands(
+            &[P1],
+            WithFlowSquared,
+            PRESSURE_PA,
+            &[Size("p1_with_flow_squared", "Pa", -60e3, 60e3, 3e3)],
+        ),
+        on_stands(
+            &[P4],
+            WithFlowSquared,
+            PRESSURE_PA,
+            &[Size("p4_with_flow_squared", "Pa", -60e3, 60e3, 3e3)],
+        ),
+        on_stands(&[T1], WithValve, TEMPERATURE_K, &[Size("t1_with_valve", "K", -20.0, 20.0, 1.5)]),
+        on_stands(&[P1], WithValve, PRESSURE_PA, &[Size("p1_with_valve", "Pa", -20e3, 20e3, 800.0)]),
+        on_stands(&[P3], Offset, TURBINE_PA, &[Size("p3_offset", "Pa", -40e3, 40e3, 2e3)]),
+        on_stands(&[P4], Offset, PRESSURE_PA, &[Size("p4_offset", "Pa", -20e3, 20e3, 800.0)]),
+        on_stands(&[TOil], Offset, HOT_GAS_K, &[Size("t_oil_offset", "K", -60.0, 60.0, 5.0)]),
+        on_stands(&[Tt], Offset, HOT_GAS_K, &[Size("tt_offset", "K", -60.0, 60.0, 5.0)]),
         in_logs(&[T2], Lag, LAG_S, &[Size("sheath_diameter", "m", 0.0, 0.012, 0.0015), ELEMENT_LAG]),
         in_logs(&[T4], Lag, LAG_S, &[Size("t4_lag", "s", 0.0, 30.0, 1.0)]),
         in_logs(&[T3], Lag, LAG_S, &[Size("t3_lag", "s", 0.0, 30.0, 1.0)]),
-        in_logs(&[T4], Offset, HOT_GAS_K, &[Size("t4_offset", "K", -60.0, 60.0, 5.0)]),
-        in_logs(&[T3], Offset, HOT_GAS_K, &[Size("t3_offset", "K", -60.0, 60.0, 5.0)]),
-        in_logs(&[TurbineFlow], Gain, RATIO, &[Size("turbine_flow_gain", "1", 0.6, 1.5, 0.05)]),
+        searched(&[T4], Offset, HOT_GAS_K, &[Size("t4_offset", "K", -60.0, 60.0, 5.0)]),
+        searched(&[T3], Offset, HOT_GAS_K, &[Size("t3_offset", "K", -60.0, 60.0, 5.0)]),
+        searched(&[TurbineFlow], Gain, RATIO, &[Size("turbine_flow_gain", "1", 0.6, 1.5, 0.05)]),
         in_logs(&[TurbineFlow], Lag, LAG_S, &[Size("turbine_flow_lag", "s", 0.0, 30.0, 1.0)]),
         fault(&[ShaftSpeed], Frozen, FROZEN_S),
         fault(&[CompressorFlow], Frozen, FROZEN_S),
@@ -147,8 +207,10 @@ const OF_COMPRESSOR: [Channel; 7] = {
 pub fn additive() -> impl Iterator<Item = &'static SensorFault> {
     use FaultKind::{Drift, Gain, Offset, TowardsWall};
     CATALOGUE.iter().filter(|fault| {
-        matches!(fault.kind, Offset | Gain | Drift | TowardsWall)
-            && fault.channels.iter().all(|channel| OF_COMPRESSOR.contains(channel))
+        // T1 is a reference of every balance: only a model that it drives distinguishes its wall from a gain.
+        let additive = matches!(fault.kind, Offset | Gain | Drift)
+            || (fault.kind == TowardsWall && fault.channels == [Channel::T2]);
+        additive && fault.channels.iter().all(|channel| OF_COMPRESSOR.contains(channel))
     })
 }
 
@@ -175,7 +237,8 @@ pub fn repeats_s(channel: Channel) -> f64 {
 
 /// Effects for the effect library, by kind: the faults that a diagnosis of a stand searches for.
 pub fn effects() -> Vec<Arc<dyn Effect>> {
-    let mut faults: Vec<SensorFault> = searched_for().filter(|fault| !fault.only_in_logs).collect();
+    let mut faults: Vec<SensorFault> =
+        searched_for().filter(|fault| fault.searched_in != SearchedIn::Logs).collect();
     faults.sort_by_key(|fault| fault.kind);
     faults.into_iter().map(FaultEffect::of).collect()
 }
@@ -183,7 +246,16 @@ pub fn effects() -> Vec<Arc<dyn Effect>> {
 /// Further effects for logs without steps, of the compressor's sensors or the turbine's.
 pub fn log_effects(compressor: bool) -> Vec<Arc<dyn Effect>> {
     let of_side = |fault: &SensorFault| OF_COMPRESSOR.contains(&fault.channels[0]) == compressor;
-    searched_for().filter(|fault| fault.only_in_logs && of_side(fault)).map(FaultEffect::of).collect()
+    searched_for()
+        .filter(|fault| fault.searched_in == SearchedIn::Logs && of_side(fault))
+        .map(FaultEffect::of)
+        .collect()
+}
+
+/// Whether an effect is a fault that no log without steps is searched for.
+pub fn is_only_on_stands(id: &str) -> bool {
+    let mut on_stands = searched_for().filter(|fault| fault.searched_in == SearchedIn::Stands);
+    on_stands.any(|fault| fault.sizes[0].0 == id)
 }
 
 fn searched_for() -> impl Iterator<Item = SensorFault> {
@@ -211,7 +283,7 @@ impl SensorFault {
             FaultKind::Drift if relative => run_ratio * reading,
             FaultKind::Drift => run_ratio,
             FaultKind::TowardsWall => housing_k - reading,
-            FaultKind::Lag | FaultKind::Frozen => 0.0,
+            FaultKind::Lag | FaultKind::Frozen | FaultKind::WithFlowSquared | FaultKind::WithValve => 0.0,
         }
     }
 
@@ -223,8 +295,18 @@ impl SensorFault {
             FaultKind::Lag => ("follows with a lag", "dy/dt = (x - y)/tau", "first-order sensor"),
             FaultKind::TowardsWall => (
                 "has a stem that conducts: the tip is drawn towards the housing",
-                "T_tip tends to T2 + chi (Tc - T2)",
+                "T_tip tends to T + chi (T_wall - T)",
                 "fin of a thermowell, lumped to its tip: Incropera, Fundamentals of Heat and Mass Transfer, 3.6",
+            ),
+            FaultKind::WithFlowSquared => (
+                "has an error that grows with the square of the flow",
+                "y = x + b (G/G0)^2, G = m/A of the inlet pipe, G0 = 120 kg/(s m2)",
+                "dynamic pressure at a tap, or gas that is not mixed at the probe",
+            ),
+            FaultKind::WithValve => (
+                "has an error that grows with the opening of the valve",
+                "y = x + b u",
+                "flow around the sensor that changes with the valve",
             ),
             FaultKind::Offset | FaultKind::Drift | FaultKind::Frozen => {
                 ("reads high or low by a constant", "y = x + b", "calibration of the sensor")
@@ -236,6 +318,13 @@ impl SensorFault {
             Channel::Tc => (Submodel::TcProbe, Some(Submodel::CompressorHousing)),
             Channel::P2 => (Submodel::P2Sensor, Some(Submodel::Outlet)),
             Channel::CompressorFlow => (Submodel::FlowMeter, Some(Submodel::CompressorFlow)),
+            Channel::ShaftSpeed => (Submodel::SpeedSensor, None),
+            Channel::TurbineFlow => (Submodel::TurbineFlow, None),
+            Channel::P1 => (Submodel::P1Sensor, None),
+            Channel::P3 => (Submodel::P3Sensor, None),
+            Channel::T3 => (Submodel::T3Probe, None),
+            Channel::P4 => (Submodel::P4Sensor, None),
+            Channel::TOil => (Submodel::OilProbe, None),
             _ => (Submodel::TurbineHousing, None),
         };
         let constant = matches!(self.kind, FaultKind::Offset | FaultKind::Gain);
@@ -288,7 +377,13 @@ impl Effect for FaultEffect {
         match self.fault.kind {
             FaultKind::Gain => path.gain_ratio *= size,
             FaultKind::Lag => path.lag_s += size,
-            FaultKind::TowardsWall => rig.model.params.t2_probe_stem_ratio += size,
+            // Its tip has a state of its own, which the stem acts on.
+            FaultKind::TowardsWall if self.fault.channels[0] == Channel::T2 => {
+                rig.model.params.t2_probe_stem_ratio += size;
+            }
+            FaultKind::TowardsWall => path.towards_wall_ratio += size,
+            FaultKind::WithFlowSquared => path.with_flow_squared += size,
+            FaultKind::WithValve => path.with_valve += size,
             FaultKind::Offset | FaultKind::Drift | FaultKind::Frozen => path.offset += size,
         }
         Ok(())
@@ -306,6 +401,10 @@ impl fmt::Display for SensorFault {
             FaultKind::Lag => "lag",
             FaultKind::TowardsWall => {
                 return write!(f, "conduction along the {} probe", self.channel_names());
+            }
+            FaultKind::WithFlowSquared | FaultKind::WithValve => {
+                let with = if self.kind == FaultKind::WithValve { "valve opening" } else { "flow squared" };
+                return write!(f, "error of {} with {with}", self.channel_names());
             }
             FaultKind::Frozen => "frozen reading",
         };

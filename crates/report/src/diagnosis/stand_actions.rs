@@ -7,7 +7,7 @@ use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict};
 const WORTH_A_CHECK: f64 = 0.1;
 
 /// What to check for an effect of the library; one without a row gets the check of its part.
-const EFFECTS: [(&str, &str); 28] = [
+const EFFECTS: [(&str, &str); 31] = [
     (
         "actuator_lag",
         "time a step of the turbine inlet valve: command, position, pressure before the turbine",
@@ -81,13 +81,22 @@ const EFFECTS: [(&str, &str); 28] = [
     ),
     ("ventilation", "check fans, cell ventilation and the insulation of the housings"),
     (
+        "t1_towards_wall",
+        "check immersion depth of the T1 probe, its distance from the housing, and the insulation of its stem",
+    ),
+    (
+        "turbine_capacity",
+        "check turbine vanes and volute for deposits and damage, and the turbine flow meter",
+    ),
+    ("turbine_leak", "check the waste gate and the seals around the turbine wheel for leaks"),
+    (
         "turbine_flow_gain",
         "compare the turbine flow meter with a second one, and look for leaks before the turbine",
     ),
 ];
 
 /// What to check where a cause acts that is not in the library.
-const PLACES: [(&str, &str); 13] = [
+const PLACES: [(&str, &str); 19] = [
     ("actuator", "check the turbine inlet valve and its controller: set-point, position, pressure"),
     ("turbine_flow", "check for leaks before the turbine, its vanes and the turbine flow meter"),
     ("shaft", "check the oil supply, the bearings, and whether another power is taken from the shaft"),
@@ -105,6 +114,18 @@ const PLACES: [(&str, &str); 13] = [
     ("t2_probe", "check the T2 probe: calibration, immersion depth, insulation, deposits"),
     ("tc_probe", "check the Tc probe: calibration, depth, contact with the housing"),
     ("p2_sensor", "check the P2 transducer: calibration, range, pulse line"),
+    ("p1_sensor", "check the P1 tap and transducer: calibration, and whether the tap sees dynamic pressure"),
+    (
+        "p3_sensor",
+        "check the P3 tap and transducer: calibration, pulse line, and whether the tap sees dynamic pressure",
+    ),
+    (
+        "t3_probe",
+        "check the T3 probe: calibration, radiation to the wall, and whether the gas is mixed there",
+    ),
+    ("p4_sensor", "check the P4 tap and transducer: calibration, and whether the tap sees dynamic pressure"),
+    ("oil_probe", "check the probe of the oil supply: calibration, immersion depth"),
+    ("speed_sensor", "check the number of pulses per revolution that the speed sensor assumes"),
     (
         "compressor_housing",
         "check whether coolant or oil runs through the compressor housing, and its insulation",

@@ -131,6 +131,7 @@ mod tests {
                 .map(tolerance)
                 .into(),
             covariance: Vec::new(),
+            doubt: None,
         };
         let twin = Twin { found: &found, source: Path::new("first.json"), p3_lag_s: 0.4 };
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../campaigns/grid18.yaml"));

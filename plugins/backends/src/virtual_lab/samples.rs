@@ -10,7 +10,7 @@ use crate::virtual_lab::sensors::sensor::Sensor;
 use mapper_core::{CHANNELS, Channel, ChannelColumn, ElementColumn, Event, SampleBatch, Setpoints};
 use mapper_physics::gas::pressure_tap;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_physics::rig::instruments::{self, ChannelFollower};
+use mapper_physics::rig::instruments::{ChannelFollower, Instruments};
 use mapper_physics::simulation::model::{Outputs, PreparedModel, State};
 
 /// Frequency of the surge cycle, Hz: the order of a small compressor with a short outlet duct.
@@ -94,11 +94,12 @@ impl SampleCollector {
         let surge_flow_kg_s = instant.surge_flow_kg_s(settings);
         let prepared = instant.running.map(|_| settings.model.prepare(&instant.boundary));
         let SensorBank { sensors, followers, second_order, several, resonator } = sensor_bank;
-        let compute_swing = compute_swing(t_s, instant, surge_flow_kg_s, resonator, settings);
+        let swing = compute_swing(t_s, instant, surge_flow_kg_s, resonator, settings);
         let mut elements = self.elements.iter_mut();
         let follow = followers.iter_mut().zip(second_order);
         for ((row, column), (follower, second)) in CHANNELS.iter().zip(&mut self.columns).zip(follow) {
-            let total = true_value(row.channel, instant, prepared.as_ref(), commands, compute_swing);
+            let total =
+                true_value(row.channel, instant, prepared.as_ref(), commands, swing, &settings.instruments);
             let truth = match settings.static_tap_pipe_diameters_m.get(&row.channel) {
                 Some(pipe_diameter_m) => wall_pressure_pa(row.channel, total, *pipe_diameter_m, instant),
                 None => total,
@@ -173,7 +174,8 @@ fn true_value(
     instant: &Instant<'_>,
     prepared: Option<&PreparedModel<'_>>,
     commands: Option<&Setpoints>,
-    compute_swing: Swing,
+    swing: Swing,
+    instruments: &Instruments,
 ) -> f64 {
     let boundary = &instant.boundary;
     let command = |value: fn(&Setpoints) -> f64| commands.map_or(f64::NAN, value);
@@ -185,11 +187,11 @@ fn true_value(
         _ => {}
     }
     if let (Some((state, outputs)), Some(prepared)) = (instant.running, prepared) {
-        let value = instruments::true_value(channel, prepared, state, outputs).unwrap_or(f64::NAN);
+        let value = instruments.at_sensor(channel, prepared, state, outputs).unwrap_or(f64::NAN);
         return match channel {
-            Channel::CompressorFlow => value * (1.0 + compute_swing.flow_ratio),
-            Channel::P2 => value * (1.0 + compute_swing.p2_ratio),
-            Channel::P1 => value * (1.0 + compute_swing.p1_ratio),
+            Channel::CompressorFlow => value * (1.0 + swing.flow_ratio),
+            Channel::P2 => value * (1.0 + swing.p2_ratio),
+            Channel::P1 => value * (1.0 + swing.p1_ratio),
             _ => value,
         };
     }

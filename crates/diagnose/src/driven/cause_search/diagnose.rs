@@ -19,7 +19,7 @@ use mapper_inference::interval::IDENTIFIED_RATIO;
 use mapper_numerics::statistics::{NORMAL_975, rms};
 use mapper_observe::Declared;
 use mapper_physics::rig::effect::{Effect, Rig};
-use mapper_physics::rig::sensor_fault::log_effects;
+use mapper_physics::rig::sensor_fault::{is_only_on_stands, log_effects};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -58,7 +58,8 @@ pub struct Ask<'a> {
 /// [`DrivenError::Channel`] if a required channel is missing, [`DrivenError::TooFewRows`] if there are too few rows to fit,
 /// [`DrivenError::NoAnswer`] if the nominal machine has no solution under the driving channels.
 pub fn diagnose(ask: &Ask<'_>, side: Which) -> Result<Diagnosis, DrivenError> {
-    let effects = [ask.effects, &log_effects(side == Which::Compressor)].concat();
+    let asked = ask.effects.iter().filter(|effect| !is_only_on_stands(&effect.info().id)).cloned();
+    let effects: Vec<_> = asked.chain(log_effects(side == Which::Compressor)).collect();
     let ask = &Ask { effects: &effects, ..*ask };
     match side {
         Which::Compressor => of_side::<CompressorSide>(ask),

@@ -79,19 +79,26 @@ pub fn signature(study: &Study, fit: &Fit, effect: usize) -> Option<Vec<f64>> {
     Some(fit.prediction.values.iter().zip(&there.values).map(|(with, without)| with - without).collect())
 }
 
-/// Locations of the gap, largest first. `fits` are single effects and pairs, best first; if `named` is set, the first is the cause.
+/// Locations of the gap, largest first. `fits` are single effects and pairs, best first; if `named` is set, so many of the first are the
+/// causes that the data do not distinguish.
 pub fn places(
     study: &Study,
     linearised: &Linearised,
     null: &Fit,
     fits: &[Gain<'_>],
-    named: bool,
+    named: Option<usize>,
 ) -> Vec<Place> {
-    let considered = if named { &fits[..fits.len().min(1)] } else { fits };
+    let considered = named.map_or(fits, |causes| &fits[..fits.len().min(causes)]);
     // The other fits give each member's contribution.
     let mut explanations = of_fits(study, fits);
     explanations.truncate(considered.len());
-    places_of(study, linearised, null, &explanations, if named { 0.0 } else { BEND })
+    if named.is_some() {
+        // Fits to the same steps: their evidence is comparable.
+        for (explanation, Gain { fit, .. }) in explanations.iter_mut().zip(considered) {
+            explanation.score = fit.score - RARITY * fit.hypothesis.effects.len() as f64;
+        }
+    }
+    places_of(study, linearised, null, &explanations, if named.is_some() { 0.0 } else { BEND })
 }
 
 /// Locations of the gap from its explanations, largest first. Explanations within the share `bend` of the best gain remain open; `bend` is

@@ -1,5 +1,6 @@
 //! Which effects explain a recording best: the causes of [`mapper_inference::search`], fitted by runs of the model.
 
+use crate::gap::best_fit::coordinate::Coordinate;
 use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::Selection;
 use crate::gap::causes::additions::{Addition, additions, onset_additions};
@@ -7,6 +8,7 @@ use crate::gap::causes::calibration::Calibration;
 use crate::gap::causes::weigh::{prior, weight};
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study, members};
 use crate::gap::residuals::whiten::Linearised;
+use mapper_core::half_width_95;
 use mapper_inference::hypotheses::MAX_MEMBERS;
 use mapper_inference::search::{Causes, Known, Limits, Offer, climb, extend};
 
@@ -30,6 +32,8 @@ const LIMITS: Limits = Limits { members: MAX_MEMBERS, starts: 2, fits: 6, slack:
 /// If a single takes at least this off the cost, nuisances are linearised again at its fit: tolerances of what an
 /// effect changes act otherwise there than at the nominal point.
 const STRONG: f64 = 30.0;
+/// Starts with the most linear gain that are fitted as a single: bounds the time. Judgement: half of the library, since strong effects bend.
+const SINGLES: usize = 26;
 /// A further effect that leaves more than this share of the excess cost is one of many that chip at a cause of another kind:
 /// nothing is built upon it.
 const HALVED: f64 = 0.5;
@@ -76,8 +80,9 @@ pub fn search(search: Search<'_>, progress: &dyn Fn(f64, &str)) -> Result<Search
     progress(0.15, "single effects");
     // From where nothing is off, not from the null's nuisances, which may have bent far to stand in for an effect.
     let untouched = fit(study, linearised, &study.nothing(), selection, Effort { iterations: 1, ..QUICK })?;
-    let singles: Vec<Start> =
-        additions(study, linearised, selection, &untouched).into_iter().map(|a| (a.start, QUICK)).collect();
+    let mut singles = additions(study, linearised, selection, &untouched);
+    singles.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let singles: Vec<Start> = singles.into_iter().take(SINGLES).map(|a| (a.start, QUICK)).collect();
     let mut known = Known::default();
     known.keep(&search, null.clone());
     known.fit_all(&search, &singles);
@@ -179,6 +184,54 @@ impl Causes for Search<'_> {
         let excess = |fit: &Fit| (fit.cost - values as f64).max(0.0);
         to.hypothesis.effects.len() < 3 || excess(to) < HALVED * excess(from)
     }
+}
+
+/// Fits without what the recording does not support: members of a set whose 95 % interval contains neutral, and onsets without evidence
+/// against the same effect throughout.
+pub fn supported(search: &Search<'_>, fits: Vec<Fit>) -> Vec<Fit> {
+    let simpler = |fit: &Fit| -> Option<Fit> {
+        let study = search.study;
+        if fit.hypothesis.effects.len() > 1
+            && let Some(member) = undetermined(search, fit)
+        {
+            return search.fit(&search.without(fit, member));
+        }
+        let onset =
+            fit.hypothesis.effects.iter().position(|(index, _)| study.courses[*index].onset().is_some());
+        let mut start = fit.hypothesis.clone();
+        start.effects[onset?].0 = study.family(start.effects[onset?].0);
+        let throughout = search.fit(&(start, EFFORT))?;
+        (search.ln_odds(fit) - search.ln_odds(&throughout) < search.calibration.threshold)
+            .then_some(throughout)
+    };
+    let mut kept: Vec<Fit> = Vec::with_capacity(fits.len());
+    for mut fit in fits {
+        for _ in 0..MAX_MEMBERS {
+            let Some(next) = simpler(&fit) else { break };
+            fit = next;
+        }
+        kept.push(fit);
+    }
+    ranked(search, kept.iter())
+}
+
+/// The first effect of a fit with all its parameters within their 95 % interval of neutral.
+fn undetermined(search: &Search<'_>, fit: &Fit) -> Option<usize> {
+    let mut place = 0;
+    for (index, values) in &fit.hypothesis.effects {
+        let parameters = &search.study.effects[*index].info().parameters;
+        let near = parameters.iter().zip(values).enumerate().all(|(i, (parameter, value))| {
+            let coordinate = Coordinate::new(parameter);
+            let variance = fit.covariance.get((place + i, place + i)).copied().unwrap_or(0.0);
+            let half = half_width_95(search.calibration.interval_factor * variance.max(0.0).sqrt());
+            (coordinate.of(*value) - coordinate.of(parameter.neutral)).abs() < half
+        });
+        if near {
+            return Some(*index);
+        }
+        place += parameters.len();
+    }
+    None
 }
 
 /// Whether each effect of a fit does something: one that the fit left at its neutral value, or that this machine has no place

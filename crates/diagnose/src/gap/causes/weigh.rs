@@ -151,6 +151,19 @@ pub const MAX_EQUIVALENT: usize = 2;
 /// Evidence difference below which data do not distinguish causes, in calibration temperatures: a factor of 20.
 pub const ALIKE: f64 = 3.0;
 
+/// The named cause and those that the data do not distinguish from it, as in [`Candidate::equivalent`].
+pub(crate) fn alike<'a>(
+    posterior: &CauseProbabilities,
+    calibration: &Calibration,
+    fits: &'a [Fit],
+    weight: &dyn Fn(&Fit) -> f64,
+) -> Vec<&'a Fit> {
+    let shown = || posterior.shown.iter().map(|place| &fits[*place]);
+    let best = shown().next().map_or(f64::NEG_INFINITY, weight);
+    let near = |fit: &&Fit| best - weight(fit) < ALIKE * calibration.temperature;
+    shown().filter(near).take(1 + MAX_EQUIVALENT).collect()
+}
+
 /// Causes whose scores the data cannot distinguish from the best, nearest first, without supersets of a better cause.
 fn equivalents(
     study: &Study,

@@ -2,6 +2,7 @@
 
 use crate::gap::findings::experiment::{AlsoChanged, Experiment};
 use crate::gap::reference::baseline_assumptions::Since;
+use mapper_core::probability_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -31,6 +32,10 @@ pub struct Diagnosis {
     pub r#where: Vec<Place>,
     /// Causes, best first.
     pub candidates: Vec<Candidate>,
+    /// Tolerances that end beyond three sigmas of their prior in the reported fit, furthest first: suspects.
+    pub suspects: Vec<Strained>,
+    /// Parts of the machine whose causes fit this recording equally well; empty if the named cause is the only one.
+    pub inseparable: Vec<String>,
     /// Probability that nothing is beyond tolerance.
     pub probability_none: f64,
     /// Probability that the cause is not in the effect library.
@@ -227,6 +232,9 @@ pub struct PointGap {
     pub eta_before: f64,
     /// Efficiency with the best cause.
     pub eta_after: f64,
+    /// Residual of T2 minus T1 at the end of the step, from a fit to other steps, as an error of the efficiency: what a cause outside the
+    /// library may do to it.
+    pub eta_residual: f64,
     /// Heat-transfer coefficient of the nominal model, W/(m2 K).
     pub h_nominal_w_m2k: f64,
     /// Heat-transfer coefficient with the tolerances of the best cause's fit, but without the cause, W/(m2 K).
@@ -240,8 +248,10 @@ pub struct PointGap {
 pub struct Strained {
     /// Name.
     pub what: String,
-    /// Absolute deviation in declared sigmas, > 0; at most 6.
+    /// Absolute deviation in declared sigmas, above 3.
     pub sigmas: f64,
+    /// Deviation, in the unit of what it changes; ratios for gains and scales.
+    pub value: f64,
 }
 
 /// The gap, with each step predicted by a fit to other steps.
@@ -418,6 +428,54 @@ impl Suggestion {
             minutes: self.minutes,
             t3_k: self.t3_k,
             oil_temperature_k: self.oil_temperature_k,
+        }
+    }
+}
+
+/// Probability below which a cause other than the first is not listed: it would be shown as "<0.5 %".
+const EXCLUDED: f64 = 0.005;
+
+impl Diagnosis {
+    /// Causes to list: the first, and others that are not excluded.
+    pub fn listed(&self) -> impl Iterator<Item = &Candidate> {
+        self.candidates
+            .iter()
+            .enumerate()
+            .filter(|(place, c)| *place == 0 || c.probability >= EXCLUDED)
+            .map(|(_, c)| c)
+    }
+
+    /// Whether a cause outside the library is more probable than not, and no law describes it: it may change any point.
+    pub fn is_outside_without_law(&self) -> bool {
+        let is_open = matches!(self.verdict, Verdict::PartlyExplained | Verdict::Unexplained);
+        is_open && self.probability_outside > 0.5 && law_found(self).is_none()
+    }
+
+    /// Why the named cause is not the best explanation of the recording; `None` if it is.
+    pub fn doubt(&self) -> Option<String> {
+        if let Some(law) = law_found(self) {
+            return Some(format!(
+                "a law explains the recording better ({}): {}; add the law as an effect to the next diagnosis",
+                probability_text(law.probability),
+                law.sentence
+            ));
+        }
+        let others: Vec<String> = self
+            .candidates
+            .first()
+            .into_iter()
+            .flat_map(|first| &first.equivalent)
+            .map(|set| set.join(" + "))
+            .collect();
+        match self.verdict {
+            Verdict::PartlyExplained | Verdict::Unexplained => Some(format!(
+                "a cause outside the catalogue is the most probable ({}), and its effect is not included",
+                probability_text(self.probability_outside)
+            )),
+            Verdict::Explained if !others.is_empty() => {
+                Some(format!("the recording does not distinguish the cause from {}", others.join(", ")))
+            }
+            Verdict::Explained | Verdict::WithinTolerance => None,
         }
     }
 }

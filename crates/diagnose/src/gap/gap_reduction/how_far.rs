@@ -1,17 +1,20 @@
 //! Gap reduction on held-out steps.
 
 use crate::gap::best_fit::adequacy::misfit_of_steps;
-use crate::gap::best_fit::first_step::{is_start, with_start_read};
+use crate::gap::best_fit::first_step::with_start_read;
 use crate::gap::best_fit::fit::{Effort, Fit, fit};
 use crate::gap::best_fit::selection::{Selection, dot_over};
-use crate::gap::findings::report::{ChannelGap, Gap, PointGap, Strained};
+use crate::gap::findings::report::{ChannelGap, Gap, PointGap};
 use crate::gap::gap_reduction::folds::Folds;
 use crate::gap::gap_reduction::gap_distribution::{StepMisfit, carried};
-use crate::gap::residuals::nuisance::{NuisanceKind, OUTPUTS};
+use crate::gap::gap_reduction::strain::beyond_prior;
+use crate::gap::residuals::nuisance::OUTPUTS;
 use crate::gap::residuals::study::{Hypothesis, Study};
 use crate::gap::residuals::whiten::{Linearised, rows_of_step};
+use mapper_core::Channel;
 use mapper_numerics::parallel;
 use mapper_numerics::statistics::DOUBT_SIGMAS;
+use mapper_physics::simulation::inputs::Inputs;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -74,23 +77,13 @@ pub fn how_far(compared: Compared<'_>, folds: &Folds) -> Gap {
         steps_with_gap: carried.steps,
         largest_step: carried.largest.map(|(step, _)| step),
         largest_share: carried.largest.map_or(0.0, |(_, share)| share),
-        strained: strained(study, null),
+        strained: beyond_prior(study, nominal, null).into_iter().next(),
         worse,
         held_out_steps: if folds.steps.len() > 1 { steps } else { Vec::new() },
         folds: folds.steps.clone(),
         channels,
-        points: points(study, &compared.causes.first().unwrap_or(&null).hypothesis),
+        points: points(study, &compared.causes.first().unwrap_or(&null).hypothesis, &after.values),
     }
-}
-
-/// The tolerance of a fit furthest outside its prior. Initial metal state and clock errors are excluded, because they are not rig
-/// properties.
-fn strained(study: &Study, fit: &Fit) -> Option<Strained> {
-    let own = study.nuisances.iter().zip(&fit.hypothesis.nuisances);
-    let machine = own.filter(|(n, _)| !is_start(n.kind) && !matches!(n.kind, NuisanceKind::Delay(_)));
-    let (nuisance, sigmas) = machine.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    let strained = Strained { what: nuisance.kind.to_string(), sigmas: sigmas.abs() };
-    (strained.sigmas > DOUBT_SIGMAS).then_some(strained)
 }
 
 fn unseen(compared: Compared<'_>, folds: &Folds) -> (Unseen, Unseen) {
@@ -149,6 +142,8 @@ pub fn channels_on(
     by_channel(study, [&nominal, &of(before), &of(after)], steps)
 }
 
+/// Number of blocks at the end of a step whose mean residual counts for its point: half a minute.
+const END_BLOCKS: usize = 3;
 /// A channel is worse if its residual grows by this ratio, and by more than chance.
 const WORSE_RATIO: f64 = 1.1;
 
@@ -190,10 +185,21 @@ fn by_channel(
     (channels, worse)
 }
 
+/// Residual of T2 over the last blocks of a step as a share of the temperature rise: at equal pressures, that of the efficiency.
+fn rise_residual_ratio(study: &Study, step: usize, predicted: &[f64]) -> Option<f64> {
+    let group = study.groups.iter().find(|g| g.step == step && OUTPUTS[g.output] == Channel::T2)?;
+    let rows = group.rows.end.saturating_sub(END_BLOCKS).max(group.rows.start)..group.rows.end;
+    let mean = |of: &dyn Fn(usize) -> f64| rows.clone().map(of).sum::<f64>() / rows.len() as f64;
+    let rise_k =
+        mean(&|row| study.measured[row]) - study.inputs.at(study.steps[step].blocks.last()?.mean_s).t1_k;
+    let residual_k = mean(&|row| study.measured[row] - predicted[row]);
+    (rise_k > 1.0).then(|| (residual_k / rise_k).abs())
+}
+
 /// Efficiency and heat transfer at the end of each step: with the cause and its tolerances, with these tolerances alone, and for the
 /// nominal model. All use the same speed, pressures and metal temperatures, so a shifted operating point does not appear as an efficiency
 /// change.
-fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
+fn points(study: &Study, after: &Hypothesis, predicted: &[f64]) -> Vec<PointGap> {
     let tolerances = Hypothesis { nuisances: after.nuisances.clone(), effects: Vec::new() };
     let nothing = study.nothing();
     let Ok(points) = study.points_with_others(after, &[&nothing, &tolerances]) else { return Vec::new() };
@@ -201,7 +207,8 @@ fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
         .steps
         .iter()
         .zip(points)
-        .filter_map(|(step, (after, others))| {
+        .enumerate()
+        .filter_map(|(index, (step, (after, others)))| {
             let [nominal, before] = others.as_slice() else { return None };
             Some(PointGap {
                 speed_rpm: after.speed_rpm,
@@ -209,6 +216,7 @@ fn points(study: &Study, after: &Hypothesis) -> Vec<PointGap> {
                 eta_nominal: nominal.efficiency,
                 eta_before: before.efficiency,
                 eta_after: after.efficiency,
+                eta_residual: after.efficiency * rise_residual_ratio(study, index, predicted).unwrap_or(0.0),
                 h_nominal_w_m2k: nominal.h_w_m2k,
                 h_before_w_m2k: before.h_w_m2k,
                 h_after_w_m2k: after.h_w_m2k,

@@ -3,3 +3,4 @@
 pub mod folds;
 pub(crate) mod gap_distribution;
 pub mod how_far;
+pub mod strain;

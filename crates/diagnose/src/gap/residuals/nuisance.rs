@@ -7,6 +7,7 @@ use mapper_observe::channels::{self, DRIVERS};
 use mapper_observe::declared::Declared;
 use mapper_observe::perturbation::Perturbation;
 use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::instruments::ChannelPath;
 use mapper_physics::rig::sensor_fault::gain_error;
 
 /// Outputs of the model that sensors measure, in the order of the residuals.
@@ -124,6 +125,8 @@ pub fn nuisances(declared: &Declared) -> Vec<Nuisance> {
 pub struct Circumstances {
     /// Perturbations of the ambient temperature and the start, each in its unit.
     pub knobs: Vec<(Perturbation, f64)>,
+    /// Errors of the sensors of [`DRIVERS`], in their order: without them, the inputs are those of the machine.
+    pub paths: [ChannelPath; DRIVERS.len()],
     /// Relative increase of the temperature drop through the turbine.
     pub t4_drop_ratio: f64,
     /// Coefficients of the efficiency map's shape.

@@ -2,7 +2,10 @@
 
 use crate::gap::residuals::nuisance::Circumstances;
 use crate::gap::residuals::study::{Hypothesis, PredictError, Study};
+use crate::gap::residuals::true_inputs::{MEASURED, SurroundingsCourse, TrueInputs};
+use mapper_core::Channel;
 use mapper_physics::rig::effect::Rig;
+use mapper_physics::rig::instruments::{ChannelPath, Surroundings};
 use mapper_physics::simulation::model::{Outputs, State};
 
 /// Model state at the end of a step.
@@ -30,6 +33,36 @@ impl PointState {
 }
 
 impl Study {
+    /// The inputs without the errors that these circumstances give their sensors.
+    pub(crate) fn true_inputs<'a>(&'a self, circumstances: &'a Circumstances) -> TrueInputs<'a> {
+        let depends = circumstances.paths.iter().any(ChannelPath::depends_on_surroundings);
+        let course = depends.then(|| self.surroundings.get_or_init(|| self.surroundings_course()));
+        TrueInputs { recorded: &self.inputs, circumstances, course }
+    }
+
+    /// Walls and flows along the recording, as measured, or as the nominal machine has them; empty if that cannot follow.
+    fn surroundings_course(&self) -> SurroundingsCourse {
+        let mut course = SurroundingsCourse { t_s: self.times_s.clone(), rows: Vec::new() };
+        let drive = self.drive(&self.nothing(), &self.times_s, |_, _, _, state, outputs| {
+            course.rows.push([state.tc_k, outputs.flow_kg_s, state.tt_k, outputs.turbine_flow_kg_s]);
+        });
+        if drive.is_err() {
+            return SurroundingsCourse::default();
+        }
+        for (place, channel) in MEASURED.into_iter().enumerate() {
+            // Readings that never change belong to an experiment that is only planned.
+            let column = self.table.column(channel).filter(|c| c.windows(2).any(|pair| pair[0] != pair[1]));
+            for index in 0..course.rows.len() {
+                let row = &mut course.rows[index][place];
+                *row = column.and_then(|column| mean_near(self, column, index)).unwrap_or(*row);
+                if [Channel::CompressorFlow, Channel::TurbineFlow].contains(&channel) {
+                    *row = Surroundings::flow_ratio(&self.nominal.model.params, channel, *row);
+                }
+            }
+        }
+        course
+    }
+
     /// For each step, its blocks' times after its start, s, and their position on the speed line (beyond 1: surge).
     pub(crate) fn surge_positions(
         &self,
@@ -83,4 +116,14 @@ impl Study {
         })?;
         Ok(points)
     }
+}
+
+/// Mean of the readings that are nearer to one of a study's times than to the others.
+fn mean_near(study: &Study, column: &[f64], index: usize) -> Option<f64> {
+    let (t_s, times_s) = (study.times_s[index], &study.times_s);
+    let half = |other: Option<&f64>, away_s: f64| 0.5 * (other.copied().unwrap_or(t_s + away_s) + t_s);
+    let before = index.checked_sub(1).and_then(|before| times_s.get(before));
+    let near = study.table.range(half(before, -1.0), half(times_s.get(index + 1), 1.0));
+    let read: Vec<f64> = column[near].iter().copied().filter(|value| value.is_finite()).collect();
+    (!read.is_empty()).then(|| read.iter().sum::<f64>() / read.len() as f64)
 }

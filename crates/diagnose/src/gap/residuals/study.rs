@@ -6,6 +6,7 @@ pub use crate::gap::residuals::hypothesis::{EffectValues, Hypothesis, members};
 use crate::gap::residuals::initial_state::{rested, with_metal_held};
 use crate::gap::residuals::nuisance::{Circumstances, Nuisance, OUTPUTS, apply, nuisances};
 use crate::gap::residuals::shape::{SHAPES, ShapedMap};
+use crate::gap::residuals::true_inputs::SurroundingsCourse;
 use mapper_core::{Channel, Recording, StepMarker};
 use mapper_observe::averages::block::{Block, block_mean, blocks};
 use mapper_observe::averages::mean_reading::mean_reading;
@@ -17,14 +18,13 @@ use mapper_observe::initial_state::state_as_read;
 use mapper_observe::model_inputs::lagged_command::{LaggedCommand, Response};
 use mapper_observe::model_inputs::smoothed_inputs::SmoothedInputs;
 use mapper_observe::model_inputs::step_timing::{Times, with_command_times};
-use mapper_observe::perturbation::{Perturbation, Shifted};
 use mapper_physics::rig::effect::{Effect, EffectError, EffectParameter, Rig, add};
-use mapper_physics::rig::instruments::{ChannelFollower, true_value};
+use mapper_physics::rig::instruments::ChannelFollower;
 use mapper_physics::simulation::driven::{DriveError, FrozenGrid, drive, settle};
 use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::{Model, Outputs, PreparedModel, State};
 use nalgebra::DMatrix;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Values of one output in one step with common noise.
 #[derive(Debug, Clone)]
@@ -110,6 +110,7 @@ pub struct Study {
     pub(crate) rows: Vec<Vec<[Option<u32>; OUTPUTS.len()]>>,
     /// For each group the noise of the subtracted values, unit squared; empty if nothing was subtracted.
     pub(crate) other_noise: Vec<DMatrix<f64>>,
+    pub(crate) surroundings: OnceLock<SurroundingsCourse>,
 }
 
 /// The first step counts from this time before the first jump, s. The rig's earlier history is unknown, and the metal's start is fitted
@@ -248,6 +249,7 @@ impl Study {
             places,
             rows,
             other_noise: Vec::new(),
+            surroundings: OnceLock::new(),
         }
     }
 
@@ -288,12 +290,7 @@ impl Study {
             rig.model.map =
                 Arc::new(ShapedMap { inner: rig.model.map.clone(), coefficients: circumstances.shape });
         }
-        // A sensor that reads too high drives the model too high, so its error is subtracted.
-        for channel in DRIVERS {
-            let path = rig.instruments.path(channel);
-            circumstances.knobs.push((Perturbation::Input(channel), -path.offset));
-            circumstances.knobs.push((Perturbation::InputGain(channel), 1.0 / path.gain_ratio - 1.0));
-        }
+        circumstances.paths = DRIVERS.map(|channel| *rig.instruments.path(channel));
         Ok((rig, circumstances))
     }
 
@@ -341,7 +338,7 @@ impl Study {
         for (place, first) in stretches.iter().enumerate() {
             let there = rig_in(*first)?;
             let (rig, circumstances) = &there;
-            let inputs = Shifted { inputs: &self.inputs, shifts: &circumstances.knobs };
+            let inputs = self.true_inputs(circumstances);
             let start = match state {
                 None => self.start(rig, &inputs, circumstances)?,
                 Some(state) => state,
@@ -399,7 +396,9 @@ impl Study {
                 for (output, channel) in OUTPUTS.iter().enumerate() {
                     let seen = match &command {
                         Some(command) if *channel == Channel::P3 => command.p3_pa(t_s),
-                        _ => true_value(*channel, prepared, state, outputs).unwrap_or(f64::NAN),
+                        _ => {
+                            rig.instruments.at_sensor(*channel, prepared, state, outputs).unwrap_or(f64::NAN)
+                        }
                     };
                     // T4 is T3' minus a temperature drop that is known only to a few per cent.
                     let seen = if *channel == Channel::T4 {

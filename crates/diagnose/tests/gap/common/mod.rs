@@ -7,7 +7,7 @@ use mapper_core::{
 use mapper_observe::declared::{Declared, declared_uncertainties};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::effect::Rig;
-use mapper_physics::rig::instruments::{ChannelFollower, true_value};
+use mapper_physics::rig::instruments::ChannelFollower;
 use mapper_physics::simulation::inputs::InterpolatedInputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
@@ -120,7 +120,8 @@ fn recorded(
         let at = mapper_physics::simulation::inputs::Inputs::at(&inputs, t_s);
         let prepared = rig.model.prepare(&at);
         for (i, (channel, noise, _)) in SENSORS.iter().enumerate() {
-            let seen = followers[i].read(t_s, true_value(*channel, &prepared, state, outputs).unwrap());
+            let seen = followers[i]
+                .read(t_s, rig.instruments.at_sensor(*channel, &prepared, state, outputs).unwrap());
             slow[i] = decay * slow[i] + (1.0 - decay * decay).sqrt() * normal();
             values[i].push(seen + offsets[i] + noise * (0.8 * normal() + 0.6 * slow[i]));
         }

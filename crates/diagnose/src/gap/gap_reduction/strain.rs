@@ -1,0 +1,46 @@
+//! Tolerances that end outside their prior.
+
+use crate::gap::best_fit::first_step::is_start;
+use crate::gap::best_fit::fit::{Effort, Fit, MAX_SIGMAS, fit};
+use crate::gap::best_fit::selection::Selection;
+use crate::gap::findings::report::Strained;
+use crate::gap::residuals::nuisance::NuisanceKind;
+use crate::gap::residuals::study::Study;
+use crate::gap::residuals::whiten::Linearised;
+use mapper_numerics::statistics::DOUBT_SIGMAS;
+
+/// Continues a fit that ends at the limit of a tolerance without that limit, which stands for none.
+const UNLIMITED: Effort = Effort { iterations: 8, enough: 0.5, most_sigmas: 1e3 };
+
+/// Tolerances of a fit beyond three sigmas of their prior, furthest first, with the size that the recording asks for: [`MAX_SIGMAS`] limits
+/// the search for causes, not this report. Initial metal state and clock errors are no rig properties, and a deviation of one corner of the map is
+/// plausible: they are excluded.
+pub fn beyond_prior(study: &Study, linearised: &Linearised, fitted: &Fit) -> Vec<Strained> {
+    let limited = fitted.hypothesis.nuisances.iter().any(|sigmas| sigmas.abs() > 0.999 * MAX_SIGMAS);
+    let freed = limited
+        .then(|| fit(study, linearised, &fitted.hypothesis, &Selection::all(study), UNLIMITED).ok())
+        .flatten();
+    let nuisances = &freed.as_ref().unwrap_or(fitted).hypothesis.nuisances;
+    let mut beyond: Vec<Strained> = study
+        .nuisances
+        .iter()
+        .zip(nuisances)
+        .filter(|(n, sigmas)| {
+            let of_rig = !matches!(n.kind, NuisanceKind::Delay(_) | NuisanceKind::Shape(_));
+            sigmas.abs() > DOUBT_SIGMAS && of_rig && !is_start(n.kind)
+        })
+        .map(|(nuisance, sigmas)| Strained {
+            what: nuisance.kind.to_string(),
+            sigmas: sigmas.abs(),
+            value: nuisance.value(*sigmas),
+        })
+        .collect();
+    beyond.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+    beyond
+}
+
+/// Cost of the tolerances of a fit beyond three sigmas of their prior: what an effect that releases them can gain at most without a better
+/// fit to the readings.
+pub fn cost_beyond_prior(fitted: &Fit) -> f64 {
+    fitted.hypothesis.nuisances.iter().filter(|sigmas| sigmas.abs() > DOUBT_SIGMAS).map(|u| u * u).sum()
+}

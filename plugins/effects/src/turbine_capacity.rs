@@ -1,0 +1,47 @@
+//! The turbine swallows more or less gas.
+
+use mapper_physics::effect_parameters;
+use mapper_physics::machine::hooks::TooManyExtraStates;
+use mapper_physics::rig::effect::{Rig, Submodel};
+use mapper_physics::rig::effect_kind::{About, EffectKind};
+
+effect_parameters! {
+    /// The turbine swallows more or less gas.
+    #[derive(Debug)]
+    pub(crate) struct TurbineCapacity {
+        /// Choked flow over the nominal one.
+        scale_ratio = "turbine_capacity" ["1"] 0.7 .. 1.3, neutral 1.0, step -0.03;
+    }
+}
+
+impl EffectKind for TurbineCapacity {
+    const ABOUT: About = About {
+        id: "turbine_capacity",
+        name: "flow capacity of the turbine",
+        description: "the turbine swallows more or less gas at every expansion ratio",
+        equation: "m_t = s m_t,nominal",
+        source: "deposits on vanes or volute, or another volute",
+        submodel: Submodel::TurbineFlow,
+        also_shows_in: &[Submodel::Shaft],
+    };
+
+    fn put_into(self, rig: &mut Rig) -> Result<(), TooManyExtraStates> {
+        rig.model.params.turbine.choked_flow_kg_s *= self.scale_ratio;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Instant;
+
+    /// Unlike a gain of the flow meter, the power changes with the flow.
+    #[test]
+    fn flow_and_power_fall_together() {
+        let (nominal, at) = (Instant::nominal(), Instant::with(TurbineCapacity { scale_ratio: 0.96 }));
+        let flow = at.outputs.turbine_flow_kg_s / nominal.outputs.turbine_flow_kg_s;
+        let power = at.outputs.turbine.power_w / nominal.outputs.turbine.power_w;
+        assert!((flow - 0.96).abs() < 1e-12 && (power - 0.96).abs() < 5e-3, "{flow}, {power}");
+    }
+}

@@ -7,6 +7,30 @@ use crate::formatting::wrapped::wrapped;
 use mapper_diagnose::gap::correction::{CorrectedMap, NEEDED_PROBABILITY, NotCorrected, PointCorrection};
 use mapper_diagnose::gap::findings::report::{Diagnosis, law_found};
 
+/// What the table before and after shows.
+pub(crate) const CORRECTION_CAPTION: &str = "Efficiency, %, with its 95 % interval";
+/// Its columns.
+pub(crate) const CORRECTION_HEADS: [&str; 6] =
+    ["step", "krpm", "valve", "as recorded", "corrected", "change, points"];
+
+/// Rows of the table before and after, one a point.
+pub(crate) fn correction_rows(points: &[PointCorrection]) -> Vec<[String; 6]> {
+    let value = |[eta, low, high]: [f64; 3]| format!("{:.1} +/- {:.1}", 100.0 * eta, 50.0 * (high - low));
+    let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    let row = |point: &PointCorrection| {
+        let change = point.before.zip(point.after).map(|(before, after)| 100.0 * (after[0] - before[0]));
+        [
+            point.step.to_string(),
+            format!("{:.1}", point.speed_rpm / 1e3),
+            format!("{:.3}", point.valve),
+            or_none(point.before.map(value)),
+            or_none(point.after.map(value)),
+            or_none(change.map(|change| format!("{change:+.2}"))),
+        ]
+    };
+    points.iter().map(row).collect()
+}
+
 /// The text, in lines of a terminal.
 pub fn correction_text(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
     let line = |line: &str| match line.chars().count() > COLUMNS {
@@ -23,6 +47,13 @@ fn unwrapped(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
         for cause_of_map in &map.causes {
             text += &format!("  {}\n", cause(cause_of_map));
         }
+        if diagnosis.is_outside_without_law() {
+            let largest = map.points.iter().map(|point| point.correction_sigma).fold(0.0, f64::max);
+            text += &format!(
+                "No law describes the cause: it may touch every point, and the residual of T2, up to {:.2} points, widens their intervals.\n",
+                100.0 * largest
+            );
+        }
         if law_found(diagnosis).is_some() {
             text += "A law was found: write it with `mapper gap diagnose --laws DIR`, and correct with `--effect`.\n";
         }
@@ -32,20 +63,10 @@ fn unwrapped(map: &CorrectedMap, diagnosis: &Diagnosis) -> String {
         let word = if place == 0 { "Corrected for" } else { "or, not distinguished," };
         text += &format!("{word} {} ({:.0} %)\n", cause(cause_of_map), 100.0 * cause_of_map.probability);
     }
-    text += "\nEfficiency, %, with its 95 % interval\n";
-    let heads = ["step", "krpm", "valve", "as recorded", "corrected", "change, points"].map(str::to_owned);
-    let mut table = with_heads(&heads);
-    let value = |[eta, low, high]: [f64; 3]| format!("{:.1} +/- {:.1}", 100.0 * eta, 50.0 * (high - low));
-    for point in &map.points {
-        let change = point.before.zip(point.after).map(|(before, after)| 100.0 * (after[0] - before[0]));
-        table.add_row([
-            point.step.to_string(),
-            format!("{:.1}", point.speed_rpm / 1e3),
-            format!("{:.3}", point.valve),
-            point.before.map_or_else(|| "-".to_owned(), value),
-            point.after.map_or_else(|| "-".to_owned(), value),
-            change.map_or_else(|| "-".to_owned(), |change| format!("{change:+.2}")),
-        ]);
+    text += &format!("\n{CORRECTION_CAPTION}\n");
+    let mut table = with_heads(&CORRECTION_HEADS);
+    for row in correction_rows(&map.points) {
+        table.add_row(row);
     }
     text += &format!("{table}\n");
     text += &consequence(&map.points);

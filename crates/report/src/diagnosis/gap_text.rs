@@ -7,7 +7,8 @@ use crate::formatting::table::COLUMNS;
 use crate::formatting::wrapped::wrapped;
 use mapper_core::{probability_text, step_number, with_unit};
 use mapper_diagnose::gap::findings::report::{
-    Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Verdict, law_found,
+    Candidate, ChannelGap, Diagnosis, Estimate, Gap, Law, PointGap, SmallestSeen, Strained, Verdict,
+    law_found,
 };
 use mapper_diagnose::gap::reference::baseline_assumptions::Since;
 use std::collections::BTreeMap;
@@ -53,11 +54,15 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
             text += &wrapped(&place, COLUMNS, 6);
         }
     }
+    if !diagnosis.inseparable.is_empty() {
+        let parts = diagnosis.inseparable.join(", ");
+        text += &wrapped(&format!("  inseparable in this recording: {parts}"), COLUMNS, 6);
+    }
     if !diagnosis.smallest_seen.is_empty() {
         text += &smallest_seen(&diagnosis.smallest_seen);
     }
     text += "\nwhich\n";
-    for candidate in diagnosis.candidates.iter().take(CAUSES) {
+    for candidate in diagnosis.listed().take(CAUSES) {
         text += &format!("  {:>7}  {}\n", probability_text(candidate.probability), cause(candidate));
         for set in &candidate.equivalent {
             text += &format!("           indistinguishable from {}\n", set.join(" + "));
@@ -67,6 +72,9 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         [(diagnosis.probability_none, NOTHING), (diagnosis.probability_outside, OUTSIDE)]
     {
         text += &format!("  {:>7}  {what}\n", probability_text(probability));
+    }
+    for suspect in &diagnosis.suspects {
+        text += &format!("  suspect: {}\n", suspect_text(suspect));
     }
     text += &laws(diagnosis);
     text += &how_far(diagnosis);
@@ -89,6 +97,21 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         }
     }
     text
+}
+
+/// A warning that what was found is not the best explanation, on lines of its own; empty without a doubt.
+pub fn doubt_text(doubt: Option<&str>) -> String {
+    doubt.map_or_else(String::new, |doubt| wrapped(&format!("warning: {doubt}"), COLUMNS, 2))
+}
+
+/// A tolerance outside its prior, in words.
+pub fn suspect_text(suspect: &Strained) -> String {
+    format!(
+        "{} ends {:.1} sigma from what is declared ({})",
+        suspect.what,
+        suspect.sigmas,
+        four_figures(suspect.value)
+    )
 }
 
 /// Below this probability a closure term closes a gap without being its cause.
@@ -154,7 +177,13 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
             named(first),
             probability_text(first.probability)
         ),
+        (Verdict::WithinTolerance, _) if !diagnosis.suspects.is_empty() => {
+            format!("no cause is named, but {}", suspect_text(&diagnosis.suspects[0]))
+        }
         (Verdict::WithinTolerance, _) => format!("nothing beyond the declared tolerances {seen}"),
+        (Verdict::Explained, Some(first)) if is_not_borne_out(&diagnosis.gap) => {
+            format!("{} is the most probable cause; held-out steps do not confirm it", named(first))
+        }
         (Verdict::Explained, Some(first)) => {
             let verb = if first.effects.len() == 1 { "explains" } else { "explain" };
             let what =
@@ -170,6 +199,11 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
             law_found(diagnosis).map_or_else(|| outside.clone(), |law| format!("{outside}: {}", law.sentence))
         }
     }
+}
+
+/// Whether steps with a gap that the fit of the cause did not see keep it.
+fn is_not_borne_out(gap: &Gap) -> bool {
+    gap.folds.len() > 1 && gap.steps_with_gap > 0 && gap.shrink <= 0.0
 }
 
 /// Effects in both recordings, which are not judged, if a reference recording was given.
@@ -267,7 +301,12 @@ fn how_far(diagnosis: &Diagnosis) -> String {
             gap.held_out_steps.len()
         ),
     };
-    if named && gap.worse.is_empty() {
+    if named && gap.worse.is_empty() && gap.shrink <= 0.0 {
+        text += match gap.steps_with_gap {
+            0 => "  tolerances leave no gap on these steps either\n",
+            _ => "  the cause does not reduce the gap on these steps\n",
+        };
+    } else if named && gap.worse.is_empty() {
         text += &format!(
             "  {:.1} % of the gap removed; of steps like these {:.0} .. {:.0} %\n",
             100.0 * gap.shrink,
@@ -279,11 +318,30 @@ fn how_far(diagnosis: &Diagnosis) -> String {
         text += &format!("  the gap does not shrink: {} gets worse\n", gap.worse.join(", "));
     }
     text += &by_channel(diagnosis, &gap.channels, "with the cause", if named { 3 } else { 2 });
+    text += &touched(diagnosis);
     if named {
         text += &strained(gap);
         text += &points(&gap.points);
     }
     text
+}
+
+/// Points that a cause outside the library may touch, if no law describes it.
+fn touched(diagnosis: &Diagnosis) -> String {
+    let points = diagnosis.gap.points.iter().enumerate();
+    let largest = points.max_by(|a, b| a.1.eta_residual.total_cmp(&b.1.eta_residual));
+    let Some((step, point)) = largest.filter(|_| diagnosis.is_outside_without_law()) else {
+        return String::new();
+    };
+    wrapped(
+        &format!(
+            "  no law describes the cause: it may change the efficiency of every point; by the residual of T2, up to +/- {:.2} points (step {})",
+            100.0 * point.eta_residual,
+            step_number(step)
+        ),
+        COLUMNS,
+        4,
+    )
 }
 
 /// If tolerances can replace the cause without a larger residual: the tolerance that would have to exceed its prior.

@@ -3,7 +3,9 @@
 use crate::page::prose::sentence;
 use crate::page::shell::{Purpose, shell};
 use crate::page::table::scrolling;
-use crate::{NOTHING, OUTSIDE, four_figures, gap_text, headline, named, next_measurement, stand_actions};
+use crate::{
+    NOTHING, OUTSIDE, four_figures, gap_text, headline, named, next_measurement, stand_actions, suspect_text,
+};
 use mapper_chart::palette::{self, Colour};
 use mapper_chart::{Axis, Figure, Line, Panel, Scatter};
 use mapper_core::{Channel, probability_text, step_number};
@@ -54,9 +56,13 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
         }
         (heading("Causes"))
         (causes(done))
+        @for suspect in &diagnosis.suspects { p { "Suspect: " (suspect_text(suspect)) "." } }
         (heading("Place in the machine"))
         @if diagnosis.r#where.is_empty() { p { "No part departs from the model by more than noise." } }
         @else { (places(done)) }
+        @if !diagnosis.inseparable.is_empty() {
+            p { "Inseparable in this recording: " (diagnosis.inseparable.join(", ")) "." }
+        }
         figure { (PreEscaped(map_of_where(done))) figcaption { "Ends of the steps, coloured by the difference between measured and computed readings." } }
         @if !diagnosis.forces.is_empty() {
             (heading("Missing heat, power or flow of each balance, if it alone has one"))
@@ -91,7 +97,7 @@ fn sections(done: &Diagnosed, heading: &dyn Fn(&str) -> Markup) -> Markup {
 /// The most probable causes with their probabilities as bars.
 fn causes(done: &Diagnosed) -> Markup {
     let diagnosis = &done.diagnosis;
-    let candidates = diagnosis.candidates.iter().take(8);
+    let candidates = diagnosis.listed().take(8);
     let rows = candidates.map(|candidate| (named(candidate), candidate.probability)).chain([
         (NOTHING.to_owned(), diagnosis.probability_none),
         (OUTSIDE.to_owned(), diagnosis.probability_outside),

@@ -1,5 +1,6 @@
 //! The test report of a run, as Markdown.
 
+use crate::diagnosis::correction_text::{CORRECTION_CAPTION, CORRECTION_HEADS, correction_rows};
 use crate::formatting::display::Display;
 use crate::formatting::duration::duration;
 use crate::formatting::markdown::{self, Align};
@@ -24,6 +25,7 @@ use mapper_core::{
     Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, PointBudgets,
     Recording, ReferenceState, SurgeNotFound, terminal_text,
 };
+use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{TwoParameter, ZeroOutcome};
 use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
@@ -77,6 +79,8 @@ pub struct RunReport<'a> {
     pub sensors: &'a [FusedChannel],
     /// Uncertainty budgets of the points.
     pub budgets: &'a [PointBudgets],
+    /// Efficiencies before and after a correction for the causes of a gap; empty without one.
+    pub corrections: &'a [PointCorrection],
     /// Deviations of the points from the simulator's truth; `None` on a real rig.
     pub score: Option<&'a ScoreSummary>,
     /// Result of the search for surge; `None` if there was none.
@@ -186,6 +190,14 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         let _ = writeln!(text, "{}", score_text(score));
     }
     points_section(&mut text, &units, report);
+    if !report.corrections.is_empty() {
+        let _ = writeln!(text, "\n## Before and after the correction\n\n{CORRECTION_CAPTION}\n");
+        text.push_str(&markdown::table(
+            &CORRECTION_HEADS,
+            Align::Right,
+            &correction_rows(report.corrections),
+        ));
+    }
     text.push_str(&budget_section(report.budgets));
     if let Some(SurgeReport { marks, remarks, surges }) = surge {
         let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &units));

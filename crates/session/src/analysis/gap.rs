@@ -58,6 +58,7 @@ impl Gap {
     /// [`SessionError::Json`]: none in practice.
     pub fn json(&self) -> Result<Value, SessionError> {
         let mut value = serde_json::to_value(&self.diagnosed.diagnosis)?;
+        value["candidates"] = json!(self.diagnosed.diagnosis.listed().collect::<Vec<_>>());
         // An effect that is present in both recordings belongs to the rig; it does not describe a complete machine.
         let whole = self.diagnosed.diagnosis.since.is_none();
         value["found"] = json!(whole.then(|| Found::of(&self.diagnosed)).flatten());

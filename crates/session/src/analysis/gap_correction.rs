@@ -47,8 +47,8 @@ impl Session<'_> {
         let quiet = Session::new(self.registry);
         let identify = |recorded| quiet.identify(vec![recorded], map, method);
         let before = identify(recorded.clone())?;
-        let refused = |gap, causes, why, before: Identified| {
-            let points = before.points_alone().map(|point| correction_of(Some(point), None, 0.0)).collect();
+        let refused = |gap: Gap, causes, why, mut before: Identified| {
+            let points = widened_by_residual(&mut before, &gap);
             let map = CorrectedMap { causes, refused: Some(why), points };
             Ok(GapCorrection { gap, map, identified: before })
         };
@@ -82,6 +82,7 @@ impl Session<'_> {
             return refused(gap, named, why, before);
         }
         let points = widened(&mut identified, &before, &moved, &after);
+        identified.corrections.clone_from(&points);
         identified.remarks.extend(named.iter().map(|cause| {
             format!(
                 "corrected for {}, which the diagnosis of this recording names with {}: without its correction the efficiencies are others",
@@ -98,6 +99,23 @@ impl Session<'_> {
         }
         Ok(GapCorrection { gap, map: CorrectedMap { causes: named, refused: None, points }, identified })
     }
+}
+
+/// Adds the residual of T2 to every point that a cause outside the library may touch, if no law describes that cause.
+fn widened_by_residual(identified: &mut Identified, gap: &Gap) -> Vec<PointCorrection> {
+    let (diagnosis, steps) = (&gap.diagnosed.diagnosis, &gap.diagnosed.study.steps);
+    let residual = |step: usize| {
+        let place = steps.iter().position(|other| other.marker.index == step)?;
+        Some(diagnosis.gap.points.get(place)?.eta_residual).filter(|_| diagnosis.is_outside_without_law())
+    };
+    let mut points = Vec::with_capacity(identified.points.len());
+    for scored in &mut identified.points {
+        let recorded = scored.point.clone();
+        let eta_sigma = residual(recorded.step).unwrap_or(0.0);
+        widen(&mut scored.point, eta_sigma, 0.0);
+        points.push(correction_of(Some(&recorded), None, eta_sigma));
+    }
+    points
 }
 
 /// Adds the uncertainty of the correction to every point: `moved` are the results one standard deviation away in each direction, `others`

@@ -10,6 +10,7 @@ use mapper_core::{
     Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, SurgeNotFound,
     ThermalModel, join_recordings,
 };
+use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{
     FoundFault, IdentifyConfig, NominalRig, TwoParameter, ZeroOutcome, ZeroSettings, identify_with_rig,
     isothermal_zero, method_for,
@@ -57,6 +58,8 @@ pub struct Identified {
     pub score: Option<ScoreSummary>,
     /// Surge-side limits of the map; `None` if there was no search.
     pub surge: Option<SoughtSurge>,
+    /// Efficiencies before and after a correction for the causes of a gap; empty without one.
+    pub corrections: Vec<PointCorrection>,
     /// Other remarks.
     pub remarks: Vec<String>,
 }
@@ -210,6 +213,7 @@ impl Session<'_> {
             zero,
             score,
             surge,
+            corrections: Vec::new(),
             remarks,
         })
     }

@@ -381,6 +381,7 @@ fn run_report_of<'a>(
         recording: &identified.recording,
         used: &identified.config.declared,
         budgets: &identified.budgets,
+        corrections: &identified.corrections,
         zero: &identified.zero,
         sources: &origin.sources,
         origin: origin

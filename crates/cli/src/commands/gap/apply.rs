@@ -4,6 +4,7 @@ use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
+use mapper_report::doubt_text;
 use mapper_session::{Twin, found_in, twin_campaign, write_new};
 use std::path::PathBuf;
 
@@ -31,6 +32,10 @@ impl Apply {
         let written = twin_campaign(&text, &twin, &registry::registry().effects)?;
         write_new(&self.out, written.as_bytes())?;
         mapper_campaign::load(&self.out).map_err(Failure::of_campaign)?;
-        standard_output::print(&format!("campaign with the diagnosed machine: {}\n", self.out.display()))
+        standard_output::print(&format!(
+            "campaign with the diagnosed machine: {}\n{}",
+            self.out.display(),
+            doubt_text(found.doubt.as_deref())
+        ))
     }
 }

@@ -4,7 +4,7 @@ use crate::command_line::shared_arguments::channel_map;
 use crate::output::failure::Failure;
 use crate::{output::standard_output, registry};
 use clap::Args;
-use mapper_report::held_text;
+use mapper_report::{doubt_text, held_text};
 use mapper_session::{Recorded, SealedForecast, Session, found_in};
 use serde_json::json;
 use std::path::PathBuf;
@@ -47,16 +47,18 @@ impl Predict {
         if let Some(diagnosis) = &self.diagnosis {
             let found = found_in(diagnosis)?;
             let steps = session.forecast_twin(&campaign, &map, effects, &found)?;
+            let doubt = found.doubt.clone();
             let forecast = SealedForecast { campaign: campaign.name.clone(), found, steps };
             let (seal, steps) = (forecast.write(&self.forecast)?, forecast.steps.len());
             if self.json {
                 return standard_output::print_json(
-                    &json!({ "forecast": self.forecast, "steps": steps, "sha256": seal }),
+                    &json!({ "forecast": self.forecast, "steps": steps, "sha256": seal, "doubt": doubt }),
                 );
             }
             return standard_output::print(&format!(
-                "forecast of {steps} steps in {}\nSHA-256: {seal}\n",
-                self.forecast.display()
+                "forecast of {steps} steps in {}\nSHA-256: {seal}\n{}",
+                self.forecast.display(),
+                doubt_text(doubt.as_deref())
             ));
         }
         // clap requires a recording if no diagnosis is given.

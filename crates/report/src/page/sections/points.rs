@@ -1,5 +1,6 @@
 //! The points by speed line, as in test reports.
 
+use crate::diagnosis::correction_text::{CORRECTION_CAPTION, CORRECTION_HEADS, correction_rows};
 use crate::page::run_page::RunPage;
 use crate::page::table::{Cell, Row, data_table};
 use crate::{Display, END_S, PointCell, point_cells, point_groups, point_heads, shared_errors_text};
@@ -24,6 +25,10 @@ pub(crate) fn points(page: &RunPage<'_>, display: &Display) -> Markup {
                 @let rows: Vec<Row> = group.points.iter().map(|point| row(page, display, point)).collect();
                 (data_table(&group.caption, &heads, &rows))
             }
+            @if !report.corrections.is_empty() {
+                @let rows: Vec<Row> = correction_rows(report.corrections).into_iter().map(corrected).collect();
+                (data_table(&format!("Before and after the correction: {CORRECTION_CAPTION}"), &CORRECTION_HEADS.map(str::to_owned), &rows))
+            }
         }
     }
 }
@@ -36,6 +41,10 @@ fn row(page: &RunPage<'_>, display: &Display, point: &IdentifiedPoint) -> Row {
         if index == last { cell.class(class_of(point.verdict)) } else { cell }
     };
     Row { step: Some(point.step), cells: cells.into_iter().enumerate().map(cell).collect() }
+}
+
+fn corrected(cells: [String; 6]) -> Row {
+    Row { step: None, cells: cells.into_iter().map(Cell::text).collect() }
 }
 
 fn class_of(verdict: Verdict) -> &'static str {

@@ -3,6 +3,7 @@
 use crate::reproduction::ReproduceError;
 use mapper_core::{Channel, OperatingPoint, Recording, StepKind, StepMarker};
 use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::simulation::inputs::Inputs;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::{Simulator, Watch};
 use mapper_physics::simulation::steady::hold_speed;
@@ -50,6 +51,8 @@ pub(crate) struct Truth {
     pub(crate) flow_kg_s: f64,
     pub(crate) pressure_ratio: f64,
     pub(crate) probe_time_constant_s: f64,
+    /// Whether the housing is hotter than the gas behind the wheel.
+    pub(crate) heats_gas: bool,
 }
 
 /// A jump as recorded, with its truth.
@@ -60,20 +63,56 @@ pub(crate) struct Run {
     pub(crate) truth: Vec<Truth>,
 }
 
-/// Runs a jump for `seconds`: from the machine's own steady state at the from-speed, to the P3 that holds the
-/// to-speed on the nominal machine.
+/// A jump of P3 that follows its command with a first-order lag; without a lag it is a step.
+struct P3Jump {
+    to: BoundaryConditions,
+    from_pa: f64,
+    lag_s: f64,
+}
+
+impl Inputs for P3Jump {
+    fn at(&self, t_s: f64) -> BoundaryConditions {
+        if self.lag_s == 0.0 {
+            return self.to;
+        }
+        let left_ratio = (-t_s.max(0.0) / self.lag_s).exp();
+        BoundaryConditions { p3_pa: self.to.p3_pa + left_ratio * (self.from_pa - self.to.p3_pa), ..self.to }
+    }
+
+    fn next_kink_s(&self, _t_s: f64) -> f64 {
+        f64::INFINITY
+    }
+
+    fn is_constant_after(&self, _t_s: f64) -> bool {
+        self.lag_s == 0.0
+    }
+}
+
+/// [`run_lagged`] with a step of P3, as in the paper's model.
 pub(crate) fn run(machine: &Model, jump: Jump, seconds: f64) -> Result<Run, ReproduceError> {
+    run_lagged(machine, jump, seconds, 0.0)
+}
+
+/// Runs a jump for `seconds`: from the machine's own steady state at the from-speed, to the P3 that holds the
+/// to-speed on the nominal machine. P3 follows with `lag_s`.
+pub(crate) fn run_lagged(
+    machine: &Model,
+    jump: Jump,
+    seconds: f64,
+    lag_s: f64,
+) -> Result<Run, ReproduceError> {
     let at_opening =
         BoundaryConditions { valve_opening_ratio: jump.opening, ..BoundaryConditions::default() };
     let start = hold_speed(machine, jump.from_rpm, &at_opening)?;
     let boundary = hold_speed(&Model::nominal(), jump.to_rpm, &at_opening)?.boundary;
+    let inputs = P3Jump { to: boundary, from_pa: start.boundary.p3_pa, lag_s };
     let mut simulator = Simulator::new(machine, 0.0, start.state, RELATIVE_TOLERANCE, Watch::default());
     let mut recording = Recording::default();
     let mut truth = Vec::new();
     let count = (seconds * RATE_HZ).round() as u32;
     simulator.run_to(
         seconds,
-        &boundary,
+        &inputs,
         (0..=count).map(|i| f64::from(i) / RATE_HZ),
         |t_s, state, outputs| {
             for (channel, value) in [
@@ -98,6 +137,7 @@ pub(crate) fn run(machine: &Model, jump: Jump, seconds: f64) -> Result<Run, Repr
                 flow_kg_s: outputs.flow_kg_s,
                 pressure_ratio: outputs.pressure_ratio,
                 probe_time_constant_s: outputs.t2_probe_time_constant_s,
+                heats_gas: outputs.wall_k > outputs.t2_prime_k,
             });
         },
         |_| {},

@@ -18,7 +18,7 @@ pub use figure_data::{FigureResult, Statement, Table, Verdict, picture_path};
 pub use page::{figure_json, reproduction_page};
 
 /// Numbers of the figures that [`reproduce`] redoes, in its order.
-pub const FIGURES: [&str; 7] = ["5", "6", "7", "8", "9", "10", "12"];
+pub const FIGURES: [&str; 8] = ["5", "6", "7", "8", "9", "10", "11", "12"];
 
 /// Redoes all figures; `progress` receives the figure's number before each is made.
 ///
@@ -36,6 +36,7 @@ pub fn reproduce(mut progress: impl FnMut(&str)) -> Result<Vec<FigureResult>, Re
             "8" => figures::figure_8::figure()?,
             "9" => figures::figure_9::figure()?,
             "10" => figures::figure_10::figure()?,
+            "11" => figures::figure_11::figure()?,
             _ => figures::figure_12::figure()?,
         });
     }

@@ -1,6 +1,7 @@
 //! The complete campaign: the form of the file, and the result with units resolved and defaults filled in. Its
 //! elements are in `elements`, one file each.
 
+use crate::elements::evaluation::acceptance::AcceptanceFile;
 use crate::elements::evaluation::drift::DriftFile;
 use crate::elements::evaluation::identification::IdentificationFile;
 use crate::elements::evaluation::tolerances::TolerancesElement;
@@ -12,6 +13,7 @@ use crate::elements::points::timing::TimingFile;
 use crate::elements::points::zero::ZeroFile;
 use crate::elements::rig::backend::backend;
 use crate::elements::rig::boundary::BoundaryFile;
+use crate::elements::rig::calibration::Calibration;
 use crate::elements::rig::guards::{GuardedBy, GuardsFile};
 use crate::elements::rig::limits::LimitsFile;
 use crate::elements::rig::readers::{ReaderFile, readers};
@@ -22,8 +24,9 @@ use crate::elements::turbocharger::efficiency::EfficiencyFile;
 use crate::elements::turbocharger::machine::MachineFile;
 use crate::elements::turbocharger::reference::ReferenceFile;
 use mapper_core::{
-    Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift, OperatingPoint,
-    ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing, VisitOrder,
+    AcceptanceCriteria, Channel, EfficiencyDefinition, GuardSet, Limits, ModelTolerances, OnDrift,
+    OperatingPoint, ReferenceState, Repeats, SafeTrajectory, Soak, SpeedControlSettings, SurgeSeek, Timing,
+    VisitOrder,
 };
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::FollowOutlet;
@@ -41,6 +44,7 @@ pub use crate::elements::output::outputs::{FormatName, Outputs};
 pub use crate::elements::output::report::Report;
 pub use crate::elements::points::sequence::SequenceSource;
 pub use crate::elements::rig::backend::BackendChoice;
+pub use crate::elements::rig::calibration::{CalibrationRule, Date};
 pub use crate::elements::rig::readers::ReaderChoice;
 pub use crate::elements::rig::several_sensors::SensorDeclaration;
 pub use crate::elements::turbocharger::machine::{DescriptionSource, Machine, MapSource};
@@ -63,6 +67,12 @@ pub struct Campaign {
     pub follow_outlet: FollowOutlet,
     /// Declared uncertainty of each channel that has a sensor.
     pub sensors: BTreeMap<Channel, SensorDeclaration>,
+    /// Whether every sensor needs a valid calibration.
+    #[serde(skip_serializing_if = "CalibrationRule::is_optional")]
+    pub calibration: CalibrationRule,
+    /// Criteria by which points are accepted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceptance: Option<AcceptanceCriteria>,
     /// Declared tolerances of the nominal model; the defaults if the file gives none.
     pub tolerances: ModelTolerances,
     /// Whether the file gives any tolerances: only then does the campaign declare that the machine matches its nominal map.
@@ -157,6 +167,13 @@ pub(crate) struct CampaignFile {
     boundary: BoundaryFile,
     /// Declared uncertainty of each measured channel, by its symbol.
     sensors: SensorsFile,
+    /// Whether every sensor needs a valid calibration: `required` makes a missing or expired one, and readings outside its range, errors.
+    #[serde(default)]
+    #[schemars(example = &"required")]
+    calibration: CalibrationRule,
+    /// Criteria of a test code, which the report judges at each point: `PTC 10`, or your own values of another code.
+    #[schemars(example = &"PTC 10")]
+    acceptance: Option<AcceptanceFile>,
     /// Declared tolerances of the nominal model; the defaults if none are given.
     #[serde(default, deserialize_with = "TolerancesElement::declared")]
     #[schemars(with = "TolerancesElement")]
@@ -237,7 +254,11 @@ impl CampaignFile {
         let reference = self.reference.map_or(ReferenceState::SAE, ReferenceState::from);
         let lines = self.grid.lines(reference, &limits);
         let (points, point_paths) = self.grid.points(&lines, boundary.t1_k);
-        let sensors = self.sensors.declarations();
+        let mut sensors = self.sensors.declarations();
+        for (channel, date) in &self.report.calibration {
+            let sensor = sensors.get_mut(channel).filter(|sensor| sensor.calibrations.is_empty());
+            sensor.into_iter().for_each(|sensor| sensor.calibrations = vec![Some(Calibration::on(*date))]);
+        }
         let probe_diameter_m = sensors.get(&Channel::T2).map_or(0.0, |sensor| sensor.probe_diameter_m);
         let mut machine = self.machine.machine(probe_diameter_m, origin, files)?;
         let alpha_area_ratio = machine.params.compressor.alpha_area_ratio;
@@ -263,6 +284,8 @@ impl CampaignFile {
             boundary,
             follow_outlet,
             sensors,
+            calibration: self.calibration,
+            acceptance: self.acceptance.map(AcceptanceCriteria::from),
             tolerances: self.tolerances.unwrap_or_default(),
             tolerances_declared: self.tolerances.is_some(),
             backend: backend(self.backend),

@@ -19,11 +19,12 @@ mod si_values;
 mod testing;
 
 pub use campaign::Campaign;
+pub use checks::calibration::{CalibrationWarning, forecast_calibration_warnings};
 pub use checks::concern::Concern;
 pub use checks::reachable_points::{Unreachable, nominal_model, unreachable_points};
 pub use files::load::{
     CampaignError, FILE_SIZE_LIMIT, MAP_SIZE_LIMIT, backend_mistake, check, check_with, format_mistake, load,
-    read_named_file, read_text, warnings,
+    mistakes, read_named_file, read_text, warnings,
 };
 pub use files::nightly::{Nightly, NightlyError, NightlyGroup, load_nightly};
 pub use files::schema::json_schema;

@@ -3,4 +3,5 @@
 
 mod findings;
 mod nightly_workflow;
+mod register;
 mod shipped;

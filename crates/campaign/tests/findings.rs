@@ -471,6 +471,22 @@ fn types_and_names() {
         "2026-09-01",
     );
     one(
+        "T1: {noise: 0.1 K}",
+        "T1: {noise: 0.1 K, calibration: {date: 2027-01-31, due: 2026-01-31}}",
+        Kind::Conflict,
+        "2026-01-31",
+        "before its day 2027-01-31",
+        "exchange the days",
+    );
+    one(
+        "T1: {noise: 0.1 K}",
+        "T1: {noise: 0.1 K, calibration: {date: 2026-01-31, range: {min: 0 degC, max: 9 kPa}}}",
+        Kind::Unit,
+        "9 kPa",
+        "not a unit of a temperature",
+        "degC",
+    );
+    one(
         "campaign: short\n",
         "campaign: short\nreport: {calibration: {T2: yesterday}}\n",
         Kind::WrongValue,

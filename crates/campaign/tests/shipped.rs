@@ -55,7 +55,7 @@ fn turbo_a_is_the_machine_of_appendix_a() {
     assert_eq!((t2.declared.noise_sigma, t2.declared.offset_sigma, t2.probe_diameter_m), (0.1, 0.25, 0.0));
     assert_eq!(campaign.sensors[&Channel::CompressorFlow].declared.gain_sigma_ratio, 0.005);
     assert_eq!(campaign.report.humidity_ratio, Some(0.5));
-    assert_eq!(campaign.report.calibration[&Channel::T2], "2026-09-01");
+    assert_eq!(campaign.report.calibration[&Channel::T2].to_string(), "2026-09-01");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The clock on the wall, for runs in real time.
 
+use mapper_campaign::campaign::Date;
 use mapper_core::Wall;
 use std::time::{Duration, Instant};
 
@@ -11,6 +12,11 @@ impl SystemWall {
     pub fn new() -> Self {
         SystemWall(Instant::now())
     }
+}
+
+/// The current day, UTC; `None` before 1970.
+pub fn today() -> Option<Date> {
+    Date::of_ns(u64::try_from(jiff::Timestamp::now().as_nanosecond()).unwrap_or(0))
 }
 
 impl Wall for SystemWall {

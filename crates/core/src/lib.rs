@@ -18,6 +18,7 @@ mod schema;
 pub mod test_plan;
 mod text;
 
+pub use identification::acceptance::{ACCEPTANCE_WINDOW_S, AcceptanceCriteria};
 pub use identification::common_errors::CommonErrors;
 pub use identification::identified::{
     EstimateUncertainty, IdentifiedPoint, Method, Verdict, Window, confidence_interval_95, half_width_95,
@@ -34,8 +35,9 @@ pub use identification::thermal_model::{
 };
 pub use identification::uncertainty_budget::{BudgetRow, PointBudgets, UncertaintyBudget};
 pub use identification::warning::{
-    Bound, EndEvidence, EtaSignal, FitFailure, HeatCorrected, LeftOut, MapRegion, ModelDoubt, ModelEvidence,
-    NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault, Swapped, TooFew, Warning, WideInterval,
+    Bound, CalibrationDefect, EndEvidence, EtaSignal, FitFailure, HeatCorrected, LeftOut, MapRegion,
+    ModelDoubt, ModelEvidence, NoCompression, PoorFit, Scaled, StepConflict, SuspectedFault, Swapped, TooFew,
+    Warning, WideInterval,
 };
 pub use identification::window_rule::WindowRule;
 pub use maps::efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
@@ -52,7 +54,9 @@ pub use maps::reference_state::{NAMED_REFERENCES, NamedReference, ReferenceState
 pub use maps::turbine_map::{
     FittedTurbine, FittedTurbineLine, FittedTurbineNode, ImportedTurbine, TurbineMap, TurbineMapPoint,
 };
-pub use measurement::channel::{CHANNELS, Channel, ChannelInfo, Dimension, Group, UnknownChannel};
+pub use measurement::channel::{
+    CHANNELS, Channel, ChannelInfo, Dimension, Group, MODELLED_CHANNELS, UnknownChannel,
+};
 pub use measurement::declared_uncertainty::{DeclaredUncertainty, NoiseColour};
 pub use measurement::event::{Event, EventKind};
 pub use measurement::held_point::{HeldPoint, JUMPS, VALVE_JUMP_RATIO};

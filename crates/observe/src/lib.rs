@@ -5,9 +5,11 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod acceptance;
 pub mod averages;
 pub mod channels;
 pub mod declared;
+pub mod energy_balance;
 pub mod initial_state;
 pub mod model_inputs;
 pub mod perturbation;

@@ -71,10 +71,16 @@ pub use point_results::shared_errors::shared_errors_text;
 pub use point_results::warning_text::{warning_text, with_messages};
 pub use reference_pages::campaign_page::campaign_page;
 pub use reference_pages::sequence_page::sequence_page;
+pub use test_report::acceptance::{
+    ACCEPTANCE_HEADS, BALANCE_HEADS, BALANCE_WORDS, JudgedPoints, acceptance_rows, acceptance_words,
+    balance_rows,
+};
 pub use test_report::assumed_text::{assumed_sentence, assumed_text, first_campaign_text};
 pub use test_report::conditions::{CONDITION_HEADS, condition_rows};
 pub use test_report::ending_text::{PointsOrigin, ending_sentence};
-pub use test_report::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, instrument_rows};
+pub use test_report::instruments::{
+    INSTRUMENT_HEADS, INSTRUMENT_WORDS, REGISTER_HEADS, instrument_rows, register_rows,
+};
 pub use test_report::key_figures::key_figures;
 pub use test_report::repeated_jumps::repeated_jumps_text;
 pub use test_report::run_report::{

@@ -77,6 +77,7 @@ pub use mapper_runner::Operator;
 pub use nights::night_report::{night_report_link, night_report_path, write_night_report};
 pub use nights::nightly::PreparedNight;
 pub use nights::nightly_run::NightlyRun;
+pub use plan::calibration_check::load_on;
 pub use plan::campaign_forecast::CampaignForecast;
 pub use plan::planning::{PlanInputs, nominal_model, plan, plan_of};
 pub use plan::rehearsal::{Rehearsal, rehearse};

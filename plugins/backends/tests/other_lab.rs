@@ -3,7 +3,7 @@
 
 use mapper_backends::other_lab::{OtherStructure, apply_structure};
 use mapper_backends::virtual_lab::{LabSettings, Structure, VirtualLab};
-use mapper_core::{Backend, CHANNELS, Channel, RigMode, SampleBatch, Setpoints};
+use mapper_core::{Backend, Channel, MODELLED_CHANNELS, RigMode, SampleBatch, Setpoints};
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::model::Model;
 use mapper_physics::simulation::simulate::Watch;
@@ -65,7 +65,7 @@ fn tied_together_it_is_the_virtual_lab() {
 #[test]
 fn as_it_is_it_is_another_machine() {
     let (lumped, other) = (recorded(None), recorded(Some(OtherStructure::default())));
-    assert_eq!(lumped.columns.len(), CHANNELS.len());
+    assert_eq!(lumped.columns.len(), MODELLED_CHANNELS);
     let apart = |channel| {
         let pairs = column(&lumped, channel).iter().zip(column(&other, channel)).skip(10);
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)

@@ -1,5 +1,6 @@
 //! Checks of a campaign beyond its schema: consistency of values, reachable points, and warnings about unusual values.
 
+pub(crate) mod calibration;
 pub(crate) mod concern;
 pub(crate) mod consistency;
 pub(crate) mod prospects;

@@ -162,6 +162,18 @@ pub fn warnings(text: &str, origin: &Path, campaign: &Campaign, more: Vec<Concer
     tree.findings(notes)
 }
 
+/// Mistakes of a campaign that another crate found, each at its place in the text.
+pub fn mistakes(text: &str, origin: &Path, concerns: Vec<Concern>) -> Findings {
+    let (tree, mut notes) = match read(text, origin) {
+        Ok(read) => read,
+        Err(findings) => return findings,
+    };
+    for concern in concerns {
+        note(&tree, &mut notes, FindingKind::Implausible, concern);
+    }
+    tree.findings(notes)
+}
+
 /// Files of other commands, by a key that only they have.
 const OTHER_FILES: [(&str, &str, &str); 2] = [
     ("nightly", "this file describes nightly runs, not a campaign", "use `mapper nightly FILE`"),

@@ -5,10 +5,10 @@ use crate::output::failure::Failure;
 use crate::{
     interrupt,
     output::{output_options, standard_output},
-    registry,
+    registry, wall_clock,
 };
 use clap::Args;
-use mapper_campaign::CampaignError;
+use mapper_campaign::{CampaignError, campaign::Date};
 use mapper_report::{assumed_text, declared_sensors_text, duration, lines_text, verdict_forecast_text};
 use mapper_session::{Session, nominal_model};
 use serde_json::json;
@@ -19,6 +19,9 @@ use std::path::PathBuf;
 pub struct Check {
     /// Campaign file (YAML)
     pub campaign: PathBuf,
+    /// Day of the run, on which calibrations must be valid; today if it is left out
+    #[arg(long, value_name = "DATE")]
+    pub date: Option<Date>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -27,8 +30,9 @@ pub struct Check {
 impl Check {
     /// Checks a campaign, makes its plan or rehearses its script, and prints a summary after any warnings.
     pub fn run(&self) -> Result<(), Failure> {
-        let campaign = match mapper_campaign::load(&self.campaign) {
-            Ok(campaign) => campaign,
+        let day = self.date.or_else(wall_clock::today);
+        let (campaign, text) = match mapper_session::load_on(&self.campaign, day) {
+            Ok(loaded) => loaded,
             Err(CampaignError::Mistakes(findings)) if self.json => {
                 let omitted = findings.omitted;
                 let mut mistakes = Failure::of_campaign(CampaignError::Mistakes(findings)).json();
@@ -48,12 +52,8 @@ impl Check {
             .map_err(|error| Failure::in_campaign(error, &self.campaign))?;
         let stop = interrupt::stop_flag()?;
         let session = Session { stop: &stop, ..Session::new(&registry) };
-        let forecast = session.forecast_campaign(&campaign, &model)?;
-        let text = mapper_campaign::read_text(&self.campaign).map_err(|error| {
-            Failure::new(Code::Failure, format!("failed to read {}: {error}", self.campaign.display()))
-        })?;
+        let forecast = session.forecast_campaign(&campaign, &model, day)?;
         let warnings = mapper_campaign::warnings(&text, &self.campaign, &campaign, forecast.concerns);
-        let (steps, duration_s) = (forecast.steps, forecast.duration_s);
         let lines = mapper_campaign::resolved_lines(&campaign, &model);
         if self.json {
             return standard_output::print_json(&json!({
@@ -61,8 +61,8 @@ impl Check {
                 "points": campaign.points.len(),
                 "lines": lines,
                 "assumed": campaign.machine.assumed,
-                "steps": steps,
-                "minutes": duration_s / 60.0,
+                "steps": forecast.steps,
+                "minutes": forecast.duration_s / 60.0,
                 "backend": campaign.backend.name,
                 "expected": forecast.verdicts,
                 "advice": forecast.advice,
@@ -85,11 +85,12 @@ impl Check {
             count => format!(", {count} warnings"),
         };
         standard_output::print(&format!(
-            "{}: no mistakes{number}. {} points in {at_most}{steps} steps on `{}` in {} of rig time{forecast_by}.\n{}{}{}{}",
+            "{}: no mistakes{number}. {} points in {at_most}{} steps on `{}` in {} of rig time{forecast_by}.\n{}{}{}{}",
             self.campaign.display(),
             campaign.points.len(),
+            forecast.steps,
             campaign.backend.name,
-            duration(duration_s),
+            duration(forecast.duration_s),
             verdict_forecast_text(forecast.verdicts, &forecast.advice),
             declared_sensors_text(&campaign),
             assumed_text(&campaign),

@@ -4,7 +4,7 @@ use crate::output::detail_options::ShownArguments;
 use crate::output::exit_code::Code;
 use crate::output::failure::Failure;
 use crate::terminal::results_text;
-use crate::wall_clock::SystemWall;
+use crate::wall_clock::{SystemWall, today};
 use crate::{
     interrupt,
     output::{output_options, standard_output},
@@ -17,7 +17,7 @@ use mapper_live::{ObserverRequest, LiveError, LiveRun, Observers, TlsFiles};
 use mapper_report::{plan_text, with_messages};
 use mapper_session::{
     InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, RunTermination, Session,
-    SessionError, SessionEvent, recording::run_directory, soak_s, start_time_ns,
+    SessionError, SessionEvent, load_on, recording::run_directory, soak_s, start_time_ns,
 };
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -68,10 +68,7 @@ impl Run {
     pub fn run(&self) -> Result<(), Failure> {
         let kept = self.resume.as_ref().map(|run| run.join(run_directory::CAMPAIGN));
         let Some(file) = self.campaign.clone().or(kept) else { return Ok(()) };
-        let campaign = mapper_campaign::load(&file).map_err(Failure::of_campaign)?;
-        let campaign_text = mapper_campaign::read_text(&file).map_err(|error| {
-            Failure::new(Code::Failure, format!("failed to read {}: {error}", file.display()))
-        })?;
+        let (campaign, campaign_text) = load_on(&file, today()).map_err(Failure::of_campaign)?;
         let resume = self.resume.as_deref().map(InterruptedRun::read).transpose()?;
         if self.pace.is_some_and(|pace| !(pace.is_finite() && pace > 0.0)) {
             return Err(Failure::new(Code::BadInput, "--pace takes a number above 0"));

@@ -1,5 +1,6 @@
 //! Settings and results of identification: window rule, tolerances, identified points, shared parameters and uncertainty.
 
+pub(crate) mod acceptance;
 pub(crate) mod common_errors;
 pub(crate) mod identified;
 pub(crate) mod inlet_convection;

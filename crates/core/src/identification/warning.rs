@@ -31,6 +31,8 @@ Warning {
     "lost_samples" LostSamples { lost: usize, samples: usize },
     /// Samples were left out: spikes, or farther than `limit_k` from the fit.
     "outliers" Outliers { count: usize, limit_k: Option<f64> },
+    /// The calibration of a sensor does not support its readings.
+    "calibration" Calibration { channel: Channel, sensor: String, defect: CalibrationDefect },
     /// Part of the state at the step's end is not from its last seconds.
     "end_state" EndState { channel: Channel, lost_before_end_s: f64 },
 
@@ -103,6 +105,17 @@ macro_rules! kinds {
 }
 
 kinds! {
+    /// What is wrong with a calibration; values in the unit of the channel.
+    CalibrationDefect {
+        /// It is required, and this key of it is missing; the whole of it if the key is `calibration`.
+        Missing { key: String },
+        /// It is not valid any more on the day of the run; days as year-month-day.
+        Expired { due: String, day: String },
+        /// A reading is outside the calibrated range: the farthest one.
+        Range { reading: f64, min: f64, max: f64 },
+        /// The certificate's standard uncertainty is larger than the declared one.
+        Uncertainty { certified: f64, declared: f64 },
+    }
     /// Evidence for a scaled channel; medians.
     Scaled {
         /// N, m_c and P2/P1 give an impossible specific speed.

@@ -54,6 +54,21 @@ pub enum Channel {
     /// Commanded oil inlet temperature.
     #[serde(rename = "T_oil_command")]
     TOilCommand,
+    /// Oil outlet temperature.
+    #[serde(rename = "T_oil_out")]
+    TOilOut,
+    /// Oil mass flow.
+    #[serde(rename = "m_oil")]
+    OilFlow,
+    /// Cooling water inlet temperature.
+    #[serde(rename = "T_water")]
+    TWater,
+    /// Cooling water outlet temperature.
+    #[serde(rename = "T_water_out")]
+    TWaterOut,
+    /// Cooling water mass flow.
+    #[serde(rename = "m_water")]
+    WaterFlow,
 }
 
 /// The device a channel belongs to; one message per group and sample is recorded.
@@ -62,7 +77,7 @@ pub enum Channel {
 pub enum Group {
     /// Shaft and compressor side.
     Compressor,
-    /// Turbine side, oil included.
+    /// Turbine side, oil and cooling water included.
     Turbine,
     /// The test cell.
     Ambient,
@@ -133,7 +148,7 @@ pub struct ChannelInfo {
 
 /// Every channel, in recording order.
 #[rustfmt::skip]
-pub const CHANNELS: [ChannelInfo; 19] = {
+pub const CHANNELS: [ChannelInfo; 24] = {
     use Channel as C;
     use Dimension::{MassFlow, Pressure, Ratio, RotationalSpeed, Temperature};
     const fn row(channel: Channel, symbol: &'static str, group: Group, field: &'static str, dimension: Dimension, description: &'static str) -> ChannelInfo {
@@ -159,8 +174,16 @@ pub const CHANNELS: [ChannelInfo; 19] = {
         row(C::T3Command,      "T3_command",    Group::Command,    "turbine_inlet_temperature_k", Temperature,     "commanded turbine inlet temperature"),
         row(C::ValveCommand,   "valve_command", Group::Command,    "valve_opening",               Ratio,           "commanded back-pressure valve opening, relative to the nominal area"),
         row(C::TOilCommand,    "T_oil_command", Group::Command,    "oil_temperature_k",           Temperature,     "commanded oil inlet temperature"),
+        row(C::TOilOut,        "T_oil_out",     Group::Turbine,    "oil_outlet_temperature_k",    Temperature,     "oil outlet temperature"),
+        row(C::OilFlow,        "m_oil",         Group::Turbine,    "oil_flow_kg_s",               MassFlow,        "oil mass flow"),
+        row(C::TWater,         "T_water",       Group::Turbine,    "water_temperature_k",         Temperature,     "cooling water inlet temperature"),
+        row(C::TWaterOut,      "T_water_out",   Group::Turbine,    "water_outlet_temperature_k",  Temperature,     "cooling water outlet temperature"),
+        row(C::WaterFlow,      "m_water",       Group::Turbine,    "water_flow_kg_s",             MassFlow,        "cooling water mass flow"),
     ]
 };
+
+/// Number of channels that the model has: the first ones. The others are only measured.
+pub const MODELLED_CHANNELS: usize = 19;
 
 impl Channel {
     /// The channel's row in [`CHANNELS`].

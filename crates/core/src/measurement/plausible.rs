@@ -23,19 +23,21 @@ pub struct Plausible {
 /// | T1, ambient | 220..390 K | arctic cell to the outlet of an upstream stage without a cooler | 100..3000 |
 /// | T2 | 220..700 K | limit of compressor wheels | 100..3000 |
 /// | compressor housing | 220..800 K | above the limit of aluminium | 100..3000 |
-/// | oil | 220..480 K | oil burns above | 100..3000 |
+/// | oil, water | 220..480 K | oil burns above, and water boils at 18 bar | 100..3000 |
 /// | turbine side | 220..1600 K | above the limit of turbine materials | 100..3000 |
 pub fn plausible(channel: Channel) -> Plausible {
     let running = match channel {
         Channel::ShaftSpeed => 1e3..=4e5,
-        Channel::CompressorFlow | Channel::TurbineFlow => 1e-4..=20.0,
+        Channel::CompressorFlow | Channel::TurbineFlow | Channel::OilFlow | Channel::WaterFlow => 1e-4..=20.0,
         Channel::P1 => 3e4..=6e5,
         Channel::P2 | Channel::P3 | Channel::P4 | Channel::P3Command => 5e4..=2e6,
         Channel::T1 | Channel::TAmb => 220.0..=390.0,
         Channel::T2 => 220.0..=700.0,
         Channel::Tc => 220.0..=800.0,
         Channel::T3 | Channel::T4 | Channel::Tt | Channel::T3Command => 220.0..=1600.0,
-        Channel::TOil | Channel::TOilCommand => 220.0..=480.0,
+        Channel::TOil | Channel::TOilOut | Channel::TOilCommand | Channel::TWater | Channel::TWaterOut => {
+            220.0..=480.0
+        }
         Channel::ValveCommand => 0.0..=10.0,
     };
     let any = match channel.info().dimension {

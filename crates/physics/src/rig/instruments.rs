@@ -146,7 +146,8 @@ impl Instruments {
     }
 }
 
-/// The value of the quantity of `channel` on a running machine, in the channel's unit; `None` for commands, which no sensor measures.
+/// The value of the quantity of `channel` on a running machine, in the channel's unit; `None` for commands, which no sensor measures, and for
+/// channels that the model does not have.
 pub fn true_value(
     channel: Channel,
     prepared: &PreparedModel<'_>,
@@ -171,6 +172,9 @@ pub fn true_value(
         Channel::TOil => boundary.oil_temperature_k,
         Channel::TAmb => boundary.ambient_temperature_k,
         Channel::P3Command | Channel::T3Command | Channel::ValveCommand | Channel::TOilCommand => {
+            return None;
+        }
+        Channel::TOilOut | Channel::OilFlow | Channel::TWater | Channel::TWaterOut | Channel::WaterFlow => {
             return None;
         }
     };

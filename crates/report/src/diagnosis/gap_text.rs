@@ -409,5 +409,5 @@ fn points(points: &[PointGap]) -> String {
         if h_w_m2k.abs() < 0.5 { "nor h".to_owned() } else { format!("h by up to {h_w_m2k:+.0} W/(m2 K)") };
     let joined = if eta_points.abs() < 0.005 && h_w_m2k.abs() >= 0.5 { "but changes " } else { "" };
     let nor = if eta_points.abs() >= 0.005 && h_w_m2k.abs() < 0.5 { "not h".to_owned() } else { h };
-    format!("  at equal speed and pressures the cause {eta}, {joined}{nor}\n")
+    format!("  at the recorded points, at equal speed and pressures, the cause {eta}, {joined}{nor}\n")
 }

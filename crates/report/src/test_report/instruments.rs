@@ -1,4 +1,4 @@
-//! The instruments: declared uncertainty, uncertainty after a zero, date of calibration.
+//! The instruments: declared uncertainty, uncertainty after a zero, calibration register.
 
 use crate::formatting::display::Display;
 use mapper_campaign::Campaign;
@@ -41,7 +41,7 @@ pub fn instrument_rows(
             _ => dash(),
         };
         let several = sensor.redundant.as_ref().map(|_| " (several)").unwrap_or_default();
-        let calibrated = campaign.report.calibration.get(channel).cloned();
+        let dates = sensor.calibrations.iter().flatten().map(|calibration| calibration.date);
         [
             channel.to_string(),
             format!("{}{several}", channel.info().description),
@@ -54,10 +54,43 @@ pub fn instrument_rows(
                 _ => dash(),
             },
             place,
-            calibrated.unwrap_or_else(|| "not stated".to_owned()),
+            dates.max().map_or_else(|| "not stated".to_owned(), |date| date.to_string()),
         ]
     };
     campaign.sensors.iter().map(row).collect()
+}
+
+/// Columns of [`register_rows`].
+pub const REGISTER_HEADS: [&str; 7] =
+    ["sensor", "certificate", "laboratory", "calibrated", "due", "range", "U (k = 2)"];
+
+/// A row for each sensor whose calibration states more than its day.
+pub fn register_rows(campaign: &Campaign, display: &Display) -> Vec<[String; 7]> {
+    let mut rows = Vec::new();
+    for (&channel, declaration) in &campaign.sensors {
+        for (_, sensor, calibration) in declaration.calibrated(channel) {
+            let Some(calibration) = calibration.filter(|one| one.is_certified()) else { continue };
+            let text = |value: &Option<String>| value.clone().unwrap_or_else(dash);
+            let reading = |value: f64| display.shown_reading(channel, value);
+            rows.push([
+                sensor,
+                text(&calibration.certificate),
+                text(&calibration.laboratory),
+                calibration.date.to_string(),
+                calibration.due.map_or_else(dash, |due| due.to_string()),
+                calibration.range.map_or_else(dash, |(min, max)| {
+                    format!("{} to {} {}", reading(min), reading(max), display.unit_of(channel))
+                }),
+                calibration
+                    .uncertainty
+                    .and_then(|expanded| display.difference(channel, expanded))
+                    .map_or_else(dash, |expanded| {
+                        format!("{} {}", two_figures(expanded), display.difference_unit(channel))
+                    }),
+            ]);
+        }
+    }
+    rows
 }
 
 fn dash() -> String {

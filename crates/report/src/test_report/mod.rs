@@ -1,5 +1,6 @@
 //! The test report of a run and its sections: key figures, conditions, instruments, zero, drift, surge and assumptions.
 
+pub(crate) mod acceptance;
 pub(crate) mod assumed_text;
 pub(crate) mod conditions;
 pub(crate) mod ending_text;

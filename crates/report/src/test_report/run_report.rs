@@ -11,10 +11,13 @@ use crate::point_results::point_table::{point_cells, point_groups, point_heads};
 use crate::point_results::point_warnings::doubts;
 use crate::point_results::points::score_text;
 use crate::point_results::shared_errors::shared_errors_text;
+use crate::test_report::acceptance::{JudgedPoints, acceptance_sections};
 use crate::test_report::assumed_text::assumed_sentence;
 use crate::test_report::conditions::{CONDITION_HEADS, condition_rows};
 use crate::test_report::ending_text::PointsOrigin;
-use crate::test_report::instruments::{INSTRUMENT_HEADS, INSTRUMENT_WORDS, instrument_rows};
+use crate::test_report::instruments::{
+    INSTRUMENT_HEADS, INSTRUMENT_WORDS, REGISTER_HEADS, instrument_rows, register_rows,
+};
 use crate::test_report::key_figures::key_figures;
 use crate::test_report::repeated_jumps::repeated_jumps_text;
 use crate::test_report::surge_text::surge_text;
@@ -87,6 +90,14 @@ pub struct RunReport<'a> {
     pub surge: Option<SurgeReport<'a>>,
     /// Whether a picture of the map is next to the report as `map.svg`.
     pub has_picture: bool,
+}
+
+impl<'a> RunReport<'a> {
+    /// The points and their readings, for energy balance and acceptance.
+    pub(crate) fn judged_points(&self) -> JudgedPoints<'a> {
+        let RunReport { campaign, recording, points, used, .. } = *self;
+        JudgedPoints { campaign, recording, points, used }
+    }
 }
 
 /// A recording that points were identified from.
@@ -174,10 +185,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         text.push('\n');
     }
     if let Some(campaign) = campaign {
-        let rows = instrument_rows(campaign, report.used, &display);
-        let _ = writeln!(text, "## Instruments\n\n{INSTRUMENT_WORDS}\n");
-        text.push_str(&markdown::table(&INSTRUMENT_HEADS, Align::Left, &rows));
-        text.push('\n');
+        text.push_str(&instruments_section(campaign, report.used, &display));
     }
     if !sensors.is_empty() {
         let lines: String = sensors.iter().map(|fused| format!("- {fused}\n")).collect();
@@ -199,6 +207,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         ));
     }
     text.push_str(&budget_section(report.budgets));
+    text.push_str(&acceptance_sections(report.judged_points()));
     if let Some(SurgeReport { marks, remarks, surges }) = surge {
         let _ = write!(text, "\n## Surge\n\n{}", surge_text(marks, remarks, surges, &units));
     }
@@ -354,6 +363,24 @@ fn whole_duration(campaign: &Campaign, plan: &Plan) -> String {
         ),
         None => duration(plan.duration_s()),
     }
+}
+
+fn instruments_section(
+    campaign: &Campaign,
+    used: &BTreeMap<Channel, DeclaredUncertainty>,
+    display: &Display,
+) -> String {
+    let rows = instrument_rows(campaign, used, display);
+    let mut text = format!("## Instruments\n\n{INSTRUMENT_WORDS}\n\n");
+    text.push_str(&markdown::table(&INSTRUMENT_HEADS, Align::Left, &rows));
+    text.push('\n');
+    let register = register_rows(campaign, display);
+    if !register.is_empty() {
+        text.push_str("### Calibration register\n\n");
+        text.push_str(&markdown::table(&REGISTER_HEADS, Align::Left, &register));
+        text.push('\n');
+    }
+    text
 }
 
 fn points_section(text: &mut String, units: &DisplayUnits, report: &RunReport<'_>) {

@@ -1,10 +1,12 @@
 //! Converts a recording into identified points, with their truth if known. All commands use this module.
 
 use crate::plan::surge::find_surge_marks;
+use crate::recording::calibration_warnings;
 use crate::recording::fusing::fused;
 use crate::recording::identification_config::{declared_conditions, identification_of, identification_with};
 use crate::recording::recording_file::{Recorded, check_all_distinct, check_machine};
 use crate::{Session, SessionError, SessionEvent};
+use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
     Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, SurgeNotFound,
@@ -168,6 +170,7 @@ impl Session<'_> {
             method
         });
         remarks.extend(unknown_barometer(map));
+        let day = recorded.first().and_then(|first| Date::of_ns(first.read.start_time_ns));
         let soak = campaign.and_then(|campaign| campaign.zero);
         let (mut recordings, mut sources) = (Vec::new(), Vec::new());
         for Recorded { read, approaches, .. } in recorded {
@@ -192,7 +195,10 @@ impl Session<'_> {
             conditions: &conditions,
         });
         let found = identify_with_rig(&recording, &config, nominal)?;
-        let points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
+        let mut points: Vec<IdentifiedPoint> = found.points.into_iter().filter_map(Result::ok).collect();
+        if let Some(campaign) = campaign {
+            calibration_warnings::warn(&mut points, &recording, campaign, day);
+        }
         for point in &points {
             self.send(SessionEvent::PointIdentified(Box::new(point.clone())));
         }

@@ -1,11 +1,13 @@
 //! Forecast of a campaign before its run: duration, expected verdicts, and settings that will give no result.
 
+use crate::plan::calibration_check::calibration_concerns;
 use crate::plan::needed_dwell::{needed_dwell_s, settled_time_s};
 use crate::plan::planning::{PlanInputs, plan_of};
 use crate::plan::rehearsal::rehearse;
 use crate::plan::verdict_forecast::{advise, forecast_verdicts};
 use crate::rig::drive::soak_s;
 use crate::{Session, SessionError};
+use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, Concern};
 use mapper_core::{
     Advice, Dwell, JointSettings, Method, Plan, PlanStep, StepKind, VerdictForecast, WindowRule,
@@ -51,7 +53,8 @@ pub struct CampaignForecast {
 }
 
 impl Session<'_> {
-    /// Simulates the steps of the campaign, or rehearses its script, and looks for settings that will give no result.
+    /// Simulates the steps of the campaign, or rehearses its script, and looks for settings that will give no result, and for
+    /// calibrations that are not valid on the day of the run.
     ///
     /// # Errors
     /// [`SessionError`] if the plan is missing, or the script fails.
@@ -59,6 +62,7 @@ impl Session<'_> {
         &self,
         campaign: &Campaign,
         model: &Model,
+        day: Option<Date>,
     ) -> Result<CampaignForecast, SessionError> {
         let every = campaign.points.len().div_ceil(MAX_SIMULATED_POINTS).max(1);
         let plan = match &campaign.sequence {
@@ -72,6 +76,7 @@ impl Session<'_> {
             required_error_concern(campaign, &plan),
             information_concern(campaign, &plan),
         ];
+        let calibrations = calibration_concerns(campaign, model, day);
         let verdicts = forecast_verdicts(campaign, &plan);
         let advice = match verdicts {
             Some(now) if now.surely_good() < now.points => {
@@ -92,7 +97,7 @@ impl Session<'_> {
             steps,
             is_planned,
             duration_s: soak_s(campaign) + duration_s,
-            concerns: concerns.into_iter().flatten().collect(),
+            concerns: calibrations.into_iter().chain(concerns.into_iter().flatten()).collect(),
             verdicts,
             advice,
         })

@@ -1,5 +1,6 @@
 //! Planning of a campaign before its run: order of steps, forecasts of duration and verdicts, rehearsal of scripts.
 
+pub(crate) mod calibration_check;
 pub(crate) mod campaign_forecast;
 pub(crate) mod needed_dwell;
 pub(crate) mod planning;

@@ -23,6 +23,13 @@ impl<D: Dimension> Quantity<D> {
     }
 }
 
+impl<D> From<Quantity<D>> for f64 {
+    /// The value in the unit used inside.
+    fn from(quantity: Quantity<D>) -> f64 {
+        quantity.inside
+    }
+}
+
 impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
     fn deserialize<S: Deserializer<'de>>(deserializer: S) -> Result<Self, S::Error> {
         let text = String::deserialize(deserializer)?;

@@ -12,8 +12,8 @@ use crate::virtual_lab::sensors::elements::ElementBank;
 use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
 use crate::virtual_lab::sensors::sensor::Sensor;
 use mapper_core::{
-    Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, RigDescription, RigMode,
-    SafeTrajectory, SampleBatch, Setpoints,
+    Backend, BackendError, CHANNELS, Channel, Event, EventKind, GuardName, MODELLED_CHANNELS, RigDescription,
+    RigMode, SafeTrajectory, SampleBatch, Setpoints,
 };
 use mapper_physics::laws::standstill::{self, StandstillState};
 use mapper_physics::rig::instruments::ChannelFollower;
@@ -73,7 +73,7 @@ pub struct VirtualLab {
 
 /// Channels the lab delivers: all of them.
 fn channels() -> Vec<Channel> {
-    CHANNELS.iter().map(|row| row.channel).collect()
+    CHANNELS[..MODELLED_CHANNELS].iter().map(|row| row.channel).collect()
 }
 
 impl VirtualLab {

@@ -7,7 +7,9 @@ use crate::virtual_lab::rig::precursor::{P2_SHARE, Resonator, Swing};
 use crate::virtual_lab::sensors::elements::ElementBank;
 use crate::virtual_lab::sensors::second_order::SecondOrderFollower;
 use crate::virtual_lab::sensors::sensor::Sensor;
-use mapper_core::{CHANNELS, Channel, ChannelColumn, ElementColumn, Event, SampleBatch, Setpoints};
+use mapper_core::{
+    CHANNELS, Channel, ChannelColumn, ElementColumn, Event, MODELLED_CHANNELS, SampleBatch, Setpoints,
+};
 use mapper_physics::gas::pressure_tap;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::rig::instruments::{ChannelFollower, Instruments};
@@ -70,7 +72,7 @@ impl SampleCollector {
         SampleCollector {
             first_sequence,
             t_s: Vec::new(),
-            columns: vec![Vec::new(); CHANNELS.len()],
+            columns: vec![Vec::new(); MODELLED_CHANNELS],
             elements: sensor_bank.several.iter().flat_map(ElementBank::columns).collect(),
             truth: TruthRecorder::default(),
         }

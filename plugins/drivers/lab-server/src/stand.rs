@@ -1,7 +1,8 @@
 //! The lab as a PLC sees it: readings, setpoints, a heartbeat, and interlocks that no client can bypass. Time is an argument.
 
 use mapper_core::{
-    Backend, BackendError, CHANNELS, Channel, EventKind, RigMode, SetpointRange, SetpointRanges, Setpoints,
+    Backend, BackendError, CHANNELS, Channel, EventKind, MODELLED_CHANNELS, RigMode, SetpointRange,
+    SetpointRanges, Setpoints,
 };
 use std::collections::BTreeMap;
 
@@ -13,7 +14,11 @@ const OVERSPEED: f64 = 1.05;
 /// Measured channels, in the order of registers.
 pub fn measured() -> Vec<Channel> {
     let is_command = |channel: Channel| channel.symbol().ends_with("_command");
-    CHANNELS.iter().map(|row| row.channel).filter(|channel| !is_command(*channel)).collect()
+    CHANNELS[..MODELLED_CHANNELS]
+        .iter()
+        .map(|row| row.channel)
+        .filter(|channel| !is_command(*channel))
+        .collect()
 }
 
 /// The setpoints, in the order of registers.

@@ -1,13 +1,13 @@
 //! `report:`
 
 use crate::checking::Check;
+use crate::elements::rig::calibration::{Date, check_date};
 use crate::elements::rig::sensors::CALIBRATED;
 use crate::si_values::si_if_given;
 use crate::units::{Fraction, Pressure, Quantity, Temperature};
 use mapper_core::Channel;
 use mapper_physics::gas::air::Air;
 use mapper_physics::machine::params::BoundaryConditions;
-use mapper_yaml::FindingKind;
 use mapper_yaml::steps;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,10 +29,10 @@ pub struct Report {
     pub operator: Option<String>,
     /// Place of the test.
     pub test_cell: Option<String>,
-    /// Day of the last calibration of each sensor, by its symbol, e.g. `T2: 2026-09-01`.
+    /// Day of the last calibration of each sensor, by its symbol, e.g. `T2: 2026-09-01`: the short form of `calibration` at the sensor.
     #[serde(default)]
     #[schemars(with = "BTreeMap<SensorSymbol, Date>")]
-    pub calibration: BTreeMap<Channel, String>,
+    pub calibration: BTreeMap<Channel, Date>,
     /// Barometric pressure in the cell.
     #[serde(rename(deserialize = "barometer"), default, deserialize_with = "si_if_given::<Pressure, _>")]
     #[schemars(with = "Option<Quantity<Pressure>>", extend("x-min" = "50 kPa", "x-max" = "120 kPa"))]
@@ -77,7 +77,7 @@ const HYGROMETER_RATIO: f64 = 0.03;
 const ANYWHERE_RATIO: f64 = 0.577_350_269_189_625_8;
 
 /// A channel that has a sensor, by its symbol.
-struct SensorSymbol;
+pub(crate) struct SensorSymbol;
 
 impl JsonSchema for SensorSymbol {
     fn inline_schema() -> bool {
@@ -93,60 +93,17 @@ impl JsonSchema for SensorSymbol {
     }
 }
 
-/// A day, written year-month-day, e.g. `2026-09-01`.
-#[derive(JsonSchema)]
-#[serde(transparent)]
-#[expect(dead_code, reason = "stands for its schema alone")]
-struct Date(
-    #[schemars(regex(pattern = r"^[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])$"), example = &"2026-09-01")]
-     String,
-);
-
-/// Checks that days of calibration exist in the calendar. The schema checks their form.
+/// Checks that days of calibration exist in the calendar.
 pub(crate) fn check(check: &mut Check<'_>) {
     let tree = check.tree;
     for channel in tree.keys(&steps!["report", "calibration"]) {
-        let steps = steps!["report", "calibration", channel];
-        if let Some(text) = check.text(&steps)
-            && let Some((year, month, day)) = date(text)
-            && (1..=12).contains(&month)
-            && (29..=31).contains(&day)
-            && day > days_of(year, month)
-        {
-            let message = format!("`{text}` is not a calendar date");
-            let remedy = "write year-month-day, e.g. `2026-09-01`";
-            check.note(FindingKind::WrongValue, &steps, message, remedy);
-        }
-    }
-}
-
-fn date(text: &str) -> Option<(u32, u32, u32)> {
-    let mut parts = text.splitn(3, '-').map(|part| part.parse().ok());
-    Some((parts.next()??, parts.next()??, parts.next()??))
-}
-
-fn days_of(year: u32, month: u32) -> u32 {
-    match month {
-        4 | 6 | 9 | 11 => 30,
-        2 if year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400)) => 29,
-        2 => 28,
-        _ => 31,
+        check_date(check, &steps!["report", "calibration", channel]);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// In the calendar 1900 was not a leap year; 2000 and 2024 were.
-    #[test]
-    fn months_have_their_days() {
-        for (year, month, days) in
-            [(2026, 2, 28), (2024, 2, 29), (1900, 2, 28), (2000, 2, 29), (2026, 4, 30), (2026, 12, 31)]
-        {
-            assert_eq!(days_of(year, month), days, "{year}-{month}");
-        }
-    }
 
     #[test]
     fn written_with_units_kept_in_si() {
@@ -155,7 +112,7 @@ mod tests {
                 .unwrap();
         assert!((report.barometer_pa.unwrap() - 99e3).abs() < 1e-6);
         assert_eq!((report.humidity_ratio, report.cell_temperature_k), (Some(0.45), None));
-        assert_eq!(report.calibration[&Channel::T2], "2026-09-01");
+        assert_eq!(report.calibration[&Channel::T2].to_string(), "2026-09-01");
         assert!(serde_json::to_value(&report).unwrap().get("barometer_pa").is_some(), "SI names in SI files");
     }
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod backend;
 pub(crate) mod boundary;
+pub(crate) mod calibration;
 pub(crate) mod guards;
 pub(crate) mod limits;
 pub(crate) mod readers;

@@ -1,12 +1,14 @@
 //! `sensors:`
 
 use crate::checking::Check;
+use crate::elements::rig::calibration::{self, CalibrationFile};
 use crate::elements::rig::several_sensors::{
-    Sensor, SensorDeclaration, Sensors, Several, check_several, each_place,
+    DeclaredSensors, Sensor, SensorDeclaration, Sensors, Several, check_several, each_place,
 };
 use crate::si_values::or;
 use crate::units::{
-    Dimension, Fraction, Length, MassFlow, PressureDifference, Quantity, Speed, TemperatureDifference,
+    Dimension, Fraction, Length, MassFlow, Pressure, PressureDifference, Quantity, Speed, Temperature,
+    TemperatureDifference,
 };
 use mapper_core::{Channel, DeclaredUncertainty};
 use mapper_yaml::FindingKind;
@@ -15,80 +17,70 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// Declared uncertainty of each measured channel, by its symbol; one standard deviation throughout.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct SensorsFile {
-    /// Shaft speed.
-    #[serde(rename = "N")]
-    n: Sensors<SpeedSensor>,
-    /// Compressor mass flow.
-    m_c: Sensors<FlowSensor>,
-    /// Compressor inlet pressure.
-    #[serde(rename = "P1")]
-    p1: Sensors<PressureSensor>,
-    /// Compressor inlet total temperature.
-    #[serde(rename = "T1")]
-    t1: Sensors<TemperatureSensor>,
-    /// Compressor outlet pressure.
-    #[serde(rename = "P2")]
-    p2: Sensors<PressureSensor>,
-    /// Compressor outlet total temperature.
-    #[serde(rename = "T2")]
-    t2: Sensors<ProbeSensor>,
-    /// Compressor housing temperature.
-    #[serde(rename = "Tc")]
-    tc: Sensors<TemperatureSensor>,
-    /// Turbine mass flow.
-    m_t: Option<Sensors<FlowSensor>>,
-    /// Turbine inlet pressure.
-    #[serde(rename = "P3")]
-    p3: Option<Sensors<PressureSensor>>,
-    /// Turbine inlet total temperature.
-    #[serde(rename = "T3")]
-    t3: Option<Sensors<TemperatureSensor>>,
-    /// Turbine outlet pressure.
-    #[serde(rename = "P4")]
-    p4: Option<Sensors<PressureSensor>>,
-    /// Turbine outlet total temperature.
-    #[serde(rename = "T4")]
-    t4: Option<Sensors<TemperatureSensor>>,
-    /// Turbine housing temperature.
-    #[serde(rename = "Tt")]
-    tt: Option<Sensors<TemperatureSensor>>,
-    /// Oil inlet temperature.
-    #[serde(rename = "T_oil")]
-    t_oil: Option<Sensors<TemperatureSensor>>,
-    /// Ambient temperature.
-    #[serde(rename = "T_amb")]
-    t_amb: Option<Sensors<TemperatureSensor>>,
+/// Declares the sensors of the file: description, symbol, channel, type.
+macro_rules! sensors {
+    ($(#[doc = $doc:literal] $symbol:literal $field:ident: $channel:ident, $sensors:ty;)+) => {
+        /// Declared uncertainty of each measured channel, by its symbol; one standard deviation throughout.
+        #[derive(Debug, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub(crate) struct SensorsFile {
+            $(#[doc = $doc] #[serde(rename = $symbol)] $field: $sensors,)+
+        }
+
+        impl SensorsFile {
+            /// The declared uncertainties of each channel that has a sensor.
+            pub(crate) fn declarations(&self) -> BTreeMap<Channel, SensorDeclaration> {
+                let all = [$((Channel::$channel, self.$field.declared(Channel::$channel)),)+];
+                all.into_iter().filter_map(|(channel, declared)| Some((channel, declared?))).collect()
+            }
+        }
+
+        /// Symbols of all channels that have a sensor.
+        pub(crate) const CALIBRATED: &[&str] = &[$($symbol),+];
+    };
 }
 
-impl SensorsFile {
-    /// The declared uncertainties of each channel that has a sensor.
-    pub(crate) fn declarations(&self) -> BTreeMap<Channel, SensorDeclaration> {
-        use Channel as C;
-        let mut all = BTreeMap::new();
-        let mut put = |channel: Channel, sensors: Option<SensorDeclaration>| {
-            all.extend(sensors.map(|sensors| (channel, sensors)));
-        };
-        put(C::ShaftSpeed, Some(self.n.declaration(C::ShaftSpeed)));
-        put(C::CompressorFlow, Some(self.m_c.declaration(C::CompressorFlow)));
-        put(C::P1, Some(self.p1.declaration(C::P1)));
-        put(C::T1, Some(self.t1.declaration(C::T1)));
-        put(C::P2, Some(self.p2.declaration(C::P2)));
-        put(C::T2, Some(self.t2.declaration(C::T2)));
-        put(C::Tc, Some(self.tc.declaration(C::Tc)));
-        put(C::TurbineFlow, self.m_t.as_ref().map(|s| s.declaration(C::TurbineFlow)));
-        put(C::P3, self.p3.as_ref().map(|s| s.declaration(C::P3)));
-        put(C::T3, self.t3.as_ref().map(|s| s.declaration(C::T3)));
-        put(C::P4, self.p4.as_ref().map(|s| s.declaration(C::P4)));
-        put(C::T4, self.t4.as_ref().map(|s| s.declaration(C::T4)));
-        put(C::Tt, self.tt.as_ref().map(|s| s.declaration(C::Tt)));
-        put(C::TOil, self.t_oil.as_ref().map(|s| s.declaration(C::TOil)));
-        put(C::TAmb, self.t_amb.as_ref().map(|s| s.declaration(C::TAmb)));
-        all
-    }
+sensors! {
+    /// Shaft speed.
+    "N" n: ShaftSpeed, Sensors<SpeedSensor>;
+    /// Compressor mass flow.
+    "m_c" m_c: CompressorFlow, Sensors<FlowSensor>;
+    /// Compressor inlet pressure.
+    "P1" p1: P1, Sensors<PressureSensor>;
+    /// Compressor inlet total temperature.
+    "T1" t1: T1, Sensors<TemperatureSensor>;
+    /// Compressor outlet pressure.
+    "P2" p2: P2, Sensors<PressureSensor>;
+    /// Compressor outlet total temperature.
+    "T2" t2: T2, Sensors<ProbeSensor>;
+    /// Compressor housing temperature.
+    "Tc" tc: Tc, Sensors<TemperatureSensor>;
+    /// Turbine mass flow.
+    "m_t" m_t: TurbineFlow, Option<Sensors<FlowSensor>>;
+    /// Turbine inlet pressure.
+    "P3" p3: P3, Option<Sensors<PressureSensor>>;
+    /// Turbine inlet total temperature.
+    "T3" t3: T3, Option<Sensors<TemperatureSensor>>;
+    /// Turbine outlet pressure.
+    "P4" p4: P4, Option<Sensors<PressureSensor>>;
+    /// Turbine outlet total temperature.
+    "T4" t4: T4, Option<Sensors<TemperatureSensor>>;
+    /// Turbine housing temperature.
+    "Tt" tt: Tt, Option<Sensors<TemperatureSensor>>;
+    /// Oil inlet temperature.
+    "T_oil" t_oil: TOil, Option<Sensors<TemperatureSensor>>;
+    /// Ambient temperature.
+    "T_amb" t_amb: TAmb, Option<Sensors<TemperatureSensor>>;
+    /// Oil outlet temperature.
+    "T_oil_out" t_oil_out: TOilOut, Option<Sensors<TemperatureSensor>>;
+    /// Oil mass flow.
+    "m_oil" m_oil: OilFlow, Option<Sensors<FlowSensor>>;
+    /// Cooling water inlet temperature.
+    "T_water" t_water: TWater, Option<Sensors<TemperatureSensor>>;
+    /// Cooling water outlet temperature.
+    "T_water_out" t_water_out: TWaterOut, Option<Sensors<TemperatureSensor>>;
+    /// Cooling water mass flow.
+    "m_water" m_water: WaterFlow, Option<Sensors<FlowSensor>>;
 }
 
 fn declaration<D: Dimension>(
@@ -106,18 +98,15 @@ fn declaration<D: Dimension>(
         static_tap_pipe_diameter_m: None,
         probe_diameter_m: 0.0,
         redundant: None,
+        calibrations: Vec::new(),
     }
 }
 
-/// Symbols of all channels that have a sensor.
-pub(crate) const CALIBRATED: [&str; 15] =
-    ["N", "m_c", "P1", "T1", "P2", "T2", "Tc", "m_t", "P3", "T3", "P4", "T4", "Tt", "T_oil", "T_amb"];
-
-/// Declares a kind of sensor: its dimension, the `schemars` attributes of its noise, its offset and its common offset, the text on its
-/// gain, keys of its own, and what they add to the declaration.
+/// Declares a kind of sensor: the dimensions of its readings and of their differences, the `schemars` attributes of its noise, its offset
+/// and its common offset, the text on its gain, keys of its own, and what they add to the declaration.
 macro_rules! sensor {
     (
-        $(#[$doc:meta])* $sensor:ident: $dimension:ty,
+        $(#[$doc:meta])* $sensor:ident: $reading:ty, $dimension:ty,
         noise: [$($noise:tt)*], offset: [$($offset:tt)*], common: [$($common:tt)*], gain: $gain:tt,
         { $($own:tt)* } $declaration:expr
     ) => {
@@ -144,12 +133,16 @@ macro_rules! sensor {
             /// Offset that all sensors of the channel share and that does not average out (one calibration bath, stratification, radiation); 0 if none is given.
             #[schemars($($common)*)]
             common_offset: Option<Quantity<$dimension>>,
+            /// Calibration of this sensor, as its certificate states it.
+            calibration: Option<CalibrationFile<Quantity<$reading>, Quantity<$dimension>>>,
         }
 
         impl Sensor for $sensor {
             fn declaration(&self) -> SensorDeclaration {
                 let own: fn(&$sensor, SensorDeclaration) -> SensorDeclaration = $declaration;
-                own(self, declaration(self.noise, self.offset, self.gain))
+                let common = declaration(self.noise, self.offset, self.gain);
+                let calibrations = vec![self.calibration.as_ref().map(CalibrationFile::calibration)];
+                own(self, SensorDeclaration { calibrations, ..common })
             }
 
             fn several(&self) -> Several<'_> {
@@ -165,7 +158,7 @@ macro_rules! sensor {
 
 sensor! {
     /// Speed sensor.
-    SpeedSensor: Speed,
+    SpeedSensor: Speed, Speed,
     noise: [extend("x-min" = "0 rpm"), example = &"30 rpm"],
     offset: [extend("x-min" = "0 rpm"), example = &"0 rpm"],
     common: [extend("x-min" = "0 rpm")],
@@ -175,7 +168,7 @@ sensor! {
 
 sensor! {
     /// Flow meter.
-    FlowSensor: MassFlow,
+    FlowSensor: MassFlow, MassFlow,
     noise: [extend("x-min" = "0 kg/s")],
     offset: [extend("x-min" = "0 kg/s"), example = &"0 kg/s"],
     common: [extend("x-min" = "0 kg/s")],
@@ -185,7 +178,7 @@ sensor! {
 
 sensor! {
     /// Pressure sensor.
-    PressureSensor: PressureDifference,
+    PressureSensor: Pressure, PressureDifference,
     noise: [extend("x-min" = "0 Pa"), example = &"20 Pa"],
     offset: [extend("x-min" = "0 Pa")],
     common: [extend("x-min" = "0 Pa")],
@@ -213,7 +206,7 @@ pub(crate) enum TapName {
 
 sensor! {
     /// Temperature sensor.
-    TemperatureSensor: TemperatureDifference,
+    TemperatureSensor: Temperature, TemperatureDifference,
     noise: [extend("x-min" = "0 K"), example = &"0.1 K"],
     offset: [extend("x-min" = "0 K")],
     common: [extend("x-min" = "0 K")],
@@ -223,7 +216,7 @@ sensor! {
 
 sensor! {
     /// Temperature probe with its own inertia.
-    ProbeSensor: TemperatureDifference,
+    ProbeSensor: Temperature, TemperatureDifference,
     noise: [extend("x-min" = "0 K"), example = &"0.1 K"],
     offset: [extend("x-min" = "0 K")],
     common: [extend("x-min" = "0 K")],
@@ -251,6 +244,9 @@ pub(crate) fn check(check: &mut Check<'_>) {
     }
     for symbol in CALIBRATED {
         check_several(check, symbol);
+        for sensor in each_place(check, symbol) {
+            calibration::check(check, &[&sensor[..], &steps!["calibration"]].concat());
+        }
     }
 }
 
@@ -268,13 +264,9 @@ mod tests {
     }
 
     #[test]
-    fn the_symbols_are_those_of_the_channels_with_a_key() {
-        let schema = serde_json::to_value(schemars::schema_for!(SensorsFile)).unwrap();
-        let keys: Vec<&String> = schema["properties"].as_object().unwrap().keys().collect();
-        assert_eq!(keys.len(), CALIBRATED.len());
+    fn the_symbols_are_those_of_channels() {
         for symbol in CALIBRATED {
-            assert!(keys.iter().any(|key| *key == symbol), "{symbol}");
-            serde_json::from_value::<Channel>(symbol.into()).unwrap();
+            serde_json::from_value::<Channel>((*symbol).into()).unwrap();
         }
     }
 

@@ -1,6 +1,7 @@
 //! Several sensors of one channel below `sensors:`: identical ones by their `count`, or a list.
 
 use crate::checking::Check;
+use crate::elements::rig::calibration::Calibration;
 use mapper_core::{Channel, DeclaredElement, DeclaredUncertainty, Element, MAX_ELEMENTS, RedundantSensors};
 use mapper_yaml::{FindingKind, Step, steps};
 use schemars::JsonSchema;
@@ -22,6 +23,25 @@ pub struct SensorDeclaration {
     /// Each of several sensors; `None` if there is only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redundant: Option<RedundantSensors>,
+    /// The calibration of each sensor as listed; one for identical sensors. Empty if none is declared.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub calibrations: Vec<Option<Calibration>>,
+}
+
+impl SensorDeclaration {
+    /// Each sensor with its calibration: its place in a list, its name, and the calibration if it has one.
+    pub fn calibrated(&self, channel: Channel) -> Vec<(Option<usize>, String, Option<&Calibration>)> {
+        let listed = match &self.redundant {
+            Some(redundant) if self.calibrations.len() > 1 => redundant.elements.as_slice(),
+            _ => &[],
+        };
+        let calibration = |index: usize| self.calibrations.get(index).and_then(Option::as_ref);
+        if listed.is_empty() {
+            return vec![(None, channel.to_string(), calibration(0))];
+        }
+        let each = listed.iter().enumerate();
+        each.map(|(index, element)| (Some(index), element.name.clone(), calibration(index))).collect()
+    }
 }
 
 /// The sensors of a channel: one, several identical ones (`count`), or a list.
@@ -80,16 +100,41 @@ impl<S: Sensor> Sensors<S> {
                 None => return SensorDeclaration::default(),
             },
         };
+        let calibrations: Vec<Option<Calibration>> = match self {
+            Sensors::Alike(sensor) => sensor.declaration().calibrations,
+            Sensors::Each(sensors) => sensors.iter().flat_map(|one| one.declaration().calibrations).collect(),
+        };
+        let none = calibrations.iter().all(Option::is_none);
+        let calibrations = if none { Vec::new() } else { calibrations };
         let declared = redundant.fused(|_| true);
         if members.len() < 2 {
             let offset_sigma = first.declared.offset_sigma.hypot(common_offset_sigma);
             return SensorDeclaration {
                 declared: DeclaredUncertainty { offset_sigma, ..first.declared },
+                calibrations,
                 ..first
             };
         }
         let probe_diameter_m = redundant.probe_diameter_m(|_| true);
-        SensorDeclaration { declared, probe_diameter_m, redundant: Some(redundant), ..first }
+        SensorDeclaration { declared, probe_diameter_m, redundant: Some(redundant), calibrations, ..first }
+    }
+}
+
+/// The sensors of a channel, which may have none.
+pub(crate) trait DeclaredSensors {
+    /// Their declared properties.
+    fn declared(&self, channel: Channel) -> Option<SensorDeclaration>;
+}
+
+impl<S: Sensor> DeclaredSensors for Sensors<S> {
+    fn declared(&self, channel: Channel) -> Option<SensorDeclaration> {
+        Some(self.declaration(channel))
+    }
+}
+
+impl<S: Sensor> DeclaredSensors for Option<Sensors<S>> {
+    fn declared(&self, channel: Channel) -> Option<SensorDeclaration> {
+        self.as_ref().map(|sensors| sensors.declaration(channel))
     }
 }
 

@@ -93,6 +93,9 @@ const PLACES: &[Place] = &[
     Place { temperature: Some(Channel::TOil), pressure: None, patterns: &[
         (7, "(oil|oel).*(^|_)?{I}(_|$)"), (6, "(^|_)(oil|oel)"), (6, "(oil|oel)(_|$)"),
     ]},
+    Place { temperature: Some(Channel::TOilOut), pressure: None, patterns: &[
+        (8, "(oil|oel).*(^|_){O}(_|$)"),
+    ]},
     Place { temperature: Some(Channel::TAmb), pressure: None, patterns: &[
         (6, "(^|_|{q})(amb|ambient|umg|umgebung|room|raum|cell|zelle|testbed|pruefstand)"),
     ]},
@@ -171,6 +174,8 @@ fn rows() -> Vec<Row> {
         (Channel::TurbineFlow, 3, format!("^{flow}_?3$")),
         (Channel::TurbineFlow, 7, format!("(^|_){flow}_?(t|turb|turbine|abgas|exh|exhaust|gas)(_|$)")),
         (Channel::TurbineFlow, 7, format!("(turb|turbine|abgas|exh|exhaust|hotgas|hot_gas)_?{flow}(_|$)")),
+        (Channel::OilFlow, 7, format!("(^|_){flow}_?(oil|oel)(_|$)")),
+        (Channel::OilFlow, 7, format!("(oil|oel)_?{flow}(_|$)")),
         (
             Channel::ValveCommand,
             6,

@@ -2,7 +2,9 @@
 
 use crate::formatting::number::four_figures;
 use crate::point_results::warning_text::sentence::{Sentence, number, sentence, signed};
-use mapper_core::{Scaled, StepConflict, SuspectedFault, Swapped, Warning, with_unit};
+use mapper_core::{
+    CalibrationDefect, Channel, Dimension, Scaled, StepConflict, SuspectedFault, Swapped, Warning, with_unit,
+};
 use mapper_observe::plausible::Implausible;
 
 /// The sentence; `None` for other warnings.
@@ -55,6 +57,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
             number(*limit_k, 1),
             *count
         ),
+        Warning::Calibration { channel, sensor, defect } => calibration(*channel, sensor, defect),
         Warning::EndState { channel, lost_before_end_s } => sentence!(
             "{} was lost {} s before the step's end; its last values are used",
             *channel,
@@ -62,6 +65,41 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         ),
         _ => return None,
     })
+}
+
+fn calibration(channel: Channel, sensor: &str, defect: &CalibrationDefect) -> Sentence {
+    match defect {
+        CalibrationDefect::Missing { key } if key == "calibration" => {
+            sentence!("{} has no calibration", sensor)
+        }
+        CalibrationDefect::Missing { key } => {
+            sentence!("the calibration of {} has no `{}`", sensor, key.clone())
+        }
+        CalibrationDefect::Expired { due, day } => sentence!(
+            "the calibration of {} was valid until {}, and the run is on {}",
+            sensor,
+            due.clone(),
+            day.clone()
+        ),
+        CalibrationDefect::Range { reading, min, max } => {
+            let (zero, scale, unit) = match channel.info().dimension {
+                Dimension::Temperature => (273.15, 1.0, "degC"),
+                Dimension::Pressure => (0.0, 1e-3, "kPa"),
+                Dimension::RotationalSpeed => (0.0, 1e-3, "krpm"),
+                Dimension::MassFlow => (0.0, 1e3, "g/s"),
+                Dimension::Ratio => (0.0, 1.0, ""),
+            };
+            let shown = |value: f64| number(scale * (value - zero), 1);
+            let text = "{} reads {} {}, outside its calibrated range of {} to {} {}";
+            sentence!(text, sensor, shown(*reading), unit, shown(*min), shown(*max), unit)
+        }
+        CalibrationDefect::Uncertainty { certified, declared } => sentence!(
+            "the certificate of {} has a standard uncertainty of {}, and offset and gain are declared as {}",
+            sensor,
+            with_unit(format!("{certified:.2e}"), channel.unit()),
+            with_unit(format!("{declared:.2e}"), channel.unit())
+        ),
+    }
 }
 
 fn scaled(evidence: &Scaled) -> Sentence {

@@ -1,0 +1,127 @@
+//! The calibration register: whether the calibration of each sensor supports its readings.
+
+use crate::campaign::Campaign;
+use crate::elements::rig::calibration::{Calibration, CalibrationRule, Date};
+use mapper_core::{CalibrationDefect, Channel, DeclaredUncertainty, Dimension, Warning};
+use mapper_physics::machine::params::BoundaryConditions;
+use mapper_physics::operating_point::follow_outlet::hold_speed;
+use mapper_physics::rig::instruments::true_value;
+use mapper_physics::rig::sensor_fault::CALIBRATED_AT_K;
+use mapper_physics::simulation::model::Model;
+use mapper_yaml::Step;
+use std::collections::BTreeMap;
+
+/// A defect of a sensor's calibration, at its place in the campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationWarning {
+    /// The key of the calibration.
+    pub at: Vec<Step>,
+    /// The defect.
+    pub warning: Warning,
+}
+
+impl Campaign {
+    /// The defects of all calibrations on the day of a run. `readings`: lowest and highest reading of a channel.
+    pub fn calibration_warnings(
+        &self,
+        day: Option<Date>,
+        readings: impl Fn(Channel) -> Option<(f64, f64)>,
+    ) -> Vec<CalibrationWarning> {
+        let mut warnings = Vec::new();
+        for (&channel, declaration) in &self.sensors {
+            let read = readings(channel);
+            for (index, sensor, calibration) in declaration.calibrated(channel) {
+                let redundant = declaration.redundant.as_ref().and_then(|all| all.elements.get(index?));
+                let declared = redundant.map_or(declaration.declared, |element| element.declared);
+                let mut defects = Vec::new();
+                if self.calibration == CalibrationRule::Required {
+                    let missing = missing(calibration).map(str::to_owned);
+                    defects.extend(missing.map(|key| CalibrationDefect::Missing { key }));
+                }
+                defects.extend(
+                    calibration
+                        .into_iter()
+                        .flat_map(|one| contradictions(channel, one, day, read, &declared)),
+                );
+                let sensors = [Step::from("sensors"), Step::from(channel.symbol())].into_iter();
+                let at: Vec<Step> =
+                    sensors.chain(index.map(Step::from)).chain([Step::from("calibration")]).collect();
+                let warning = |defect| CalibrationWarning {
+                    at: at.clone(),
+                    warning: Warning::Calibration { channel, sensor: sensor.clone(), defect },
+                };
+                warnings.extend(defects.into_iter().map(warning));
+            }
+        }
+        warnings
+    }
+}
+
+/// The first required key that a calibration lacks.
+fn missing(calibration: Option<&Calibration>) -> Option<&'static str> {
+    let Some(calibration) = calibration else { return Some("calibration") };
+    let keys = [
+        ("certificate", calibration.certificate.is_some()),
+        ("due", calibration.due.is_some()),
+        ("range", calibration.range.is_some()),
+    ];
+    keys.into_iter().find(|(_, has)| !has).map(|(key, _)| key)
+}
+
+fn contradictions(
+    channel: Channel,
+    calibration: &Calibration,
+    day: Option<Date>,
+    read: Option<(f64, f64)>,
+    declared: &DeclaredUncertainty,
+) -> Vec<CalibrationDefect> {
+    let mut defects = Vec::new();
+    if let (Some(due), Some(day)) = (calibration.due, day)
+        && due < day
+    {
+        defects.push(CalibrationDefect::Expired { due: due.to_string(), day: day.to_string() });
+    }
+    if let (Some((min, max)), Some((low, high))) = (calibration.range, read)
+        && (low < min || high > max)
+    {
+        let reading = if min - low > high - max { low } else { high };
+        defects.push(CalibrationDefect::Range { reading, min, max });
+    }
+    if let (Some(expanded), Some((_, high))) = (calibration.uncertainty, read) {
+        // k = 2; a tenth of it is left to rounding.
+        let certified = 0.5 * expanded;
+        let zero = if channel.info().dimension == Dimension::Temperature { CALIBRATED_AT_K } else { 0.0 };
+        let declared = declared.offset_sigma.hypot(declared.gain_sigma_ratio * (high - zero));
+        if declared < 0.9 * certified {
+            defects.push(CalibrationDefect::Uncertainty { certified, declared });
+        }
+    }
+    defects
+}
+
+/// The defects of all calibrations on the day of a run at the forecast readings of the points.
+pub fn forecast_calibration_warnings(
+    campaign: &Campaign,
+    model: &Model,
+    day: Option<Date>,
+) -> Vec<CalibrationWarning> {
+    let declares = |channel: &Channel| {
+        let calibrations = campaign.sensors.get(channel).into_iter().flat_map(|one| &one.calibrations);
+        calibrations.flatten().any(|one| one.range.is_some() || one.uncertainty.is_some())
+    };
+    let mut forecast: BTreeMap<Channel, (f64, f64)> = BTreeMap::new();
+    let channels: Vec<Channel> = campaign.sensors.keys().copied().filter(declares).collect();
+    let points = if channels.is_empty() { &[][..] } else { &campaign.points };
+    for point in points {
+        let under =
+            BoundaryConditions { valve_opening_ratio: point.valve_opening_ratio, ..campaign.boundary };
+        let Ok(held) = hold_speed(model, point.speed_rpm, &under, campaign.follow_outlet) else { continue };
+        let prepared = model.prepare(&held.boundary);
+        for channel in &channels {
+            let Some(value) = true_value(*channel, &prepared, &held.state, &held.outputs) else { continue };
+            let range = forecast.entry(*channel).or_insert((value, value));
+            *range = (range.0.min(value), range.1.max(value));
+        }
+    }
+    campaign.calibration_warnings(day, |channel| forecast.get(&channel).copied())
+}

@@ -1,0 +1,71 @@
+//! `acceptance:`
+
+use crate::elements::output::report::SensorSymbol;
+use crate::si_values::or;
+use crate::units::{Duration, Fraction, Quantity};
+use mapper_core::{ACCEPTANCE_WINDOW_S, AcceptanceCriteria, Channel};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+// Untagged: the form of the YAML node shows which variant it is, and the schema was checked before.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum AcceptanceFile {
+    Preset(AcceptancePreset),
+    Own(OwnCriteria),
+}
+
+#[derive(Debug, Deserialize, JsonSchema)]
+pub(crate) enum AcceptancePreset {
+    #[serde(rename = "PTC 10")]
+    Ptc10,
+}
+
+/// Criteria of another code, from your copy of it.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct OwnCriteria {
+    /// Name of the code.
+    #[schemars(example = &"SAE J1826")]
+    name: String,
+    /// Edition and clause of the values.
+    source: String,
+    /// Time at the end of each step over which they are judged; 20 s if none is given.
+    #[schemars(extend("x-above" = "0 s"))]
+    window: Option<Quantity<Duration>>,
+    /// Permitted fluctuation of each channel: highest minus lowest reading over the mean, temperatures and pressures absolute.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<SensorSymbol, Fluctuation>")]
+    fluctuation: BTreeMap<Channel, Fluctuation>,
+    /// Permitted size of the losses in the energy balance over the power of the turbine.
+    #[schemars(extend("x-min" = "0 %", "x-max" = "100 %"), example = &"5 %")]
+    heat_balance: Option<Quantity<Fraction>>,
+}
+
+/// Permitted fluctuation of a channel.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline)]
+struct Fluctuation(
+    #[schemars(extend("x-above" = "0 %", "x-max" = "100 %"), example = &"0.5 %")] Quantity<Fraction>,
+);
+
+impl From<AcceptanceFile> for AcceptanceCriteria {
+    fn from(file: AcceptanceFile) -> Self {
+        match file {
+            AcceptanceFile::Preset(AcceptancePreset::Ptc10) => AcceptanceCriteria::ptc_10(),
+            AcceptanceFile::Own(own) => AcceptanceCriteria {
+                name: own.name,
+                source: own.source,
+                window_s: or(own.window, ACCEPTANCE_WINDOW_S),
+                fluctuation_ratio: own
+                    .fluctuation
+                    .into_iter()
+                    .map(|(at, ratio)| (at, ratio.0.inside))
+                    .collect(),
+                heat_balance_ratio: own.heat_balance.map(|ratio| ratio.inside),
+            },
+        }
+    }
+}

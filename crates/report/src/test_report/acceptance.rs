@@ -1,0 +1,120 @@
+//! Energy balance of the points, and criteria of acceptance.
+
+use crate::formatting::markdown::{self, Align};
+use crate::point_results::end_readings::END_S;
+use mapper_campaign::Campaign;
+use mapper_core::{Channel, DeclaredUncertainty, Recording, StepMarker, half_width_95, step_number};
+use mapper_observe::acceptance::{JudgedCriterion, judge_acceptance};
+use mapper_observe::energy_balance::{EnergyBalance, Power, energy_balance};
+use mapper_physics::gas::air::Air;
+use mapper_recording::score::ScoredPoint;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Columns of [`balance_rows`].
+pub const BALANCE_HEADS: [&str; 6] =
+    ["step", "compressor, W", "turbine, W", "oil, W", "water, W", "losses, W"];
+
+/// Meaning of the columns.
+pub const BALANCE_WORDS: &str = "Means of the last 2 s of each step, half widths of 95 % intervals from the declared sensors. Compressor: rise of \
+                                 the enthalpy of its air. Turbine: drop of the enthalpy of its gas, taken for dry air. Losses: turbine minus the \
+                                 others; until the housings are settled, heat that they store is part of them, and so are oil and water where they \
+                                 are not measured.";
+
+/// Columns of [`acceptance_rows`].
+pub const ACCEPTANCE_HEADS: [&str; 5] = ["criterion", "limit, %", "largest, %", "result", "steps that fail"];
+
+/// The points and their readings.
+#[derive(Clone, Copy)]
+pub struct JudgedPoints<'a> {
+    /// Its air and criteria; `None` for a log without a campaign.
+    pub campaign: Option<&'a Campaign>,
+    /// The readings.
+    pub recording: &'a Recording,
+    /// The points.
+    pub points: &'a [ScoredPoint],
+    /// Uncertainty of each channel used in the identification.
+    pub used: &'a BTreeMap<Channel, DeclaredUncertainty>,
+}
+
+fn balances<'a>(report: JudgedPoints<'a>) -> Vec<(&'a StepMarker, EnergyBalance)> {
+    let air = report.campaign.map_or(Air::DRY, |campaign| campaign.machine.params.compressor.air());
+    let steps = report
+        .points
+        .iter()
+        .filter_map(|scored| report.recording.steps.iter().find(|step| step.index == scored.point.step));
+    let balance = |step: &'a StepMarker| {
+        let span_s = ((step.end_s - END_S).max(step.start_s), step.end_s);
+        (step, energy_balance(report.recording, span_s, air, report.used))
+    };
+    steps.map(balance).collect()
+}
+
+/// A row for each point; none if the power of the turbine was not measured.
+pub fn balance_rows(report: JudgedPoints<'_>) -> Vec<[String; 6]> {
+    let balances = balances(report);
+    if balances.iter().all(|(_, balance)| balance.turbine.is_none()) {
+        return Vec::new();
+    }
+    let shown = |power: Option<Power>| match power {
+        Some(power) => format!("{:.0} +/- {:.0}", power.w, half_width_95(power.sigma_w)),
+        None => "-".to_owned(),
+    };
+    let row = |(step, balance): (&StepMarker, EnergyBalance)| {
+        let EnergyBalance { compressor, turbine, oil, water, losses } = balance;
+        let [compressor, turbine, oil, water, losses] = [compressor, turbine, oil, water, losses].map(shown);
+        [step_number(step.index).to_string(), compressor, turbine, oil, water, losses]
+    };
+    balances.into_iter().map(row).collect()
+}
+
+/// A row for each criterion of the campaign; none without criteria.
+pub fn acceptance_rows(report: JudgedPoints<'_>) -> Vec<[String; 5]> {
+    let criteria = report.campaign.and_then(|campaign| campaign.acceptance.as_ref());
+    let Some(criteria) = criteria else { return Vec::new() };
+    let row = |judged: JudgedCriterion| {
+        let failed: Vec<String> = judged.failed().map(|step| step_number(step).to_string()).collect();
+        let result = match (judged.largest_ratio(), failed.len()) {
+            (None, _) => "not measured".to_owned(),
+            (Some(_), 0) => "pass".to_owned(),
+            (Some(_), failed) => format!("fail at {failed} of {}", judged.steps.len()),
+        };
+        let percent = |ratio: f64| format!("{:.2}", 100.0 * ratio);
+        [
+            judged.channel.map_or_else(
+                || "heat balance: losses over turbine".to_owned(),
+                |channel| format!("fluctuation of {channel}"),
+            ),
+            percent(judged.limit_ratio),
+            judged.largest_ratio().map_or_else(|| "-".to_owned(), percent),
+            result,
+            failed.join(", "),
+        ]
+    };
+    judge_acceptance(criteria, report.recording, &balances(report)).into_iter().map(row).collect()
+}
+
+/// Name, source and window of the campaign's criteria, a sentence.
+pub fn acceptance_words(report: JudgedPoints<'_>) -> Option<String> {
+    let criteria = report.campaign?.acceptance.as_ref()?;
+    Some(format!(
+        "{} ({}). Judged over the last {} s of each step; a fluctuation is the highest minus the lowest reading over the mean.",
+        criteria.name, criteria.source, criteria.window_s
+    ))
+}
+
+/// Both sections; empty if there is nothing to show.
+pub(crate) fn acceptance_sections(report: JudgedPoints<'_>) -> String {
+    let mut text = String::new();
+    let balance = balance_rows(report);
+    // Writing to a String cannot fail.
+    if !balance.is_empty() {
+        let _ = writeln!(text, "\n## Energy balance\n\n{BALANCE_WORDS}\n");
+        text.push_str(&markdown::table(&BALANCE_HEADS, Align::Right, balance));
+    }
+    if let Some(words) = acceptance_words(report) {
+        let _ = writeln!(text, "\n## Acceptance\n\n{words}\n");
+        text.push_str(&markdown::table(&ACCEPTANCE_HEADS, Align::Left, acceptance_rows(report)));
+    }
+    text
+}

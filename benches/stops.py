@@ -4,7 +4,8 @@
     target/python-env/bin/python benches/stops.py --mapper target/release/mapper
 
 In a run with a rig, the time is that from the request to the event of the first command of the safe state, which is sent before it is
-reported: an upper bound. Elsewhere it is the end of the process, or the message that results are still written.
+reported: an upper bound. While the rig is connected, it is the message that it has no setpoint yet; the safe command then follows the
+connection, and the time between is another row. Elsewhere it is the end of the process, or the message that results are still written.
 """
 
 import argparse
@@ -41,7 +42,9 @@ class Slow(module.PythonRig):
     def arm(self):
         pathlib.Path(__file__).with_name("arms").touch()
         time.sleep({ARMS_S})
-        return super().arm()
+        armed = super().arm()
+        pathlib.Path(__file__).with_name("armed").touch()
+        return armed
 if __name__ == "__main__":
     module.serve("slow_rig", "1.0", Slow)
 """
@@ -124,10 +127,11 @@ SHORT_WARM_UP = ("warm_up: 2 min", "warm_up: 1 s")
 SURGE = ("seed: 1 ", "surge_search: {}\nseed: 1 ")
 SCRIPT = ("seed: 1 ", "sequence: long.rhai\nseed: 1 ")
 SLOW = ("  virtual_lab: {}", "  slow_rig: {real_time: true}")
+CONNECTING = lambda line: "while the rig is being connected" in line
 
 
-def in_run(replaced, pace, begins):
-    """From the last request to the event of the interruption."""
+def in_run(replaced, pace, begins, ends=event("interrupted"), since=None):
+    """From the last request, or from the file `since`, to the event of the interruption or another line."""
 
     def measure(mapper, folder, requests, rng):
         (folder / "long.rhai").write_text(LONG_SCRIPT)
@@ -151,7 +155,9 @@ def in_run(replaced, pace, begins):
             process.until(begins)
         time.sleep(rng.uniform(0.05, 0.5))
         asked = process.ask(requests)
-        at = process.until(event("interrupted"))
+        at = process.until(ends)
+        if since is not None:
+            asked = time.monotonic() - time.time() + (folder / since).stat().st_mtime
         # The run-down takes seconds in real time.
         process.child.kill()
         process.child.wait()
@@ -198,7 +204,8 @@ PLAN = lambda _, folder: ["run", ROOT / "campaigns/turbo_a.yaml", "--out", folde
 NIGHTLY = lambda _, folder: ["nightly", ROOT / "campaigns/nightly.yaml", "--db", folder / "history.db"]
 PHASES = [
     ("planning", to_end(PLAN, (0.1, 0.4)), ENDS),
-    (f"connecting, {ARMS_S:.0f} s", in_run([SLOW, NO_SOAK], None, None), ["Ctrl-C", "SIGTERM"]),
+    (f"connecting, {ARMS_S:.0f} s: message", in_run([SLOW, NO_SOAK], None, None, CONNECTING), ["Ctrl-C", "SIGTERM"]),
+    ("armed to safe command", in_run([SLOW, NO_SOAK], None, None, since="armed"), ["Ctrl-C", "SIGTERM"]),
     ("soak (zero)", in_run([], 1, event("soak_started")), NOW),
     ("warm-up", in_run([NO_SOAK], 1, event("rig_time")), NOW),
     ("step", in_run([NO_SOAK, SHORT_WARM_UP], 1, event("step_started")), IN_STEP),

@@ -21,7 +21,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Two steps of 20 s after 10 s of warm-up and before 5 s of cool-down.
-fn plan() -> Plan {
+pub fn plan() -> Plan {
     let step = |index: usize, p3_pa: f64, speed_rpm: f64| PlanStep {
         index,
         kind: StepKind::Point,

@@ -111,8 +111,8 @@ impl Runner<'_> {
     ///
     /// # Errors
     /// [`RunError`] if the rig or an observer failed.
-    pub fn run_under(self, protection: &Protection<'_>) -> Result<RunEnd, RunError> {
-        self.backend.arm().map_err(RunError::NotArmed)?;
+    pub fn run_under(mut self, protection: &Protection<'_>) -> Result<RunEnd, RunError> {
+        let answered = self.arm(protection)?;
         let sample_s = 1.0 / self.backend.describe().sample_rate_hz;
         let mut run = Run {
             runner: self,
@@ -128,7 +128,9 @@ impl Runner<'_> {
             stop_confirmed: false,
         };
         // After a panic, the possibly inconsistent state is used only to make the rig safe.
-        let end = match catch_unwind(AssertUnwindSafe(|| run.execute())) {
+        let end = match catch_unwind(AssertUnwindSafe(|| {
+            answered.map_err(Halt::from).and_then(|()| run.execute())
+        })) {
             Ok(Ok(())) => Ok(RunEnd::Completed),
             Ok(Err(halt)) => run.shut_down(halt),
             Err(panic) => run.shut_down(Halt::Failed(RunError::Panicked { message: panic_message(&*panic) })),

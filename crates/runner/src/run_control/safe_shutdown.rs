@@ -22,7 +22,7 @@ const PAUSE_S: f64 = 0.5;
 struct Panicked(String);
 
 /// Contains a panic of an observer, so that the shutdown continues.
-fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
+pub(crate) fn catch_panic(report: impl FnOnce() -> Result<(), RunError>) -> Result<(), RunError> {
     let panicked =
         |panic: Box<dyn std::any::Any + Send>| Err(RunError::Panicked { message: panic_message(&*panic) });
     catch_unwind(AssertUnwindSafe(report)).unwrap_or_else(panicked)

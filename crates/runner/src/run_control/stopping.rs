@@ -1,11 +1,49 @@
 //! Stops requested from outside: immediately, or at the end of the step.
 
-use crate::run_control::run::{Halt, Run};
+use crate::run_control::protection::Protection;
+use crate::run_control::run::{Halt, Run, Runner};
+use crate::run_control::run_error::RunError;
+use crate::run_control::safe_shutdown::catch_panic;
 use mapper_core::{Event, EventKind};
+use std::panic::resume_unwind;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
 
 /// Interval at which a waiting run checks for a stop, s of run time: half of the 20 ms that a stop may take.
 const STOP_CHECK_INTERVAL_S: f64 = 0.01;
+
+impl Runner<'_> {
+    /// Connects and arms the rig. A stop meanwhile is answered at once. No setpoint is sent before the rig is armed, and the safe command
+    /// is then the first one. The result inside is that of the answer: its failure must not leave an armed rig.
+    pub(crate) fn arm(&mut self, protection: &Protection<'_>) -> Result<Result<(), RunError>, RunError> {
+        let Runner { backend, observer, stop, .. } = self;
+        let stops = || stop.load(Ordering::Relaxed) || protection.stop_after_step.load(Ordering::Relaxed);
+        let mut answered = None;
+        let armed = thread::scope(|scope| {
+            let (done, ended) = channel();
+            let arming = scope.spawn(move || {
+                let armed = backend.arm();
+                // The caller waits for it.
+                let _ = done.send(());
+                armed
+            });
+            while ended.recv_timeout(Duration::from_secs_f64(LOOK_S)) == Err(RecvTimeoutError::Timeout) {
+                if answered.is_none() && stops() {
+                    let message = "asked to stop while the rig is being connected: it has no setpoint yet and is made safe as \
+                                   soon as it answers"
+                        .to_owned();
+                    let event = Event { t_s: 0.0, kind: EventKind::Note, message };
+                    answered = Some(catch_panic(|| Ok(observer.on_event(&event)?)));
+                }
+            }
+            arming.join().unwrap_or_else(|panic| resume_unwind(panic))
+        });
+        armed.map_err(RunError::NotArmed)?;
+        Ok(answered.unwrap_or(Ok(())))
+    }
+}
 
 impl Run<'_, '_> {
     /// Waits for the clock; `false` if a stop came first.

@@ -1,7 +1,7 @@
 //! The same faults with the rig as a driver: a separate program, connected by pipes.
 
 use super::faulty_driver::{ExpectedEnd, PROTOCOL_FAULTS};
-use super::{run_on, usual};
+use super::{default_guards, run_on};
 use mapper_core::EventKind;
 use mapper_driver_host::{DEFAULT_TIMEOUTS, Driver};
 use mapper_runner::RunEnd;

@@ -9,7 +9,7 @@ use mapper_campaign::Campaign;
 use mapper_core::{JointSettings, Method, OperatingPoint, Plan, PlanInputHashes};
 use mapper_identify::{IdentifyConfig, ZeroSettings, expected_after_zero};
 use mapper_physics::simulation::model::Model;
-use mapper_planner::{PlanRequest, PredictedMethod, hash_inputs, make_plan, sha256_hex};
+use mapper_planner::{PlanRequest, PredictedMethod, make_plan, sha256_hex};
 
 /// The nominal model of a campaign.
 ///
@@ -54,7 +54,7 @@ pub(crate) fn order_points(campaign: &Campaign, model: &Model) -> Result<Vec<Ope
 /// [`SessionError::Json`] if the campaign cannot be written as JSON.
 pub(crate) fn hash_inputs(campaign: &Campaign, model: &Model) -> Result<PlanInputHashes, SessionError> {
     let Some(script) = &campaign.sequence else {
-        return Ok(hash_inputs(&PlanInputs::of(campaign)?.request(campaign, model)));
+        return Ok(mapper_planner::hash_inputs(&PlanInputs::of(campaign)?.request(campaign, model)));
     };
     let without_script = Campaign { sequence: None, repeats: None, ..campaign.clone() };
     let script_sha256 = Some(sha256_hex(&script.text));

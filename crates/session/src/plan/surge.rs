@@ -8,7 +8,7 @@ use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::operating_point::follow_outlet::hold_speed;
 use mapper_physics::simulation::model::Model;
 use mapper_recording::ChannelMap;
-use mapper_runner::surge::{SurgeErrors, SurgeMarks, find_surge_marks};
+use mapper_runner::surge::{self, SurgeErrors, SurgeMarks};
 use mapper_runner::{HoldConditions, SurgeSearch};
 
 /// Setpoints and predicted readings of the nominal machine at a point near or beyond its surge line. `None` if P3 or T2 would exceed the
@@ -93,5 +93,5 @@ pub(crate) fn find_surge_marks(
     let errors = campaign.map_or_else(SurgeErrors::default, |campaign| {
         SurgeErrors::of(&declared(campaign, &ChannelMap::native()))
     });
-    find_surge_marks(approaches, config.reference, errors)
+    surge::find_surge_marks(approaches, config.reference, errors)
 }

@@ -326,7 +326,7 @@ mod tests {
     }
 
     impl LoggingRig {
-        fn write_result(&self, words: String) -> Result<(), BackendError> {
+        fn write(&self, words: String) -> Result<(), BackendError> {
             self.log.lock().unwrap().push(words);
             Ok(())
         }

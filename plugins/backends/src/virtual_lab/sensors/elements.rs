@@ -73,9 +73,8 @@ impl ElementBank {
                 stream(Element { channel, number: index + 1 }),
             ),
             follower: ChannelFollower::new(ChannelPath {
-                gain_ratio: 1.0,
-                offset: 0.0,
                 lag_s: element.lag_s,
+                ..ChannelPath::default()
             }),
             tip: None,
             last: f64::NAN,

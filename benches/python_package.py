@@ -3,7 +3,7 @@
     python benches/python_package.py [CALLS]
 
 An hour of the virtual lab at 10 Hz, 14 channels, as a DataFrame to points: processor time of the whole, of the two calls of Rust in it (import, with the
-checks of a log, and identification), and of the rest; medians of five. Then CALLS (1000) calls each of `Recording.from_frame`, `identify`, `Campaign.from_text` and `Map.to` on four minutes of it, with the resident
+checks of a log, and identification), and of the rest; medians of 30. Then CALLS (1000) calls each of `Recording.from_frame`, `identify`, `Campaign.from_text` and `Map.to` on four minutes of it, with the resident
 memory after every tenth of them.
 """
 
@@ -46,8 +46,8 @@ class Stopwatch:
     def Recording(self):
         return self
 
-    def read(self, *arguments):
-        return self.watch(_mapper.Recording.read, *arguments)
+    def of_frame(self, *arguments):
+        return self.watch(_mapper.Recording.of_frame, *arguments)
 
     def identify(self, *arguments):
         return self.watch(_mapper.identify, *arguments)
@@ -71,7 +71,7 @@ def main():
         units = {symbol: unit for symbol, unit in run.recording.channels.items() if symbol in CHANNELS}
     mapping = {symbol: f"{symbol} [{unit}]" for symbol, unit in units.items()}
     rows = []
-    for _ in range(5):
+    for _ in range(30):
         watch = Stopwatch()
         _recording._mapper = _result._mapper = watch
         _, whole = timed(lambda: mapper.identify(mapper.Recording.from_frame(frame, mapping), campaign).points)

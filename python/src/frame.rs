@@ -1,19 +1,16 @@
-//! The log format in which the package hands a DataFrame over: a line of text, a line of JSON, and the values of each row as 64-bit floats in
-//! this computer's order of bytes, the time, s, first.
+//! The log format in which the package hands a DataFrame over, in memory: a line of text, a line of JSON, and the values of each column as
+//! 64-bit floats in this computer's order of bytes, the time, s, first.
 
 use mapper_log_formats::LOG_FORMATS;
 use mapper_recording::logs::{
     Column, Group, Layout, Log, LogError, LogFile, LogFormat, LogFormats, LogOptions, Row, RowSink,
 };
 use serde_json::Value;
-use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::sync::LazyLock;
 
 const NAME: &str = "DataFrame";
 const MAGIC: &[u8] = b"mapper DataFrame\n";
 const VALUE_BYTES: usize = 8;
-/// Largest header, bytes: some hundred names of columns.
-const HEADER_LIMIT: u64 = 1 << 20;
 const FORMAT: LogFormat = LogFormat { name: NAME, recognises, open };
 
 /// All log formats, DataFrames included.
@@ -32,20 +29,19 @@ struct Frame {
     layout: Layout,
 }
 
-/// The file behind its header, and the header.
-fn opened(file: &LogFile) -> Result<(impl Read, Value), LogError> {
-    let mut reader = BufReader::new(file.open()?);
-    let failed = |error| file.error(error);
-    reader.read_exact(&mut [0; MAGIC.len()]).map_err(failed)?;
-    let mut header = String::new();
-    reader.by_ref().take(HEADER_LIMIT).read_line(&mut header).map_err(failed)?;
-    let header = serde_json::from_str(&header).map_err(|error| file.content(NAME, error.to_string()))?;
-    Ok((reader, header))
+/// The header, and the values after it, column by column, the time first.
+fn parts(file: &LogFile) -> Result<(Value, &[[u8; VALUE_BYTES]]), LogError> {
+    let bytes = file.bytes().and_then(|bytes| bytes.strip_prefix(MAGIC));
+    let bytes = bytes.ok_or_else(|| file.content(NAME, "it exists in memory only"))?;
+    let end = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
+    let (header, values) = bytes.split_at(end);
+    let header = serde_json::from_slice(header).map_err(|error| file.content(NAME, error.to_string()))?;
+    Ok((header, values.get(1..).unwrap_or_default().as_chunks().0))
 }
 
 fn open(file: &LogFile, options: &LogOptions) -> Result<Box<dyn Log>, LogError> {
     options.only(&[]).map_err(|why| file.content(NAME, why))?;
-    let (_, header) = opened(file)?;
+    let (header, _) = parts(file)?;
     let names = header["columns"].as_array().into_iter().flatten().filter_map(Value::as_str);
     let column = |name: &str| Column { name: name.to_owned(), header: name.to_owned(), ..Column::default() };
     let layout = Layout {
@@ -63,25 +59,21 @@ impl Log for Frame {
     }
 
     fn rows(&mut self, wanted: &[usize], sink: &mut RowSink<'_>) -> Result<(), LogError> {
-        let (mut reader, _) = opened(&self.file)?;
-        let mut bytes = vec![0; VALUE_BYTES * (1 + self.layout.columns.len())];
-        let mut values = vec![f64::NAN; wanted.len()];
-        loop {
-            match reader.read_exact(&mut bytes) {
-                Ok(()) => {}
-                Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(()),
-                Err(error) => return Err(self.file.error(error)),
+        let (_, values) = parts(&self.file)?;
+        let rows = values.len() / (1 + self.layout.columns.len());
+        let value = |column: usize, row: usize| {
+            let cell = values.get(column * rows + row)?;
+            Some(f64::from_ne_bytes(*cell)).filter(|value| value.is_finite())
+        };
+        let mut read = vec![f64::NAN; wanted.len()];
+        for row in 0..rows {
+            // A row without time has no place.
+            let Some(t_s) = value(0, row) else { continue };
+            for (value_of, column) in read.iter_mut().zip(wanted) {
+                *value_of = value(1 + column, row).unwrap_or(f64::NAN);
             }
-            let value = |column: usize| {
-                let cell = bytes.get(VALUE_BYTES * column..)?.first_chunk::<VALUE_BYTES>()?;
-                Some(f64::from_ne_bytes(*cell)).filter(|value| value.is_finite())
-            };
-            // The clock is before the columns. A row without time has no place.
-            let Some(t_s) = value(0) else { continue };
-            for (value_of, column) in values.iter_mut().zip(wanted) {
-                *value_of = value(1 + column).unwrap_or(f64::NAN);
-            }
-            sink(Row { group: 0, t_s, values: &values })?;
+            sink(Row { group: 0, t_s, values: &read })?;
         }
+        Ok(())
     }
 }

@@ -9,6 +9,7 @@ use mapper_core::{Channel, Series};
 use mapper_recording::{ChannelMap, ChannelMapError};
 use mapper_session::{Recorded, SessionError, channel_map};
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -29,11 +30,6 @@ pub struct Source {
 }
 
 impl Source {
-    fn new(path: PathBuf, map: ChannelMap, given: Option<&Checked>) -> Result<Self, SessionError> {
-        let recorded = Recorded::read_run(&registry(), &path, &map, given)?;
-        Ok(Source { path, map, recorded })
-    }
-
     /// The recordings with a given campaign in place of their own.
     pub fn with(&self, given: Option<&Checked>) -> Result<Vec<Recorded>, SessionError> {
         // Which steps of a resumed run count depends on the campaign.
@@ -55,47 +51,57 @@ impl Source {
     }
 }
 
-/// The channel map from a file or a text; that of this program's recordings if there is none.
-fn map_of(file: Option<&Path>, text: Option<&str>) -> Result<ChannelMap, SessionError> {
-    match (file, text) {
-        (_, Some(text)) => ChannelMap::from_yaml(text, file.unwrap_or(Path::new("channels.yaml")))
-            .map_err(|findings| ChannelMapError::Mistakes(Box::new(findings)).into()),
-        (Some(file), None) => channel_map(file),
-        (None, None) => Ok(ChannelMap::native()),
+impl Recording {
+    /// With the steps, events and so on of all its parts.
+    fn of(source: Source) -> Result<Recording, Fault> {
+        let read = &source.recorded;
+        let first = read.first().ok_or(SessionError::NoRecording)?;
+        let warnings: Vec<String> =
+            read.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();
+        let steps: Vec<_> = read.iter().flat_map(|one| &one.read.recording.steps).collect();
+        let events: Vec<_> = read.iter().flat_map(|one| &one.read.recording.events).collect();
+        let summary = json!({
+            "path": first.path,
+            "start_time_ns": first.read.start_time_ns,
+            "metadata": first.read.metadata,
+            "warnings": warnings,
+            "steps": steps,
+            "events": events,
+        });
+        Ok(Recording { summary: summary.to_string(), source: Arc::new(source) })
     }
 }
 
 #[pymethods]
 impl Recording {
-    /// Reads a recording. `channels_text`: a channel map as text, which `channels` then names in messages.
+    /// Reads a recording.
     #[staticmethod]
-    #[pyo3(signature = (path, channels=None, channels_text=None, campaign=None))]
+    #[pyo3(signature = (path, channels=None, campaign=None))]
     fn read(
         py: Python<'_>,
         path: PathBuf,
         channels: Option<PathBuf>,
-        channels_text: Option<String>,
         campaign: Option<&Campaign>,
     ) -> PyResult<Recording> {
         let campaign = campaign.map(|campaign| campaign.inner.clone());
         compute(py, None, move |_| {
-            let map = map_of(channels.as_deref(), channels_text.as_deref())?;
-            let source = Source::new(path, map, campaign.as_ref().map(|inner| &inner.campaign))?;
-            let read = &source.recorded;
-            let first = read.first().ok_or(SessionError::NoRecording)?;
-            let warnings: Vec<String> =
-                read.iter().flat_map(|one| &one.read.warnings).map(ToString::to_string).collect();
-            let steps: Vec<_> = read.iter().flat_map(|one| &one.read.recording.steps).collect();
-            let events: Vec<_> = read.iter().flat_map(|one| &one.read.recording.events).collect();
-            let summary = json!({
-                "path": first.path,
-                "start_time_ns": first.read.start_time_ns,
-                "metadata": first.read.metadata,
-                "warnings": warnings,
-                "steps": steps,
-                "events": events,
-            });
-            Ok(Recording { summary: summary.to_string(), source: Arc::new(source) })
+            let map = channels.map_or_else(|| Ok(ChannelMap::native()), |file| channel_map(&file))?;
+            let given = campaign.as_ref().map(|inner| &inner.campaign);
+            let recorded = Recorded::read_run(&registry(), &path, &map, given)?;
+            Recording::of(Source { path, map, recorded })
+        })
+    }
+
+    /// Reads a DataFrame, as the log format of this package, with its channel map as text.
+    #[staticmethod]
+    fn of_frame(py: Python<'_>, content: PyBackedBytes, channels_text: String) -> PyResult<Recording> {
+        compute(py, None, move |_| {
+            let map = ChannelMap::from_yaml(&channels_text, Path::new("channels.yaml"));
+            let map =
+                map.map_err(|findings| SessionError::from(ChannelMapError::Mistakes(Box::new(findings))))?;
+            let path = PathBuf::from("DataFrame");
+            let recorded = vec![Recorded::read_bytes(&registry(), &content, &path, &map, None)?];
+            Recording::of(Source { path, map, recorded })
         })
     }
 

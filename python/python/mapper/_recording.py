@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,10 +24,8 @@ class Recording:
     Made by :meth:`read` or :meth:`from_frame`.
     """
 
-    def __init__(self, inner: _mapper.Recording, directory: TemporaryDirectory[str] | None = None) -> None:
+    def __init__(self, inner: _mapper.Recording) -> None:
         self._inner = inner
-        # The file of a DataFrame lives as long as its recording.
-        self._directory = directory
         self._summary: dict[str, Any] = json.loads(inner.summary)
         self._units: dict[str, str] = dict(inner.channels)
 
@@ -59,7 +56,7 @@ class Recording:
             The campaign in the recording has mistakes, for example because another version made it: give `campaign`.
         """
         own = None if campaign is None else campaign._inner
-        return cls(_mapper.Recording.read(Path(path), None if channels is None else Path(channels), None, own))
+        return cls(_mapper.Recording.read(Path(path), None if channels is None else Path(channels), own))
 
     @classmethod
     def from_frame(
@@ -106,14 +103,10 @@ class Recording:
             mapping["ambient_pressure"] = _source(frame, "ambient", ambient_pressure, columns)
         elif ambient_pressure is not None:
             mapping["ambient_pressure"] = ambient_pressure
-        directory = TemporaryDirectory(prefix="mapper-")
-        file = Path(directory.name) / "DataFrame"
         header = json.dumps({"columns": list(columns), "start_time_ns": start_time_ns})
-        with file.open("wb") as out:
-            out.write(b"mapper DataFrame\n" + header.encode() + b"\n")
-            np.column_stack([t_s, *columns.values()]).tofile(out)
-        text = json.dumps(mapping, indent=2, ensure_ascii=False)
-        return cls(_mapper.Recording.read(file, Path("channels.yaml"), text), directory)
+        # The only copy of the samples on this side.
+        content = b"".join((b"mapper DataFrame\n", header.encode(), b"\n", *(column.data for column in (t_s, *columns.values()))))
+        return cls(_mapper.Recording.of_frame(content, json.dumps(mapping, indent=2, ensure_ascii=False)))
 
     @property
     def channels(self) -> dict[str, str]:
@@ -151,8 +144,7 @@ class Recording:
 
     def __repr__(self) -> str:
         """Return a line on the recording."""
-        path = "DataFrame" if self._directory is not None else self._summary["path"]
-        return f"Recording({path!r}, {len(self._units)} channels, {len(self._summary['steps'])} steps)"
+        return f"Recording({self._summary['path']!r}, {len(self._units)} channels, {len(self._summary['steps'])} steps)"
 
 
 def _clock(frame: pd.DataFrame, time: str | None) -> tuple[npt.NDArray[np.float64], int | None]:
@@ -176,9 +168,9 @@ def _clock(frame: pd.DataFrame, time: str | None) -> tuple[npt.NDArray[np.float6
 
 
 def _numbers(column: pd.Series[Any], symbol: str) -> npt.NDArray[np.float64]:
-    """Return the values of a column; empty cells are NaN."""
+    """Return the values of a column, one after the other in memory; empty cells are NaN."""
     try:
-        return column.to_numpy(dtype=np.float64, na_value=np.nan)
+        return np.ascontiguousarray(column.to_numpy(dtype=np.float64, na_value=np.nan))
     except (TypeError, ValueError) as error:
         message = f"{symbol}: column `{column.name}` has values that are not numbers: {error}"
         raise _mapper.RecordingError(message) from error
@@ -199,7 +191,7 @@ def _column(frame: pd.DataFrame, text: object) -> tuple[str, str | None] | None:
 def _source(
     frame: pd.DataFrame, symbol: str, source: str | Mapping[str, Any], columns: dict[str, npt.NDArray[np.float64]]
 ) -> dict[str, Any]:
-    """Copy the column of a channel and return its line of the channel map."""
+    """Take the column of a channel and return its line of the channel map."""
     rest = {} if isinstance(source, str) else {key: value for key, value in source.items() if key != "column"}
     named = source if isinstance(source, str) else source.get("column")
     found = _column(frame, named)

@@ -138,7 +138,8 @@ impl Session<'_> {
         map: &ChannelMap,
         method: Option<Method>,
     ) -> Result<Identified, SessionError> {
-        let paths: Vec<PathBuf> = recorded.iter().map(|one| one.path.clone()).collect();
+        let own = recorded.iter().filter(|one| may_have_truth(one));
+        let paths: Vec<PathBuf> = own.map(|one| one.path.clone()).collect();
         with_truths(&paths, |truths| self.identify_and_score(recorded, map, method, truths))
     }
 
@@ -173,8 +174,10 @@ impl Session<'_> {
         let day = recorded.first().and_then(|first| Date::of_ns(first.read.start_time_ns));
         let soak = campaign.and_then(|campaign| campaign.zero);
         let (mut recordings, mut sources) = (Vec::new(), Vec::new());
-        for Recorded { read, approaches, .. } in recorded {
-            sources.push(Source { steps: read.recording.steps.clone(), approaches });
+        for one in recorded {
+            let may_have_truth = may_have_truth(&one);
+            let Recorded { read, approaches, .. } = one;
+            sources.push(Source { steps: read.recording.steps.clone(), approaches, may_have_truth });
             recordings.push(read.recording);
         }
         let fused = fused(recordings, config, campaign, map);
@@ -202,7 +205,9 @@ impl Session<'_> {
         for point in &points {
             self.send(SessionEvent::PointIdentified(Box::new(point.clone())));
         }
-        let truths = truths.wait()?;
+        let mut own = truths.wait()?.into_iter();
+        let truth = |source: &Source| source.may_have_truth.then(|| own.next()).flatten().unwrap_or_default();
+        let truths: Vec<Truth> = sources.iter().map(truth).collect();
         let surge = sought(&sources, &truths, off, campaign, &config);
         let points = scored(&sources, &truths, &recording, &origins, points);
         let score = mapper_recording::score::summarise(&points);
@@ -256,6 +261,7 @@ fn rest_unused(recording: &Recording, config: &IdentifyConfig) -> Option<String>
 struct Source {
     steps: Vec<StepMarker>,
     approaches: Option<Recording>,
+    may_have_truth: bool,
 }
 
 /// The campaign that all recordings belong to; `None` if none names one.
@@ -278,6 +284,11 @@ fn same_campaign(recorded: &[Recorded]) -> Result<Option<&Campaign>, SessionErro
         return Err(SessionError::DifferentCampaigns { first, other, differs });
     }
     Ok(Some(campaign))
+}
+
+/// Whether the file is worth a look for truth: a log of another program has none, and a recording in memory has no file.
+fn may_have_truth(recorded: &Recorded) -> bool {
+    recorded.read.format.is_some()
 }
 
 /// The points with their truth, each from its own recording.

@@ -6,7 +6,7 @@ use crate::{Registry, SessionError};
 use mapper_campaign::{Campaign, CampaignError};
 use mapper_core::Recording;
 use mapper_observe::OtherMachine;
-use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, ReadReport, read_recording, read_recording_from};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -45,6 +45,32 @@ impl Recorded {
         }
         let options = ReadOptions { logs: registry.logs, ..ReadOptions::default() };
         let read = read_recording(&file, map, &options)?;
+        Recorded::described(file, read, map, given)
+    }
+
+    /// Same as [`read`](Recorded::read), from memory; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`read`](Recorded::read).
+    pub fn read_bytes(
+        registry: &Registry,
+        bytes: &[u8],
+        name: &Path,
+        map: &ChannelMap,
+        given: Option<&Campaign>,
+    ) -> Result<Recorded, SessionError> {
+        let options = ReadOptions { logs: registry.logs, ..ReadOptions::default() };
+        let read = read_recording_from(bytes, name, map, &options)?;
+        Recorded::described(name.to_owned(), read, map, given)
+    }
+
+    /// The contents with the campaign that describes the machine.
+    fn described(
+        file: PathBuf,
+        read: ReadReport,
+        map: &ChannelMap,
+        given: Option<&Campaign>,
+    ) -> Result<Recorded, SessionError> {
         let campaign = match given {
             Some(campaign) => Some(campaign.clone()),
             None if map.machine.is_some() => None,

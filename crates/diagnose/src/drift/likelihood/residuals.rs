@@ -4,9 +4,13 @@ use crate::drift::likelihood::candidates::Candidates;
 use crate::drift::likelihood::low_rank::LowRank;
 use crate::drift::runs::request::Unsolvable;
 use crate::drift::sensitivity::readings::Readings;
-use mapper_numerics::statistics::{EXCLUDE_SIGMAS, median};
+use mapper_numerics::statistics::median;
 use mapper_observe::perturbation::UNINFORMATIVE;
 use nalgebra::{DMatrix, DVector};
+
+/// Distance from the model, relative to the median segment, above which a segment is an outlier.
+const FAR_OUT: f64 = 5.0;
+const LEAVE_OUT_ROUNDS: usize = 4;
 
 /// Excludes outlying segments even for the best explanation: the model cannot follow the machine there (surge, a valve at its stop). Returns
 /// their number, the noise without them, and the residual of the best explanation.
@@ -21,7 +25,7 @@ pub(crate) fn leave_out(
     let mut out = vec![false; own.len()];
     let mut noise = LowRank::new(own, columns)?;
     let mut left = unexplained(&noise, difference, candidates);
-    loop {
+    for _ in 0..LEAVE_OUT_ROUNDS {
         let sizes: Vec<f64> = (0..own.len())
             .map(|block| {
                 left.rows(block * count, count).iter().map(|value| value * value).sum::<f64>() / count as f64
@@ -30,7 +34,7 @@ pub(crate) fn leave_out(
         let kept = (0..own.len()).filter(|block| !out[*block]).map(|block| sizes[block]);
         let usual = median(kept).unwrap_or(1.0).max(1.0);
         let far: Vec<usize> = (0..own.len())
-            .filter(|block| !out[*block] && sizes[*block] > EXCLUDE_SIGMAS * EXCLUDE_SIGMAS * usual)
+            .filter(|block| !out[*block] && sizes[*block] > FAR_OUT * FAR_OUT * usual)
             .collect();
         if far.is_empty() {
             break;

@@ -6,7 +6,6 @@
 use crate::driven::cause_search::noise::Whitening;
 use crate::driven::cause_search::sides::side::{Side, Smooth};
 use crate::gap::best_fit::coordinate::{Coordinate, coordinates, parameters, set_parameter};
-use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::PRIOR_STEPS;
 use crate::gap::residuals::study::Hypothesis;
 use mapper_inference::descent::{ENOUGH, End, FINE, Model, Normal, Reach, Until, descend, room_within};
@@ -49,6 +48,8 @@ const OUTSIDE_RATIO: f64 = 12.0;
 /// No model of this kind leaves less than so many widths below the median, however well it happens to fit; nor does what is
 /// called a cause outside the catalogue.
 const MIN_LEFT: f64 = -2.0;
+/// An unknown so many standard deviations off is beyond what is known of any machine.
+const MAX_SIGMAS: f64 = 5.0;
 /// Maximum number of iterations.
 const ITERATIONS: usize = 15;
 

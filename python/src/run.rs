@@ -5,7 +5,9 @@ use crate::campaign::{Campaign, Inner};
 use crate::error::Fault;
 use crate::map::Map;
 use crate::registry::{registry, registry_with_rig};
-use mapper_session::{RunTermination, RunOutcome, RunRequest, Session, SessionError, SessionEvent, with_messages};
+use mapper_session::{
+    RunOutcome, RunRequest, RunTermination, Session, SessionError, SessionEvent, with_messages,
+};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;

@@ -13,7 +13,7 @@ use crate::{
 use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
-use mapper_live::{ObserverRequest, LiveError, LiveRun, Observers, TlsFiles};
+use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles};
 use mapper_report::{plan_text, with_messages};
 use mapper_session::{
     InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, RunTermination, Session,

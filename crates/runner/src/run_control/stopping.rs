@@ -29,7 +29,9 @@ impl Runner<'_> {
                 let _ = done.send(());
                 armed
             });
-            while ended.recv_timeout(Duration::from_secs_f64(STOP_CHECK_INTERVAL_S)) == Err(RecvTimeoutError::Timeout) {
+            while ended.recv_timeout(Duration::from_secs_f64(STOP_CHECK_INTERVAL_S))
+                == Err(RecvTimeoutError::Timeout)
+            {
                 if answered.is_none() && stops() {
                     let message = "asked to stop while the rig is being connected: it has no setpoint yet and is made safe as \
                                    soon as it answers"

@@ -213,8 +213,11 @@ impl Controller for Nodes {
         let reading =
             |((channel, _, scale), value): (&(Channel, NodeId, crate::settings::Scale), DataValue)| {
                 let mut quality = quality(&value);
-                let mut reason =
-                    value.status.map(describe_status).filter(|_| quality != Quality::Good).unwrap_or_default();
+                let mut reason = value
+                    .status
+                    .map(describe_status)
+                    .filter(|_| quality != Quality::Good)
+                    .unwrap_or_default();
                 // A node may change its type at run time: a Boolean is not a reading.
                 let there = value.value.as_ref().filter(|there| is_number(there));
                 let inside = there.map_or(f64::NAN, |there| scale.inside(number(there)));

@@ -72,10 +72,7 @@ impl ElementBank {
                 seed,
                 stream(Element { channel, number: index + 1 }),
             ),
-            follower: ChannelFollower::new(ChannelPath {
-                lag_s: element.lag_s,
-                ..ChannelPath::default()
-            }),
+            follower: ChannelFollower::new(ChannelPath { lag_s: element.lag_s, ..ChannelPath::default() }),
             tip: None,
             last: f64::NAN,
         };

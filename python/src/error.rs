@@ -104,8 +104,8 @@ fn of_session(error: SessionError) -> PyErr {
         | E::Backend(_)
         | E::Reader { .. }
         | E::FirstMap(_)
-        | E::Unguarded { .. }
-        | E::GuardBlind { .. } => CampaignError::new_err(error.to_string()),
+        | E::MissingGuards { .. }
+        | E::GuardWithoutChannel { .. } => CampaignError::new_err(error.to_string()),
         _ => MapperError::new_err(error.to_string()),
     }
 }

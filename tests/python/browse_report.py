@@ -85,6 +85,8 @@ with sync_playwright() as playwright:
     result["copied"], result["tables"] = [], count("main table")
     for index in range(result["tables"]):
         of = page.locator("main table").nth(index)
+        # Some tables are folded away.
+        of.evaluate("table => table.closest('details')?.setAttribute('open', '')")
         of.locator("button.copy").click()
         page.wait_for_timeout(50)
         page.focus("#paste")

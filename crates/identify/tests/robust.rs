@@ -154,7 +154,7 @@ fn lost_samples_and_spikes_are_left_out() {
     assert!((point.eta.unwrap() - transient.eta).abs() < 1e-8);
     let reported = |expected: &dyn Fn(&Warning) -> bool| point.warnings.iter().any(expected);
     assert!(reported(&|warning| matches!(warning, Warning::LostSamples { lost: 32, .. })));
-    assert!(reported(&|warning| *warning == Warning::Outliers { count: 1, limit_k: None }));
+    assert!(reported(&|warning| *warning == Warning::Outliers { count: 1 }));
     assert_eq!(point.verdict, Verdict::Good);
 }
 

@@ -29,8 +29,8 @@ Warning {
     "steps_contradict" StepsContradict(StepConflict),
     /// Samples were lost (NaN, gaps).
     "lost_samples" LostSamples { lost: usize, samples: usize },
-    /// Samples were left out: spikes, or farther than `limit_k` from the fit.
-    "outliers" Outliers { count: usize, limit_k: Option<f64> },
+    /// Samples were left out: spikes.
+    "outliers" Outliers { count: usize },
     /// The calibration of a sensor does not support its readings.
     "calibration" Calibration { channel: Channel, sensor: String, defect: CalibrationDefect },
     /// Part of the state at the step's end is not from its last seconds.
@@ -142,8 +142,6 @@ kinds! {
         Overlap { first: usize, first_start_s: f64, first_end_s: f64, second: usize, second_start_s: f64, second_end_s: f64 },
         /// Several steps have the same number.
         SharedNumber { number: usize, steps: usize },
-        /// No plan has so many steps.
-        LargeNumber { number: usize, start_s: f64, max_number: usize },
     }
     /// Reason for too few samples.
     TooFew {
@@ -208,16 +206,8 @@ kinds! {
     }
     /// Evidence against the joint model.
     ModelEvidence {
-        /// Least squares did not converge.
-        NotConverged,
-        /// Residual over all steps, relative to the declared noise.
-        Residual { residual_ratio: f64 },
         /// Slow part of the residual, relative to that of the declared noise.
         SlowResidual { residual_ratio: f64 },
-        /// Impossible exponent of the convection law.
-        Exponent { exponent: f64, exponent_sigma: f64 },
-        /// T2 lags as behind an impossible probe.
-        Probe { diameter_m: f64 },
         /// Scatter of the points about the convection law.
         Scatter { scatter_ratio: f64 },
         /// Points with an impossible efficiency.
@@ -235,9 +225,6 @@ pub struct ModelDoubt {
     /// The evidence.
     #[serde(flatten)]
     pub evidence: ModelEvidence,
-    /// Whether all parameters with a prior are held as declared because of it.
-    #[serde(default)]
-    pub parameters_held: bool,
 }
 
 /// An end of the map.
@@ -327,13 +314,13 @@ mod tests {
     #[test]
     fn values_and_code_survive_a_file() {
         let doubt =
-            ModelDoubt { evidence: ModelEvidence::Residual { residual_ratio: 2.0 }, parameters_held: true };
+            ModelDoubt { evidence: ModelEvidence::SlowResidual { residual_ratio: 2.0 } };
         let signal = EtaSignal::Settled { rise_k: 3.0 };
         let region = LeftOut::Region { region: MapRegion::Choke, sigmas: 7.0, doubts: vec![doubt.clone()] };
         let all = [
             Warning::NoTransient,
             Warning::DeadChannel { channel: Channel::P2, reading: 3.0 },
-            Warning::Outliers { count: 2, limit_k: None },
+            Warning::Outliers { count: 2 },
             Warning::SwappedChannels(Swapped::T2AboveT3),
             Warning::OffsetsDominate(WideInterval { eta_noise_sigma: 0.01, eta_bias_sigma: 0.02, signal }),
             Warning::LeftOut(region),

@@ -128,7 +128,7 @@ pub(crate) fn doubts(
         doubts.push(ModelEvidence::Bend { offset_ratio: smoothed.strain });
     }
     doubts.extend(split_doubt(problem, refinements));
-    doubts.into_iter().map(|evidence| ModelDoubt { evidence, parameters_held: false }).collect()
+    doubts.into_iter().map(|evidence| ModelDoubt { evidence }).collect()
 }
 
 /// Fits steps with rising T2 and steps with falling T2 separately: their shared parameters must agree.

@@ -52,7 +52,7 @@ pub(crate) fn cleaned(samples: Samples, config: &IdentifyConfig, findings: &mut 
         }
     }
     if spikes > 0 {
-        findings.remark(Warning::Outliers { count: spikes, limit_k: None });
+        findings.remark(Warning::Outliers { count: spikes });
     }
     if kept.iter().all(|keep| *keep) {
         return samples;

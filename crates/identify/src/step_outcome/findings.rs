@@ -75,7 +75,7 @@ mod tests {
     fn doubts_come_before_remarks_whatever_was_found_first() {
         let (mut findings, mut other) = (Findings::new(), Findings::new());
         let [spikes, dead, no_jump] = [
-            Warning::Outliers { count: 2, limit_k: None },
+            Warning::Outliers { count: 2 },
             Warning::DeadChannel { channel: Channel::T2, reading: 0.0 },
             Warning::ThroughTheLaw { convection_origin: None },
         ];

@@ -115,24 +115,10 @@ fn left_out(reason: &LeftOut) -> Sentence {
 }
 
 pub(crate) fn model_doubt(doubt: &ModelDoubt) -> Sentence {
-    let sentence = match &doubt.evidence {
-        ModelEvidence::NotConverged => sentence!("least squares over all steps did not converge"),
-        ModelEvidence::Residual { residual_ratio } => sentence!(
-            "the residual over all steps is {} times the declared noise: something outside the model has an influence",
-            number(*residual_ratio, 2)
-        ),
+    match &doubt.evidence {
         ModelEvidence::SlowResidual { residual_ratio } => sentence!(
             "the residual of T2 over all steps has a shape: its slow part is {} times that of the declared noise",
             number(*residual_ratio, 2)
-        ),
-        ModelEvidence::Exponent { exponent, exponent_sigma } => sentence!(
-            "the convection law's exponent is {} +/- {}, which is impossible for flow in a housing",
-            number(*exponent, 2),
-            number(1.96 * exponent_sigma, 2)
-        ),
-        ModelEvidence::Probe { diameter_m } => sentence!(
-            "T2 lags as if behind a probe of {} mm, which no outlet has: something else delays it",
-            number(1e3 * diameter_m, 1)
         ),
         ModelEvidence::Scatter { scatter_ratio } => {
             sentence!("the points scatter by {} % about the convection law", number(100.0 * scatter_ratio, 1))
@@ -153,9 +139,5 @@ pub(crate) fn model_doubt(doubt: &ModelDoubt) -> Sentence {
             number(*falling, 3),
             number(*sigmas, 1)
         ),
-    };
-    match doubt.parameters_held {
-        true => sentence.then(sentence!("; so all parameters with a prior are held as declared")),
-        false => sentence,
     }
 }

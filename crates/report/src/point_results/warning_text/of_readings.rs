@@ -49,14 +49,9 @@ pub(crate) fn sentence_of(warning: &Warning) -> Option<Sentence> {
         Warning::LostSamples { lost, samples } => {
             sentence!("{} of {} samples in the window were lost and are left out", *lost, *samples)
         }
-        Warning::Outliers { count, limit_k: None } => {
+        Warning::Outliers { count } => {
             sentence!("samples far from their neighbours, left out: {}", *count)
         }
-        Warning::Outliers { count, limit_k: Some(limit_k) } => sentence!(
-            "samples more than {} K from the fit and from their neighbours, left out: {}",
-            number(*limit_k, 1),
-            *count
-        ),
         Warning::Calibration { channel, sensor, defect } => calibration(*channel, sensor, defect),
         Warning::EndState { channel, lost_before_end_s } => sentence!(
             "{} was lost {} s before the step's end; its last values are used",
@@ -210,8 +205,5 @@ fn steps_contradict(conflict: &StepConflict) -> Sentence {
                 "{steps} steps have the number {number}, so their results cannot be distinguished: give each its own"
             )
         }
-        StepConflict::LargeNumber { number, start_s, max_number } => format!(
-            "step {number} at {start_s:.1} s has a number beyond {max_number}, which no plan has: correct the step marks"
-        ),
     })
 }

@@ -243,13 +243,13 @@ fn hostile_parts_are_named_and_left_out() {
     for (number, word) in [
         (0, "not a part"),
         (1, "not a part"),
-        (2, "bytes of"),
+        (2, "bytes instead"),
         (3, "contains the item"),
         (5, "was made by mapper 1.2.4"),
         (6, "more than"),
         (7, "not a part"),
         (9, "changed"),
-        (11, "bytes of"),
+        (11, "bytes instead"),
     ] {
         let reason = why.get(format!("number {number}").as_str()).copied().unwrap_or("nothing");
         assert!(reason.contains(word), "{number}: {reason}");

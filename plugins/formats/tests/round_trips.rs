@@ -118,7 +118,6 @@ fn a_map_without_reference_is_refused_with_the_usual_choices() {
         "SAE (298 K, 100 kPa)",
         "Garrett (545 degR, 13.95 psia)",
         "BorgWarner (293 K, 98.1 kPa)",
-        "--reference",
     ] {
         assert!(error.contains(choice), "{error}");
     }

@@ -169,7 +169,7 @@ static double outputs(double *r, const int *switches, const double *y, double *v
     r[VR_pressure_ratio] = pressure_ratio;
     r[VR_surge_position] = point.surge_position;
     r[VR_eta] = efficiency;
-    r[VR_h] = h * (wall_k > r[VR_T2_prime] ? r[VR_compressor_hot_metal_h_ratio] : 1.0);
+    r[VR_h] = h;
     r[VR_q_c] = q1_w + after_w_k * (r[VR_T2] - wall_k);
     r[VR_W_c] = gamma > 0.0 ? flow * moist_cp * mean_heat_capacity(r[VR_T1_prime], equivalent_k) * (equivalent_k - r[VR_T1_prime])
                             : flow * cp1 * (equivalent_k - r[VR_T1_prime]);

@@ -91,7 +91,7 @@ fn read(folder: &Path) -> Case {
             p3_pa: row[2],
             valve_opening_ratio: row[3],
         });
-        truth.push(Truth { eta: row[4], h_w_m2k: row[5], speed_rpm: 0.0, heats_gas: false });
+        truth.push(Truth { eta: row[4], h_w_m2k: row[5], speed_rpm: 0.0 });
     }
     let mut declared: BTreeMap<_, _> = common::RIG
         .into_iter()

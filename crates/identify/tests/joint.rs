@@ -87,11 +87,9 @@ fn without_noise_a_slow_probe_is_found_with_and_without_a_known_share() {
 fn without_noise_convection_that_depends_on_direction_is_found() {
     let campaign = campaign(&eighteen(), 120.0, Machine { direction: 0.65, ..Machine::default() });
     let (points, thermal) = found(&campaign.recording, &joint());
-    let (eta, h) = worst(&points, &campaign);
+    let (eta, _) = worst(&points, &campaign);
     let factor = value(&thermal.direction_factor);
     assert!((factor - 0.65).abs() < 0.02 && eta < 0.003, "factor {factor}, eta {eta}");
-    // A point whose housing heats the gas has the h of that direction.
-    assert!(campaign.truth.iter().any(|truth| truth.heats_gas) && h < 0.05, "h {h}");
 }
 
 /// With all extensions off it is the dynamic method, to the digit.

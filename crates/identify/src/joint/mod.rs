@@ -15,7 +15,7 @@ pub(crate) mod uncertainty;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, FULLY, Problem, ROUGHLY};
-use crate::joint::step_model::parameters::{FLOW_GAIN, INLET, LN_DIRECTION, OFFSETS, PROBE_MM2, SHARED};
+use crate::joint::step_model::parameters::{FLOW_GAIN, INLET, OFFSETS, PROBE_MM2, SHARED};
 use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
@@ -95,10 +95,7 @@ pub(crate) fn estimate(
         let own = &mut findings[step.position];
         let (Judged { value: eta, uncertainty: eta_error, interval, .. }, ln_h) =
             (smoothed.eta[i], smoothed.ln_h[i]);
-        let heats_gas = problem.setting.heats_gas_at_end(&step.end, &problem.shared, &member.local);
-        let direction_ratio = if heats_gas { problem.shared[LN_DIRECTION].exp() } else { 1.0 };
-        let fitted_h_w_m2k =
-            direction_ratio * problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0;
+        let fitted_h_w_m2k = problem.setting.h_at_end(&step.end, &problem.shared, &member.local).0;
         let h_w_m2k = fitted_h_w_m2k * ln_h.value.exp();
         let h_error = EstimateUncertainty {
             noise_standard_error: h_w_m2k * ln_h.uncertainty.noise_standard_error,

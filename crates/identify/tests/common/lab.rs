@@ -20,8 +20,6 @@ pub struct Truth {
     pub eta: f64,
     pub h_w_m2k: f64,
     pub speed_rpm: f64,
-    /// Whether the housing is hotter than the gas behind the wheel.
-    pub heats_gas: bool,
 }
 
 pub struct Campaign {
@@ -91,19 +89,17 @@ pub fn campaign(points: &[(f64, f64)], dwell_s: f64, machine: Machine) -> Campai
         simulator.restart();
         let from = index as u32 * count;
         let times = (from..from + count).map(|i| f64::from(i) * 0.1);
-        let mut last = Truth { eta: 0.0, h_w_m2k: 0.0, speed_rpm: 0.0, heats_gas: false };
+        let mut last = Truth { eta: 0.0, h_w_m2k: 0.0, speed_rpm: 0.0 };
         simulator
             .run_to(
                 start_s + dwell_s,
                 &boundary,
                 times,
                 |t_s, state, outputs| {
-                    let heats_gas = state.tc_k > outputs.t2_prime_k;
                     last = Truth {
                         eta: outputs.efficiency,
-                        h_w_m2k: outputs.h_w_m2k * if heats_gas { machine.direction } else { 1.0 },
+                        h_w_m2k: outputs.h_w_m2k,
                         speed_rpm: state.shaft_speed_rpm(),
-                        heats_gas,
                     };
                     let t2_k = if machine.direction == 1.0 {
                         outputs.t2_probe_k

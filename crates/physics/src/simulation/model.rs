@@ -231,9 +231,6 @@ impl PreparedModel<'_> {
             t2_k = hooks.fold(&site, t2_k, |hook, site, value| hook.gas_outlet_k(site, value));
             site.t2_k = t2_k;
         }
-        if wall_k > t2_prime_k {
-            h_w_m2k *= compressor.hot_metal_h_ratio;
-        }
         let t2_probe_time_constant_s = thermocouple::time_constant_s(
             params.t2_probe_diameter_m,
             compressor.outlet_diameter_m,

@@ -16,8 +16,7 @@ pub struct Outputs {
     pub efficiency: f64,
     /// Place on the speed line: <= 0 choked, 1 on the surge line, > 1 beyond it.
     pub surge_position_ratio: f64,
-    /// Heat-transfer coefficient between gas and compressor housing after compression, W/(m2 K): with the factor of metal that is
-    /// hotter than its gas.
+    /// Heat-transfer coefficient between gas and compressor housing, W/(m2 K).
     pub h_w_m2k: f64,
     /// Gas before the compressor wheel (station 1'), K.
     pub t1_prime_k: f64,

@@ -125,11 +125,9 @@ pub(super) fn evaluate(
         compression::isentropic_rise_ratio(lumped.pressure_ratio, boundary.t1_k, compressor.air());
     let bulk_k = compression::compressed_k(boundary.t1_k, rise_ratio, lumped.efficiency, compressor.air());
     let cp2_j_kgk = moist_cp_ratio * air::heat_capacity_j_kgk(bulk_k);
-    let direction_ratio =
-        |wall_k: f64, gas_k: f64| if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 };
-    let whole_w_k =
-        lumped.h_w_m2k * compressor.internal_area_m2 / direction_ratio(lumped.wall_k, lumped.t2_prime_k);
-    let directed_w_k = |wall_k: f64, gas_k: f64| whole_w_k * direction_ratio(wall_k, gas_k);
+    let whole_w_k = lumped.h_w_m2k * compressor.internal_area_m2;
+    let directed_w_k =
+        |wall_k: f64, gas_k: f64| whole_w_k * if wall_k > gas_k { compressor.hot_metal_h_ratio } else { 1.0 };
     let after_wheel_w_k =
         |wall_k: f64, gas_k: f64| directed_w_k(wall_k, gas_k) * (1.0 - compressor.alpha_area_ratio);
     let h_ratios = h_ratios(structure);

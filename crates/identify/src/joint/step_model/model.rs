@@ -157,11 +157,6 @@ impl Setting {
     /// T2 by eqs. 1-3. The heating/cooling ratio scales h if the metal is the hotter one. Eqs. 1-3 have one h, so each part of the area is
     /// scaled instead.
     fn t2_k(&self, gas: &Gas, convection: Convection, alpha: f64, ln_direction: f64) -> f64 {
-        self.outlet(gas, convection, alpha, ln_direction).0
-    }
-
-    /// T2, and whether the metal is hotter than the gas behind the wheel.
-    fn outlet(&self, gas: &Gas, convection: Convection, alpha: f64, ln_direction: f64) -> (f64, bool) {
         let Convection { h_w_m2k, bulk_k, inlet_h_ratio } = convection;
         let outward = |hotter: bool| if hotter && ln_direction != 0.0 { ln_direction.exp() } else { 1.0 };
         let before_m2 = outward(gas.tc_k > gas.t1_k) * alpha * self.internal_area_m2;
@@ -183,11 +178,10 @@ impl Setting {
         };
         let after_m2 = (1.0 - alpha) * self.internal_area_m2;
         let plain = pass(after_m2);
-        let heats_gas = gas.tc_k > plain.t2_prime_k;
-        if ln_direction != 0.0 && heats_gas {
-            return (pass(after_m2 * outward(true)).t2_k, true);
+        if ln_direction != 0.0 && gas.tc_k > plain.t2_prime_k {
+            return pass(after_m2 * outward(true)).t2_k;
         }
-        (plain.t2_k, heats_gas)
+        plain.t2_k
     }
 
     fn reynolds(&self, flow_kg_s: f64, bulk_k: f64) -> f64 {
@@ -217,13 +211,7 @@ impl Setting {
         self.ln_inlet_ratio(&gas, shared, compressed_k(gas.t1_k, gas.rise_ratio, gas.eta, gas.air))
     }
 
-    /// Whether the heating/cooling ratio scales the h behind the wheel at a step's end.
-    pub(crate) fn heats_gas_at_end(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> bool {
-        let gas = self.gas(end, &[0.0; TERM_COUNT], shared, local);
-        self.outlet(&gas, self.h(&gas, shared, local[LN_DEVIATION]), shared[ALPHA], 0.0).1
-    }
-
-    /// h at a step's end by the law of metal that the gas heats, W/(m2 K), and ln of its Reynolds number over the reference.
+    /// h at a step's end, W/(m2 K), and ln of its Reynolds number over the reference.
     pub(crate) fn h_at_end(&self, end: &Row, shared: &SharedVector, local: &LocalVector) -> (f64, f64) {
         let gas = self.gas(end, &[0.0; TERM_COUNT], shared, local);
         let Convection { h_w_m2k, bulk_k, .. } = self.h(&gas, shared, local[LN_DEVIATION]);

@@ -2,8 +2,7 @@
 
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{
-    ETA, EXPONENT, HUMIDITY, LN_AREA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION, OFFSETS, SHARED,
-    SharedVector,
+    ETA, EXPONENT, HUMIDITY, LN_AREA, LN_COEFFICIENT, LN_DEVIATION, OFFSETS, SHARED, SharedVector,
 };
 use crate::joint::step_model::rows::StepRows;
 use nalgebra::DVector;
@@ -106,12 +105,10 @@ pub(crate) fn quantities(
             let (own, mixed) = &covariance.own[i];
             let mut weights = [0.0; SHARED];
             weights[LN_AREA] = -1.0;
-            let (end, local) = (&steps[i].end, &problem.members[i].local);
-            if problem.setting.heats_gas_at_end(end, &problem.shared, local) {
-                weights[LN_DIRECTION] = 1.0;
-            }
             if problem.setting.with_law {
-                let at = |shared: &SharedVector| problem.setting.h_at_end(end, shared, local);
+                let at = |shared: &SharedVector| {
+                    problem.setting.h_at_end(&steps[i].end, shared, &problem.members[i].local)
+                };
                 let (h_w_m2k, ln_re) = at(&problem.shared);
                 weights[LN_COEFFICIENT] = 1.0;
                 weights[EXPONENT] = ln_re;

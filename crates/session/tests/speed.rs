@@ -88,7 +88,7 @@ fn a_limit_of_p3_is_reported_and_nothing_winds_up() {
         driven
             .events
             .iter()
-            .any(|event| event.kind == EventKind::Note && event.message.contains("its highest"))
+            .any(|event| event.kind == EventKind::Note && event.message.contains("its upper limit"))
     );
     assert!(missed.iter().all(|step| step.rows.iter().all(|row| row.2 <= 288e3)));
     assert!(!reached.is_empty());

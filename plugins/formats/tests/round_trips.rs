@@ -114,11 +114,7 @@ proptest! {
 fn a_map_without_reference_is_refused_with_the_usual_choices() {
     let rows = "RPM,WC,PRC,ETAC\n50000,0.05,1.3,0.6\n";
     let error = import("csv", rows, None).unwrap_err().to_string();
-    for choice in [
-        "SAE (298 K, 100 kPa)",
-        "Garrett (545 degR, 13.95 psia)",
-        "BorgWarner (293 K, 98.1 kPa)",
-    ] {
+    for choice in ["SAE (298 K, 100 kPa)", "Garrett (545 degR, 13.95 psia)", "BorgWarner (293 K, 98.1 kPa)"] {
         assert!(error.contains(choice), "{error}");
     }
     let map = import("csv", rows, Some(ReferenceState::GARRETT)).unwrap();

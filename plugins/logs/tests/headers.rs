@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use mapper_core::Channel::{
-    self, CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, TOil, Tc, TurbineFlow,
+    self, CompressorFlow, P1, P2, P3, P4, ShaftSpeed, T1, T2, T3, T4, TOil, TOilOut, Tc, TurbineFlow,
 };
 use mapper_log_formats::LOG_FORMATS;
 use mapper_recording::logs::proposal::{Certainty, propose};
@@ -50,6 +50,7 @@ fn value(holds: Holds, load: f64) -> (Kind, f64) {
             T4 => (Kind::Temperature, between(540.0, 720.0)),
             Tc => (Kind::Temperature, between(299.0, 357.0)),
             TOil => (Kind::Temperature, between(334.0, 343.0)),
+            TOilOut => (Kind::Temperature, between(345.0, 356.0)),
             ShaftSpeed => (Kind::Speed, between(22e3, 118e3)),
             TurbineFlow => (Kind::Flow, between(0.011, 0.1545)),
             _ => (Kind::Flow, between(0.0105, 0.1522)),
@@ -234,7 +235,7 @@ fn conventions() -> Vec<Vec<(&'static str, Holds)>> {
             ("p_turb_out", a(P4)),
             ("T_comp_housing", a(Tc)),
             ("T_oil_in", a(TOil)),
-            ("T_oil_out", temperature(345.0, 356.0)),
+            ("T_oil_out", a(TOilOut)),
             ("p_oil_in", pressure(250e3, 300e3)),
             ("n_turbo", a(ShaftSpeed)),
         ],

@@ -129,7 +129,7 @@ fn a_rig_that_cannot_be_armed_is_not_checked() {
         }
     };
     // The message states the expected variables, not the secrets.
-    assert!(lab.notes[0].contains("`unit: 255` (or 0), no other"), "{:?}", lab.notes);
+    assert!(lab.notes[0].contains("`unit: 255` or 0;"), "{:?}", lab.notes);
     assert!(
         lab.notes[1].contains("for the user in $PLC_USER with the password in $PLC_PASSWORD"),
         "{:?}",

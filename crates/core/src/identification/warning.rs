@@ -313,8 +313,7 @@ mod tests {
 
     #[test]
     fn values_and_code_survive_a_file() {
-        let doubt =
-            ModelDoubt { evidence: ModelEvidence::SlowResidual { residual_ratio: 2.0 } };
+        let doubt = ModelDoubt { evidence: ModelEvidence::SlowResidual { residual_ratio: 2.0 } };
         let signal = EtaSignal::Settled { rise_k: 3.0 };
         let region = LeftOut::Region { region: MapRegion::Choke, sigmas: 7.0, doubts: vec![doubt.clone()] };
         let all = [

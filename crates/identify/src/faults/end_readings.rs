@@ -6,6 +6,9 @@ use crate::objections::ends::{Ends, LAST_S};
 use mapper_core::{Channel, Recording};
 use mapper_physics::gas::air::Air;
 
+/// Maximum number of rows of a balance, evenly spread: the cost grows with the cube, and these take a second.
+pub(crate) const MAX_STEPS: usize = 500;
+
 /// The channels of the compressor, in the order of all arrays here.
 pub(crate) const CHANNELS: [Channel; 7] = [
     Channel::T1,

@@ -16,7 +16,7 @@ mod smooth;
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};
 use crate::faults::balances::efficiency::FittedEfficiencies;
-use crate::faults::end_readings::{CHANNELS, Readings, span_s};
+use crate::faults::end_readings::{CHANNELS, MAX_STEPS, Readings, span_s};
 use crate::faults::found_fault::{FoundFault, Suspect};
 use crate::faults::nominal_rig::NominalRig;
 use crate::objections::ends::Ends;
@@ -36,9 +36,6 @@ const OTHER_CONVECTION_RATIO: f64 = 0.2;
 /// The same of the conditions: weather and altitude, a cell that is hot, another test.
 const OTHER_PRESSURE_PA: f64 = 3e3;
 const OTHER_TEMPERATURE_K: f64 = 10.0;
-
-/// Maximum number of rows of a balance, evenly spread: the cost grows with the cube, and these take a second.
-pub(crate) const MAX_STEPS: usize = 500;
 
 /// All balances of a recording, and the prior of the parameters. `ends`: of the usable steps. `fitted`: efficiencies of the joint fit, if
 /// available.

@@ -52,7 +52,7 @@ pub(crate) const PROTOCOL_FAULTS: &[(f64, Fault, ExpectedEnd)] = &[
     (FAULT_S, Fault::Trips { is_reported: true }, ExpectedEnd::Trips("tripped by itself", FAULT_S + 1.5)),
     (FAULT_S, Fault::Trips { is_reported: false }, ExpectedEnd::Trips("no longer drives it", 130.0)),
     // These faults start before the jump.
-    (60.0, Fault::Ignores, ExpectedEnd::Trips("not reached", 130.0)),
+    (60.0, Fault::Ignores, ExpectedEnd::Trips("instead of", 130.0)),
     (40.0, Fault::Frozen(P2), ExpectedEnd::Trips("frozen", 91.5)),
     // The host detects these before any guard.
     (FAULT_S, Fault::Mute(1.5), ExpectedEnd::Lost("are missing")),

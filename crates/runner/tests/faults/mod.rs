@@ -137,7 +137,7 @@ fn every_fault_of_a_rig_ends_the_run_in_the_safe_state() {
         (Fault::Torn(T2), "values for", FAULT_S + 1.5),
         (Fault::Trips { is_reported: true }, "tripped by itself", FAULT_S + 1.5),
         (Fault::Trips { is_reported: false }, "no longer drives it", 130.0),
-        (Fault::Ignores, "not reached", 130.0),
+        (Fault::Ignores, "instead of", 130.0),
     ] {
         // Setpoints are ignored from before the jump.
         let begin_s = if fault == Fault::Ignores { 60.0 } else { FAULT_S };

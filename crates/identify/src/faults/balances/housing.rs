@@ -13,9 +13,8 @@
 
 use crate::IdentifyConfig;
 use crate::config::coloured;
-use crate::faults::MAX_STEPS;
 use crate::faults::balance_rows::{Rows, common, own};
-use crate::faults::end_readings::{CHANNELS, PerChannel, Readings, span_s};
+use crate::faults::end_readings::{CHANNELS, MAX_STEPS, PerChannel, Readings, span_s};
 use crate::step_data::samples::Samples;
 use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
 use mapper_numerics::statistics::{MIN_VALUES, mean};

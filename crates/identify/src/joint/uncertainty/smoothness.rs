@@ -6,9 +6,9 @@
 //! Learning, 2006, ch. 2 and 5). Its amplitude and lengths are averaged with their posterior weights. On a strongly curved map the offsets
 //! keep their declared spread; on a flat one they lose about half of it. All quantities correlated with the efficiencies are corrected too.
 
-use crate::faults::MAX_STEPS;
 use crate::faults::balances::efficiency::{FittedEfficiencies, FittedHeat};
 use crate::faults::end_readings::CHANNELS;
+use crate::faults::end_readings::MAX_STEPS;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
 use crate::joint::step_model::parameters::{FLOW_GAIN, LOCAL, OFFSET_CHANNELS, OFFSETS, SURFACE};

@@ -298,7 +298,7 @@ mod tests {
                     * (usize::from(place.temperature.is_some()) + usize::from(place.pressure.is_some()))
             })
             .sum();
-        assert_eq!(ROWS.len(), places + 13);
+        assert_eq!(ROWS.len(), places + 15);
         assert!(SET.is_some() && DERIVED.is_some() && OTHER.is_some() && OF_KIND.len() == 3);
     }
 

@@ -122,7 +122,7 @@ fn a_rig_that_cannot_be_armed_is_not_checked() {
         let finished = checked(name, campaign, scratch.path(), password).exits(5);
         assert_eq!(finished.stdout, "");
         assert_eq!(finished.stderr.trim_end().lines().count(), 1, "{}", finished.stderr);
-        let begun = format!("mapper: `{name}` cannot be armed, so that none of its 13 rules was judged: ");
+        let begun = format!("mapper: `{name}` cannot be armed, so none of the 13 rules was checked: ");
         assert!(finished.stderr.starts_with(&begun), "{}", finished.stderr);
         for reason in reasons {
             assert!(finished.stderr.contains(reason), "{reason}: {}", finished.stderr);

@@ -56,7 +56,7 @@ pub(crate) const PROTOCOL_FAULTS: &[(f64, Fault, ExpectedEnd)] = &[
     (40.0, Fault::Frozen(P2), ExpectedEnd::Trips("frozen", 91.5)),
     // The host detects these before any guard.
     (FAULT_S, Fault::Mute(1.5), ExpectedEnd::Lost("are missing")),
-    (FAULT_S, Fault::Doubled, ExpectedEnd::Lost("was expected")),
+    (FAULT_S, Fault::Doubled, ExpectedEnd::Lost("expected sample")),
     (FAULT_S, Fault::Reordered, ExpectedEnd::Lost("a sample at")),
     (FAULT_S, Fault::Backward(100.0), ExpectedEnd::Lost("a sample at")),
     (FAULT_S, Fault::Torn(T2), ExpectedEnd::Lost("values for")),

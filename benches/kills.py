@@ -3,15 +3,14 @@
     cargo build --release
     target/python-env/bin/python benches/kills.py --mapper target/release/mapper --kills 500
 
-Runs four campaigns in turn, each with noise and without: nine points of a minute evaluated by `dynamic` and by `joint` with a repeated jump, the same with a search of
+Runs four campaigns in turn: nine points of a minute evaluated by `dynamic` and by `joint` with a repeated jump, the same with a search of
 the surge line, and the same as a script that waits at each point. Kills each run with SIGKILL at a random moment of a random phase: start
 (planning, connecting), recording (soak, warm-up, steps), end (identification, writing of results). Then it goes on with `mapper run
 --resume`, which is killed in the same way up to twice more, until it is through, and compares with the uninterrupted run:
 
 - steps and soaks whose journal entry holds but which the recordings, cut as they are, do not contain;
 - points that are there twice or not at all, and the exit code;
-- efficiencies of points and map, in standard errors of the difference. A step of a resumed run has other noise, as on a real rig. So
-  half of the runs have a lab without noise, and their difference is that of the program: another thermal state at the first step;
+- efficiencies of points and map, in standard errors of the difference (a resumed run warms up again and draws other noise);
 - whether `identify RUN` gives the points of `RUN/points.json`, `report RUN` its page, and `drift RUN` the answer of the uninterrupted run.
 """
 
@@ -36,10 +35,6 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 
 from machines import ROOT, quantile
-
-
-# Ending of the name of a campaign whose lab has no noise.
-QUIET = ", no noise"
 
 
 def points_of(run):
@@ -91,7 +86,7 @@ def held(recording):
 class Whole:
     """The uninterrupted run of one campaign."""
 
-    def __init__(self, mapper, kind, campaign, folder, noisy):
+    def __init__(self, mapper, kind, campaign, folder):
         begin = time.monotonic()
         self.kind, self.campaign = kind, campaign
         process = subprocess.Popen([mapper, "run", str(campaign), "--out", str(folder)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -105,9 +100,7 @@ class Whole:
             if now > size:
                 size, last_s = now, time.monotonic() - begin
             time.sleep(0.005)
-        # Without noise a channel is frozen, and points that need it are doubtful.
-        self.exit = process.returncode
-        assert self.exit in ((0, 6) if QUIET in kind else (0,)), self.exit
+        assert process.returncode == 0, process.returncode
         self.run = next(folder.iterdir())
         self.bytes = size
         # Durations of the start and of the end, s.
@@ -115,8 +108,6 @@ class Whole:
         self.points = {key(p): p for p in points_of(self.run) if p["kind"] == "point"}
         self.map = map_of(self.run)
         self.drift = drift_of(mapper, self.run)
-        # The same campaign with noise: its intervals are the scale of differences.
-        self.scale = noisy or self
 
 
 def answer(mapper, command, run):
@@ -141,17 +132,10 @@ def map_of(run):
     return {(*place, number): cells for place, found in places.items() for number, cells in enumerate(found)}
 
 
-def difference(one, other, scale):
-    """Of two efficiencies, in standard errors of the difference of two that have the interval of `scale`."""
-    sigma = math.sqrt(2) * (scale["eta_high"] - scale["eta_low"]) / (2 * 1.96)
+def difference(one, other):
+    """Of two efficiencies, in standard errors."""
+    sigma = math.hypot(one["eta_high"] - one["eta_low"], other["eta_high"] - other["eta_low"]) / (2 * 1.96)
     return abs(one["eta"] - other["eta"]) / sigma
-
-
-def differences(own, whole, scale):
-    """At all places with an efficiency in all three."""
-    known = lambda place: scale[place].get("eta_high") is not None and None not in (own[place].get("eta"), whole[place].get("eta"))
-    places = filter(known, own.keys() & whole.keys() & scale.keys())
-    return [difference(own[place], whole[place], scale[place]) for place in places]
 
 
 def kill(process, rng, whole, recordings, done_bytes, progress):
@@ -226,7 +210,7 @@ def killed(mapper, folder, index, whole, again):
     run = runs[0]
     points = points_of(run)
     code, text = answer(mapper, "identify", run)
-    same = code == whole.exit and [(key(p), p["eta"]) for p in json.loads(text)["points"]] == [(key(p), p["eta"]) for p in points]
+    same = code == 0 and [(key(p), p["eta"]) for p in json.loads(text)["points"]] == [(key(p), p["eta"]) for p in points]
     page = subprocess.run([mapper, "report", str(run), "--out", str(out / "page.html")], capture_output=True, env=environment)
     shown = page.returncode == 0 and (out / "page.html").exists()
     drift = drift_of(mapper, run) == whole.drift
@@ -255,16 +239,14 @@ def campaigns(folder):
         "surge": [listed, (seed, f"surge_search: {{dwell: 12 s}}\n{seed}")],
         "script": [listed, (seed, f"sequence: waits.rhai\n{seed}")],
     }
-    quiet = ("  virtual_lab: {}", "  virtual_lab: {noise: none}")
-    for noise, (kind, changes) in itertools.product([[], [quiet]], kinds.items()):
+    for kind, changes in kinds.items():
         text = shipped
-        for before, after in short + changes + noise:
+        for before, after in short + changes:
             assert before in text, before
             text = text.replace(before, after)
-        name = kind + QUIET if noise else kind
-        path = folder / f"{name}.yaml"
+        path = folder / f"{kind}.yaml"
         path.write_text(text)
-        yield name, path
+        yield kind, path
 
 
 def main():
@@ -281,10 +263,7 @@ def main():
     until = time.monotonic() + 60 * arguments.minutes
     with tempfile.TemporaryDirectory() as scratch, concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         folder = Path(scratch)
-        wholes = []
-        for kind, path in campaigns(folder):
-            noisy = next((whole for whole in wholes if kind == whole.kind + QUIET), None)
-            wholes.append(Whole(mapper, kind, path, folder / f"whole-{kind}", noisy))
+        wholes = [Whole(mapper, kind, path, folder / f"whole-{kind}") for kind, path in campaigns(folder)]
         seeds = itertools.count(arguments.first)
         one_more = lambda index: pool.submit(killed, mapper, folder, index, wholes[index % len(wholes)], arguments.again)
         running = {one_more(next(seeds)) for _ in range(arguments.jobs)}
@@ -311,12 +290,13 @@ def table(found):
             whole = one["whole"]
             own = {key(p): p for p in one["points"] if p["kind"] == "point"}
             count = sum(p["kind"] == "point" for p in one["points"])
-            other = own.keys() != whole.points.keys() or count != len(own) or one["exit"] not in (whole.exit, -signal.SIGKILL)
-            wrong += other
-            if one["wrong"] or other:
+            if one["wrong"] or own.keys() != whole.points.keys() or count != len(own) or one["exit"] not in (0, -signal.SIGKILL):
+                wrong += own.keys() != whole.points.keys() or count != len(own) or one["exit"] not in (0, -signal.SIGKILL)
                 print(one["index"], kind, one["kills"], f"exit {one['exit']}, {count} points at {len(own)} places; differ:", one["wrong"], file=sys.stderr)
-            points += differences(own, whole.points, whole.scale.points)
-            maps += differences(one["map"], whole.map, whole.scale.map)
+            both = [(own[place], whole.points[place]) for place in own.keys() & whole.points.keys()]
+            points += [difference(*pair) for pair in both if all(p["eta"] is not None for p in pair)]
+            cells = [(one["map"][place], whole.map[place]) for place in one["map"].keys() & whole.map.keys()]
+            maps += [difference(*pair) for pair in cells if all(len(cell) == 3 for cell in pair)]
         numbers = [len(ones), sum(len(one["kills"]) for one in ones), sum("why" in one for one in ones), sum(one["lost"] for one in ones), wrong, differ]
         apart = ", ".join(f"{quantile(points, share):.2f}" for share in (0.5, 0.99, 1.0)) if points else "-"
         print(f"| {kind} | " + " | ".join(map(str, numbers)) + f" | {apart} | {max(maps, default=math.nan):.2f} |")

@@ -128,16 +128,18 @@ pub(crate) fn run_lagged(
                 series.t_s.push(t_s);
                 series.values.push(value);
             }
+            let heats_gas = outputs.wall_k > outputs.t2_prime_k;
+            let direction_ratio = if heats_gas { machine.params.compressor.hot_metal_h_ratio } else { 1.0 };
             truth.push(Truth {
                 t_s,
                 eta: outputs.efficiency,
-                h_w_m2k: outputs.h_w_m2k,
+                h_w_m2k: direction_ratio * outputs.h_w_m2k,
                 t2_k: outputs.t2_k,
                 speed_rpm: state.shaft_speed_rpm(),
                 flow_kg_s: outputs.flow_kg_s,
                 pressure_ratio: outputs.pressure_ratio,
                 probe_time_constant_s: outputs.t2_probe_time_constant_s,
-                heats_gas: outputs.wall_k > outputs.t2_prime_k,
+                heats_gas,
             });
         },
         |_| {},

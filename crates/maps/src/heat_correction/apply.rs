@@ -17,7 +17,6 @@ const HEAT_ERROR_RATIO: f64 = 0.5;
 const PREMISE_ERROR: f64 = 0.01;
 /// Above this a corrected efficiency is none.
 const HIGHEST_EFFICIENCY: f64 = 0.95;
-/// The code of the warning at each corrected point.
 
 /// What the correction did to a line.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

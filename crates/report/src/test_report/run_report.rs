@@ -203,7 +203,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         text.push_str(&markdown::table(
             &CORRECTION_HEADS,
             Align::Right,
-            &correction_rows(report.corrections),
+            correction_rows(report.corrections),
         ));
     }
     text.push_str(&budget_section(report.budgets));

@@ -113,7 +113,7 @@ impl SequenceRunner {
         self.answer.is_some()
     }
 
-    /// The script's next step; `Ok(None)` when the script has ended. If the step was not [requested](Self::ask) before, `finished`
+    /// The script's next step; `Ok(None)` when the script has ended. If the step was not [requested](Self::request_step) before, `finished`
     /// passes the result of the last step (`None` before the first).
     ///
     /// # Errors

@@ -153,7 +153,7 @@ impl Assembler {
 /// Parses a request to an instrument: code, channel and parameters.
 ///
 /// # Errors
-/// [`TelegramError::Torn`]
+/// [`TelegramError::Malformed`]
 pub fn parse_request(body: &[u8]) -> Result<(Code, u8, String), TelegramError> {
     let malformed = || TelegramError::Malformed(String::from_utf8_lossy(body).into_owned());
     let text = std::str::from_utf8(body.get(1..).ok_or_else(malformed)?).map_err(|_| malformed())?;

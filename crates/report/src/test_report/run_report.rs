@@ -200,11 +200,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
     points_section(&mut text, &units, report);
     if !report.corrections.is_empty() {
         let _ = writeln!(text, "\n## Before and after the correction\n\n{CORRECTION_CAPTION}\n");
-        text.push_str(&markdown::table(
-            &CORRECTION_HEADS,
-            Align::Right,
-            correction_rows(report.corrections),
-        ));
+        text.push_str(&markdown::table(&CORRECTION_HEADS, Align::Right, correction_rows(report.corrections)));
     }
     text.push_str(&budget_section(report.budgets));
     text.push_str(&acceptance_sections(report.judged_points()));

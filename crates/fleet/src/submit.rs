@@ -71,7 +71,7 @@ pub struct Submission {
     pub merge_refused: Option<String>,
 }
 
-/// Safety factor on the estimated duration of a task.
+/// Safety factor on the estimated duration of a task. Judgement: nodes of one cluster differ by a third.
 const TIME_SAFETY_FACTOR: f64 = 1.5;
 /// Memory in addition to the items, with overheads that only queues count, MB.
 const MEMORY_OVERHEAD_MB: u64 = 128;

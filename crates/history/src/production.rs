@@ -10,7 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Minimum number of nights for a drift: two always lie on a line.
 const MIN_NIGHTS_FOR_DRIFT: usize = 3;
-const MS_PER_DAY: f64 = 86_400_000.0;
+/// Milliseconds of a day.
+pub const MS_PER_DAY: f64 = 86_400_000.0;
 
 /// Results of many machines, measured with one campaign and method.
 #[derive(Debug, Clone, PartialEq, Serialize)]

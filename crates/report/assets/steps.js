@@ -19,7 +19,7 @@ function stepWords(step, p) {
       (p.h == null ? "" : `, h ${shown(p.h, 0)} ± ${shown(half(p.h_low, p.h_high), 0)} W/(m² K)`),
     p.raw.length ? `readings at the end: ${p.raw.join(", ")}` : null,
     model ? `T2 residual ${shown(model.rms_k, 3)} K rms, after a shift of the mean by ${shown(model.shift_k, 3)} K` : null,
-    ...p.said.map(sentence),
+    ...p.warnings.map(sentence),
   ].filter(Boolean);
 }
 

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 const REDRAW_INTERVAL: Duration = Duration::from_millis(250);
 /// Maximum width of a warning, columns.
 const COLUMNS: usize = 80;
-/// Number of times in a run that a program receives the rig's time.
+/// Number of times in a run that a program receives the rig's time: steps of half a per cent.
 const RIG_TIME_MESSAGES: f64 = 200.0;
 /// The current activity is above the bar, the progress below it.
 const RUN_BAR: &str = "{prefix}\n[{bar:14}] {msg}";

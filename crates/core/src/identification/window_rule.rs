@@ -26,7 +26,7 @@ impl WindowRule {
     pub const SHORTEST_S: f64 = 30.0;
 
     /// Share of a step, at its end, in which its operating point must have settled for a method that evaluates the step from
-    /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may pass through a momentary rest.
+    /// its jump on. The point's state is the mean of the last seconds, but an oscillating step may pass through a momentary rest. Judgement.
     const SETTLED_END_RATIO: f64 = 0.25;
 
     /// The same for a step of `dwell_s`, s: at most [`Self::SHORTEST_S`].

@@ -7,7 +7,7 @@ use mapper_core::{
 };
 use std::collections::BTreeSet;
 
-/// Maximum sample rate of a rig, Hz.
+/// Maximum sample rate of a rig, Hz: a hundred times that of the fastest logs of gas stands, and a second of it fits into memory.
 const MAX_RATE_HZ: f64 = 100_000.0;
 
 /// Invalid or inconsistent data from a driver.

@@ -400,14 +400,8 @@ fn points(points: &[PointGap]) -> String {
     };
     let eta_points = 100.0 * largest(|p| p.eta_after - p.eta_before);
     let h_w_m2k = largest(|p| p.h_after_w_m2k - p.h_before_w_m2k);
-    let eta = if eta_points.abs() < 0.005 {
-        "does not touch the efficiency".to_owned()
-    } else {
-        format!("changes the efficiency by up to {eta_points:+.2} points")
-    };
-    let h =
-        if h_w_m2k.abs() < 0.5 { "nor h".to_owned() } else { format!("h by up to {h_w_m2k:+.0} W/(m2 K)") };
-    let joined = if eta_points.abs() < 0.005 && h_w_m2k.abs() >= 0.5 { "but changes " } else { "" };
-    let nor = if eta_points.abs() >= 0.005 && h_w_m2k.abs() < 0.5 { "not h".to_owned() } else { h };
-    format!("  at the recorded points, at equal speed and pressures, the cause {eta}, {joined}{nor}\n")
+    format!(
+        "  at equal speed and pressures, the cause changes the wheel's own efficiency by up to {eta_points:+.2} points and h by up to \
+         {h_w_m2k:+.0} W/(m2 K); `mapper gap correct` gives its effect on the identified efficiencies\n"
+    )
 }

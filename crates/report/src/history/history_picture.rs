@@ -1,7 +1,7 @@
 //! Trends of the nights: a panel per figure, a line per campaign and method.
 
 use mapper_chart::{Axis, Colour, Figure as Picture, Line, Note, Panel, Scatter};
-use mapper_history::{ListedRun, Metric, median};
+use mapper_history::{ListedRun, MS_PER_DAY, Metric, median};
 use std::collections::{BTreeMap, BTreeSet};
 
 const COLOURS: [Colour; 8] = [
@@ -15,7 +15,6 @@ const COLOURS: [Colour; 8] = [
     Colour(0x45, 0x4F, 0x5B),
 ];
 const MOVED: Colour = Colour(0xC6, 0x28, 0x28);
-const MS_PER_DAY: f64 = 86_400_000.0;
 
 /// Maximum number of dates under an axis.
 const DATES_MAX: i64 = 6;

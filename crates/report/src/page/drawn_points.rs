@@ -48,7 +48,7 @@ pub(crate) struct DrawnPoint {
     valve: Option<f64>,
     verdict: &'static str,
     repeat: bool,
-    said: Vec<String>,
+    warnings: Vec<String>,
     /// Readings at the end of the step, as displayed.
     raw: Vec<String>,
 }
@@ -104,7 +104,7 @@ pub(crate) fn drawn_point(
         valve: point.valve_opening_ratio.is_finite().then_some(point.valve_opening_ratio),
         verdict: verdict_word(point.verdict),
         repeat: !point.kind.measures(),
-        said: point.warnings.iter().map(warning_text).collect(),
+        warnings: point.warnings.iter().map(warning_text).collect(),
         raw: Vec::new(),
     }
 }

@@ -22,7 +22,7 @@ const NUMBERED: [Channel; 6] = [Channel::P2, Channel::T2, Channel::P3, Channel::
 /// Gas turbines and some engine programs number the compressor 2 and 3, the turbine 4 and 5.
 const ENGINE_NUMBERS: &str = "its stations may be numbered as in a gas turbine: 2 before and 3 behind the compressor, 4 before and 5 behind the turbine";
 
-/// What the checks said.
+/// Results of the checks.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Agreement {
     /// Number of pairs of channels that agree.

@@ -7,7 +7,9 @@ use crate::map::Map;
 use crate::recording::Recording;
 use crate::registry::registry;
 use mapper_core::Method;
-use mapper_session::{Identified as Found, Recorded, Session, SessionError, compressor_map};
+use mapper_session::{
+    Identified as Found, Recorded, Session, SessionError, compressor_map, result_remark_text,
+};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::sync::Arc;
@@ -44,7 +46,11 @@ impl Identified {
             let mut remarks = Vec::new();
             Ok((compressor_map(&machine, &found, &mut remarks), remarks))
         })?;
-        map.map(|map| Map { map }).ok_or_else(|| IdentificationError::new_err(remarks.join("; ")))
+        map.map(|map| Map { map }).ok_or_else(|| {
+            IdentificationError::new_err(
+                remarks.iter().map(result_remark_text).collect::<Vec<_>>().join("; "),
+            )
+        })
     }
 }
 

@@ -29,6 +29,7 @@ pub use identification::joint_settings::{
     ALPHA_AREA_SIGMA_RATIO, Choice, ConvectionWithinStep, EfficiencyWithinStep, JointSettings,
 };
 pub use identification::model_tolerances::ModelTolerances;
+pub use identification::result_remark::ResultRemark;
 pub use identification::settle_bands::SettleBands;
 pub use identification::thermal_model::{
     ConvectionLaw, CorrelatedPair, IdentifiedInlet, Origin, SharedValue, ThermalModel,

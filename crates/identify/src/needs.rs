@@ -1,6 +1,6 @@
 //! Channels that each method needs.
 
-use mapper_core::{Channel, Method, Recording};
+use mapper_core::{Channel, Method, Recording, ResultRemark};
 
 /// Channels that every point needs: its position on the map, and the temperature rise.
 const EVERY: [Channel; 6] =
@@ -19,18 +19,12 @@ pub fn missing(recording: &Recording, method: Method) -> Vec<Channel> {
 
 /// The default method for a recording, and why it differs from `usual`. Without a housing temperature no heat-transfer model applies, so only
 /// the apparent efficiency remains.
-pub fn method_for(recording: &Recording, usual: Method) -> (Method, Option<String>) {
+pub fn method_for(recording: &Recording, usual: Method) -> (Method, Option<ResultRemark>) {
     let lost = missing(recording, usual);
     if lost.is_empty() || usual == Method::Steady || !missing(recording, Method::Steady).is_empty() {
         return (usual, None);
     }
-    let why = format!(
-        "the recording has no {}, which `{usual}` needs: the efficiencies are those of conventional mapping (`{}`), in which \
-         heat that the housing takes or gives counts as work; no heat-transfer coefficient is identified",
-        names(&lost),
-        Method::Steady
-    );
-    (Method::Steady, Some(why))
+    (Method::Steady, Some(ResultRemark::ConventionalMapping { usual, missing: lost }))
 }
 
 /// Symbols with descriptions.

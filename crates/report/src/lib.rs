@@ -67,6 +67,7 @@ pub use point_results::lines_of_points::{first_doubts_text, points_by_line_text,
 pub use point_results::point_table::{PointCell, PointGroup, point_cells, point_groups, point_heads};
 pub use point_results::point_warnings::{Doubt, doubts};
 pub use point_results::points::{opening, points_text, score_text, step_name, truth_text, verdict_word};
+pub use point_results::result_remark_text::result_remark_text;
 pub use point_results::shared_errors::shared_errors_text;
 pub use point_results::warning_text::{warning_text, with_messages};
 pub use reference_pages::campaign_page::campaign_page;

@@ -1,6 +1,7 @@
 //! All functions that a script may call: one row per function defines its registration and its documentation.
 
 use crate::error::throw;
+use crate::request::Refusal;
 use crate::result::StepResult;
 use crate::session::{ScriptThrow, Session, lock};
 use crate::step::EndCondition;
@@ -55,6 +56,7 @@ pub(crate) fn register(engine: &mut Engine, session: &SharedSession) {
     for name in ["to_string", "to_debug"] {
         engine.register_fn(name, |point: &mut Point| point.0.to_string());
         engine.register_fn(name, |result: &mut StepResult| describe_result(result));
+        engine.register_fn(name, |refusal: &mut Refusal| refusal.message.clone());
     }
     let notes = session.clone();
     engine.on_print(move |text| lock(&notes).note(text));

@@ -1,5 +1,6 @@
 //! Errors of a script, with their position in it.
 
+use crate::request::Refusal;
 use rhai::{Dynamic, EvalAltResult, ParseError, Position};
 use std::fmt;
 use std::path::PathBuf;
@@ -137,12 +138,9 @@ impl ScriptError {
 
 /// The error of a refused call. A script may catch it and choose another step.
 pub(crate) fn throw(message: String, remedy: &str) -> Box<EvalAltResult> {
-    let thrown = if remedy.is_empty() { message } else { format!("{message}{REMEDY_MARK}{remedy}") };
-    Box::new(EvalAltResult::ErrorRuntime(thrown.into(), Position::NONE))
+    let refusal = Refusal { message, remedy: remedy.to_owned() };
+    Box::new(EvalAltResult::ErrorRuntime(Dynamic::from(refusal), Position::NONE))
 }
-
-/// Separates message and remedy in the thrown text; a script that prints the text shows a line break.
-const REMEDY_MARK: char = '\n';
 
 fn message_and_remedy(error: EvalAltResult) -> (String, String) {
     use crate::sandbox::{CALL_DEPTH_LIMIT, OPERATION_LIMIT, ScriptEnd};
@@ -183,11 +181,13 @@ fn message_and_remedy(error: EvalAltResult) -> (String, String) {
     }
 }
 
+/// A script may throw anything, and a refusal that it caught.
 fn thrown_message_and_remedy(thrown: Dynamic) -> (String, String) {
-    let text = thrown.to_string();
-    match text.split_once(REMEDY_MARK) {
-        Some((message, remedy)) => (message.to_owned(), remedy.to_owned()),
-        None if text.is_empty() => ("the sequence script stopped itself".to_owned(), String::new()),
-        None => (text, String::new()),
+    match thrown.try_cast_result::<Refusal>() {
+        Ok(Refusal { message, remedy }) => (message, remedy),
+        Err(thrown) => match thrown.to_string() {
+            text if text.is_empty() => ("the sequence script stopped itself".to_owned(), String::new()),
+            text => (text, String::new()),
+        },
     }
 }

@@ -44,7 +44,7 @@ class Result:
     @property
     def remarks(self) -> list[str]:
         """Remarks of the identification, and warnings of the reader."""
-        return [*self.json["recording_warnings"], *self.json["remarks"]]
+        return [*self.json["recording_warnings"], *(remark["message"] for remark in self.json["remarks"])]
 
     @cached_property
     def map(self) -> Map:

@@ -58,7 +58,7 @@ class Run:
         """
         made = self._outcome.map
         if made is None:
-            remarks = [] if self.json is None else self.json["remarks"]
+            remarks = [] if self.json is None else [remark["message"] for remark in self.json["remarks"]]
             raise _mapper.IdentificationError("; ".join(remarks) or self.outcome)
         return Map(made)
 

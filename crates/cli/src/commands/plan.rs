@@ -12,7 +12,7 @@ use mapper_core::{Jump, OperatingPoint, Plan as StepPlan, VisitOrder};
 use mapper_physics::simulation::model::Model;
 use mapper_planner::{PlanRequest, make_plan, plan_other_orders};
 use mapper_report::{
-    comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text, with_messages,
+    comparison_json, comparison_text, jump_json, jump_text, plan_svg, plan_text,
 };
 use mapper_session::{
     PlanInputs, Rehearsal, Session, SessionError, json_text, nominal_model, plan_of, rehearse,
@@ -105,7 +105,7 @@ impl Plan {
             if let Some(zero) = campaign.zero {
                 value["soak_s"] = zero.duration_s.into();
             }
-            return standard_output::print_json(&with_messages(value));
+            return standard_output::print_json(&value);
         }
         let mut text = plan_text(&campaign, &plan);
         if let Some(others) = &others {
@@ -131,7 +131,7 @@ impl Plan {
             if let Some(zero) = campaign.zero {
                 value["soak_s"] = zero.duration_s.into();
             }
-            return standard_output::print_json(&with_messages(value));
+            return standard_output::print_json(&value);
         }
         let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
         standard_output::print(&format!(

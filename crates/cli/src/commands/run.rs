@@ -14,7 +14,7 @@ use clap::Args;
 use mapper_campaign::Campaign;
 use mapper_core::{PacedClock, Verdict};
 use mapper_live::{LiveError, LiveRun, ObserverRequest, Observers, TlsFiles};
-use mapper_report::{plan_text, with_messages};
+use mapper_report::plan_text;
 use mapper_session::{
     InterruptedRun, Operator, Phase, PreparedRun, RunOutcome, RunRequest, RunTermination, Session,
     SessionError, SessionEvent, load_on, recording::run_directory, soak_s, start_time_ns,
@@ -197,7 +197,7 @@ impl Run {
             (Err(_), Some(_)) if !self.json => {}
             (results, failure) => {
                 let mut value = match results {
-                    Ok(results) => with_messages(serde_json::to_value(&results).map_err(SessionError::from)?),
+                    Ok(results) => serde_json::to_value(&results).map_err(SessionError::from)?,
                     Err(_) => json!({"run": directory, "recording": recording, "points": [], "map": {}}),
                 };
                 if let Some(failure) = failure {

@@ -22,6 +22,8 @@ use terminal_size::terminal_size_of;
 pub struct Failure {
     code: Code,
     message: String,
+    /// The command for the remedy.
+    command: Option<String>,
     /// Mistakes of a file, for programs.
     findings: Option<Value>,
     presentation: Presentation,
@@ -43,13 +45,19 @@ enum Presentation {
 impl Failure {
     /// A failure with a message that completes "mapper: ".
     pub fn new(code: Code, message: impl std::fmt::Display) -> Self {
-        Failure { code, message: message.to_string(), findings: None, presentation: Presentation::Sentence }
+        Failure {
+            code,
+            message: message.to_string(),
+            command: None,
+            findings: None,
+            presentation: Presentation::Sentence,
+        }
     }
 
     /// A library error with the command for its remedy, if there is one.
     fn with_command(code: Code, error: &dyn std::fmt::Display, command: Option<String>) -> Self {
-        let command = command.map(|command| format!(" ({command})")).unwrap_or_default();
-        Failure::new(code, format!("{error}{command}"))
+        let shown = command.as_ref().map(|command| format!(" ({command})")).unwrap_or_default();
+        Failure { command, ..Failure::new(code, format!("{error}{shown}")) }
     }
 
     /// All mistakes of a campaign, or that it cannot be read.
@@ -62,11 +70,11 @@ impl Failure {
 
     /// All mistakes of a file that people write.
     fn of_findings(findings: &Findings) -> Self {
+        let message = findings.render(output_options::is_stderr_coloured());
         Failure {
-            code: Code::BadInput,
-            message: findings.render(output_options::is_stderr_coloured()),
             findings: Some(json!(findings.list)),
             presentation: Presentation::Rendered,
+            ..Failure::new(Code::BadInput, message)
         }
     }
 
@@ -108,14 +116,13 @@ impl Failure {
             Ok(error) => return SessionError::from(*error).into(),
             Err(error) => error,
         };
-        let error = match error.downcast::<SessionError>() {
-            Ok(error) => return (*error).into(),
-            Err(error) => error,
-        };
-        match error.downcast::<BlindError>() {
-            Ok(error) => (*error).into(),
-            Err(error) => Failure::new(Code::BadInput, error),
-        }
+        error.downcast::<SessionError>().map_or_else(
+            |error| match error.downcast::<BlindError>() {
+                Ok(error) => (*error).into(),
+                Err(error) => Failure::new(Code::BadInput, error),
+            },
+            |error| (*error).into(),
+        )
     }
 
     /// Standard output was closed by its reader: a normal end of a pipe.
@@ -142,12 +149,11 @@ impl Failure {
         Some(ExitCode::from(self.code as u8))
     }
 
-    /// Code, message, and remedy: that of the first mistake, or the text after the last semicolon of the message.
+    /// Code, message, and help: the remedy of the first mistake, or the command that helps.
     pub fn json(&self) -> Value {
-        let first = self.findings.as_ref().and_then(|findings| findings.get(0));
-        let (message, help) = match first {
+        let (message, help) = match self.findings.as_ref().and_then(|findings| findings.get(0)) {
             Some(first) => (first["message"].clone(), first["remedy"].clone()),
-            None => (json!(self.message), json!(self.message.rsplit_once("; ").map(|(_, help)| help))),
+            None => (json!(self.message), json!(self.command)),
         };
         let mut value = json!({ "code": self.code as u8, "message": message, "help": help });
         if let Some(findings) = &self.findings {

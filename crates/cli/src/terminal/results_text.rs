@@ -7,8 +7,8 @@ use mapper_maps::RepeatedJump;
 use mapper_observe::FusedChannel;
 use mapper_report::{
     Display, Paint, ScoredPoint, disagreement_text, first_doubts_text, paint_verdict, points_by_line_text,
-    points_text, repeated_jumps_text, sensors_text, shared_errors_text, surge_columns_text, surge_text,
-    thermal_text, truth_text, verdict_sentence, wrapped, zero_text,
+    points_text, repeated_jumps_text, result_remark_text, sensors_text, shared_errors_text,
+    surge_columns_text, surge_text, thermal_text, truth_text, verdict_sentence, wrapped, zero_text,
 };
 use mapper_session::{Identified, Results, SoughtSurge};
 use std::fmt::Write;
@@ -55,7 +55,7 @@ pub fn results_text(units: &DisplayUnits, results: &Results, more: &str, shown: 
             sensors: &results.sensors,
             zero: &results.zero,
             surge: results.surge.as_ref(),
-            remarks: results.remarks.clone(),
+            remarks: results.remarks.iter().map(result_remark_text).collect(),
             more,
         },
         shown,
@@ -91,7 +91,7 @@ pub fn identified_text(
         sensors: &identified.sensors,
         zero: &identified.zero,
         surge: identified.surge.as_ref(),
-        remarks: identified.remarks.iter().cloned().chain(warnings).collect(),
+        remarks: identified.remarks.iter().map(result_remark_text).chain(warnings).collect(),
         more,
     };
     shown_results_text(units, &found, shown)

@@ -6,6 +6,7 @@ pub(crate) mod identified;
 pub(crate) mod inlet_convection;
 pub(crate) mod joint_settings;
 pub(crate) mod model_tolerances;
+pub(crate) mod result_remark;
 pub(crate) mod settle_bands;
 pub(crate) mod thermal_model;
 pub(crate) mod uncertainty_budget;

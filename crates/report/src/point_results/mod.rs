@@ -7,5 +7,6 @@ pub(crate) mod lines_of_points;
 pub(crate) mod point_table;
 pub(crate) mod point_warnings;
 pub(crate) mod points;
+pub(crate) mod result_remark_text;
 pub(crate) mod shared_errors;
 pub(crate) mod warning_text;

@@ -10,6 +10,7 @@ use crate::point_results::lines_of_points::verdict_sentence;
 use crate::point_results::point_table::{point_cells, point_groups, point_heads};
 use crate::point_results::point_warnings::doubts;
 use crate::point_results::points::score_text;
+use crate::point_results::result_remark_text::result_remark_text;
 use crate::point_results::shared_errors::shared_errors_text;
 use crate::test_report::acceptance::{JudgedPoints, acceptance_sections};
 use crate::test_report::assumed_text::assumed_sentence;
@@ -26,7 +27,7 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::DisplayUnits;
 use mapper_core::{
     Channel, CompressorMap, DeclaredUncertainty, EfficiencyDefinition, Event, Method, Plan, PointBudgets,
-    Recording, ReferenceState, SurgeNotFound, terminal_text,
+    Recording, ReferenceState, ResultRemark, SurgeNotFound, terminal_text,
 };
 use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{TwoParameter, ZeroOutcome};
@@ -59,7 +60,7 @@ pub struct RunReport<'a> {
     /// How the run ended, or how the points were made.
     pub origin: PointsOrigin,
     /// Further remarks: on the recording, the method and the map.
-    pub remarks: &'a [String],
+    pub remarks: &'a [ResultRemark],
     /// Reference state of corrected quantities.
     pub reference: ReferenceState,
     /// Definition of the efficiencies.
@@ -160,7 +161,7 @@ fn markdown_report(report: &RunReport<'_>) -> String {
         let _ = writeln!(text, "{words}\n");
     }
     for remark in remarks {
-        let _ = writeln!(text, "- {remark}");
+        let _ = writeln!(text, "- {}", result_remark_text(remark));
     }
     if !remarks.is_empty() {
         text.push('\n');

@@ -5,7 +5,7 @@ use crate::analysis::identification::Identified;
 use crate::recording::recording_file::Recorded;
 use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::Campaign;
-use mapper_core::{BudgetRow, IdentifiedPoint, Method, UncertaintyBudget, half_width_95, probability_text};
+use mapper_core::{BudgetRow, IdentifiedPoint, Method, ResultRemark, UncertaintyBudget, half_width_95};
 use mapper_diagnose::gap::correction::{
     Changes, CorrectedMap, NotCorrected, PointCorrection, one_sigma_away,
 };
@@ -83,15 +83,12 @@ impl Session<'_> {
         }
         let points = widened(&mut identified, &before, &moved, &after);
         identified.corrections.clone_from(&points);
-        identified.remarks.extend(named.iter().map(|cause| {
-            format!(
-                "corrected for {}, which the diagnosis of this recording names with {}: without its correction the efficiencies are others",
-                cause.names.join(" + "),
-                probability_text(cause.probability)
-            )
+        identified.remarks.extend(named.iter().map(|cause| ResultRemark::Corrected {
+            causes: cause.names.clone(),
+            probability: cause.probability,
         }));
         identified.remarks.extend(
-            gap.drift.as_ref().map(|drift| format!("the drift of a sensor was subtracted: {}", drift.reason)),
+            gap.drift.as_ref().map(|drift| ResultRemark::DriftSubtracted { reason: drift.reason.clone() }),
         );
         if let Some(directory) = directory {
             let identified = identified.clone();

@@ -9,8 +9,8 @@ use crate::{Session, SessionError, SessionEvent};
 use mapper_campaign::campaign::Date;
 use mapper_campaign::{Campaign, nominal_model};
 use mapper_core::{
-    Channel, IdentifiedPoint, Method, PointBudgets, Recording, StepMarker, StepOrigin, SurgeNotFound,
-    ThermalModel, join_recordings,
+    Channel, IdentifiedPoint, Method, PointBudgets, Recording, ResultRemark, StepMarker, StepOrigin,
+    SurgeNotFound, ThermalModel, join_recordings,
 };
 use mapper_diagnose::gap::correction::PointCorrection;
 use mapper_identify::{
@@ -23,7 +23,7 @@ use mapper_recording::score::{
     AwaitedTruths, ScoreSummary, ScoredMark, ScoredPoint, Truth, score, score_marks, with_truths,
 };
 use mapper_recording::{AmbientPressure, Barometer, ChannelMap};
-use mapper_report::with_messages;
+use mapper_report::{result_remark_text, with_messages};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -63,7 +63,7 @@ pub struct Identified {
     /// Efficiencies before and after a correction for the causes of a gap; empty without one.
     pub corrections: Vec<PointCorrection>,
     /// Other remarks.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<ResultRemark>,
 }
 
 /// Result of the surge search.
@@ -113,7 +113,8 @@ impl Identified {
     /// # Errors
     /// [`SessionError::NoPoints`] with the known facts, including the `warnings` of the reader.
     pub fn has_points(&self, warnings: &[String]) -> Result<(), SessionError> {
-        let why: Vec<&str> = warnings.iter().chain(&self.remarks).map(String::as_str).collect();
+        let why: Vec<String> =
+            warnings.iter().cloned().chain(self.remarks.iter().map(result_remark_text)).collect();
         if self.points.is_empty() { Err(SessionError::NoPoints { why: why.join("; ") }) } else { Ok(()) }
     }
 
@@ -184,7 +185,7 @@ impl Session<'_> {
         let sensors = fused.channels.into_iter().next().unwrap_or_default();
         let first = fused.recordings.first().ok_or(SessionError::NoRecording)?;
         let zero = ZeroOutcome::of(first, &fused.config, soak);
-        remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| rest_unused(first, &fused.config)));
+        remarks.extend(campaign.filter(|_| soak.is_none()).and_then(|_| unused_rest(first, &fused.config)));
         let (_, config) = zero.take_off(Recording::default(), fused.config.clone());
         let off = |recording: Recording| zero.take_off(recording, fused.config.clone()).0;
         let (recording, origins) = join_recordings(fused.recordings.into_iter().map(off).collect());
@@ -231,30 +232,19 @@ impl Session<'_> {
 }
 
 /// Remark that gauge pressures are added to an unknown ambient pressure.
-fn unknown_barometer(map: &ChannelMap) -> Option<String> {
+fn unknown_barometer(map: &ChannelMap) -> Option<ResultRemark> {
     let unknown = Barometer::unknown();
     let used = [Channel::P1, Channel::P2].into_iter().any(|channel| map.is_gauge(channel));
     (used && map.ambient_pressure == Some(AmbientPressure::Constant(unknown))).then(|| {
-        format!(
-            "the ambient pressure is unknown: it counts as {:.1} kPa with a standard uncertainty of {:.0} kPa, which the intervals include; write \
-             what the barometer read or the altitude of the stand as `ambient_pressure` in the channel map",
-            1e-3 * unknown.pressure_pa,
-            1e-3 * unknown.sigma_pa
-        )
+        ResultRemark::UnknownAmbientPressure { pressure_pa: unknown.pressure_pa, sigma_pa: unknown.sigma_pa }
     })
 }
 
 /// Remark that a recording has a soak long enough for a zero, but no zero was requested.
-fn rest_unused(recording: &Recording, config: &IdentifyConfig) -> Option<String> {
+fn unused_rest(recording: &Recording, config: &IdentifyConfig) -> Option<ResultRemark> {
     let settings = ZeroSettings { shortest_s: UNUSED_REST_S, ..ZeroSettings::default() };
     let rest = isothermal_zero(recording, config, &settings).ok().filter(|rest| !rest.offsets.is_empty())?;
-    Some(format!(
-        "from {:.0} to {:.0} s, before the first step, the machine rests and its sensors read alike: `zero: {{soak: {:.0} min}}` in the \
-         campaign takes off what they read differently there, which leaves less of the declared offsets in the intervals",
-        rest.start_s,
-        rest.end_s,
-        (rest.end_s - rest.start_s) / 60.0
-    ))
+    Some(ResultRemark::UnusedRest { start_s: rest.start_s, end_s: rest.end_s })
 }
 
 /// Metadata kept for each recording.

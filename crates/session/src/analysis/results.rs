@@ -10,7 +10,8 @@ use mapper_campaign::Campaign;
 use mapper_campaign::campaign::Outputs;
 use mapper_campaign::units::Kind;
 use mapper_core::{
-    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, RunEnding, ThermalModel,
+    CompressorMap, ExportError, IdentifiedPoint, MapUnits, Method, Plan, ResultRemark, RunEnding,
+    ThermalModel,
 };
 use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_maps::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
@@ -61,7 +62,7 @@ pub struct Results {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surge: Option<SoughtSurge>,
     /// Other remarks.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<ResultRemark>,
     /// Why a file of the results could not be written, and how to write it later; `None`: all were written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unwritten: Option<String>,
@@ -159,7 +160,7 @@ impl Session<'_> {
         let mut all = Vec::new();
         for RunPart { recording, .. } in parts {
             let read = read_recording(recording, &ChannelMap::native(), &ReadOptions::default())?;
-            remarks.extend(read.warnings.iter().map(ToString::to_string));
+            remarks.extend(read.warnings.iter().map(|warning| incomplete(None, warning)));
             all.push(Recorded::of(recording.clone(), read, Some(campaign.clone())));
         }
         let all = merge_parts(parts.iter().map(|part| (part.soaked, part.saved.as_ref())).zip(all));
@@ -234,7 +235,7 @@ impl Session<'_> {
         gap: Option<&Gap>,
     ) -> Result<String, SessionError> {
         let origin = Provenance::of(&shown);
-        let mut remarks: Vec<String> =
+        let mut remarks: Vec<ResultRemark> =
             shown.iter().flat_map(|one| remarks_of(one, shown.len() > 1)).collect();
         let identified = self.identify(shown, channels, None)?;
         remarks.extend(identified.remarks.iter().cloned());
@@ -247,7 +248,7 @@ impl Session<'_> {
             let identified = self.identify(other, channels, None)?;
             match compressor_map(&machine, &identified, &mut Vec::new()) {
                 Some(map) => other_maps.push((name, map.at_reference(reference))),
-                None => remarks.push(format!("{name} has no map to compare this one with")),
+                None => remarks.push(ResultRemark::NothingToCompare { run: name }),
             }
         }
         let others: Vec<OtherRun<'_>> =
@@ -264,7 +265,7 @@ impl Session<'_> {
         origin: &Provenance,
         identified: Identified,
         (recording_file, further_recordings): (PathBuf, Vec<PathBuf>),
-        mut remarks: Vec<String>,
+        mut remarks: Vec<ResultRemark>,
         directory: &Path,
     ) -> Result<(Results, Result<(), SessionError>), SessionError> {
         remarks.extend(identified.remarks.iter().cloned());
@@ -367,7 +368,7 @@ fn run_report_of<'a>(
     identified: &'a Identified,
     map: Option<&'a CompressorMap>,
     program: &'a str,
-    remarks: &'a [String],
+    remarks: &'a [ResultRemark],
     repeats: &'a [RepeatedJump],
     has_picture: bool,
 ) -> RunReport<'a> {
@@ -435,20 +436,21 @@ fn source(recorded: &Recorded) -> ReportSource {
     }
 }
 
-/// Reader warnings of a file, prefixed with its name if there are several.
-fn remarks_of(recorded: &Recorded, several: bool) -> Vec<String> {
-    let named = |warning: &mapper_recording::ReadWarning| match several {
-        true => format!("{}: {warning}", recorded.path.display()),
-        false => warning.to_string(),
-    };
-    recorded.read.warnings.iter().map(named).collect()
+/// Remarks on the parts of a file that cannot be read, with its name if there are several.
+fn remarks_of(recorded: &Recorded, several: bool) -> Vec<ResultRemark> {
+    let file = several.then(|| recorded.path.display().to_string());
+    recorded.read.warnings.iter().map(|warning| incomplete(file.clone(), warning)).collect()
+}
+
+fn incomplete(file: Option<String>, warning: &mapper_recording::ReadWarning) -> ResultRemark {
+    ResultRemark::RecordingIncomplete { file, reason: warning.to_string() }
 }
 
 /// The map of all points with map coordinates, with a fitted surface if there are enough of them. `None` without a map; a remark says why.
 pub fn compressor_map(
     machine: &str,
     identified: &Identified,
-    remarks: &mut Vec<String>,
+    remarks: &mut Vec<ResultRemark>,
 ) -> Option<CompressorMap> {
     let has_place = |point: &&IdentifiedPoint| {
         [point.flow_corrected_kg_s, point.pressure_ratio, point.speed_corrected_rpm]
@@ -458,14 +460,14 @@ pub fn compressor_map(
     let placed: Vec<IdentifiedPoint> = identified.points_alone().filter(has_place).cloned().collect();
     let config = &identified.config;
     let map = assemble(&placed, machine, config.reference, config.method, Grouping::default())
-        .map_err(|error| remarks.push(format!("there is no map: {error}")))
+        .map_err(|error| remarks.push(ResultRemark::NoMap { reason: error.to_string() }))
         .ok()?;
     let marks = identified.surge.iter().flat_map(|surge| surge.marks.iter().map(|scored| scored.mark));
     let map = CompressorMap { efficiency: Some(config.air.efficiency), surge: marks.collect(), ..map };
     match MapFit::new(&map).and_then(|fit| fit.table(&MapFitOptions::default())) {
         Ok(table) => Some(CompressorMap { fitted: Some(table), ..map }),
         Err(error) => {
-            remarks.push(format!("the map is not fitted: {error}"));
+            remarks.push(ResultRemark::MapNotFitted { reason: error.to_string() });
             Some(map)
         }
     }
@@ -478,7 +480,7 @@ fn export(
     map: &CompressorMap,
     units: &MapUnits,
     files: &mut ResultFiles<'_>,
-    remarks: &mut Vec<String>,
+    remarks: &mut Vec<ResultRemark>,
 ) -> Result<BTreeMap<String, PathBuf>, SessionError> {
     let mut paths = BTreeMap::new();
     for name in formats {
@@ -487,7 +489,7 @@ fn export(
             Ok(bytes) => bytes,
             // A campaign of a few points has a map but no fitted surface.
             Err(error @ ExportError::NeedsFit { .. }) => {
-                remarks.push(error.to_string());
+                remarks.push(ResultRemark::FormatNotWritten { reason: error.to_string() });
                 continue;
             }
             Err(error) => return Err(error.into()),

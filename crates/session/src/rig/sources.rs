@@ -53,8 +53,8 @@ impl Registry {
         }
         let own = rig.describe();
         let age_s = campaign.guard_set().signals.first().map_or(DEFAULT_MAX_AGE_S, |guard| guard.age_s);
-        let mut taken: Vec<(Channel, String)> =
-            own.channels.iter().map(|channel| (*channel, "the rig".to_owned())).collect();
+        let mut taken: Vec<(Channel, Provider)> =
+            own.channels.iter().map(|channel| (*channel, Provider::Rig)).collect();
         let (mut readers, mut read, mut exclusive) = (Vec::new(), Vec::new(), Vec::new());
         for choice in &campaign.readers {
             let at = format!("readers.{}.backend.{}", choice.name, choice.backend.name);
@@ -85,11 +85,28 @@ impl Registry {
     }
 }
 
+/// What delivers a channel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Provider {
+    Rig,
+    /// The auxiliary instrument of this name.
+    Reader(String),
+}
+
+impl std::fmt::Display for Provider {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Provider::Rig => f.write_str("the rig"),
+            Provider::Reader(name) => write!(f, "`{name}`"),
+        }
+    }
+}
+
 /// The channels to take from an auxiliary instrument.
 fn select_channels(
     choice: &ReaderChoice,
     rig: &RigDescription,
-    taken: &mut Vec<(Channel, String)>,
+    taken: &mut Vec<(Channel, Provider)>,
 ) -> Result<Vec<Channel>, SessionError> {
     let below = |key: &str| format!("readers.{}.{key}", choice.name);
     let wrong = |at: String, problem: ReaderProblem| {
@@ -98,7 +115,7 @@ fn select_channels(
     if rig.controls {
         return wrong(below("backend"), ReaderProblem::Controls(format!("`{}`", choice.backend.name)));
     }
-    let from = |channel: &Channel, taken: &[(Channel, String)]| {
+    let from = |channel: &Channel, taken: &[(Channel, Provider)]| {
         taken.iter().find(|(known, _)| known == channel).map(|(_, other)| other.clone())
     };
     match &choice.channels {
@@ -113,10 +130,10 @@ fn select_channels(
             }
             // A listed channel replaces the rig's own.
             for channel in listed {
-                if let Some(other) = from(channel, taken).filter(|other| other != "the rig") {
+                if let Some(other) = from(channel, taken).filter(|other| *other != Provider::Rig) {
                     return wrong(
                         below("channels"),
-                        ReaderProblem::DuplicateChannel { channel: *channel, other },
+                        ReaderProblem::DuplicateChannel { channel: *channel, other: other.to_string() },
                     );
                 }
             }
@@ -126,7 +143,7 @@ fn select_channels(
                 if let Some(other) = from(channel, taken) {
                     return wrong(
                         below("backend"),
-                        ReaderProblem::DuplicateChannel { channel: *channel, other },
+                        ReaderProblem::DuplicateChannel { channel: *channel, other: other.to_string() },
                     );
                 }
             }
@@ -134,6 +151,6 @@ fn select_channels(
     }
     let channels = choice.channels.clone().unwrap_or_else(|| rig.channels.clone());
     taken.retain(|(channel, _)| !channels.contains(channel));
-    taken.extend(channels.iter().map(|channel| (*channel, format!("`{}`", choice.name))));
+    taken.extend(channels.iter().map(|channel| (*channel, Provider::Reader(choice.name.clone()))));
     Ok(channels)
 }

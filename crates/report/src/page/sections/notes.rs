@@ -4,8 +4,8 @@ use crate::page::prose::{prose, sentence};
 use crate::page::run_page::RunPage;
 use crate::page::table::{Cell, Row, data_table, words_table};
 use crate::{
-    Display, SurgeReport, ZERO_HEADS, doubts, repeated_jumps_text, score_text, surge_heads, surge_remarks,
-    surge_rows, zero_rows, zero_words,
+    Display, SurgeReport, ZERO_HEADS, doubts, repeated_jumps_text, result_remark_text, score_text,
+    surge_heads, surge_remarks, surge_rows, zero_rows, zero_words,
 };
 use mapper_campaign::campaign::DisplayUnits;
 use maud::{Markup, html};
@@ -20,7 +20,7 @@ pub(crate) fn notes(page: &RunPage<'_>, units: &DisplayUnits) -> Markup {
             h2 #notes-head { "Notes" }
             h3 { "Outcome" }
             p { (prose(&report.origin.sentence())) }
-            @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (prose(remark)) } } } }
+            @if !report.remarks.is_empty() { ul { @for remark in report.remarks { li { (prose(&result_remark_text(remark))) } } } }
             @if let Some(score) = report.score {
                 h3 { "Comparison with the simulator's truth" }
                 (sentences(&score_text(score)))

@@ -6,8 +6,9 @@ mod of_step;
 pub(crate) mod sentence;
 
 use crate::plan::plan_remark_text::plan_remark_text;
+use crate::point_results::result_remark_text::result_remark_text;
 use crate::point_results::warning_text::sentence::Sentence;
-use mapper_core::{ModelDoubt, Warning};
+use mapper_core::{ModelDoubt, PlanRemark, ResultRemark, Warning};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -31,7 +32,7 @@ pub(crate) fn sentence_of(warning: &Warning) -> Sentence {
     })
 }
 
-/// A JSON value in which each warning, each doubt and each remark of a plan has its sentence as `message`, for people.
+/// A JSON value in which each warning, each doubt and each remark of a plan or of results has its sentence as `message`, for people.
 pub fn with_messages(mut value: Value) -> Value {
     add_messages(&mut value);
     value
@@ -47,7 +48,13 @@ fn add_messages(value: &mut Value) {
                         all.iter_mut().for_each(|one| add_message(one, warning_text))
                     }
                     ("remarks", Value::Array(all)) => {
-                        all.iter_mut().for_each(|one| add_message(one, plan_remark_text))
+                        for one in all {
+                            if has_code(one, PlanRemark::CODES) {
+                                add_message(one, plan_remark_text);
+                            } else if has_code(one, ResultRemark::CODES) {
+                                add_message(one, result_remark_text);
+                            }
+                        }
                     }
                     ("doubts", Value::Array(all)) => {
                         all.iter_mut().for_each(|one| add_message(one, model_doubt_text))
@@ -58,6 +65,10 @@ fn add_messages(value: &mut Value) {
         }
         _ => {}
     }
+}
+
+fn has_code(value: &Value, codes: &[&str]) -> bool {
+    value.get("code").and_then(Value::as_str).is_some_and(|code| codes.contains(&code))
 }
 
 fn add_message<T: DeserializeOwned>(value: &mut Value, text: fn(&T) -> String) {

@@ -1,6 +1,7 @@
 //! Enums of warnings and remarks: each variant has a stable code and its values; `mapper-report` turns them into sentences.
 
 /// Declares an enum of warnings or remarks. In JSON a variant has its code as `code`, and its values; readers take no notice of a `message`.
+#[macro_export]
 macro_rules! coded_enum {
     (
         $(#[doc = $of:literal])* $enum:ident {
@@ -33,4 +34,5 @@ macro_rules! coded_enum {
         }
     };
 }
+#[doc(inline)]
 pub(crate) use coded_enum;

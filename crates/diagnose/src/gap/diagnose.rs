@@ -11,6 +11,7 @@ use crate::gap::causes::smallest_seen::smallest_seen;
 use crate::gap::causes::weigh::{alike, rivals, suspicions, weigh, weight};
 use crate::gap::findings::experiment::Experiment;
 use crate::gap::findings::report::{Diagnosis, Verdict};
+use crate::gap::findings::warning::GapWarning;
 use crate::gap::gap_reduction::folds::Folds;
 use crate::gap::gap_reduction::how_far::{Compared, how_far};
 use crate::gap::gap_reduction::strain::{beyond_prior, cost_beyond_prior};
@@ -118,14 +119,11 @@ pub fn diagnose(question: Question<'_>) -> Result<Diagnosed, GapError> {
         let changed = study.since(healthy, nominal, tolerances_declared)?;
         study = changed.study;
         since = Some(changed.since);
-        let of_healthy = |warning: String| format!("the healthy recording: {warning}");
+        let of_healthy = |warning| GapWarning::HealthyRecording { warning: Box::new(warning) };
         warnings.extend(changed.warnings.into_iter().map(of_healthy));
     }
     if study.scatter_s > 0.0 {
-        warnings.push(format!(
-            "the times of the samples are off by {:.0} ms, as P3 shows where it jumps: readings that move count for as much less",
-            1e3 * study.scatter_s
-        ));
+        warnings.push(GapWarning::UncertainTimes { scatter_s: study.scatter_s });
     }
     progress(0.02, "tolerances");
     let linearised = Linearised::new(&study)?;

@@ -1,6 +1,7 @@
 //! A diagnosis as a page for a terminal.
 
 use crate::diagnosis::gap_next::next_text;
+use crate::diagnosis::gap_warning_text::{gap_warning_text, offset_at_rest_text};
 use crate::diagnosis::stand_actions::stand_actions;
 use crate::formatting::number::four_figures;
 use crate::formatting::table::COLUMNS;
@@ -34,7 +35,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     }
     if diagnosis.verdict != Verdict::WithinTolerance {
         for sensor in &diagnosis.off_at_rest {
-            text += &format!("{sensor}: subtracted before the diagnosis\n");
+            text += &format!("{}: subtracted before the diagnosis\n", offset_at_rest_text(sensor));
         }
     }
     if !diagnosis.r#where.is_empty() {
@@ -91,9 +92,9 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         }
     }
     if !diagnosis.warnings.is_empty() {
-        text += "\nbefore you believe it\n";
+        text += "\nlimits of this diagnosis\n";
         for warning in &diagnosis.warnings {
-            text += &format!("  {warning}\n");
+            text += &format!("  {}\n", gap_warning_text(warning));
         }
     }
     text
@@ -170,7 +171,7 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
     match (diagnosis.verdict, first) {
         (Verdict::WithinTolerance, _) if !diagnosis.off_at_rest.is_empty() => format!(
             "{}; with that subtracted nothing beyond the declared tolerances {seen}",
-            diagnosis.off_at_rest.join(", ")
+            diagnosis.off_at_rest.iter().map(offset_at_rest_text).collect::<Vec<_>>().join(", ")
         ),
         (Verdict::WithinTolerance, Some(first)) if first.probability > diagnosis.probability_none => format!(
             "nothing beyond the declared tolerances {seen} for certain; {} is suspected ({})",

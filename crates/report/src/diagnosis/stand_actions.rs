@@ -1,5 +1,6 @@
 //! Checks at the stand that confirm or exclude a cause.
 
+use crate::diagnosis::gap_warning_text::offset_at_rest_text;
 use crate::formatting::number::number;
 use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict};
 
@@ -161,8 +162,11 @@ pub fn stand_actions(diagnosis: &Diagnosis) -> Vec<String> {
             actions.extend(diagnosis.r#where.iter().take(2).filter_map(|place| of(&PLACES, &place.submodel)));
         }
     }
-    let mut once: Vec<String> =
-        diagnosis.off_at_rest.iter().map(|sensor| format!("calibrate this sensor: {sensor}")).collect();
+    let mut once: Vec<String> = diagnosis
+        .off_at_rest
+        .iter()
+        .map(|sensor| format!("calibrate this sensor: {}", offset_at_rest_text(sensor)))
+        .collect();
     for action in actions {
         if !once.iter().any(|known| known == action) {
             once.push(action.to_owned());

@@ -16,6 +16,7 @@ use mapper_diagnose::gap::best_fit::selection::Selection;
 use mapper_diagnose::gap::causes::calibration::Calibration;
 use mapper_diagnose::gap::diagnose::{Diagnosed, GapError, Question, diagnose};
 use mapper_diagnose::gap::findings::report::{Diagnosis, Next, Verdict, law_found};
+use mapper_diagnose::gap::findings::warning::{GapWarning, OffsetAtRest};
 use mapper_diagnose::gap::next_experiment::best_experiment::sensor_near;
 use mapper_diagnose::gap::next_experiment::outlook::Alike;
 use mapper_diagnose::gap::preconditions::problem::Problem;
@@ -32,7 +33,7 @@ use mapper_observe::model_inputs::lagged_command::Response;
 use mapper_observe::{Declared, FusedChannel};
 use mapper_physics::rig::effect::Effect;
 use mapper_physics::simulation::model::Model;
-use mapper_recording::ChannelMap;
+use mapper_recording::{ChannelMap, ReadWarning};
 use mapper_report::page::gap_page;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -147,9 +148,9 @@ impl Session<'_> {
             "the law needs confirmation: measure there, and add the law as an effect to the next diagnosis"
                 .clone_into(reason);
         }
-        // Reader warnings belong to the remarks of the diagnosis.
-        let warnings = recorded.read.warnings.iter().map(ToString::to_string);
-        diagnosed.diagnosis.warnings.extend(warnings);
+        let of_reader =
+            |warning: &ReadWarning| GapWarning::RecordingIncomplete { reason: warning.to_string() };
+        diagnosed.diagnosis.warnings.extend(recorded.read.warnings.iter().map(of_reader));
         diagnosed.diagnosis.off_at_rest = off_at_rest;
         note_drift(&mut diagnosed.diagnosis, drift.as_ref());
         diagnosed.diagnosis.warnings.extend(doubted.map(|reason| {
@@ -292,7 +293,7 @@ struct Zeroed {
     recording: Recording,
     declared: Declared,
     zero: ZeroOutcome,
-    off_at_rest: Vec<String>,
+    off_at_rest: Vec<OffsetAtRest>,
 }
 
 /// A recording prepared for the diagnosis.
@@ -306,26 +307,22 @@ struct Prepared {
     sensors: Vec<FusedChannel>,
     zero: ZeroOutcome,
     /// Remarks of the zero on sensors with offsets beyond their declaration.
-    off_at_rest: Vec<String>,
+    off_at_rest: Vec<OffsetAtRest>,
 }
 
 /// Zero offset, in declared standard deviations, above which a sensor is reported.
 const BEYOND_SIGMAS: f64 = 3.0;
 
-/// One sentence for each sensor whose zero offset exceeds its declaration.
-fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<String> {
+/// The sensors whose zero offset exceeds their declaration.
+fn off_at_rest(zero: &ZeroOutcome, declared: &BTreeMap<Channel, DeclaredUncertainty>) -> Vec<OffsetAtRest> {
     let ZeroOutcome::Found(zero) = zero else { return Vec::new() };
-    let beyond = zero.offsets.iter().filter_map(|(channel, off)| {
-        let sigma = declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
+    let beyond = zero.offsets.iter().filter_map(|(channel, offset)| {
+        let declared_sigma = declared.get(channel).map_or(0.0, |declared| declared.offset_sigma);
         let left = zero.left_sigma.get(channel).copied().unwrap_or(0.0);
-        let much = off.abs() > BEYOND_SIGMAS * sigma.hypot(left);
-        much.then(|| {
-            format!(
-                "{channel} reads {:.2} {unit} too {} at rest, where {sigma:.2} {unit} are declared",
-                off.abs(),
-                if *off > 0.0 { "high" } else { "low" },
-                unit = channel.unit(),
-            )
+        (offset.abs() > BEYOND_SIGMAS * declared_sigma.hypot(left)).then_some(OffsetAtRest {
+            channel: *channel,
+            offset: *offset,
+            declared_sigma,
         })
     });
     beyond.collect()

@@ -3,3 +3,4 @@
 pub mod experiment;
 pub mod in_words;
 pub mod report;
+pub mod warning;

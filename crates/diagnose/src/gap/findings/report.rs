@@ -1,6 +1,7 @@
 //! Diagnosis report, machine-readable.
 
 use crate::gap::findings::experiment::{AlsoChanged, Experiment};
+use crate::gap::findings::warning::{GapWarning, OffsetAtRest};
 use crate::gap::reference::baseline_assumptions::Since;
 use mapper_core::probability_text;
 use serde::{Deserialize, Serialize};
@@ -54,10 +55,10 @@ pub struct Diagnosis {
     pub smallest_seen: Vec<SmallestSeen>,
     /// Assumptions for missing campaign declarations; one sentence each.
     pub assumed: Vec<String>,
-    /// Sensor offsets beyond tolerance found by a soak and already subtracted; one sentence each.
-    pub off_at_rest: Vec<String>,
-    /// Unusable data and caveats; one sentence each.
-    pub warnings: Vec<String>,
+    /// Sensor offsets beyond tolerance, found at rest and already subtracted.
+    pub off_at_rest: Vec<OffsetAtRest>,
+    /// Limits of the diagnosis.
+    pub warnings: Vec<GapWarning>,
 }
 
 /// A location of the gap.

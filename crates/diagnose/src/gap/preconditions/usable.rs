@@ -1,5 +1,6 @@
 //! Checks whether a recording can be diagnosed, before any fit.
 
+use crate::gap::findings::warning::GapWarning;
 use crate::gap::preconditions::problem::Problem;
 use crate::gap::residuals::nuisance::OUTPUTS;
 use mapper_core::{Channel, Recording};
@@ -13,7 +14,7 @@ use mapper_observe::plausible::check_running;
 ///
 /// # Errors
 /// [`Problem`] for others.
-pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Result<Vec<String>, Problem> {
+pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Result<Vec<GapWarning>, Problem> {
     let mut warnings = Vec::new();
     let present: Vec<Channel> = OUTPUTS
         .into_iter()
@@ -57,23 +58,18 @@ pub fn usable(recording: &Recording, table: &Table, declared: &Declared) -> Resu
     commanded(recording, table)?;
     for channel in OUTPUTS.into_iter().filter(|channel| *channel != Channel::P3 && !present.contains(channel))
     {
-        warnings.push(format!(
-            "{channel} ({}) is not recorded: effects that show only there cannot be found",
-            channel.info().description
-        ));
+        warnings.push(GapWarning::ChannelNotRecorded { channel });
     }
     for channel in DRIVERS {
         if table.column(channel).is_none() {
-            warnings.push(format!("{channel} is not recorded: the campaign's value is used"));
+            warnings.push(GapWarning::InputNotRecorded { channel });
         }
     }
     warnings.extend(gaps(table));
     for channel in &present {
         if declared.of(*channel).noise_sigma <= 0.0 {
-            let (usual, unit) = (declared.noise_sigma(*channel), channel.unit());
-            warnings.push(format!(
-                "no noise is declared for {channel}: that of a typical sensor is used, {usual} {unit}"
-            ));
+            let noise_sigma = declared.noise_sigma(*channel);
+            warnings.push(GapWarning::AssumedNoise { channel: *channel, noise_sigma });
         }
     }
     Ok(warnings)
@@ -110,13 +106,9 @@ fn commanded(recording: &Recording, table: &Table) -> Result<(), Problem> {
     }
 }
 
-fn gaps(table: &Table) -> Option<String> {
+fn gaps(table: &Table) -> Option<GapWarning> {
     let gap = |pair: &[f64]| pair[1] - pair[0] > 2.5 * table.interval_s;
     let missing_s: f64 = table.t_s.windows(2).filter(|pair| gap(pair)).map(|pair| pair[1] - pair[0]).sum();
-    let count = table.t_s.windows(2).filter(|pair| gap(pair)).count();
-    (count > 0).then(|| {
-        format!(
-            "the recording has {count} gap(s), {missing_s:.1} s in total; blocks without samples are left out"
-        )
-    })
+    let gaps = table.t_s.windows(2).filter(|pair| gap(pair)).count();
+    (gaps > 0).then_some(GapWarning::GapsInRecording { gaps, missing_s })
 }

@@ -8,6 +8,7 @@ use crate::gap::best_fit::first_step::is_start;
 use crate::gap::best_fit::fit::MAX_SIGMAS;
 use crate::gap::best_fit::normal::nuisance_products;
 use crate::gap::best_fit::selection::{Selection, dot_over};
+use crate::gap::findings::warning::GapWarning;
 use crate::gap::preconditions::gap_error::GapError;
 use crate::gap::preconditions::machine_mismatch::another_machine;
 use crate::gap::preconditions::problem::Problem;
@@ -44,7 +45,7 @@ pub(crate) struct Changed {
     pub(crate) study: Study,
     pub(crate) since: Since,
     /// Warnings about the reference recording.
-    pub(crate) warnings: Vec<String>,
+    pub(crate) warnings: Vec<GapWarning>,
 }
 
 impl Study {

@@ -5,10 +5,12 @@ mod of_readings;
 mod of_step;
 pub(crate) mod sentence;
 
+use crate::diagnosis::gap_warning_text::gap_warning_text;
 use crate::plan::plan_remark_text::plan_remark_text;
 use crate::point_results::result_remark_text::result_remark_text;
 use crate::point_results::warning_text::sentence::Sentence;
 use mapper_core::{ModelDoubt, PlanRemark, ResultRemark, Warning};
+use mapper_diagnose::gap::findings::warning::GapWarning;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
@@ -45,7 +47,13 @@ fn add_messages(value: &mut Value) {
             for (key, entry) in entries {
                 match (key.as_str(), entry) {
                     ("warnings", Value::Array(all)) => {
-                        all.iter_mut().for_each(|one| add_message(one, warning_text))
+                        for one in all {
+                            if has_code(one, Warning::CODES) {
+                                add_message(one, warning_text);
+                            } else if has_code(one, GapWarning::CODES) {
+                                add_message(one, gap_warning_text);
+                            }
+                        }
                     }
                     ("remarks", Value::Array(all)) => {
                         for one in all {

@@ -1,6 +1,6 @@
 """Writes a recording again as the log of another program, with that program's own library.
 
-usage: python write_log.py RECORDING TARGET FORMAT
+usage: python write_log.py RECORDING TARGET FORMAT [TARGET FORMAT ...]
 
 FORMAT is one of
   csv       pandas: seconds, names with units in brackets
@@ -244,17 +244,13 @@ def write_stand(target, times, groups):
     return REST_S
 
 
-def main():
-    if len(sys.argv) != 4:
-        sys.exit(__doc__)
-    source, target, kind = sys.argv[1:]
-    times, groups, steps = read(source)
-    ahead_s = 0.0
+def write(target, kind, times, groups):
+    """Returns how far the log's clock is ahead, s."""
     match kind:
         case "csv":
             write_csv(target, times, groups)
         case "stand":
-            ahead_s = write_stand(target, times, groups)
+            return write_stand(target, times, groups)
         case "xlsx":
             write_xlsx(target, times, groups)
         case "mcap":
@@ -273,6 +269,16 @@ def main():
             write_arrow(target, times, groups)
         case _:
             sys.exit(__doc__)
+    return 0.0
+
+
+def main():
+    source, targets, kinds = sys.argv[1:2], sys.argv[2::2], sys.argv[3::2]
+    if not kinds or len(targets) != len(kinds):
+        sys.exit(__doc__)
+    times, groups, steps = read(*source)
+    for target, kind in zip(targets, kinds):
+        ahead_s = write(target, kind, times, groups)
     assert not any(math.isnan(step) for step in steps)
     json.dump({"steps_s": steps, "ahead_s": ahead_s, "rows": len(times)}, sys.stdout)
 

@@ -36,34 +36,32 @@ fn planted_drifts_are_detected_without_false_alarms() {
     // At four to six times the printed limit.
     let t2 = judge("{cause: T2, change: 0.5 K, over: 1 h, from: 10 min}", 22);
     is_found(&t2, "sensor", "T2", ("rate_per_h", 0.5), 600.0);
-    let p2 = judge("{cause: P2, change: 250 Pa, from: 25 min}", 23);
-    is_found(&p2, "sensor", "P2", ("step", 250.0), 1500.0);
     let fouling = judge("{cause: fouling, change: -0.6 %, over: 1 h}", 24);
     is_found(&fouling, "machine", "fouling", ("rate_per_h", -0.006), 0.0);
-    let friction = judge("{cause: bearing_friction, change: 1.5e-7 W s2/rad2, over: 1 h}", 25);
-    is_found(&friction, "machine", "bearing_friction", ("rate_per_h", 1.5e-7), 0.0);
+    // Steps and friction: `crates/diagnose/tests/drift`.
 }
 
 #[test]
 fn drift_compares_several_nights_and_refuses_another_machine() {
+    // Half an hour with three visits of the jump.
     let night = |seed, drift, replaced: &[(&str, &str)]| {
-        DriftCampaign { drift, seed, replaced, ..DriftCampaign::default() }.recording()
+        let speeds = "[90 krpm, 130 krpm, 70 krpm]";
+        DriftCampaign { drift, seed, speeds, every: 4, replaced, ..DriftCampaign::default() }.recording()
     };
     // The rig is the same every night, its noise is not: no offsets or tolerances are drawn, and the seed differs.
     let same_rig: &[(&str, &str)] =
         &[("    weather: wandering\n", "    weather: wandering\n    offsets: none\n")];
     let first = night(31, "", same_rig);
-    // The gain of the flow meter goes on drifting by 1 % in ten hours, of which five passed in between.
-    let second = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -5 h}", same_rig);
-    let third = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -10 h}", same_rig);
-    let report = drift(&[&first, &second, &third]);
+    // The gain of the flow meter drifts by 1 % in the ten hours in between.
+    let second = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -10 h}", same_rig);
+    let report = drift(&[&first, &second]);
     assert_eq!(
         [&report["verdict"], &report["drifts"][0]["cause"]],
         ["sensor", "m_c"],
         "{}",
         report["reason"]
     );
-    assert_eq!(report["groups"][0]["visits"].as_array().unwrap().len(), 12);
+    assert_eq!(report["groups"][0]["visits"].as_array().unwrap().len(), 8);
     // The first night has no drift.
     assert_eq!(drift(&[&first])["verdict"], "none");
 
@@ -71,16 +69,13 @@ fn drift_compares_several_nights_and_refuses_another_machine() {
     let another_seed = night(32, "", same_rig);
     let two = drift(&[&first, &another_seed]);
     assert!(!two["reason"].as_str().unwrap().starts_with("No verdict"), "{}", two["reason"]);
-    // A rebuilt machine is another machine, and so is one of another name. A short night shows it.
-    let short_night = |seed, replaced: &[(&str, &str)]| {
-        let speeds = "[90 krpm, 130 krpm, 70 krpm]";
-        DriftCampaign { speeds, every: 4, seed, replaced, ..DriftCampaign::default() }.recording()
-    };
-    let rebuilt = short_night(
+    // A rebuilt machine is another machine, and so is one of another name.
+    let rebuilt = night(
         33,
+        "",
         &[("  map: closed_form\n", "  map: closed_form\n  geometry: {bearing: {oil_conductance: 9 W/K}}\n")],
     );
-    let renamed = short_night(34, &[("  serial_number: TA-0001\n", "  serial_number: TA-0002\n")]);
+    let renamed = night(34, "", &[("  serial_number: TA-0001\n", "  serial_number: TA-0002\n")]);
     for other in [rebuilt, renamed] {
         let refused = drift(&[&first, &other]);
         assert_eq!((&refused["verdict"], &refused["drifts"]), (&"unclear".into(), &json!([])));

@@ -10,7 +10,8 @@ fn init(directory: &Path, further: &[&str]) -> Finished {
 /// The first campaign of a machine runs on the virtual lab, and at least 80 % of its points are good.
 #[test]
 fn a_wheel_diameter_is_sufficient_for_a_first_map() {
-    for wheel in ["35mm", "60mm", "90mm"] {
+    // `the_forecast_verdicts_match_a_run` has 60 mm.
+    for wheel in ["35mm", "90mm"] {
         let scratch = scratch();
         init(scratch.path(), &["--wheel", wheel]).exits(0);
         mapper_in(scratch.path(), ["check", "own.yaml"]).exits(0);
@@ -49,6 +50,7 @@ fn the_forecast_verdicts_match_a_run() {
     let mut advice = checked["advice"].as_array().unwrap().iter();
     let soak_s = advice.find_map(|advice| advice["change"]["soak_s"].as_f64()).unwrap();
     let (after, _) = holds(&format!("{without}zero: {{soak: {soak_s} s}}\n"));
+    assert!(after >= 0.8, "{after} good");
     assert!(after > before, "{after} after the advice, {before} before");
 }
 

@@ -33,11 +33,13 @@ impl Run {
         self.directory.path().join(name)
     }
 
-    /// The recording as a log of this kind, and what its writer says of it.
-    fn log(&self, kind: &str, name: &str) -> (PathBuf, Value) {
-        let target = self.file(name);
-        let written = python("write_log.py", [self.recording.as_os_str(), target.as_os_str(), kind.as_ref()]);
-        (target, written)
+    /// The recording as logs of these kinds with their names, and what their writer says of the last.
+    fn logs<const N: usize>(&self, kinds: [(&str, &str); N]) -> ([PathBuf; N], Value) {
+        let targets = kinds.map(|(_, name)| self.file(name));
+        let each = targets.iter().zip(&kinds);
+        let each = each.flat_map(|(target, (kind, _))| [target.as_os_str(), kind.as_ref()]);
+        let written = python("write_log.py", [self.recording.as_os_str()].into_iter().chain(each));
+        (targets, written)
     }
 
     fn identify(&self, log: &Path, channels: &Path) -> Finished {
@@ -71,42 +73,44 @@ fn proposed(log: &Path, name: &str) -> PathBuf {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn every_log_format_gives_identical_points() {
     let run = Run::new();
-    // The same groups as in the MDF file, hence the same channel map.
-    let (mdf, _) = run.log("mdf4", "log.mf4");
-    let channels = proposed(&mdf, "groups.yaml");
-    let (mcap, _) = run.log("mcap", "log.mcap");
-    let expected = run.identify(&mcap, &channels).exits(0).json()["points"].clone();
-    assert_eq!(expected.as_array().unwrap().len(), 4);
-    assert_eq!(run.identify(&mdf, &channels).exits(0).json()["points"], expected);
-    let (mdf, _) = run.log("mdf3", "log.mdf");
-    let channels = proposed(&mdf, "groups_3.yaml");
-    assert_eq!(run.identify(&mdf, &channels).exits(0).json()["points"], expected);
-    let points = |kind: &str, name: &str| {
-        let (log, _) = run.log(kind, name);
-        let channels = proposed(&log, &format!("{kind}.yaml"));
-        run.identify(&log, &channels).exits(0).json()["points"].clone()
+    // By one process: its libraries take longer to load than to write.
+    let ([mdf, mdf_3, mcap, csv, mat, parquet, arrow, tdms, counted, dated, xlsx], _) = run.logs([
+        ("mdf4", "log.mf4"),
+        ("mdf3", "log.mdf"),
+        ("mcap", "log.mcap"),
+        ("csv", "log.csv"),
+        ("mat", "log.mat"),
+        ("parquet", "log.parquet"),
+        ("arrow", "log.arrow"),
+        ("tdms", "log.tdms"),
+        ("tdms_time", "counted.tdms"),
+        ("tdms_date", "dated.tdms"),
+        ("xlsx", "log.xlsx"),
+    ]);
+    let with = |log: &Path, channels: &Path| run.identify(log, channels).exits(0).json()["points"].clone();
+    let points = |log: &Path| {
+        let name = log.file_name().unwrap().to_str().unwrap();
+        with(log, &proposed(log, &format!("{name}.yaml")))
     };
-    assert_eq!(points("csv", "log.csv"), expected);
+    // The same groups as in the MDF file, hence the same channel map.
+    let channels = proposed(&mdf, "groups.yaml");
+    let expected = with(&mcap, &channels);
+    assert_eq!(expected.as_array().unwrap().len(), 4);
+    assert_eq!(with(&mdf, &channels), expected);
+    for log in [mdf_3, csv, parquet, arrow, tdms, counted] {
+        assert_eq!(points(&log), expected, "{}", log.display());
+    }
     // Names of variables have no place for the unit of the valve, which is not proposed then; no number depends on it.
-    for (found, expected) in
-        points("mat", "log.mat").as_array().unwrap().iter().zip(expected.as_array().unwrap())
-    {
+    for (found, expected) in points(&mat).as_array().unwrap().iter().zip(expected.as_array().unwrap()) {
         for key in ["speed_rpm", "flow_kg_s", "pressure_ratio", "eta", "h_w_m2k"] {
             assert_eq!(found[key], expected[key], "{key}");
         }
     }
-    assert_eq!(points("parquet", "log.parquet"), expected);
-    assert_eq!(points("arrow", "log.arrow"), expected);
-    assert_eq!(points("tdms", "log.tdms"), expected);
-    assert_eq!(points("tdms_time", "counted.tdms"), expected);
     // Its library would read what lies behind a date at the wrong places.
-    let (dated, _) = run.log("tdms_date", "dated.tdms");
     let refused = mapper(["log".as_ref(), "inspect".as_ref(), dated.as_os_str()]).exits(6);
     assert!(refused.stderr.contains("`time` holds no plain numbers"), "{}", refused.stderr);
     // Excel's files keep 15 to 16 of the 17 digits of a number.
-    for (found, expected) in
-        points("xlsx", "log.xlsx").as_array().unwrap().iter().zip(expected.as_array().unwrap())
-    {
+    for (found, expected) in points(&xlsx).as_array().unwrap().iter().zip(expected.as_array().unwrap()) {
         for key in ["speed_rpm", "flow_kg_s", "pressure_ratio", "eta", "h_w_m2k"] {
             let (Some(a), Some(b)) = (found[key].as_f64(), expected[key].as_f64()) else {
                 assert_eq!(found[key], expected[key]);
@@ -121,7 +125,7 @@ fn every_log_format_gives_identical_points() {
 #[cfg_attr(not(with_python), ignore = "needs Python packages: run `cargo xtask test`")]
 fn a_test_stand_log_becomes_points_with_two_commands() {
     let run = Run::new();
-    let (log, written) = run.log("stand", "stand.txt");
+    let ([log], written) = run.logs([("stand", "stand.txt")]);
     let channels = proposed(&log, "channels.yaml");
     let found = run.identify(&log, &channels).exits(0).json();
     let expected =

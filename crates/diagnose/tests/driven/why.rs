@@ -26,9 +26,9 @@ fn diagnosis(recording: &Recording, side: Which, fit_until_s: f64) -> Diagnosis 
 }
 
 const COMPRESSOR: Which = Which::Compressor;
-/// Two; docs/validation/real-data.md has ten.
+/// One; docs/validation/real-data.md has ten.
 fn seeds() -> u64 {
-    std::env::var("MAPPER_WHY_SEEDS").map_or(2, |seeds| seeds.parse().unwrap())
+    std::env::var("MAPPER_WHY_SEEDS").map_or(1, |seeds| seeds.parse().unwrap())
 }
 
 /// Ids of the open causes, one string per cause.
@@ -38,12 +38,19 @@ fn open(found: &Diagnosis) -> Vec<String> {
 
 /// Diagnoses an engine of each seed with a planted cause, fitted to the whole log. `without` is not recorded.
 fn all_of(side: Which, course: &Course, planted: &[(&str, f64)], without: &[Channel]) -> Vec<Diagnosis> {
-    let each = (0..seeds()).map(|seed| {
-        let (mut recording, _) = engine(seed, course, planted, healthy);
-        recording.series.retain(|channel, _| !without.contains(channel));
-        diagnosis(&recording, side, f64::INFINITY)
-    });
-    each.collect()
+    (0..seeds()).map(|seed| one_of(seed, side, course, planted, without)).collect()
+}
+
+fn one_of(
+    seed: u64,
+    side: Which,
+    course: &Course,
+    planted: &[(&str, f64)],
+    without: &[Channel],
+) -> Diagnosis {
+    let (mut recording, _) = engine(seed, course, planted, healthy);
+    recording.series.retain(|channel, _| !without.contains(channel));
+    diagnosis(&recording, side, f64::INFINITY)
 }
 
 /// Number of seeds with the expected result.
@@ -66,9 +73,9 @@ fn is_named(found: &Diagnosis, effect: &str) -> bool {
     found.word == Word::Named && open(found) == [effect]
 }
 
-/// One seed may fail.
+/// One seed of several may fail.
 fn almost_all() -> usize {
-    seeds() as usize - 1
+    (seeds() as usize - 1).max(1)
 }
 
 #[test]
@@ -145,8 +152,11 @@ fn what_four_minutes_show_is_named_or_reported_to_be_alike() {
     // The area upstream of the wheel and the heating/cooling ratio of h both couple T2 to the metal.
     let found = all_of(COMPRESSOR, &hills, &[("area_split", 0.3)], no_tc);
     assert!(count(&found, |found| open(found).contains(&"area_split".to_owned())) >= almost_all());
-    // Offsets of T2, of T1 (opposite sign) and of P2 are indistinguishable if the efficiency is free.
-    let found = all_of(COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc);
+    // Offsets of T2, of T1 (opposite sign) and of P2 are indistinguishable if the efficiency is free. Two seeds at least: held-out phases do
+    // not confirm it in each.
+    let found: Vec<Diagnosis> = (0..seeds().max(2))
+        .map(|seed| one_of(seed, COMPRESSOR, &hills, &[("t2_offset", 10.0)], no_tc))
+        .collect();
     let alike = |found: &Diagnosis| {
         found.word == Word::NotDistinguished && open(found).contains(&"t2_offset".to_owned())
     };

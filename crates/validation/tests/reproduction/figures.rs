@@ -1,10 +1,10 @@
-//! The page as a whole.
+//! The page as a whole. `cargo xtask docs --check` makes it again and compares its bytes with those of the documentation.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use mapper_validation::reproduction::{FIGURES, reproduce};
 
 #[test]
-fn every_figure_has_statements_a_table_and_a_picture_and_the_same_bytes_twice() {
+fn every_figure_has_statements_a_table_and_a_picture() {
     let mut numbers = Vec::new();
     let results = reproduce(|number| numbers.push(number.to_owned())).unwrap();
     assert_eq!(numbers, FIGURES);
@@ -17,5 +17,4 @@ fn every_figure_has_statements_a_table_and_a_picture_and_the_same_bytes_twice() 
         let texts = result.statements.iter().map(|statement| &statement.here);
         assert!(cells.chain(texts).all(|text| !text.contains("NaN") && !text.contains("inf")));
     }
-    assert_eq!(reproduce(|_| {}).unwrap(), results);
 }

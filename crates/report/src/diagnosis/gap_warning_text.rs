@@ -26,6 +26,19 @@ pub fn gap_warning_text(warning: &GapWarning) -> String {
         GapWarning::HealthyRecording { warning } => {
             format!("the healthy recording: {}", gap_warning_text(warning))
         }
+        GapWarning::Drift { reason, subtracted: true } => {
+            format!(
+                "drift while the recording was made: {reason} It was subtracted from the readings before the diagnosis."
+            )
+        }
+        GapWarning::Drift { reason, subtracted: false } => format!(
+            "drift while the recording was made: {reason} The diagnosis assumes a rig that does not change, so no cause is named."
+        ),
+        GapWarning::DriftNotSubtracted { reason } => {
+            format!(
+                "a drift was found and not subtracted, because nothing but noise is left without it: {reason}"
+            )
+        }
         GapWarning::RecordingIncomplete { reason } => reason.clone(),
         GapWarning::Other { message, .. } if !message.is_empty() => message.clone(),
         other => other.code().to_owned(),

@@ -153,9 +153,8 @@ impl Session<'_> {
         diagnosed.diagnosis.warnings.extend(recorded.read.warnings.iter().map(of_reader));
         diagnosed.diagnosis.off_at_rest = off_at_rest;
         note_drift(&mut diagnosed.diagnosis, drift.as_ref());
-        diagnosed.diagnosis.warnings.extend(doubted.map(|reason| {
-            format!("Without a drift nothing but noise is left of this recording; so none was subtracted, though: {reason}")
-        }));
+        let doubted = doubted.map(|reason| GapWarning::DriftNotSubtracted { reason });
+        diagnosed.diagnosis.warnings.extend(doubted);
         Ok(Gap { diagnosed, drift, sensors, zero })
     }
 
@@ -345,16 +344,9 @@ const SURELY_OUTSIDE: f64 = 0.9;
 /// Adds the drift to the diagnosis, which does not name a cause for it.
 fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     let Some(drift) = drift else { return };
-    let taken_off = drift.drifts.iter().all(|drift| drift.cause.kind() == CauseKind::Sensor);
-    let consequence = if taken_off {
-        "this was subtracted from its reading before the diagnosis"
-    } else {
-        "the diagnosis assumes a rig that does not change, so no cause is named"
-    };
-    diagnosis
-        .warnings
-        .insert(0, format!("Drift while the recording was made: {} Here {consequence}.", drift.reason));
-    if taken_off
+    let subtracted = drift.drifts.iter().all(|drift| drift.cause.kind() == CauseKind::Sensor);
+    diagnosis.warnings.insert(0, GapWarning::Drift { reason: drift.reason.clone(), subtracted });
+    if subtracted
         && diagnosis.verdict == Verdict::Unexplained
         && diagnosis.probability_outside < SURELY_OUTSIDE
     {
@@ -366,7 +358,7 @@ fn note_drift(diagnosis: &mut Diagnosis, drift: Option<&DriftReport>) {
     }
     // A change with time cannot be expressed as a closure term.
     diagnosis.laws.clear();
-    if !taken_off && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
+    if !subtracted && matches!(diagnosis.verdict, Verdict::Explained | Verdict::PartlyExplained) {
         diagnosis.verdict = Verdict::Unexplained;
         diagnosis.experiments.clear();
         diagnosis.next.get_or_insert_with(|| sensor_near(&diagnosis.r#where));

@@ -17,7 +17,7 @@ use mapper_identify::{T2Course, TwoParameter, ZeroOutcome, t2_course};
 use mapper_maps::{Grouping, MapFit, MapFitOptions, RepeatedJump, assemble};
 use mapper_observe::FusedChannel;
 use mapper_recording::score::{ScoreSummary, ScoredPoint};
-use mapper_recording::{ChannelMap, ReadOptions, read_recording};
+use mapper_recording::{ChannelMap, ReadOptions, ReadWarning, read_recording};
 use mapper_report::page::{OtherRun, RunPage, gap_part, run_page};
 use mapper_report::{
     Display, PointsOrigin, ReportSource, RunReport, SurgeReport, instant, run_report, with_messages,
@@ -235,8 +235,8 @@ impl Session<'_> {
         gap: Option<&Gap>,
     ) -> Result<String, SessionError> {
         let origin = Provenance::of(&shown);
-        let mut remarks: Vec<ResultRemark> =
-            shown.iter().flat_map(|one| remarks_of(one, shown.len() > 1)).collect();
+        let several = shown.len() > 1;
+        let mut remarks: Vec<ResultRemark> = shown.iter().flat_map(|one| remarks_of(one, several)).collect();
         let identified = self.identify(shown, channels, None)?;
         remarks.extend(identified.remarks.iter().cloned());
         let map = compressor_map(&origin.machine, &identified, &mut remarks);
@@ -254,8 +254,8 @@ impl Session<'_> {
         let others: Vec<OtherRun<'_>> =
             other_maps.iter().map(|(name, map)| OtherRun { name: name.clone(), map }).collect();
         let repeats = identified.repeats();
-        let program = program_and_commit(self.registry.commit);
-        let report = run_report_of(&origin, &identified, map.as_ref(), &program, &remarks, &repeats, false);
+        let (map, program) = (map.as_ref(), program_and_commit(self.registry.commit));
+        let report = run_report_of(&origin, &identified, map, &program, &remarks, &repeats, false);
         page_of(&identified, &report, &others, gap)
     }
 
@@ -297,8 +297,7 @@ impl Session<'_> {
         if !identified.budgets.is_empty() {
             files.write(run_directory::BUDGET, &budget_csv(&identified.budgets)?);
         }
-        let repeats = identified.repeats();
-        let program = program_and_commit(self.registry.commit);
+        let (repeats, program) = (identified.repeats(), program_and_commit(self.registry.commit));
         let has_picture = map.contains_key("svg");
         let shown = run_report_of(
             origin,
@@ -437,12 +436,12 @@ fn source(recorded: &Recorded) -> ReportSource {
 }
 
 /// Remarks on the parts of a file that cannot be read, with its name if there are several.
-fn remarks_of(recorded: &Recorded, several: bool) -> Vec<ResultRemark> {
+fn remarks_of(recorded: &Recorded, several: bool) -> impl Iterator<Item = ResultRemark> {
     let file = several.then(|| recorded.path.display().to_string());
-    recorded.read.warnings.iter().map(|warning| incomplete(file.clone(), warning)).collect()
+    recorded.read.warnings.iter().map(move |warning| incomplete(file.clone(), warning))
 }
 
-fn incomplete(file: Option<String>, warning: &mapper_recording::ReadWarning) -> ResultRemark {
+fn incomplete(file: Option<String>, warning: &ReadWarning) -> ResultRemark {
     ResultRemark::RecordingIncomplete { file, reason: warning.to_string() }
 }
 

@@ -18,6 +18,10 @@ GapWarning {
     "uncertain_times" UncertainTimes { scatter_s: f64 },
     /// A limit of the healthy recording.
     "healthy_recording" HealthyRecording { warning: Box<GapWarning> },
+    /// Something drifted while the recording was made: `subtracted` from a sensor's readings, or the machine, so that no cause is named.
+    "drift" Drift { reason: String, subtracted: bool },
+    /// A drift was found and not subtracted: without it nothing but noise is left.
+    "drift_not_subtracted" DriftNotSubtracted { reason: String },
     /// A recording could be read in parts only.
     "recording_incomplete" RecordingIncomplete { reason: String },
 }

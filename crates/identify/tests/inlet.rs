@@ -26,24 +26,19 @@ fn worst(points: &[IdentifiedPoint], campaign: &Campaign) -> (f64, f64) {
     })
 }
 
-/// If h before the wheel has its own law (Appendix A: 40 mm), the shared model would give alpha_A = 0.21. Without noise the recording decides,
-/// whatever was declared.
+/// If h before the wheel has its own law (Appendix A: 40 mm), the shared model would give alpha_A = 0.21. Without noise the recording decides
+/// against the declaration.
 #[test]
 fn without_noise_the_law_before_the_wheel_is_identified() {
-    for inlet in [InletConvection::Shared, InletConvection::Own] {
+    use InletConvection::{Own, Shared};
+    for (inlet, inlet_convection) in [(Shared, Own), (Own, Shared)] {
         let campaign = campaign(&eighteen(), 120.0, Machine { alpha: 0.3, inlet, ..Machine::default() });
-        for declared in [InletConvection::Shared, InletConvection::Own] {
-            let config = IdentifyConfig { inlet_convection: declared, ..joint() };
-            let (points, thermal) = found(&campaign.recording, &config);
-            let chosen = thermal.inlet.unwrap();
-            assert_eq!((chosen.convection, chosen.origin), (inlet, Origin::Fitted), "{chosen:?}");
-            let ((eta, h), alpha) = (worst(&points, &campaign), thermal.alpha_area_ratio.value.unwrap());
-            // Error of the surface at eighteen points of the map, up to a third of a point.
-            assert!(
-                (alpha - 0.3).abs() < 0.007 && eta < 0.0035 && h < 0.015,
-                "alpha {alpha}, eta {eta}, h {h}"
-            );
-        }
+        let (points, thermal) = found(&campaign.recording, &IdentifyConfig { inlet_convection, ..joint() });
+        let chosen = thermal.inlet.unwrap();
+        assert_eq!((chosen.convection, chosen.origin), (inlet, Origin::Fitted), "{chosen:?}");
+        let ((eta, h), alpha) = (worst(&points, &campaign), thermal.alpha_area_ratio.value.unwrap());
+        // Error of the surface at eighteen points of the map, up to a third of a point.
+        assert!((alpha - 0.3).abs() < 0.007 && eta < 0.0035 && h < 0.015, "alpha {alpha}, eta {eta}, h {h}");
     }
 }
 

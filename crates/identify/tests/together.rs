@@ -139,12 +139,12 @@ fn the_nominal_map_tells_an_offset_beyond_its_declaration() {
         };
         points.iter().filter(|point| named(point) && point.verdict != Verdict::Good).count()
     };
-    for seed in 0..6 {
+    for seed in 0..3 {
         assert_eq!(doubted(&clean, seed), 0, "seed {seed}");
     }
     let mut off = Campaign { recording: clean.recording.clone(), truth: Vec::new() };
     off.recording.series.get_mut(&Channel::T2).unwrap().values.iter_mut().for_each(|t2_k| *t2_k += 2.75);
-    for seed in 0..3 {
+    for seed in 0..2 {
         assert_eq!(doubted(&off, seed), 18, "seed {seed}");
     }
 }
@@ -167,7 +167,7 @@ fn repeats_alone_tell_no_heat_balance() {
             step.kind = StepKind::Repeat;
         }
     }
-    for seed in 0..12 {
+    for seed in 0..6 {
         for point in found(&clean, seed, Method::Joint) {
             assert!(
                 point.warnings.iter().all(|warning| warning.code() != "contradicted_channel"),

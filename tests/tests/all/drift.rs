@@ -43,17 +43,18 @@ fn planted_drifts_are_detected_without_false_alarms() {
 
 #[test]
 fn drift_compares_several_nights_and_refuses_another_machine() {
-    // Half an hour with three visits of the jump.
+    // Half an hour with four visits of the jump.
     let night = |seed, drift, replaced: &[(&str, &str)]| {
         let speeds = "[90 krpm, 130 krpm, 70 krpm]";
         DriftCampaign { drift, seed, speeds, every: 4, replaced, ..DriftCampaign::default() }.recording()
     };
-    // The rig is the same every night, its noise is not: no offsets or tolerances are drawn, and the seed differs.
+    // The rig is the same every night, its noise is not: no offsets or tolerances are drawn, and the seed, which is not part of the machine,
+    // differs.
     let same_rig: &[(&str, &str)] =
         &[("    weather: wandering\n", "    weather: wandering\n    offsets: none\n")];
     let first = night(31, "", same_rig);
     // The gain of the flow meter drifts by 1 % in the ten hours in between.
-    let second = night(31, "{cause: m_c, change: 1 %, over: 10 h, from: -10 h}", same_rig);
+    let second = night(32, "{cause: m_c, change: 1 %, over: 10 h, from: -10 h}", same_rig);
     let report = drift(&[&first, &second]);
     assert_eq!(
         [&report["verdict"], &report["drifts"][0]["cause"]],
@@ -65,10 +66,6 @@ fn drift_compares_several_nights_and_refuses_another_machine() {
     // The first night has no drift.
     assert_eq!(drift(&[&first])["verdict"], "none");
 
-    // The seed is not part of the machine; it sets the noise of a night.
-    let another_seed = night(32, "", same_rig);
-    let two = drift(&[&first, &another_seed]);
-    assert!(!two["reason"].as_str().unwrap().starts_with("No verdict"), "{}", two["reason"]);
     // A rebuilt machine is another machine, and so is one of another name.
     let rebuilt = night(
         33,

@@ -43,7 +43,9 @@ pub use identification::warning::{
 pub use identification::window_rule::WindowRule;
 pub use maps::efficiency_definition::{EfficiencyDefinition, UnknownEfficiency};
 pub use maps::fitted_map::{FittedLine, FittedMap, FittedNode, LeftOutLine};
-pub use maps::imported_map::{ImportRemark, ImportedColumn, ImportedMap, LineEnd, MeasuredPoint};
+pub use maps::imported_map::{
+    ImportRemark, ImportedColumn, ImportedMap, LineEnd, MeasuredPoint, MeasuredTurbinePoint, TurbineReadings,
+};
 pub use maps::map::{CompressorMap, MapPoint, SpeedLine, SpeedShift};
 pub use maps::map_description::{DescribedColumn, DesignPoint, MapDescription, StaticTaps};
 pub use maps::map_format::{

@@ -1,4 +1,5 @@
-//! Points of a table of steady ones: the apparent efficiency, or the adiabatic one of a machine whose convection is known.
+//! Points of a table of steady ones: the apparent efficiency, or the adiabatic one of a machine whose convection is known. A housing whose
+//! temperature was not measured has that of its heat balance, if T3 was.
 //!
 //! Each source of uncertainty is moved by one standard deviation to both sides, and the efficiency is computed again.
 
@@ -12,7 +13,7 @@ use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, IdentifyError, single_step::budgets, step_outcome::interval_width};
 use mapper_core::{
     BudgetRow, Channel, EstimateUncertainty, EtaSignal, IdentifiedPoint, MeasuredPoint, Method,
-    NoCompression, PointBudgets, ReferenceState, StepKind, StepMarker, Warning,
+    ModelTolerances, NoCompression, PointBudgets, ReferenceState, StepKind, StepMarker, Warning,
 };
 use mapper_numerics::root::root_between;
 use mapper_physics::compressor_map::characteristic::{CharacteristicPoint, CompressorCharacteristic};
@@ -21,6 +22,7 @@ use mapper_physics::laws::compression::apparent_efficiency;
 use mapper_physics::machine::boundary::BoundaryConditions;
 use mapper_physics::machine::params::Params;
 use mapper_physics::simulation::model::{Model, Outputs, State, rad_s_of_rpm};
+use mapper_physics::simulation::steady::settle_housings;
 use std::sync::Arc;
 
 /// A machine whose heat transfer is known.
@@ -28,14 +30,16 @@ use std::sync::Arc;
 pub struct KnownHeat<'a> {
     /// Its parameters: convection, alpha_A, the T2 probe.
     pub params: &'a Params,
-    /// Standard uncertainty of h, ratio.
-    pub convection_ratio: f64,
+    /// Standard uncertainties of its heat transfer and of the conditions around it.
+    pub tolerances: ModelTolerances,
+    /// Conditions around it that a table may leave open: oil, cell, P4.
+    pub boundary: &'a BoundaryConditions,
     /// Origin of the law, for people: "declared in a.yaml".
     pub origin: &'a str,
 }
 
 /// Points and budgets of steady points, in order. `config.method` says whether their heat is removed, which needs `heat` and a housing
-/// temperature at every point; see [`method_of_table`].
+/// temperature or T3 at every point; see [`method_of_table`].
 ///
 /// # Errors
 /// [`IdentifyError`] if the configuration is out of range.
@@ -49,9 +53,9 @@ pub fn reduce(
     Ok(measured.iter().enumerate().map(|(index, measured)| of_point(index, measured, heat, config)).collect())
 }
 
-/// What the points of a table allow: heat can be removed where the housing temperature was measured at every point.
+/// What the points of a table allow: heat can be removed where the housing temperature, or T3 for its heat balance, was measured at every point.
 pub fn method_of_table(measured: &[MeasuredPoint], has_heat: bool) -> Method {
-    match has_heat && measured.iter().all(|point| point.tc_k.is_some()) {
+    match has_heat && measured.iter().all(|point| point.tc_k.or(point.turbine.t3_k).is_some()) {
         true => Method::Corrected,
         false => Method::Steady,
     }
@@ -102,13 +106,24 @@ fn estimate(
     findings: &mut Findings,
 ) -> Estimate {
     let mut estimate = Estimate::default();
-    let (Some(t2_k), Some(tc_k)) = (measured.t2_k, measured.tc_k.or(heat.is_none().then_some(f64::NAN)))
-    else {
+    let Some(t2_k) = measured.t2_k else {
         findings.refuse(Warning::NoCompression(NoCompression::NoT2));
         return estimate;
     };
-    let params = heat.map(|heat| *heat.params);
-    let inputs = Inputs { point: *measured, t2_k, tc_k, air: config.air, params };
+    let machine = heat.map(|heat| {
+        let (readings, around) = (measured.turbine, heat.boundary);
+        let boundary = BoundaryConditions {
+            t1_k: measured.t1_k,
+            p1_pa: measured.p1_pa,
+            t3_k: readings.t3_k.unwrap_or(around.t3_k),
+            p3_pa: readings.p3_pa.unwrap_or(around.p3_pa),
+            p4_pa: readings.p4_pa.unwrap_or(around.p4_pa),
+            oil_temperature_k: readings.oil_k.unwrap_or(around.oil_temperature_k),
+            ..*around
+        };
+        Machine { params: *heat.params, boundary }
+    });
+    let inputs = Inputs { point: *measured, t2_k, air: config.air, machine };
     let Some(eta) = inputs.efficiency() else {
         findings.refuse(Warning::NoCompression(NoCompression::NoRise {
             rise_k: t2_k - measured.t1_k,
@@ -148,8 +163,12 @@ fn estimate(
     }
     match heat {
         Some(heat) => {
-            let h_w_m2k = inputs.outputs(heat.params, eta).h_w_m2k;
-            let bias_standard_error = heat.convection_ratio * h_w_m2k;
+            let at = inputs
+                .machine
+                .as_ref()
+                .and_then(|machine| Some(inputs.outputs(machine, eta, &inputs.housing(machine, eta)?)));
+            let h_w_m2k = at.map_or(f64::NAN, |at| at.h_w_m2k);
+            let bias_standard_error = heat.tolerances.convection_ratio * h_w_m2k;
             let error = EstimateUncertainty { noise_standard_error: 0.0, bias_standard_error };
             estimate.h_w_m2k = Some((h_w_m2k, Some(error)));
             findings.remark(Warning::ThroughTheLaw { convection_origin: Some(heat.origin.to_owned()) });
@@ -167,10 +186,16 @@ fn estimate(
 struct Inputs {
     point: MeasuredPoint,
     t2_k: f64,
-    tc_k: f64,
     air: Air,
     /// The machine, if its heat is removed.
-    params: Option<Params>,
+    machine: Option<Machine>,
+}
+
+/// A machine and the conditions around it.
+#[derive(Debug, Clone, Copy)]
+struct Machine {
+    params: Params,
+    boundary: BoundaryConditions,
 }
 
 /// A source of uncertainty, one standard deviation.
@@ -194,25 +219,61 @@ enum Moved {
     /// By a ratio.
     Convection,
     AlphaArea,
+    /// By a ratio: conduction to the oil and through the bearing housing.
+    Bearing,
+    /// By a ratio.
+    ExternalConvection,
+    OilTemperature,
+    AmbientTemperature,
 }
 
 impl Inputs {
     /// The efficiency; `None` if there is none.
     fn efficiency(&self) -> Option<f64> {
         let MeasuredPoint { t1_k, p1_pa, p2_pa, .. } = self.point;
-        let eta = match &self.params {
-            None => apparent_efficiency(p2_pa / p1_pa, t1_k, self.t2_k, self.air),
-            Some(params) => {
-                let excess_k = |eta: f64| self.outputs(params, eta).t2_probe_target_k - self.t2_k;
-                root_between(ETA_BOUNDS.0, ETA_BOUNDS.1, 1e-10, excess_k)?
+        let apparent = apparent_efficiency(p2_pa / p1_pa, t1_k, self.t2_k, self.air);
+        let eta = match &self.machine {
+            None => apparent,
+            Some(machine) => {
+                self.adiabatic_efficiency(machine, apparent.clamp(ETA_BOUNDS.0, ETA_BOUNDS.1))?
             }
         };
         (eta.is_finite() && eta > 0.0 && p2_pa > p1_pa).then_some(eta)
     }
 
+    /// The efficiency with the housing of the measurement, or with that of the heat balance, which depends on it a little.
+    fn adiabatic_efficiency(&self, machine: &Machine, mut eta: f64) -> Option<f64> {
+        const MAX_ROUNDS: usize = 50;
+        for _ in 0..MAX_ROUNDS {
+            let housing = self.housing(machine, eta)?;
+            let excess_k = |eta: f64| self.outputs(machine, eta, &housing).t2_probe_target_k - self.t2_k;
+            let found = root_between(ETA_BOUNDS.0, ETA_BOUNDS.1, 1e-10, excess_k)?;
+            if self.point.tc_k.is_some() || (found - eta).abs() < 1e-9 {
+                return Some(found);
+            }
+            eta = found;
+        }
+        None
+    }
+
+    /// The state of the machine with its housings at rest; `None` if they find no balance.
+    fn housing(&self, machine: &Machine, eta: f64) -> Option<State> {
+        let MeasuredPoint { speed_rpm, p2_pa, tc_k, turbine, .. } = self.point;
+        let at = |tc_k: f64| State::new(rad_s_of_rpm(speed_rpm), p2_pa, tc_k, tc_k, self.t2_k);
+        tc_k.map(at).or_else(|| {
+            let (model, boundary) = self.model(machine, eta);
+            settle_housings(&model, &boundary, speed_rpm, p2_pa, turbine.p3_pa.is_some())
+        })
+    }
+
     /// The machine at this point with an efficiency.
-    fn outputs(&self, params: &Params, eta: f64) -> Outputs {
-        let mut params = *params;
+    fn outputs(&self, machine: &Machine, eta: f64, housing: &State) -> Outputs {
+        let (model, boundary) = self.model(machine, eta);
+        model.prepare(&boundary).evaluate(housing)
+    }
+
+    fn model(&self, machine: &Machine, eta: f64) -> (Model, BoundaryConditions) {
+        let mut params = machine.params;
         let compressor = &mut params.compressor;
         (compressor.humidity_kg_kg, compressor.efficiency) = (self.air.humidity_kg_kg, self.air.efficiency);
         (compressor.flow_scale_ratio, compressor.efficiency_scale_ratio) = (1.0, 1.0);
@@ -224,21 +285,16 @@ impl Inputs {
                 * (1.0 + compressor.recirculation_ratio),
             eta,
         };
-        let boundary = BoundaryConditions {
-            t1_k: self.point.t1_k,
-            p1_pa: self.point.p1_pa,
-            ..BoundaryConditions::default()
-        };
-        let speed_rad_s = rad_s_of_rpm(self.point.speed_rpm);
-        let state = State::new(speed_rad_s, self.point.p2_pa, self.tc_k, self.tc_k, self.t2_k);
-        Model::new(params, Arc::new(map)).prepare(&boundary).evaluate(&state)
+        let boundary =
+            BoundaryConditions { t1_k: self.point.t1_k, p1_pa: self.point.p1_pa, ..machine.boundary };
+        (Model::new(params, Arc::new(map)), boundary)
     }
 
     /// Change of the efficiency by one standard deviation of a source: mean of both sides, if both have an efficiency.
     fn change(&self, source: &Source, eta: f64) -> f64 {
         let moved = |by: f64| self.moved(source.what, by).efficiency();
         // An area of a share below 0 has no meaning: towards the middle, as all methods do.
-        let alpha = self.params.map(|params| params.compressor.alpha_area_ratio);
+        let alpha = self.machine.map(|machine| machine.params.compressor.alpha_area_ratio);
         let (above, below) = match source.what {
             Moved::AlphaArea if alpha.is_some_and(|alpha| alpha > 0.5) => (None, moved(-source.sigma)),
             Moved::AlphaArea => (moved(source.sigma), None),
@@ -263,11 +319,11 @@ impl Inputs {
         let averaging = coloured(config.noise_colour)
             .variance_of_mean(samples(config), config.thresholds.steady_mean_s)
             .sqrt();
-        let of_heat = [Channel::CompressorFlow, Channel::Tc];
-        for channel in [Channel::T1, Channel::T2, Channel::P1, Channel::P2].into_iter().chain(of_heat) {
-            if heat.is_none() && of_heat.contains(&channel) {
-                continue;
-            }
+        let is_balance = heat.is_some() && self.point.tc_k.is_none();
+        let mut channels = vec![Channel::T1, Channel::T2, Channel::P1, Channel::P2];
+        channels.extend(heat.is_some().then_some(Channel::CompressorFlow));
+        channels.extend(heat.is_some().then_some(if is_balance { Channel::T3 } else { Channel::Tc }));
+        for channel in channels {
             let declared = config.declared.get(&channel).copied().unwrap_or_default();
             let unit = channel.unit();
             push(format!("offset of {channel}"), declared.offset_sigma, unit, true, Moved::Reading(channel));
@@ -280,8 +336,24 @@ impl Inputs {
             push("humidity".to_owned(), config.humidity_sigma_kg_kg, "kg/kg", true, Moved::Humidity);
         }
         if let Some(heat) = heat {
-            push("convection law".to_owned(), heat.convection_ratio, "1", true, Moved::Convection);
+            let tolerances = heat.tolerances;
+            push("convection law".to_owned(), tolerances.convection_ratio, "1", true, Moved::Convection);
             push("alpha_A".to_owned(), config.alpha_area_sigma_ratio, "1", true, Moved::AlphaArea);
+            for (name, sigma, unit, moved) in [
+                ("conduction to the oil", tolerances.oil_conductance_ratio, "1", Moved::Bearing),
+                (
+                    "convection to the cell",
+                    tolerances.external_convection_ratio,
+                    "1",
+                    Moved::ExternalConvection,
+                ),
+                ("oil temperature", tolerances.oil_temperature_k, "K", Moved::OilTemperature),
+                ("ambient temperature", tolerances.ambient_temperature_k, "K", Moved::AmbientTemperature),
+            ] {
+                if is_balance {
+                    push(name.to_owned(), sigma, unit, true, moved);
+                }
+            }
         }
         sources
     }
@@ -300,17 +372,11 @@ impl Inputs {
                 moved.point.p2_pa += by;
             }
             (Moved::Humidity, _) => moved.air.humidity_kg_kg += by,
-            (Moved::Convection, _) => {
-                if let Some(params) = &mut moved.params {
-                    params.compressor.nusselt_coefficient *= 1.0 + by;
+            (what, _) => {
+                if let Some(machine) = &mut moved.machine {
+                    machine.move_by(what, by);
                 }
             }
-            (Moved::AlphaArea, _) => {
-                if let Some(params) = &mut moved.params {
-                    params.compressor.alpha_area_ratio += by;
-                }
-            }
-            (_, None) => {}
         }
         moved
     }
@@ -322,8 +388,31 @@ impl Inputs {
             Channel::P1 => Some(&mut self.point.p1_pa),
             Channel::P2 => Some(&mut self.point.p2_pa),
             Channel::CompressorFlow => Some(&mut self.point.flow_kg_s),
-            Channel::Tc => Some(&mut self.tc_k),
+            Channel::Tc => self.point.tc_k.as_mut(),
+            Channel::T3 => self.machine.as_mut().map(|machine| &mut machine.boundary.t3_k),
             _ => None,
+        }
+    }
+}
+
+impl Machine {
+    fn move_by(&mut self, what: Moved, by: f64) {
+        let Machine { params, boundary } = self;
+        match what {
+            // One law of both housings.
+            Moved::Convection => {
+                params.compressor.nusselt_coefficient *= 1.0 + by;
+                params.turbine.nusselt_coefficient *= 1.0 + by;
+            }
+            Moved::AlphaArea => params.compressor.alpha_area_ratio += by,
+            Moved::Bearing => {
+                params.bearing.conductivity_w_mk *= 1.0 + by;
+                params.bearing.oil_conductance_w_k *= 1.0 + by;
+            }
+            Moved::ExternalConvection => params.external_convection_ratio *= 1.0 + by,
+            Moved::OilTemperature => boundary.oil_temperature_k += by,
+            Moved::AmbientTemperature => boundary.ambient_temperature_k += by,
+            Moved::Reading(_) | Moved::Gain(_) | Moved::Barometer | Moved::Humidity => {}
         }
     }
 }

@@ -1,7 +1,9 @@
 //! Tables of steady points, against the steady states of the model.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use mapper_core::{Channel, DeclaredUncertainty, InletConvection, MeasuredPoint, Method};
+use mapper_core::{
+    Channel, DeclaredUncertainty, InletConvection, MeasuredPoint, Method, ModelTolerances, TurbineReadings,
+};
 use mapper_identify::{IdentifyConfig, KnownHeat, method_of_table, reduce};
 use mapper_physics::compressor_map::closed_form_map::ClosedFormMap;
 use mapper_physics::machine::params::{BoundaryConditions, Params};
@@ -29,6 +31,12 @@ fn steady_points(params: &Params) -> Vec<(MeasuredPoint, f64)> {
                 p2_pa: held.state.p2_pa,
                 tc_k: Some(held.state.tc_k),
                 humidity_kg_kg: None,
+                turbine: TurbineReadings {
+                    t3_k: Some(boundary.t3_k),
+                    p3_pa: Some(held.boundary.p3_pa),
+                    p4_pa: Some(boundary.p4_pa),
+                    oil_k: Some(boundary.oil_temperature_k),
+                },
                 end: None,
             };
             points.push((point, held.outputs.efficiency));
@@ -53,11 +61,50 @@ fn config(params: &Params, method: Method) -> IdentifyConfig {
     IdentifyConfig { method, air: params.compressor.air(), ..IdentifyConfig::default() }
 }
 
+fn tolerances(convection_ratio: f64) -> ModelTolerances {
+    ModelTolerances { convection_ratio, ..ModelTolerances::default() }
+}
+
+/// Without Tc the housings have the temperatures of their heat balance; P3 is then the one that holds the speed, if it was not measured either.
+#[test]
+fn t3_and_the_oil_stand_in_for_the_housing() {
+    let mut machines = machines();
+    machines[1].compressor.inner_capacity_ratio = 0.3;
+    machines[2].radiation_area_m2 = 0.004;
+    for params in machines {
+        let (mut points, truth): (Vec<_>, Vec<f64>) = steady_points(&params).into_iter().unzip();
+        for (index, point) in points.iter_mut().enumerate() {
+            point.tc_k = None;
+            if index % 2 == 0 {
+                point.turbine.p3_pa = None;
+            }
+        }
+        let known = KnownHeat {
+            params: &params,
+            tolerances: tolerances(0.03),
+            boundary: &BoundaryConditions::default(),
+            origin: "declared",
+        };
+        assert_eq!(method_of_table(&points, true), Method::Corrected);
+        let found = reduce(&points, Some(known), &config(&params, Method::Corrected)).unwrap();
+        for ((point, budget), eta) in found.iter().zip(truth) {
+            assert!((point.eta.unwrap() - eta).abs() < 1e-6, "{:?} {eta}", point.eta);
+            let rows = &budget.eta.as_ref().unwrap().rows;
+            assert!(rows.iter().any(|row| row.source == "conduction to the oil" && row.contribution != 0.0));
+        }
+    }
+}
+
 #[test]
 fn a_measured_housing_leads_to_the_machine_s_own_efficiencies() {
     for params in machines() {
         let (points, truth): (Vec<_>, Vec<f64>) = steady_points(&params).into_iter().unzip();
-        let known = KnownHeat { params: &params, convection_ratio: 0.0, origin: "declared" };
+        let known = KnownHeat {
+            params: &params,
+            tolerances: tolerances(0.0),
+            boundary: &BoundaryConditions::default(),
+            origin: "declared",
+        };
         assert_eq!(method_of_table(&points, true), Method::Corrected);
         let found = reduce(&points, Some(known), &config(&params, Method::Corrected)).unwrap();
         for ((point, _), eta) in found.iter().zip(truth) {
@@ -72,6 +119,7 @@ fn without_it_they_are_the_conventional_ones() {
     let params = Params::default();
     let (mut points, truth): (Vec<_>, Vec<f64>) = steady_points(&params).into_iter().unzip();
     points[4].tc_k = None;
+    points[4].turbine.t3_k = None;
     assert_eq!(method_of_table(&points, true), Method::Steady);
     let found = reduce(&points, None, &config(&params, Method::Steady)).unwrap();
     for ((point, _), measured) in found.iter().zip(&points) {
@@ -103,7 +151,12 @@ fn the_budget_predicts_the_effect_of_each_error() {
         (Channel::CompressorFlow, error(0.0, 5e-3)),
     ]);
     let config = IdentifyConfig { declared, ..config(&params, Method::Corrected) };
-    let known = KnownHeat { params: &params, convection_ratio: 0.03, origin: "declared" };
+    let known = KnownHeat {
+        params: &params,
+        tolerances: tolerances(0.03),
+        boundary: &BoundaryConditions::default(),
+        origin: "declared",
+    };
     let found = reduce(&points, Some(known), &config).unwrap();
     let etas = |points: &[MeasuredPoint], params: &Params| {
         let known = KnownHeat { params, ..known };
@@ -156,7 +209,12 @@ fn a_point_without_a_rise_has_no_efficiency_and_says_why() {
     points[2].p2_pa = 0.99 * points[2].p1_pa;
     for method in [Method::Steady, Method::Corrected] {
         let params = Params::default();
-        let known = KnownHeat { params: &params, convection_ratio: 0.03, origin: "declared" };
+        let known = KnownHeat {
+            params: &params,
+            tolerances: tolerances(0.03),
+            boundary: &BoundaryConditions::default(),
+            origin: "declared",
+        };
         let found = reduce(&points, Some(known), &config(&params, method)).unwrap();
         for (point, _) in &found[..3] {
             assert_eq!((point.eta, point.warnings[0].code()), (None, "no_compression"), "{method}");

@@ -32,3 +32,4 @@ pub use repeated_jumps::{RepeatedJump, repeated_jumps};
 pub use repeats::points_for_map;
 pub use turbine::turbine_compare::{ComparedTurbinePoint, TurbineComparison, compare_turbines};
 pub use turbine::turbine_fit::{TurbineFit, TurbineFitError, fit_turbine};
+pub use turbine::turbine_points::{ReducedTurbinePoint, reduce_turbine};

@@ -52,7 +52,9 @@ pub use maps::map_comparison_text::map_comparison_text;
 pub use maps::map_fit_text::map_fit_text;
 pub use maps::reduced_text::reduced_text;
 pub use maps::turbine_file::{TurbinePoint, turbine_points, turbine_text};
-pub use maps::turbine_map_text::{imported_turbine_text, turbine_comparison_text, turbine_fit_text};
+pub use maps::turbine_map_text::{
+    imported_turbine_text, reduced_turbine_text, turbine_comparison_text, turbine_fit_text,
+};
 pub use plan::comparison_text::{comparison_json, comparison_text};
 pub use plan::jump_text::{jump_json, jump_text};
 pub use plan::plan_picture::plan_svg;

@@ -6,7 +6,7 @@ use mapper_formats::FORMATS;
 use mapper_physics::gas::pressure_tap::total_to_static_pa;
 use mapper_physics::machine::params::BoundaryConditions;
 use mapper_physics::simulation::steady::{SteadyState, hold_speed};
-use mapper_session::{MapWork, Registry, nominal_model};
+use mapper_session::{Existing, MapOut, MapWork, Registry, nominal_model};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -53,6 +53,32 @@ fn table(states: &[SteadyState], with_tc: bool, pipe_m: Option<f64>) -> String {
     text
 }
 
+/// The same table with the turbine's readings in place of Tc; P4 is above the barometer's 98.6 kPa.
+fn table_of_both(states: &[SteadyState]) -> String {
+    let rows = table(states, false, None);
+    let mut lines = rows.lines();
+    let (title, heads) = (lines.next().unwrap(), lines.next().unwrap());
+    let mut text = format!(
+        "{title}\n{heads};m_t [g/s];Druck vor Turbine [bar];p4 [mbar(g)];Barometer [mbar];Temperatur vor Turbine [°C];T4 [°C];Öltemperatur [°C]\n"
+    );
+    for (row, held) in lines.zip(states.iter().rev()) {
+        let (boundary, outputs) = (&held.boundary, &held.outputs);
+        let readings = [
+            1e3 * outputs.turbine_flow_kg_s,
+            1e-5 * boundary.p3_pa,
+            0.01 * boundary.p4_pa - 986.0,
+            986.0,
+            boundary.t3_k - 273.15,
+            outputs.turbine.t4_k - 273.15,
+            boundary.oil_temperature_k - 273.15,
+        ];
+        let cells: Vec<String> =
+            readings.iter().map(|value| format!("{value:.7}").replace('.', ",")).collect();
+        text.push_str(&format!("{row};{}\n", cells.join(";")));
+    }
+    text
+}
+
 fn reduced(text: &str, machine: Option<&Path>, given: &MapDescription) -> MapWork {
     let scratch = tempfile::tempdir().unwrap();
     let file = scratch.path().join("points.csv");
@@ -92,12 +118,59 @@ fn the_labs_steady_states_give_the_labs_map() {
     assert!(["offset of T2", "gain of m_c", "offset of Tc", "convection law"].iter().all(|name| named(name)));
 }
 
+/// T3 and the oil replace a housing temperature: the heat balance of the campaign's machine gives it.
+#[test]
+fn t3_and_oil_give_the_labs_map_without_tc() {
+    let file = campaign_file();
+    let states = steady_states(&mapper_campaign::load(&file).unwrap());
+    let work = reduced(&table_of_both(&states), Some(&file), &MapDescription::default());
+    assert_eq!(work.json["method"], "corrected");
+    for (eta, held) in etas(&work).iter().zip(states.iter().rev()) {
+        // 0.05 points, as with Tc.
+        assert!((eta - held.outputs.efficiency).abs() < 5e-4, "{eta} {}", held.outputs.efficiency);
+    }
+}
+
+/// The same table has the turbine's points: N/sqrt(T3), m sqrt(T3)/p3, P3/P4, and the enthalpies from T3 to T4.
+#[test]
+fn the_turbines_points_become_its_map() {
+    let states = steady_states(&mapper_campaign::load(&campaign_file()).unwrap());
+    let scratch = tempfile::tempdir().unwrap();
+    let (file, out) = (scratch.path().join("points.csv"), scratch.path().join("turbine.csv"));
+    std::fs::write(&file, table_of_both(&states)).unwrap();
+    let registry = Registry { formats: FORMATS, ..Registry::default() };
+    let to = MapOut { path: &out, format: None, existing: Existing::Kept };
+    let given = MapDescription::default();
+    let work = registry.reduce_turbine_points(&file, &given, Some(&campaign_file()), Some(to)).unwrap();
+    let points = work.json["turbine"].as_array().unwrap();
+    assert_eq!(points.len(), states.len());
+    for (point, held) in points.iter().zip(states.iter().rev()) {
+        let of = |key: &str| point[key].as_f64().unwrap();
+        let (boundary, outputs) = (&held.boundary, &held.outputs);
+        let (ratio, t4_k) = (boundary.p3_pa / boundary.p4_pa, outputs.turbine.t4_k);
+        let flow = outputs.turbine_flow_kg_s * boundary.t3_k.sqrt() / (1e-3 * boundary.p3_pa);
+        // An expansion is the compression the other way round.
+        let eta = 1.0 / by_enthalpy(1.0 / ratio, boundary.t3_k, t4_k, 0.0);
+        for (key, expected) in [
+            ("speed_parameter_rpm_sqrt_k", held.state.shaft_speed_rpm() / boundary.t3_k.sqrt()),
+            ("flow_parameter_kg_sqrt_k_s_kpa", flow),
+            ("expansion_ratio", ratio),
+            ("efficiency", eta),
+        ] {
+            assert!((of(key) / expected - 1.0).abs() < 1e-5, "{key}: {} {expected}", of(key));
+        }
+        assert!((1e-4..0.1).contains(&(of("flow_standard_error") / flow)));
+        assert!((1e-4..0.1).contains(&of("efficiency_standard_error")));
+    }
+    assert_eq!(registry.inspect_turbine(&out, given).unwrap().map.points.len(), states.len());
+}
+
 /// (h(T2s) - h(T1))/(h(T2) - h(T1)) with s(T2s) - s(T1) = R ln PR, of air whose cp is 1002.5 + 275e-6 (T - 200)^2, with a mass fraction of water.
 fn by_enthalpy(ratio: f64, t1_k: f64, t2_k: f64, water: f64) -> f64 {
     let enthalpy = |t_k: f64| 1002.5 * t_k + 275e-6 / 3.0 * (t_k - 200.0).powi(3);
     let entropy = |t_k: f64| (1002.5 + 275e-6 * 4e4) * t_k.ln() + 275e-6 * (0.5 * t_k * t_k - 400.0 * t_k);
     let gas_constant = 287.05 * (1.0 + (1.0 / 0.62198 - 1.0) * water) / (1.0 + 0.865 * water);
-    let (mut low_k, mut high_k) = (t1_k, 2.0 * t1_k);
+    let (mut low_k, mut high_k) = (0.5 * t1_k, 2.0 * t1_k);
     while high_k - low_k > 1e-9 {
         let middle_k = 0.5 * (low_k + high_k);
         let is_low = entropy(middle_k) - entropy(t1_k) < gas_constant * ratio.ln();

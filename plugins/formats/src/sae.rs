@@ -24,23 +24,25 @@ fn write(map: &CompressorMap) -> Result<Vec<u8>, ExportError> {
     let mut text = heading(map, "#");
     let all = || map.lines.iter().flat_map(|line| &line.points);
     let without = all().filter(|point| point.eta.is_none()).count();
-    if without > 0 {
+    // A map without any efficiency has three columns; a heading names them for the reader.
+    let has_eta = without < all().count();
+    if without > 0 && has_eta {
         let _ = writeln!(
             text,
             "# {without} points without efficiency are left out: the format has no place for them"
         );
     }
-    text.push_str("# N(rpm) mdot(kg/s) PR Eff\n");
+    let _ = writeln!(text, "# N(rpm) mdot(kg/s) PR{}", if has_eta { " Eff" } else { "" });
     for line in &map.lines {
         // Points are stored by rising flow; the format goes from choke to surge.
         for point in line.points.iter().rev() {
-            let Some(eta) = point.eta else { continue };
+            let eta = match point.eta {
+                None if has_eta => continue,
+                eta => eta.map_or_else(String::new, |eta| format!(" {eta}")),
+            };
             // Shortest text that reads back to the same number.
-            let _ = writeln!(
-                text,
-                "{} {} {} {eta}",
-                line.speed_corrected_rpm, point.flow_corrected_kg_s, point.pressure_ratio
-            );
+            let (speed_rpm, flow_kg_s) = (line.speed_corrected_rpm, point.flow_corrected_kg_s);
+            let _ = writeln!(text, "{speed_rpm} {flow_kg_s} {}{eta}", point.pressure_ratio);
         }
     }
     Ok(text.into_bytes())

@@ -103,6 +103,8 @@ fn vane_positions_are_columns_or_titles() {
     ];
     for text in [
         "VGT [%],N/sqrt(T3),mfp,ER,eta\n20,2000,0.008,1.3,0.55\n20,3000,0.009,1.7,0.6\n80,2000,0.016,1.3,0.62\n",
+        "VGT [%],N/sqrt(T3),m*sqrt(T3)/p3 [kg/s*K^0.5/kPa],ER,eta,flow_low,flow_high\n20,2000,0.008,1.3,0.55,0.007,0.009\n\
+         20,3000,0.009,1.7,0.6,0.008,0.01\n80,2000,0.016,1.3,0.62,0.015,0.017\n",
         "Turbine map\nN/sqrt(T3),mfp,ER,eta\nVGT position 20 %\n2000,0.008,1.3,0.55\n3000,0.009,1.7,0.6\n\
          VGT position 80 %\n2000,0.016,1.3,0.62\n",
     ] {
@@ -131,5 +133,21 @@ fn what_is_written_is_read_to_the_digit() {
         assert_near(&json.read_turbine(&bytes, None).unwrap().map.points[..2], &map.points[..2]);
         assert!(matches!(json.read(&bytes, None), Err(ImportError::Turbine { .. })));
         assert!(FORMATS.find("modelica").unwrap().write_turbine(&map).is_err(), "it needs a fit");
+    }
+}
+
+/// Steady points of a stand: N/sqrt(T3), m sqrt(T3)/p3 and P3/P4 by hand; the vanes' position is in the titles.
+#[test]
+fn measured_points_are_reduced() {
+    let text = "vane position 40 %\nDrehzahl [1/min];Abgasmassenstrom [kg/h];p3 [bar];T3 [°C];p4 [bar]\n\
+                100000;360;2,0;626,85;1,0\nvane position 80 %\n100000;540;1,5;626,85;1,0\n";
+    let found = read("x.csv", text, &[]).unwrap();
+    assert!(found.remarks.contains(&ImportRemark::Measured) && found.measured.len() == 2);
+    let expected = [(0.4, 0.1 * 30.0 / 200.0, 2.0), (0.8, 0.15 * 30.0 / 150.0, 1.5)];
+    for (point, (vane, flow, ratio)) in found.map.points.iter().zip(expected) {
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+        assert_eq!((point.vane_position, point.efficiency), (Some(vane), None));
+        assert!(near(point.speed_parameter_rpm_sqrt_k, 1e5 / 30.0) && near(point.expansion_ratio, ratio));
+        assert!(near(point.flow_parameter_kg_sqrt_k_s_kpa, flow), "{point:?}");
     }
 }

@@ -251,11 +251,53 @@ fn conventions() -> Vec<Vec<(&'static str, Holds)>> {
             ("n_LP", a(ShaftSpeed)),
             ("n_HP", Holds::Other(Kind::Speed, 30e3, 150e3)),
         ],
+        vec![
+            ("p_L_v_Verd", a(P1)),
+            ("T_L_v_Verd", a(T1)),
+            ("p_L_n_Verd", a(P2)),
+            ("T_L_n_Verd", a(T2)),
+            ("p_A_v_Turb", a(P3)),
+            ("T_A_v_Turb", a(T3)),
+            ("p_A_n_Turb", a(P4)),
+            ("T_A_n_Turb", a(T4)),
+            ("n_Lader", a(ShaftSpeed)),
+            ("T_L_n_LLK", cooled_t),
+        ],
+        vec![
+            ("Pressione ingresso compressore", a(P1)),
+            ("Temperatura ingresso compressore", a(T1)),
+            ("Pressione uscita compressore", a(P2)),
+            ("Temperatura uscita compressore", a(T2)),
+            ("Pressione ingresso turbina", a(P3)),
+            ("Temperatura ingresso turbina", a(T3)),
+            ("Giri turbo", a(ShaftSpeed)),
+            ("Portata aria", a(CompressorFlow)),
+        ],
+        vec![
+            ("compInletPressTotal", a(P1)),
+            ("compInletTempTotal", a(T1)),
+            ("Prs_CmprOutlet", a(P2)),
+            ("Tmp_CmprOutlet", a(T2)),
+            ("turbInletPressTotal", a(P3)),
+            ("turbInletTempTotal", a(T3)),
+            ("nTurbo", a(ShaftSpeed)),
+            ("compMassFlow", a(CompressorFlow)),
+            ("CAC in T", temperature(301.0, 407.0)),
+            ("CAC out T", cooled_t),
+        ],
+        vec![
+            ("Pressure", a(P1)),
+            ("Temp", a(T1)),
+            ("Pressure.1", a(P2)),
+            ("Temp.1", a(T2)),
+            ("Speed", a(ShaftSpeed)),
+            ("Flow", a(CompressorFlow)),
+        ],
     ]
 }
 
 /// Other columns of logs, which are not channels.
-const DECOYS: [(&str, Holds); 14] = [
+const DECOYS: [(&str, Holds); 16] = [
     ("T2 set", temperature(300.0, 400.0)),
     ("P2_soll", pressure(105e3, 230e3)),
     ("n_corr", Holds::Other(Kind::Speed, 21e3, 117e3)),
@@ -270,6 +312,8 @@ const DECOYS: [(&str, Holds); 14] = [
     ("Kraftstofftemperatur", temperature(300.0, 310.0)),
     ("T_water_out", temperature(350.0, 366.0)),
     ("p_crankcase", pressure(100e3, 101e3)),
+    ("T2 isentropic", temperature(300.0, 390.0)),
+    ("Intake Manifold Pressure", pressure(102e3, 228e3)),
 ];
 
 /// Repeats a small sequence of numbers: the same headers in every run.

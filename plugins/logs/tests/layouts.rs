@@ -240,6 +240,21 @@ fn a_state_is_no_name_of_a_quantity() {
 }
 
 #[test]
+fn a_unit_may_begin_with_a_digit() {
+    let (layout, rows) = read(&text("time;n\n", |row| format!("{row} s;{} 1/min", 1000 * row)));
+    assert_eq!(layout.columns[0].unit.as_deref(), Some("1/min"));
+    assert!(rows.iter().enumerate().all(|(row, (_, values))| values[0] == 1000.0 * row as f64));
+}
+
+/// The day numbers of a spreadsheet under a word for the date.
+#[test]
+fn a_date_may_be_a_day_number() {
+    let line =
+        |row: usize| format!("{:.9};{};{}", 45_979.431 + row as f64 / 86_400.0, p2_kpa(row), t2_degc(row));
+    assert_measured(&text("Datum;p2 [kPa];T2 [degC]\n", line), "p2", "T2", true);
+}
+
+#[test]
 fn a_unit_that_changes_gives_no_number() {
     // An instrument that ranges by itself: 998 mbar, then 1.02 bar.
     let (layout, rows) = read(&text("Time;p2;T2\n", |row| {

@@ -153,3 +153,25 @@ fn a_machine_before_the_quantity_is_understood() {
     let channels = [Channel::P1, Channel::P2, Channel::T2, Channel::P3, Channel::T4];
     assert_eq!(channels.map(of), [0, 1, 2, 3, 4].map(Some));
 }
+
+/// pandas numbers the second of two equal names: it is no station.
+#[test]
+fn a_number_behind_a_point_is_no_station() {
+    let found = proposal("Pressure [kPa],Temp [degC],Pressure.1 [kPa],Temp.1 [degC]", |load| {
+        vec![98.0, 22.0, 98.0 + 130.0 * load, 22.0 + 110.0 * load]
+    });
+    assert_eq!(found.channels, []);
+}
+
+/// 72 degF at the inlet; taken for degC no room would be as warm.
+#[test]
+fn imperial_logs_have_imperial_temperatures() {
+    let names =
+        "turbo_speed [rpm],comp_inlet_press [psia],comp_outlet_press [psia],comp_inlet_temp,comp_outlet_temp";
+    let row = |load: f64| vec![1e5 * load, 14.3, 14.3 + 19.0 * load, 72.0 + load, 73.0 + 200.0 * load];
+    let found = proposal(names, row);
+    for channel in [Channel::T1, Channel::T2] {
+        let proposed = found.of(channel).unwrap();
+        assert_eq!((proposed.unit, proposed.certainty), (Some("degF"), Certainty::Likely), "{channel}");
+    }
+}

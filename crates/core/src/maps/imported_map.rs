@@ -37,8 +37,44 @@ pub struct MeasuredPoint {
     pub tc_k: Option<f64>,
     /// Water per dry air, kg/kg.
     pub humidity_kg_kg: Option<f64>,
+    /// Readings of the turbine side.
+    pub turbine: TurbineReadings,
     /// End of its speed line, if its row names one.
     pub end: Option<LineEnd>,
+}
+
+/// Readings of a turbine and of its oil, if the table has them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TurbineReadings {
+    /// Inlet temperature, K.
+    pub t3_k: Option<f64>,
+    /// Inlet pressure, Pa.
+    pub p3_pa: Option<f64>,
+    /// Outlet pressure, Pa.
+    pub p4_pa: Option<f64>,
+    /// Oil inlet temperature, K.
+    pub oil_k: Option<f64>,
+}
+
+/// A steady point of a turbine as measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredTurbinePoint {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// Position of the vanes.
+    pub vane_position: Option<f64>,
+    /// Shaft speed, rpm.
+    pub speed_rpm: f64,
+    /// Mass flow, kg/s.
+    pub flow_kg_s: f64,
+    /// Inlet temperature, K.
+    pub t3_k: f64,
+    /// Inlet pressure, Pa.
+    pub p3_pa: f64,
+    /// Outlet pressure, Pa.
+    pub p4_pa: f64,
+    /// Outlet temperature, K.
+    pub t4_k: Option<f64>,
 }
 
 /// An end of a speed line.

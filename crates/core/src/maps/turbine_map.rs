@@ -1,6 +1,6 @@
 //! The map of a turbine: flow and efficiency over expansion ratio and speed, and over the position of its vanes.
 
-use crate::{ImportRemark, ImportedColumn};
+use crate::{ImportRemark, ImportedColumn, MeasuredTurbinePoint};
 use serde::{Deserialize, Serialize};
 
 /// One point of a turbine map. Speed and flow are reduced by the state at the inlet, so they need no reference state.
@@ -84,11 +84,13 @@ pub struct ImportedTurbine {
     pub columns: Vec<ImportedColumn>,
     /// What the reader assumed.
     pub remarks: Vec<ImportRemark>,
+    /// The points of a table of measured ones, in its order; empty for any other file.
+    pub measured: Vec<MeasuredTurbinePoint>,
 }
 
 impl From<TurbineMap> for ImportedTurbine {
     fn from(map: TurbineMap) -> Self {
-        ImportedTurbine { map, columns: Vec::new(), remarks: Vec::new() }
+        ImportedTurbine { map, columns: Vec::new(), remarks: Vec::new(), measured: Vec::new() }
     }
 }
 

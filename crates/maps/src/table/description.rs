@@ -47,7 +47,7 @@ const fn column(name: &'static str, example: &'static str) -> DescriptionKey {
 }
 
 /// Every key.
-pub const DESCRIPTION_KEYS: [DescriptionKey; 24] = [
+pub const DESCRIPTION_KEYS: [DescriptionKey; 30] = [
     DescriptionKey {
         name: "reference",
         description: "Reference state of the corrected quantities: SAE, Garrett, BorgWarner, or temperature and pressure.",
@@ -131,6 +131,12 @@ pub const DESCRIPTION_KEYS: [DescriptionKey; 24] = [
     column("tc", "Tc [degC]"),
     column("humidity", "RH [%]"),
     column("ambient_pressure", "p_amb [mbar]"),
+    column("p3", "P3 [kPa]"),
+    column("p4", "P4 [kPa]"),
+    column("t3", "T3 [degC]"),
+    column("t4", "T4 [degC]"),
+    column("turbine_flow", "m_t [kg/s]"),
+    column("oil_temperature", "T_oil [degC]"),
 ];
 
 fn set<T>(place: &mut Option<T>, value: Option<T>) -> Option<()> {

@@ -17,7 +17,7 @@ pub use description::{
 };
 pub use efficiency_comment::{DEFINITION, efficiency_in_comment};
 pub use read::{read_any_bytes, read_any_text, read_text, read_workbook};
-pub use read_turbine::{read_turbine_text, read_turbine_workbook};
+pub use read_turbine::{read_turbine_text, read_turbine_workbook, reduced_turbine_point};
 pub use reference::{in_comment, parse_reference, settle};
 pub use rows_to_lines::{POINT_LIMIT, Row, line, map_of_rows, room_for_one_more};
 pub use sheet::file_text::{file_text, unpacked};

@@ -15,7 +15,7 @@ use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points}
 use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{
     CompressorMap, EfficiencyDefinition, ImportError, ImportRemark, ImportedMap, MapDescription,
-    MeasuredPoint, ReferenceState, StaticTaps,
+    MeasuredPoint, ReferenceState, StaticTaps, TurbineReadings,
 };
 use mapper_physics::gas::air::Air;
 use mapper_physics::gas::pressure_tap::static_to_total_pa;
@@ -87,6 +87,11 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
     let given = Given::of(description, Machine::Compressor)?;
     let (grid, layout) = layout::understood(grid, &given)?;
     let grid = grid.as_ref();
+    if layout.is_turbine_alone() {
+        let heading = layout.first_row.checked_sub(1).and_then(|row| grid.rows.get(row));
+        let text = heading.map(|row| row.text().chars().take(60).collect()).unwrap_or_default();
+        return Err(ImportError::Turbine { line: heading.map_or(1, |row| row.at), text });
+    }
     let notes = notes(grid, layout.first_row);
     let mut remarks = layout.remarks.clone();
     let mut reference = reference::settle(notes.reference, description.reference);
@@ -134,7 +139,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedMap, Import
 }
 
 /// A value that a point needs.
-fn needed(point: &Point<'_>, quantity: Quantity, value: Option<f64>) -> Result<f64, ImportError> {
+pub(super) fn needed(point: &Point<'_>, quantity: Quantity, value: Option<f64>) -> Result<f64, ImportError> {
     value.ok_or_else(|| ImportError::NotANumber {
         line: point.at,
         quantity: quantity.name().to_owned(),
@@ -177,18 +182,8 @@ fn as_measured(
     let of = |quantity: Quantity| needed(point, quantity, value(quantity));
     let flow_kg_s = row.flow_corrected_kg_s;
     let (t1_k, t2_k) = (of(Quantity::T1)?, value(Quantity::T2));
-    let ambient_pa = value(Quantity::Ambient).or(given.ambient_pa);
-    let pressure = |quantity: Quantity| match point.of(quantity).filter(|(column, _)| column.is_gauge) {
-        None => of(quantity),
-        Some((column, _)) => ambient_pa.map_or_else(
-            || {
-                let missing = "ambient pressure, over which a gauge pressure is (or give the `barometer`)";
-                Err(ImportError::NoColumn { line: point.at, missing, found: column.heading.clone() })
-            },
-            |ambient_pa| Ok(of(quantity)? + ambient_pa),
-        ),
-    };
     let taps = given.static_taps;
+    let pressure = |quantity: Quantity| needed(point, quantity, pressure_pa(point, quantity, given)?);
     let (mut p1_pa, mut p2_pa) = (pressure(Quantity::P1)?, pressure(Quantity::P2)?);
     if let Some(diameter_m) = taps.inlet_diameter_m {
         p1_pa = static_to_total_pa(p1_pa, flow_kg_s, t1_k, diameter_m);
@@ -221,8 +216,37 @@ fn as_measured(
         p2_pa,
         tc_k: value(Quantity::Tc),
         humidity_kg_kg: humidity,
+        turbine: TurbineReadings {
+            t3_k: value(Quantity::T3),
+            p3_pa: pressure_pa(point, Quantity::P3, given)?,
+            p4_pa: pressure_pa(point, Quantity::P4, given)?,
+            oil_k: value(Quantity::Oil),
+        },
         end: point.end,
     })
+}
+
+/// An absolute pressure, Pa.
+///
+/// # Errors
+/// [`ImportError::NoColumn`] for a gauge pressure without the ambient one.
+pub(super) fn pressure_pa(
+    point: &Point<'_>,
+    quantity: Quantity,
+    given: &MapDescription,
+) -> Result<Option<f64>, ImportError> {
+    let Some((column, value)) = point.of(quantity) else { return Ok(None) };
+    if !column.is_gauge {
+        return Ok(Some(column.plain(value)));
+    }
+    let ambient = point.of(Quantity::Ambient).map(|(column, value)| column.plain(value));
+    match ambient.or(given.ambient_pa) {
+        Some(ambient_pa) => Ok(Some(column.plain(value) + ambient_pa)),
+        None => {
+            let missing = "ambient pressure, over which a gauge pressure is (or give the `barometer`)";
+            Err(ImportError::NoColumn { line: point.at, missing, found: column.heading.clone() })
+        }
+    }
 }
 
 /// Saturated air of 50 degC at 100 kPa has 0.088 kg/kg.
@@ -262,18 +286,23 @@ pub(super) fn notes(grid: &Grid, first_row: usize) -> Notes {
 /// "Reference Pressure 100 kPa, Reference Temperature 298 K": a pressure and a temperature in a line that names their purpose.
 fn reference_in(grid: &Grid, text: &str) -> Option<ReferenceState> {
     let lower = text.to_lowercase();
-    if !["ref", "corrected to", "standard cond", "bezug"].iter().any(|word| lower.contains(word)) {
+    let words =
+        ["ref", "corrected to", "conditions", "standard cond", "bezug", "korrigiert auf", "normzustand"];
+    if !words.iter().any(|word| lower.contains(word)) {
         return None;
     }
-    let words: Vec<&str> = text
-        .split(|c: char| c.is_whitespace() || matches!(c, '=' | ':' | ',' | ';'))
-        .filter(|word| !word.is_empty())
-        .collect();
+    let is_mark = |c: char| c.is_whitespace() || matches!(c, '=' | ':' | ';' | '/' | '[' | ']' | '(' | ')');
+    let words: Vec<&str> =
+        text.split(is_mark).map(|word| word.trim_matches(',')).filter(|word| !word.is_empty()).collect();
     let of = |kind: Kind| {
-        words.windows(2).find_map(|pair| {
-            let [number, unit] = pair else { return None };
-            let unit = header_unit(unit.trim_matches(['(', ')', '[', ']']))?;
-            (unit.kind == kind).then_some(unit.unit.to_inside(grid.number(number)?))
+        words.iter().enumerate().find_map(|(index, word)| {
+            // `298K`, `298 K`.
+            let end = word.find(|c: char| c.is_alphabetic() || c == '°').unwrap_or(word.len());
+            let behind = if end < word.len() { word.get(end..) } else { words.get(index + 1).copied() };
+            // Rankine is never written so in a heading of a column.
+            let unit = behind.map(|unit| if matches!(unit, "R" | "°R") { "degR" } else { unit })?;
+            let unit = header_unit(unit).filter(|unit| unit.kind == kind)?;
+            Some(unit.unit.to_inside(grid.number(word.get(..end)?)?))
         })
     };
     let state = ReferenceState { t_ref_k: of(Kind::Temperature)?, p_ref_pa: of(Kind::Pressure)? };

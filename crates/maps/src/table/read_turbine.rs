@@ -3,15 +3,18 @@
 use crate::table::columns::column::{Column, Machine};
 use crate::table::columns::described_columns::Given;
 use crate::table::columns::quantity::Quantity;
-use crate::table::read::notes;
+use crate::table::read::{needed, notes, pressure_pa};
 use crate::table::reference;
 use crate::table::sheet::grid::Grid;
 use crate::table::sheet::layout;
 use crate::table::sheet::points::{Point, columns, efficiency_in_percent, points};
 use crate::table::sheet::workbook::grid_of_workbook;
 use mapper_core::{
-    ImportError, ImportRemark, ImportedTurbine, MapDescription, ReferenceState, TurbineMap, TurbineMapPoint,
+    ImportError, ImportRemark, ImportedTurbine, MapDescription, MeasuredTurbinePoint, ReferenceState,
+    TurbineMap, TurbineMapPoint,
 };
+use mapper_physics::gas::air::Air;
+use mapper_physics::laws::compression::apparent_efficiency;
 
 /// The turbine map of a text.
 ///
@@ -46,32 +49,41 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
         let (heading, key) = (column.heading.clone(), Quantity::ReducedFlow.key());
         return Err(ImportError::NoUnit { line, heading, key, example: "kg/s*K^0.5/kPa" });
     }
-    if without_unit(Quantity::Flow).is_some() {
+    if all().any(|column| is_flow(column.quantity) && !column.has_unit()) {
         remarks.push(ImportRemark::FlowUnitAssumed);
     }
     let points = points(grid, &given, &layout, &mut remarks)?;
+    let measured = match layout.is_measured() {
+        true => points.iter().map(|point| as_measured(point, description)).collect::<Result<Vec<_>, _>>()?,
+        false => Vec::new(),
+    };
     let fastest = points.iter().filter_map(speed_of).fold(0.0, f64::max);
     let has_speed_unit = all().any(|column| column.quantity == Quantity::Speed && column.has_unit());
-    let speed_is_reduced = !has_speed_unit && fastest < LARGEST_SPEED_PARAMETER;
+    let speed_is_reduced = measured.is_empty() && !has_speed_unit && fastest < LARGEST_SPEED_PARAMETER;
     if speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed) {
         remarks.push(ImportRemark::SpeedParameterAssumed);
     }
-    let corrected = all().any(|column| column.quantity == Quantity::Flow)
-        || !speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed);
+    let corrected = measured.is_empty()
+        && (all().any(|column| is_flow(column.quantity))
+            || !speed_is_reduced && all().any(|column| column.quantity == Quantity::Speed));
     let reference = match reference::settle(notes.reference, description.reference) {
         Err(ImportError::NoReference) if !corrected => None,
         settled => Some(settled?),
     };
+    if !measured.is_empty() {
+        remarks.push(ImportRemark::Measured);
+    }
     let in_percent = efficiency_in_percent(&layout, &points);
     if in_percent {
         remarks.push(ImportRemark::EfficiencyInPercent);
     }
     let columns = columns(&layout, &points, None);
     let state = reference.unwrap_or(ReferenceState::SAE);
-    let mut rows = points
-        .iter()
-        .map(|point| row(point, state, speed_is_reduced, in_percent))
-        .collect::<Result<Vec<TurbineMapPoint>, ImportError>>()?;
+    let rows: Result<Vec<TurbineMapPoint>, ImportError> = match measured.as_slice() {
+        [] => points.iter().map(|point| row(point, state, speed_is_reduced, in_percent)).collect(),
+        measured => measured.iter().map(|point| check(point.line, reduced_turbine_point(point))).collect(),
+    };
+    let mut rows = rows?;
     if rows.is_empty() {
         return Err(ImportError::Empty);
     }
@@ -83,6 +95,7 @@ fn read(grid: &Grid, description: &MapDescription) -> Result<ImportedTurbine, Im
         map: TurbineMap { machine: notes.machine, points: rows, fitted: None },
         columns,
         remarks,
+        measured,
     })
 }
 
@@ -104,17 +117,12 @@ fn row(
     in_percent: bool,
 ) -> Result<TurbineMapPoint, ImportError> {
     let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.plain(value));
-    let needed = |value: Option<f64>, quantity: Quantity| {
-        value.ok_or_else(|| ImportError::NotANumber {
-            line: point.at,
-            quantity: quantity.name().to_owned(),
-            text: String::new(),
-        })
-    };
+    let needed = |value: Option<f64>, quantity: Quantity| needed(point, quantity, value);
     let root = reference.t_ref_k.sqrt();
     let speed = needed(speed_of(point), Quantity::Speed)?;
     let is_parameter = speed_is_reduced || value(Quantity::ReducedSpeed).is_some();
-    let corrected_flow = value(Quantity::Flow).map(|kg_s| kg_s * root / (reference.p_ref_pa / 1000.0));
+    let flow = value(Quantity::TurbineFlow).or(value(Quantity::Flow));
+    let corrected_flow = flow.map(|kg_s| kg_s * root / (reference.p_ref_pa / 1000.0));
     let efficiency = value(Quantity::Efficiency).map(|eta| if in_percent { 0.01 * eta } else { eta });
     let row = TurbineMapPoint {
         vane_position: value(Quantity::Vane).or(point.vane),
@@ -126,13 +134,54 @@ fn row(
         expansion_ratio: needed(value(Quantity::PressureRatio), Quantity::PressureRatio)?,
         efficiency,
     };
-    check(point.at, &row)?;
-    Ok(row)
+    check(point.at, row)
+}
+
+fn is_flow(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::Flow | Quantity::TurbineFlow)
+}
+
+/// The measured values of a point.
+fn as_measured(point: &Point<'_>, given: &MapDescription) -> Result<MeasuredTurbinePoint, ImportError> {
+    let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.plain(value));
+    let of = |quantity: Quantity, value: Option<f64>| needed(point, quantity, value);
+    let pressure = |quantity: Quantity| of(quantity, pressure_pa(point, quantity, given)?);
+    let measured = MeasuredTurbinePoint {
+        line: point.at,
+        vane_position: value(Quantity::Vane).or(point.vane),
+        speed_rpm: of(Quantity::Speed, value(Quantity::Speed).or(point.speed))?,
+        flow_kg_s: of(Quantity::TurbineFlow, value(Quantity::TurbineFlow).or(value(Quantity::Flow)))?,
+        t3_k: of(Quantity::T3, value(Quantity::T3))?,
+        p3_pa: pressure(Quantity::P3)?,
+        p4_pa: pressure(Quantity::P4)?,
+        t4_k: value(Quantity::T4),
+    };
+    // A root and a ratio need both above zero.
+    for (quantity, value) in [("T3", measured.t3_k), ("P3", measured.p3_pa), ("P4", measured.p4_pa)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(ImportError::Value { line: point.at, quantity, value, needed: "above 0" });
+        }
+    }
+    Ok(measured)
+}
+
+/// A measured point reduced by its inlet. Its efficiency is that of the temperatures, heat loss included.
+pub fn reduced_turbine_point(point: &MeasuredTurbinePoint) -> TurbineMapPoint {
+    let (root, expansion_ratio) = (point.t3_k.sqrt(), point.p3_pa / point.p4_pa);
+    // Both ratios of an expansion are those of a compression from T3 by 1/ER, the other way round.
+    let efficiency = |t4_k: f64| 1.0 / apparent_efficiency(1.0 / expansion_ratio, point.t3_k, t4_k, Air::DRY);
+    TurbineMapPoint {
+        vane_position: point.vane_position,
+        speed_parameter_rpm_sqrt_k: point.speed_rpm / root,
+        flow_parameter_kg_sqrt_k_s_kpa: point.flow_kg_s * root / (point.p3_pa / 1000.0),
+        expansion_ratio,
+        efficiency: point.t4_k.map(efficiency).filter(|eta| eta.is_finite()),
+    }
 }
 
 /// # Errors
 /// [`ImportError::Value`] for a value that no turbine has.
-fn check(line: usize, row: &TurbineMapPoint) -> Result<(), ImportError> {
+fn check(line: usize, row: TurbineMapPoint) -> Result<TurbineMapPoint, ImportError> {
     let flow = row.flow_parameter_kg_sqrt_k_s_kpa;
     let eta = row.efficiency.unwrap_or(0.5);
     for (quantity, value, good, needed) in [
@@ -156,7 +205,7 @@ fn check(line: usize, row: &TurbineMapPoint) -> Result<(), ImportError> {
             return Err(ImportError::Value { line, quantity, value, needed });
         }
     }
-    Ok(())
+    Ok(row)
 }
 
 /// In order of vane position, speed and expansion ratio.

@@ -1,3 +1,4 @@
 //! Integration tests of the module `table`.
 
+mod wide;
 mod workbooks;

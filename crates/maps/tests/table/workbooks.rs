@@ -113,11 +113,13 @@ fn a_hidden_sheet_counts_if_it_is_named_or_the_only_one() {
 fn sheets_of_speed_lines_are_one_map() {
     let line: &[&[&str]] =
         &[&["flow [kg/s]", "PR", "eta"], &["0.07", "1.4", "0.7"], &["0.06", "1.5", "0.71"]];
-    let book = workbook(&[("60 krpm", "visible", line), ("90000 rpm", "visible", line)]);
     let given = MapDescription { reference: Some(ReferenceState::SAE), ..MapDescription::default() };
-    let map = read_workbook(&book, &given).unwrap().map;
-    let lines = map.lines.iter().map(|line| (line.speed_corrected_rpm, line.points.len()));
-    assert_eq!(lines.collect::<Vec<_>>(), [(60e3, 2), (90e3, 2)]);
+    for names in [["60 krpm", "90000 rpm"], ["60000", "90000"], ["N=60k", "N=90k"]] {
+        let book = workbook(&names.map(|name| (name, "visible", line)));
+        let map = read_workbook(&book, &given).unwrap().map;
+        let lines = map.lines.iter().map(|line| (line.speed_corrected_rpm, line.points.len()));
+        assert_eq!(lines.collect::<Vec<_>>(), [(60e3, 2), (90e3, 2)], "{names:?}");
+    }
 }
 
 /// The rectangle around the cells of a sheet has 17 thousand million cells, if one of them is in its last corner.

@@ -98,33 +98,79 @@ pub fn hold_speed(
     }
     let no_heat_balance =
         SteadyError::NoHeatBalance { speed_rpm, valve_opening_ratio: boundary.valve_opening_ratio };
-    let balance =
-        |temperatures: Temperatures| -> Result<(Temperatures, BoundaryConditions, State), SteadyError> {
-            let (boundary, state) = gas_path_at_rest(model, speed_rpm, &boundary, temperatures)?;
-            let prepared = model.prepare(&boundary);
-            let outputs = prepared.evaluate(&state);
-            let heat_w = Temperatures::from([
-                prepared.compressor_housing_balance_w(&state, &outputs),
-                prepared.turbine_housing_balance_w(&state, &outputs),
-                prepared.inner_wall_balance_w(&outputs),
-                // Rates of hidden temperatures, as heat flows of a node of 1 kJ/K.
-                1e3 * outputs.added.extra_rates_k_s[0],
-                1e3 * outputs.added.extra_rates_k_s[1],
-            ]);
-            Ok((heat_w, boundary, state))
+    let balance = |temperatures: Temperatures| {
+        let (boundary, state) = gas_path_at_rest(model, speed_rpm, &boundary, temperatures)?;
+        Ok((heat_flows_w(model, &boundary, &state), (boundary, state)))
+    };
+    let (at_rest, mut state) = settle(model, &boundary, no_heat_balance, balance)?;
+    let outputs = model.prepare(&at_rest).evaluate(&state);
+    state.t2_tip_k = outputs.t2_probe_target_k;
+    let outputs = model.prepare(&at_rest).evaluate(&state);
+    Ok(SteadyState { boundary: at_rest, state, outputs })
+}
+
+/// The housings in equilibrium around a compressor at a known speed and outlet pressure. `p3_pa` is that of `boundary`, or the one that holds the
+/// speed. `None` if there is none.
+pub fn settle_housings(
+    model: &Model,
+    boundary: &BoundaryConditions,
+    shaft_speed_rpm: f64,
+    p2_pa: f64,
+    p3_is_known: bool,
+) -> Option<State> {
+    let balance = |temperatures: Temperatures| {
+        let state = State {
+            inner_k: temperatures[2],
+            ..State::new(
+                rad_s_of_rpm(shaft_speed_rpm),
+                p2_pa,
+                temperatures[0],
+                temperatures[1],
+                boundary.t1_k,
+            )
         };
+        let outputs = model.prepare(boundary).evaluate(&state);
+        let p3_pa = if p3_is_known {
+            boundary.p3_pa
+        } else {
+            holding_p3_pa(model, boundary, &state, &outputs).ok_or(())?
+        };
+        let boundary = BoundaryConditions { p3_pa, ..*boundary };
+        Ok((heat_flows_w(model, &boundary, &state), state))
+    };
+    settle(model, boundary, (), balance).ok()
+}
+
+/// Net heat flows of all nodes, W.
+fn heat_flows_w(model: &Model, boundary: &BoundaryConditions, state: &State) -> Temperatures {
+    let prepared = model.prepare(boundary);
+    let outputs = prepared.evaluate(state);
+    Temperatures::from([
+        prepared.compressor_housing_balance_w(state, &outputs),
+        prepared.turbine_housing_balance_w(state, &outputs),
+        prepared.inner_wall_balance_w(&outputs),
+        // Rates of hidden temperatures, as heat flows of a node of 1 kJ/K.
+        1e3 * outputs.added.extra_rates_k_s[0],
+        1e3 * outputs.added.extra_rates_k_s[1],
+    ])
+}
+
+/// Newton's method on the temperatures of all nodes; `balance` gives their heat flows and the state that belongs to them.
+fn settle<T, E>(
+    model: &Model,
+    boundary: &BoundaryConditions,
+    no_heat_balance: E,
+    balance: impl Fn(Temperatures) -> Result<(Temperatures, T), E>,
+) -> Result<T, E> {
     let extra_states = model.hooks.extra_states();
     let moves = [true, true, model.has_inner_wall(), extra_states > 0, extra_states > 1];
     let first_k = boundary.t1_k + 30.0;
     let turbine_k = 0.5 * (boundary.t3_k + boundary.ambient_temperature_k);
     let mut temperatures = Temperatures::from([first_k, turbine_k, first_k, first_k, first_k]);
-    let (mut heat_w, mut at_rest, mut state) = balance(temperatures)?;
+    let (mut heat_w, mut settled) = balance(temperatures)?;
     for _ in 0..60 {
         if heat_w.amax() < HEAT_TOLERANCE_W {
-            let outputs = model.prepare(&at_rest).evaluate(&state);
-            state.t2_tip_k = outputs.t2_probe_target_k;
-            let outputs = model.prepare(&at_rest).evaluate(&state);
-            return Ok(SteadyState { boundary: at_rest, state, outputs });
+            return Ok(settled);
         }
         // Forward differences of the balances, which are smooth in the temperatures; constant temperatures stay.
         let step_k = 1e-4;
@@ -132,7 +178,7 @@ pub fn hold_speed(
         for node in (0..HEAT_NODES).filter(|node| moves[*node]) {
             let mut moved = temperatures;
             moved[node] += step_k;
-            let (by_node, ..) = balance(moved)?;
+            let (by_node, _) = balance(moved)?;
             slopes.set_column(node, &((by_node - heat_w) / step_k));
         }
         let Some(step) = slopes.lu().solve(&-heat_w).filter(|step| step.iter().all(|step| step.is_finite()))
@@ -143,7 +189,7 @@ pub fn hold_speed(
         let mut share = (80.0 / step.amax()).min(1.0);
         loop {
             temperatures = (before.1 + step * share).map(|temperature| temperature.clamp(200.0, 1500.0));
-            (heat_w, at_rest, state) = balance(temperatures)?;
+            (heat_w, settled) = balance(temperatures)?;
             if heat_w.norm() < before.0.norm() || share < 1e-3 {
                 break;
             }
@@ -151,11 +197,7 @@ pub fn hold_speed(
         }
         if temperatures == before.1 {
             // The balances are within rounding.
-            if heat_w.amax() < 1e-6 {
-                heat_w = Temperatures::zeros();
-                continue;
-            }
-            return Err(no_heat_balance);
+            return if heat_w.amax() < 1e-6 { Ok(settled) } else { Err(no_heat_balance) };
         }
     }
     Err(no_heat_balance)
@@ -188,24 +230,38 @@ fn gas_path_at_rest(
     .ok_or(SteadyError::NoFlowBalance { speed_rpm, valve_opening_ratio })?;
     let state = at(p2_pa);
     let outputs = prepared.evaluate(&state);
-    let power_w = outputs.compressor_power_w + outputs.friction_power_w - outputs.added.shaft_power_w;
-    let (lowest_pa, highest_pa) = (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * HIGHEST_EXPANSION_RATIO);
-    let p3_pa = root_between(lowest_pa, highest_pa, 0.0, |p3_pa| {
+    boundary.p3_pa = holding_p3_pa(model, &boundary, &state, &outputs).ok_or_else(|| {
+        let (lowest_pa, highest_pa) = turbine_pressures_pa(&boundary);
+        let power_w = shaft_load_w(&outputs);
+        SteadyError::NoPowerBalance { speed_rpm, valve_opening_ratio, power_w, lowest_pa, highest_pa }
+    })?;
+    Ok((boundary, state))
+}
+
+/// Power that compressor and bearings take, W.
+fn shaft_load_w(outputs: &Outputs) -> f64 {
+    outputs.compressor_power_w + outputs.friction_power_w - outputs.added.shaft_power_w
+}
+
+fn turbine_pressures_pa(boundary: &BoundaryConditions) -> (f64, f64) {
+    (boundary.p4_pa * (1.0 + 1e-6), boundary.p4_pa * HIGHEST_EXPANSION_RATIO)
+}
+
+/// The turbine inlet pressure that holds the speed, Pa.
+fn holding_p3_pa(
+    model: &Model,
+    boundary: &BoundaryConditions,
+    state: &State,
+    outputs: &Outputs,
+) -> Option<f64> {
+    let (lowest_pa, highest_pa) = turbine_pressures_pa(boundary);
+    root_between(lowest_pa, highest_pa, 0.0, |p3_pa| {
         let turbine = crate::laws::turbine::TurbineInlet::new(
             &model.params.turbine,
-            &BoundaryConditions { p3_pa, ..boundary },
+            &BoundaryConditions { p3_pa, ..*boundary },
         );
-        turbine.at(tt_k, state.shaft_speed_rad_s).power_w - power_w
+        turbine.at(state.tt_k, state.shaft_speed_rad_s).power_w - shaft_load_w(outputs)
     })
-    .ok_or(SteadyError::NoPowerBalance {
-        speed_rpm,
-        valve_opening_ratio,
-        power_w,
-        lowest_pa,
-        highest_pa,
-    })?;
-    boundary.p3_pa = p3_pa;
-    Ok((boundary, state))
 }
 
 /// Range of speeds that [`settle_under`] searches, rpm.

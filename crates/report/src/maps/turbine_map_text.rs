@@ -3,8 +3,8 @@
 use crate::formatting::number::number;
 use crate::formatting::table;
 use crate::maps::imported_map_text::{columns_text, import_remark_text};
-use mapper_core::{FittedTurbine, ImportedTurbine, TurbineMap, TurbineMapPoint};
-use mapper_maps::TurbineComparison;
+use mapper_core::{FittedTurbine, ImportedTurbine, TurbineMap, TurbineMapPoint, half_width_95};
+use mapper_maps::{ReducedTurbinePoint, TurbineComparison};
 use std::fmt::Write;
 
 /// The columns, the speed lines, and sentences on what was assumed.
@@ -36,6 +36,31 @@ pub fn imported_turbine_text(found: &ImportedTurbine) -> String {
     );
     for remark in &found.remarks {
         let _ = writeln!(text, "{}", import_remark_text(*remark));
+    }
+    text
+}
+
+/// A row for each point, with 95 % intervals.
+pub fn reduced_turbine_text(points: &[ReducedTurbinePoint], remarks: &[String]) -> String {
+    let heads = ["vanes", "rpm/K^0.5", "expansion ratio", "flow", "+/- %", "efficiency %", "+/- points"];
+    let mut rows = table::with_heads(&heads);
+    for ReducedTurbinePoint { point, flow_standard_error, efficiency_standard_error } in points {
+        let flow = point.flow_parameter_kg_sqrt_k_s_kpa;
+        rows.add_row(vec![
+            number(point.vane_position, 3),
+            format!("{:.0}", point.speed_parameter_rpm_sqrt_k),
+            format!("{:.3}", point.expansion_ratio),
+            format!("{flow:.5}"),
+            format!("{:.2}", 100.0 * half_width_95(*flow_standard_error) / flow),
+            number(point.efficiency.map(|eta| 100.0 * eta), 1),
+            number(efficiency_standard_error.map(|error| 100.0 * half_width_95(error)), 2),
+        ]);
+    }
+    let mut text = format!(
+        "{rows}\n\nFlow in kg K^0.5/(s kPa). The efficiency is that of T3 and T4, heat loss included.\n"
+    );
+    for remark in remarks {
+        let _ = writeln!(text, "{remark}");
     }
     text
 }

@@ -34,7 +34,7 @@ pub enum MapWorkError {
     },
     /// A table whose points are corrected already.
     #[error(
-        "{} is not a table of measured points, which has columns for N, flow, P1, T1, P2 and T2; inspect the columns that were recognised",
+        "{} is not a table of measured points, which has columns for N, flow, P1, T1, P2 and T2 (of a turbine N, flow, P3, T3, P4 and T4); inspect the columns that were recognised",
         .path.display()
     )]
     NotMeasured {

@@ -316,7 +316,7 @@ impl Registry {
 }
 
 /// Writes a turbine map, fitted first if the format tabulates the whole map. Returns the written map and whether it was fitted here.
-fn write_turbine_fitted_if_needed(
+pub(crate) fn write_turbine_fitted_if_needed(
     path: &Path,
     out: MapOut<'_>,
     format: &MapFormat,

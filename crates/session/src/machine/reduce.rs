@@ -1,9 +1,9 @@
-//! Reduces tables of steady points (N, flow, P1, T1, P2, T2) to a map with uncertainties. Heat transfer is removed if the housing temperature was
-//! measured.
+//! Reduces tables of steady points (N, flow, P1, T1, P2, T2) to a map with uncertainties. Heat transfer is removed if the housing temperature
+//! was measured, or T3 for its heat balance. Tables of turbine points (N, flow, P3, T3, P4, T4) become a turbine map.
 
 use crate::analysis::budget_file::budget_csv;
 use crate::machine::fmu_file::with_identified;
-use crate::machine::map_work::{MapOut, MapWork, warnings};
+use crate::machine::map_work::{MapOut, MapWork, warnings, write_turbine_fitted_if_needed};
 use crate::recording::files::Existing;
 use crate::recording::identification_config::{assumed_sensors, identification};
 use crate::{
@@ -11,13 +11,14 @@ use crate::{
 };
 use mapper_campaign::Campaign;
 use mapper_core::{
-    CompressorMap, MapDescription, MeasuredPoint, Method, PointBudgets, StaticTaps, ThermalModel,
+    CompressorMap, ImportError, MapDescription, MeasuredPoint, Method, ModelTolerances, PointBudgets,
+    StaticTaps, ThermalModel, TurbineMap,
 };
 use mapper_identify::{IdentifyConfig, KnownHeat, PressureTap, method_of_table};
-use mapper_maps::{Grouping, assemble, mark_line_ends};
+use mapper_maps::{Grouping, assemble, mark_line_ends, reduce_turbine};
 use mapper_physics::gas::air::Air;
-use mapper_physics::machine::params::Params;
-use mapper_report::reduced_text;
+use mapper_physics::machine::params::{BoundaryConditions, Params};
+use mapper_report::{reduced_text, reduced_turbine_text};
 use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;
@@ -26,9 +27,16 @@ use std::path::Path;
 struct TestStand {
     name: String,
     config: IdentifyConfig,
-    /// The thermal model: parameters, standard uncertainty of h as a ratio, origin.
-    heat: Option<(Params, f64, String)>,
+    heat: Option<ThermalMachine>,
     remarks: Vec<String>,
+}
+
+/// A machine whose heat transfer is known.
+struct ThermalMachine {
+    params: Params,
+    tolerances: ModelTolerances,
+    boundary: BoundaryConditions,
+    origin: String,
 }
 
 /// The part of `points.json` that is needed here.
@@ -63,19 +71,22 @@ impl TestStand {
 
     fn of(campaign: &Campaign, path: &Path, found: Option<&ThermalModel>) -> TestStand {
         let mut config = identification(campaign);
-        let declared = (campaign.machine.params, campaign.tolerances.convection_ratio);
+        let mut tolerances = campaign.tolerances;
+        let declared = campaign.machine.params;
         let law = found.and_then(|found| Some((found, found.convection.as_ref()?)));
-        let ((params, ratio), origin) = match law {
+        let (params, origin) = match law {
             Some((found, law)) => {
                 let a = &law.coefficient;
                 let of_a = a.value.map_or(0.0, |value| a.uncertainty.combined_standard_error() / value);
                 config.alpha_area_ratio = found.alpha_area_ratio.value.unwrap_or(config.alpha_area_ratio);
                 config.alpha_area_sigma_ratio = found.alpha_area_ratio.uncertainty.combined_standard_error();
-                ((with_identified(&declared.0, found), of_a.hypot(law.deviation_ratio)), "identified")
+                tolerances.convection_ratio = of_a.hypot(law.deviation_ratio);
+                (with_identified(&declared, found), "identified")
             }
             None => (declared, "declared"),
         };
-        let heat = Some((params, ratio, format!("{origin} in {}", path.display())));
+        let origin = format!("{origin} in {}", path.display());
+        let heat = Some(ThermalMachine { params, tolerances, boundary: campaign.boundary, origin });
         TestStand { name: campaign.machine.name.clone(), config, heat, remarks: Vec::new() }
     }
 }
@@ -109,7 +120,12 @@ impl Registry {
             },
             ..given.clone()
         };
-        let found = self.inspect_map(path, &description)?;
+        let found = match self.inspect_map(path, &description) {
+            Err(SessionError::Import { source: ImportError::Turbine { .. }, .. }) if budget.is_none() => {
+                return self.reduce_turbine_points(path, given, machine, out);
+            }
+            found => found?,
+        };
         let measured = found.measured.as_slice();
         if measured.is_empty() {
             return Err(MapWorkError::NotMeasured { path: path.to_owned() }.into());
@@ -118,10 +134,12 @@ impl Registry {
         config.thresholds.end_mean_s = config.thresholds.steady_mean_s;
         config.method = method_of_table(measured, heat.is_some());
         remarks.extend(apparent_efficiency_remark(measured, heat.is_some(), config.method));
-        let known = heat.as_ref().map(|(params, convection_ratio, origin)| KnownHeat {
-            params,
-            convection_ratio: *convection_ratio,
-            origin,
+        remarks.extend(heat_balance_remark(measured, config.method));
+        let known = heat.as_ref().map(|machine| KnownHeat {
+            params: &machine.params,
+            tolerances: machine.tolerances,
+            boundary: &machine.boundary,
+            origin: &machine.origin,
         });
         let (points, budgets): (Vec<_>, Vec<PointBudgets>) =
             mapper_identify::reduce(measured, known, &config)?.into_iter().unzip();
@@ -152,22 +170,62 @@ impl Registry {
             found.remarks.into_iter().filter(|remark| *remark != mapper_core::ImportRemark::Measured);
         Ok(MapWork { text, json, warnings: warnings(path, &assumed.collect::<Vec<_>>()) })
     }
+
+    /// Makes the map of a turbine from a table of steady points. `machine` is a campaign or run directory with the sensors.
+    ///
+    /// # Errors
+    /// As [`Registry::inspect_turbine`], [`MapWorkError::NotMeasured`], [`SessionError::Campaign`], and those of writing.
+    pub fn reduce_turbine_points(
+        &self,
+        path: &Path,
+        given: &MapDescription,
+        machine: Option<&Path>,
+        out: Option<MapOut<'_>>,
+    ) -> Result<MapWork, SessionError> {
+        let format = out.map(|out| out.format(self)).transpose()?;
+        let TestStand { name, config, remarks, .. } =
+            machine.map_or_else(|| Ok(TestStand::unknown(path)), TestStand::read)?;
+        let found = self.inspect_turbine(path, given.clone())?;
+        if found.measured.is_empty() {
+            return Err(MapWorkError::NotMeasured { path: path.to_owned() }.into());
+        }
+        let points = reduce_turbine(&found.measured, &config.declared);
+        let mut text = reduced_turbine_text(&points, &remarks);
+        let json =
+            json!({"points": path, "turbine": points, "remarks": remarks, "file": out.map(|out| out.path)});
+        if let Some((out, format)) = out.zip(format) {
+            write_turbine_fitted_if_needed(path, out, format, TurbineMap { machine: name, ..found.map })?;
+            text.push_str(&format!("map        {}\n", out.path.display()));
+        }
+        Ok(MapWork { text, json, warnings: warnings(path, &found.remarks) })
+    }
+}
+
+/// The points whose housing temperature is that of a heat balance.
+fn heat_balance_remark(measured: &[MeasuredPoint], method: Method) -> Option<String> {
+    let without_tc = measured.iter().filter(|point| point.tc_k.is_none()).count();
+    (method == Method::Corrected && without_tc > 0).then(|| {
+        format!(
+            "The housing temperature of {without_tc} of {} points is that of the machine's heat balance with T3 and oil; a measured one is surer.",
+            measured.len()
+        )
+    })
 }
 
 /// The reason why heat transfer was not removed, and the remedy. `None` if it was removed.
 fn apparent_efficiency_remark(measured: &[MeasuredPoint], has_heat: bool, method: Method) -> Option<String> {
-    let without_tc = measured.iter().filter(|point| point.tc_k.is_none()).count();
+    let without_tc = measured.iter().filter(|point| point.tc_k.or(point.turbine.t3_k).is_none()).count();
     let reason = match (method, has_heat) {
         (Method::Corrected, _) => return None,
         (_, false) if without_tc == 0 => {
-            "the table has the housing temperature, but the convection of the machine is unknown; give its campaign or a run as the machine"
+            "the table has the housing temperature or T3, but the convection of the machine is unknown; give its campaign or a run as the machine"
                 .to_owned()
         }
         _ if without_tc == measured.len() => {
-            "the table has no housing temperature (Tc); the heat correction of maps estimates the heat from the speed lines".to_owned()
+            "the table has neither the housing temperature (Tc) nor T3; the heat correction of maps estimates the heat from the speed lines".to_owned()
         }
         _ => {
-            format!("{without_tc} of {} points have no housing temperature (Tc); add it, or remove these points", measured.len())
+            format!("{without_tc} of {} points have neither a housing temperature (Tc) nor T3; add one, or remove these points", measured.len())
         }
     };
     Some(format!("The efficiencies are apparent, heat transfer included: {reason}."))

@@ -80,6 +80,10 @@ const PRESSURE_GAIN_RATIO: f64 = 5.8e-4;
 /// Standard uncertainty of a thermometer at 100 degC, K: tolerance class A of IEC 60751, 0.35 K, as the limits of a rectangular distribution.
 const THERMOMETER_K: f64 = 0.2;
 
+/// Standard uncertainty of a thermocouple at 600 degC, K: tolerance class 1 of type K (IEC 60584-1), 0.4 %, as the limits of a rectangular
+/// distribution.
+const THERMOCOUPLE_K: f64 = 1.4;
+
 /// Sensors of a table of points that come without a declaration.
 pub(crate) fn assumed_sensors() -> BTreeMap<Channel, DeclaredUncertainty> {
     let offset = |offset_sigma| DeclaredUncertainty { offset_sigma, ..DeclaredUncertainty::default() };
@@ -91,6 +95,11 @@ pub(crate) fn assumed_sensors() -> BTreeMap<Channel, DeclaredUncertainty> {
         (Channel::P1, gain(PRESSURE_GAIN_RATIO)),
         (Channel::P2, gain(PRESSURE_GAIN_RATIO)),
         (Channel::CompressorFlow, gain(flow_ratio)),
+        (Channel::T3, offset(THERMOCOUPLE_K)),
+        (Channel::T4, offset(THERMOCOUPLE_K)),
+        (Channel::P3, gain(PRESSURE_GAIN_RATIO)),
+        (Channel::P4, gain(PRESSURE_GAIN_RATIO)),
+        (Channel::TurbineFlow, gain(flow_ratio)),
     ])
 }
 

@@ -200,7 +200,7 @@ pub fn split_unit(header: &str) -> (String, Option<String>) {
         for (at, _) in header.match_indices(between) {
             let (name, unit) = (header[..at].trim(), header[at + between.len()..].trim());
             // A single letter behind a blank or a line is a place more often than a unit: `T_C`, `p_a`.
-            let doubtful = [" ", "_"].contains(&between) && unit.chars().count() < 2;
+            let doubtful = [" ", "_"].contains(&between) && unit.len() < 2;
             let longer = best.is_none_or(|(_, known)| known.len() < unit.len());
             let stated = !name.is_empty() && !doubtful && unit != "-" && !unit.ends_with("--");
             if stated && longer && header_unit(unit).is_some() {

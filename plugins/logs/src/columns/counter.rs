@@ -7,7 +7,7 @@ use mapper_recording::logs::{Kind, header_unit};
 
 /// Whether a column of numbers is labelled as a clock: by its name, unless its unit contradicts, or by its unit.
 pub(crate) fn is_clock_name(column: &HeadColumn) -> bool {
-    const NAMES: [&str; 28] = [
+    const NAMES: [&str; 32] = [
         "t",
         "ts",
         "time",
@@ -36,6 +36,10 @@ pub(crate) fn is_clock_name(column: &HeadColumn) -> bool {
         "tiempo",
         "horodatage",
         "fecha_hora",
+        "date",
+        "datum",
+        "datenum",
+        "fecha",
     ];
     let unit = column.unit.as_deref().and_then(header_unit);
     let duration = unit.is_some_and(|unit| unit.kind == Kind::Duration);

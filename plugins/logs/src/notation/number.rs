@@ -86,6 +86,13 @@ fn fortran(text: &str) -> Option<f64> {
 /// A number with its unit behind it, as in `98.75 kPa`.
 pub(crate) fn number_with_unit(cell: &str, decimal: u8) -> Option<(f64, &str)> {
     let cell = cell.trim();
+    // `1/min` begins with a digit.
+    let apart = cell.split_once(' ').filter(|(_, unit)| header_unit(unit.trim()).is_some());
+    if let Some((number, unit)) = apart
+        && let Some(number) = parse_number(number.as_bytes(), decimal)
+    {
+        return Some((number, unit.trim()));
+    }
     let end = cell.rfind(|letter: char| letter.is_ascii_digit())? + 1;
     let (number, unit) = (cell.get(..end)?, cell.get(end..)?.trim());
     // `kg/cm2` and the like end in a digit.

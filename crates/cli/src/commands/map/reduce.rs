@@ -7,10 +7,11 @@ use crate::{output::standard_output, registry};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Make a map from a table of steady points: corrected, with uncertainty by source, and without heat transfer if Tc was measured
+/// Make a map from a table of steady points: corrected, with uncertainty by source, and without heat transfer if Tc or T3 was measured
 #[derive(Debug, Args)]
 pub struct Reduce {
-    /// Table of N, flow, P1, T1, P2, T2, optionally Tc and humidity, in any layout of `mapper map inspect`
+    /// Table of N, flow, P1, T1, P2, T2, optionally Tc, T3, P3, P4, oil and humidity, or of a turbine (N, flow, P3, T3, P4, T4), in any layout of
+    /// `mapper map inspect`
     pub points: PathBuf,
     #[command(flatten)]
     pub reading: MapReading,
@@ -20,6 +21,9 @@ pub struct Reduce {
     /// Write the uncertainty budget of every point to this new file (CSV)
     #[arg(long, value_name = "FILE")]
     pub budget: Option<PathBuf>,
+    /// Make the turbine's map from a table with points of both machines
+    #[arg(long, conflicts_with = "budget")]
+    pub turbine: bool,
     #[command(flatten)]
     pub target: MapTarget,
 }
@@ -29,7 +33,11 @@ impl Reduce {
         let (given, target) = (self.reading.description()?, &self.target);
         let budget = self.budget.as_deref().map(|file| (file, target.replace.existing()));
         let machine = self.machine.as_deref();
-        let work = registry::registry().reduce_points(&self.points, &given, machine, target.map(), budget)?;
+        let registry = registry::registry();
+        let work = match self.turbine {
+            true => registry.reduce_turbine_points(&self.points, &given, machine, target.map())?,
+            false => registry.reduce_points(&self.points, &given, machine, target.map(), budget)?,
+        };
         standard_output::print_map_work(&work, target.json)
     }
 }

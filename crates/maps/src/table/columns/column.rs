@@ -54,7 +54,7 @@ impl Column {
         let Some(text) = unit.filter(|unit| !says_nothing(unit)) else {
             return Ok(Column { heading, ..Column::bare(index, quantity) });
         };
-        let is_measured = matches!(quantity, Quantity::P1 | Quantity::P2);
+        let is_measured = matches!(quantity, Quantity::P1 | Quantity::P2 | Quantity::P3 | Quantity::P4);
         let gauge = header_unit(text).filter(|found| is_measured && found.reference == Reference::Gauge);
         let is_gauge = gauge.is_some();
         match gauge.map(|found| Scale::Unit(found.unit)).or_else(|| scale(quantity, text)) {
@@ -126,6 +126,12 @@ pub(crate) fn column(index: usize, heading: &str, machine: Machine) -> Result<Op
     let shown = || heading.chars().take(60).collect::<String>();
     if machine == Machine::Compressor && is_turbine(&plain) {
         return Err(ColumnError::Turbine { heading: shown() });
+    }
+    // `flow_low` is an end of an interval.
+    let words = name.to_lowercase();
+    let mut words = words.split(|c: char| !c.is_alphanumeric()).rev();
+    if matches!(words.next(), Some("low" | "high" | "lower" | "upper")) && words.next().is_some() {
+        return Ok(None);
     }
     let by_unit = unit.as_deref().and_then(quantity_of_unit);
     let of_turbine = (machine == Machine::Turbine).then(|| quantity_of_turbine(&plain, by_unit)).flatten();
@@ -263,11 +269,14 @@ fn is_root(lower: &str) -> bool {
 }
 
 fn scale(quantity: Quantity, unit: &str) -> Option<Scale> {
+    let unit = &unit.replace(['·', '⋅'], "*");
     let lower = unit.trim().to_lowercase();
     match quantity {
         Quantity::VolumeFlow => Some(Scale::Factor(volume_flow_m3_s(unit)??)),
         Quantity::ReducedSpeed if is_root(&lower) => {
-            let speed = lower.split(['/', '*', '-']).next()?;
+            // `1/min/√K` has a slash of its own.
+            let root = ["sqrt", "√", "k^", "k0.5", "k**"].iter().filter_map(|root| lower.find(root)).min()?;
+            let speed = lower.get(..root)?.trim_end_matches(['/', '*', '-', ' ', '(']);
             Some(Scale::Factor(unit_of(Kind::Speed, speed)?.to_inside(1.0)))
         }
         Quantity::ReducedFlow => {

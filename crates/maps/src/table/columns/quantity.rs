@@ -35,11 +35,23 @@ pub enum Quantity {
     Humidity,
     /// Ambient pressure, over which gauge pressures are.
     Ambient,
+    /// Measured turbine inlet pressure.
+    P3,
+    /// Measured turbine outlet pressure.
+    P4,
+    /// Measured turbine inlet temperature.
+    T3,
+    /// Measured turbine outlet temperature.
+    T4,
+    /// Measured flow of the turbine, in a table that has the compressor's as well.
+    TurbineFlow,
+    /// Temperature of the oil that enters the bearing housing.
+    Oil,
 }
 
 impl Quantity {
     /// Every quantity.
-    pub(crate) const ALL: [Quantity; 15] = [
+    pub(crate) const ALL: [Quantity; 21] = [
         Quantity::Speed,
         Quantity::ReducedSpeed,
         Quantity::Flow,
@@ -55,6 +67,12 @@ impl Quantity {
         Quantity::Tc,
         Quantity::Humidity,
         Quantity::Ambient,
+        Quantity::P3,
+        Quantity::P4,
+        Quantity::T3,
+        Quantity::T4,
+        Quantity::TurbineFlow,
+        Quantity::Oil,
     ];
 
     /// Its key in a map description.
@@ -75,6 +93,12 @@ impl Quantity {
             Quantity::Tc => "tc",
             Quantity::Humidity => "humidity",
             Quantity::Ambient => "ambient_pressure",
+            Quantity::P3 => "p3",
+            Quantity::P4 => "p4",
+            Quantity::T3 => "t3",
+            Quantity::T4 => "t4",
+            Quantity::TurbineFlow => "turbine_flow",
+            Quantity::Oil => "oil_temperature",
         }
     }
 
@@ -85,7 +109,18 @@ impl Quantity {
 
     /// Whether a point does not need it: a cell without a number is empty.
     pub(crate) fn is_extra(self) -> bool {
-        matches!(self, Quantity::Tc | Quantity::Humidity | Quantity::Ambient)
+        matches!(
+            self,
+            Quantity::Tc
+                | Quantity::Humidity
+                | Quantity::Ambient
+                | Quantity::P3
+                | Quantity::P4
+                | Quantity::T3
+                | Quantity::T4
+                | Quantity::TurbineFlow
+                | Quantity::Oil
+        )
     }
 
     /// Whether two are forms of the same quantity.
@@ -126,6 +161,12 @@ impl Quantity {
             Quantity::Tc => "housing temperature",
             Quantity::Humidity => "humidity",
             Quantity::Ambient => "ambient pressure",
+            Quantity::P3 => "P3",
+            Quantity::P4 => "P4",
+            Quantity::T3 => "T3",
+            Quantity::T4 => "T4",
+            Quantity::TurbineFlow => "turbine flow",
+            Quantity::Oil => "oil temperature",
         }
     }
 
@@ -133,12 +174,16 @@ impl Quantity {
     pub(crate) fn kind(self) -> Kind {
         match self {
             Quantity::Speed | Quantity::ReducedSpeed => Kind::Speed,
-            Quantity::Flow | Quantity::VolumeFlow | Quantity::ReducedFlow => Kind::MassFlow,
+            Quantity::Flow | Quantity::TurbineFlow | Quantity::VolumeFlow | Quantity::ReducedFlow => {
+                Kind::MassFlow
+            }
             Quantity::PressureRatio | Quantity::Efficiency | Quantity::Vane | Quantity::Humidity => {
                 Kind::Fraction
             }
-            Quantity::P1 | Quantity::P2 | Quantity::Ambient => Kind::Pressure,
-            Quantity::T1 | Quantity::T2 | Quantity::Tc => Kind::Temperature,
+            Quantity::P1 | Quantity::P2 | Quantity::P3 | Quantity::P4 | Quantity::Ambient => Kind::Pressure,
+            Quantity::T1 | Quantity::T2 | Quantity::T3 | Quantity::T4 | Quantity::Tc | Quantity::Oil => {
+                Kind::Temperature
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::table::columns::quantity::Quantity;
 /// Whether a name belongs to a turbine.
 pub(crate) fn is_turbine(plain: &str) -> bool {
     plain.contains("expansion")
-        || matches!(plain, "mfp" | "prt" | "wt" | "etat")
+        || matches!(plain, "mfp" | "prt" | "etat")
         || (plain.contains("sqrt") || plain.contains('√'))
             && ["t3", "t4", "p3", "tt3", "t03"].iter().any(|inlet| plain.contains(inlet))
 }
@@ -32,13 +32,84 @@ pub(crate) fn quantity_of_turbine(plain: &str, by_unit: Option<Quantity>) -> Opt
     if is(&["nt"]) {
         return Some(by_unit.unwrap_or(Quantity::Speed));
     }
-    is(&["wt", "mt"]).then_some(by_unit.unwrap_or(Quantity::Flow))
+    is(&["wt", "mt"])
+        .then_some(by_unit.filter(|unit| *unit != Quantity::Flow).unwrap_or(Quantity::TurbineFlow))
+}
+
+/// A pressure or temperature whose place is in words: `Compressor inlet pressure`, `Druck vor Turbine`; without a machine the compressor's.
+fn quantity_of_place(plain: &str) -> Option<Quantity> {
+    let is_turbine = ["turb", "exhaust", "abgas"].iter().any(|word| plain.contains(word));
+    let machines = [
+        "compresseur",
+        "compressore",
+        "compressor",
+        "compresor",
+        "kompressor",
+        "verdichter",
+        "compr",
+        "comp",
+        "turbine",
+        "turbina",
+    ];
+    let place = machines.iter().fold(plain.to_owned(), |rest, machine| rest.replace(machine, ""));
+    let has = |words: &[&str]| words.iter().any(|word| place.contains(word));
+    if has(&["cooler", "kühler", "manifold", "cylinder", "engine", "room", "egr"]) {
+        return None;
+    }
+    const OUTLETS: [&str; 12] = [
+        "out",
+        "discharge",
+        "after",
+        "behind",
+        "downstream",
+        "nach",
+        "sort",
+        "après",
+        "apres",
+        "aval",
+        "salida",
+        "uscita",
+    ];
+    const INLETS: [&str; 11] = [
+        "inlet", "before", "upstream", "vor", "eintritt", "entr", "avant", "amont", "suction", "ingresso",
+        "admis",
+    ];
+    // `T_comp_in`: a letter and nothing but the place.
+    let letter = |letter: char| {
+        place
+            .strip_prefix(letter)
+            .filter(|rest| matches!(*rest, "in" | "inlet" | "vor" | "out" | "outlet" | "nach"))
+    };
+    let is_outlet = has(&OUTLETS);
+    let is_inlet = has(&INLETS) || place.starts_with("in") || place.ends_with("in");
+    let is_pressure = has(&["press", "druck", "presi"]) || letter('p').is_some();
+    let is_temperature = has(&["temp"]) || letter('t').is_some();
+    match (is_pressure, is_temperature, is_turbine, is_outlet) {
+        (true, false, false, true) => Some(Quantity::P2),
+        (true, false, true, true) => Some(Quantity::P4),
+        (false, true, false, true) => Some(Quantity::T2),
+        (false, true, true, true) => Some(Quantity::T4),
+        (true, false, false, false) if is_inlet => Some(Quantity::P1),
+        (true, false, true, false) if is_inlet => Some(Quantity::P3),
+        (false, true, false, false) if is_inlet => Some(Quantity::T1),
+        (false, true, true, false) if is_inlet => Some(Quantity::T3),
+        _ => None,
+    }
 }
 
 /// What a name means: lower case, letters, digits, `/`, `√` and `η` alone. The unit decides between volume and mass.
 pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option<Quantity> {
     let has = |words: &[&str]| words.iter().any(|word| plain.contains(word));
     let is = |words: &[&str]| words.contains(&plain);
+    if has(&["fuel", "kraftstoff", "carburant", "coolant", "coolingwater", "kühlwasser"]) {
+        return None;
+    }
+    if has(&["oil", "öl", "oel", "huile", "aceite", "olio"]) && !has(&["gasöl", "gasoil"]) {
+        let is_inlet_temperature = has(&["temp"]) || plain.starts_with('t') || by_unit.is_none();
+        let is_other =
+            has(&["press", "druck", "presi", "flow", "durchsatz", "out", "aus", "sort", "uscita", "salida"]);
+        return (is_inlet_temperature && !is_other).then_some(Quantity::Oil);
+    }
     let root = has(&["sqrt", "√", "^0.5"]);
     if root && plain.starts_with('n') {
         return Some(Quantity::ReducedSpeed);
@@ -49,18 +120,20 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
     if is(&[
         "pr", "prc", "prtt", "prts", "pi", "pic", "pitt", "pits", "pitt", "p2/p1", "p02/p01", "pt2/pt1",
         "prcomp", "ratio", "picomp", "pik", "prss",
-    ]) || has(&[
-        "pressureratio",
-        "pressratio",
-        "druckverh",
-        "rapportdepression",
-        "tauxdecompression",
-        "relaciondepresi",
-        "relacióndepresi",
-        "rapportodipress",
-        "rapportodicompress",
-        "compressionratio",
-    ]) {
+    ]) || plain.starts_with('π')
+        || has(&[
+            "pressureratio",
+            "pressratio",
+            "druckverh",
+            "rapportdepression",
+            "tauxdecompression",
+            "relaciondepresi",
+            "relacióndepresi",
+            "rapportodipress",
+            "rapportodicompress",
+            "compressionratio",
+        ])
+    {
         return Some(Quantity::PressureRatio);
     }
     if plain.starts_with("eta")
@@ -80,6 +153,9 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
     }
     let flow = match by_unit {
         Some(Quantity::VolumeFlow) => Quantity::VolumeFlow,
+        _ if has(&["turb", "abgas", "exhaust"]) || is(&["mt", "wt", "m3", "w3", "mdott"]) => {
+            Quantity::TurbineFlow
+        }
         _ => Quantity::Flow,
     };
     if has(&[
@@ -110,6 +186,10 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
         "wccorr",
         "wckorr",
     ]) || is(&[
+        "mt",
+        "wt",
+        "m3",
+        "w3",
         "m",
         "m1",
         "mc",
@@ -154,9 +234,16 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
     if is(&["tc", "tch", "thc"]) || is_wall && !has(&["turb", "bearing", "lager", "palier"]) {
         return Some(Quantity::Tc);
     }
-    for (quantity, stem) in
-        [(Quantity::P1, "p1"), (Quantity::P2, "p2"), (Quantity::T1, "t1"), (Quantity::T2, "t2")]
-    {
+    for (quantity, stem) in [
+        (Quantity::P1, "p1"),
+        (Quantity::P2, "p2"),
+        (Quantity::P3, "p3"),
+        (Quantity::P4, "p4"),
+        (Quantity::T1, "t1"),
+        (Quantity::T2, "t2"),
+        (Quantity::T3, "t3"),
+        (Quantity::T4, "t4"),
+    ] {
         let rest = plain
             .strip_prefix(stem)
             .or_else(|| plain.strip_prefix(&format!("{}0{}", &stem[..1], &stem[1..])));
@@ -180,5 +267,5 @@ pub(crate) fn quantity_of_name(plain: &str, by_unit: Option<Quantity>) -> Option
             return Some(quantity);
         }
     }
-    None
+    quantity_of_place(plain)
 }

@@ -4,15 +4,17 @@ use crate::table::columns::column::{Column, ColumnError, Machine, column};
 use crate::table::columns::described_columns::Given;
 use crate::table::columns::quantity::Quantity;
 use crate::table::sheet::grid::{Grid, GridRow, is_missing};
+use crate::table::sheet::speed_heading::{speed_in, without_speed};
 use crate::table::units_row::with_units_row;
 use mapper_core::{ImportError, ImportRemark};
-use mapper_yaml::units::header_unit;
 use std::borrow::Cow;
 
 /// Columns that belong together: all of a table, or those of one speed line of a table with its lines side by side.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Group {
     pub(crate) columns: Vec<Column>,
+    /// How many columns at the end it shares with the other groups.
+    pub(crate) shared: usize,
     /// Speed above the columns, rpm.
     pub(crate) speed_rpm: Option<f64>,
     /// Cells of every row of a table without headings; 0 if there are headings.
@@ -20,6 +22,11 @@ pub(crate) struct Group {
 }
 
 impl Group {
+    /// The columns that it does not share.
+    pub(crate) fn own_columns(&self) -> &[Column] {
+        self.columns.split_at(self.columns.len() - self.shared).0
+    }
+
     /// Position of the speed among the columns.
     pub(crate) fn speed_column(&self) -> Option<usize> {
         self.columns
@@ -32,14 +39,23 @@ impl Group {
     }
 
     fn has_flow(&self) -> bool {
-        self.has(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow])
+        self.has(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow, Quantity::TurbineFlow])
     }
 
     fn is_measured(&self) -> bool {
-        !self.has(&[Quantity::PressureRatio])
-            && self.has(&[Quantity::P1])
-            && self.has(&[Quantity::P2])
-            && self.has(&[Quantity::T1])
+        !self.has(&[Quantity::PressureRatio]) && (self.has_compressor() || self.has_turbine())
+    }
+
+    fn has_all(&self, quantities: &[Quantity]) -> bool {
+        quantities.iter().all(|quantity| self.has(&[*quantity]))
+    }
+
+    fn has_compressor(&self) -> bool {
+        self.has_all(&[Quantity::P1, Quantity::P2, Quantity::T1])
+    }
+
+    fn has_turbine(&self) -> bool {
+        self.has_all(&[Quantity::P3, Quantity::P4, Quantity::T3])
     }
 
     fn is_complete(&self) -> bool {
@@ -60,6 +76,17 @@ impl Layout {
     /// Whether the points are as measured, not corrected.
     pub(crate) fn is_measured(&self) -> bool {
         self.groups.iter().any(Group::is_measured)
+    }
+
+    /// Whether the columns are those of a turbine alone.
+    pub(crate) fn is_turbine_alone(&self) -> bool {
+        let without_own_flow =
+            |group: &Group| !group.has(&[Quantity::Flow, Quantity::VolumeFlow, Quantity::ReducedFlow]);
+        let is_turbine = |group: &Group| match group.is_measured() {
+            true => !group.has_compressor(),
+            false => without_own_flow(group),
+        };
+        self.groups.iter().any(is_turbine)
     }
 
     /// Whether speed and flow are reduced quantities, which need no reference state.
@@ -101,8 +128,11 @@ fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
         if given.machine == Machine::Compressor && is_turbine_title(row) {
             return Err(ImportError::Turbine { line: row.at, text: row.text().chars().take(60).collect() });
         }
-        if let Some(layout) = side_by_side(grid, given, index, row) {
-            return Ok(Some(layout));
+        let headings = Headings::of(grid, index, row);
+        if let Some(groups) = side_by_side(grid, given, index, &headings.cells)
+            .or_else(|| by_speed(grid, given, index, &headings.cells))
+        {
+            return Ok(Some(Layout { groups, first_row: headings.first_row, remarks: Vec::new() }));
         }
         let known = match columns(given, &row.cells) {
             Ok(known) => known,
@@ -110,7 +140,7 @@ fn layout(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
             Err(error) if is_reported(given, row, &error) => return Err(wrong(row, error)),
             Err(_) => continue,
         };
-        let group = Group { columns: known, speed_rpm: None, bare_cells: 0 };
+        let group = Group { columns: known, ..Group::default() };
         if group.is_complete() && (!row.is_comment || group.columns.len() >= 3) {
             return with_heading(grid, given, index, row, group).map(Some);
         }
@@ -204,8 +234,26 @@ pub(crate) fn is_heading(given: &Given, row: &GridRow) -> bool {
 
 fn missing(given: &Given, row: &GridRow) -> &'static str {
     let known = columns(given, &row.cells).unwrap_or_default();
-    let group = Group { columns: known, speed_rpm: None, bare_cells: 0 };
+    let group = Group { columns: known, ..Group::default() };
     if group.has_flow() { "pressure ratio (or P1, P2 and T1)" } else { "flow" }
+}
+
+/// The cells of a row of headings, with the units of the row below it.
+struct Headings {
+    cells: Vec<String>,
+    /// Index of the first row below.
+    first_row: usize,
+}
+
+impl Headings {
+    fn of(grid: &Grid, index: usize, row: &GridRow) -> Headings {
+        fn texts(row: &GridRow) -> Vec<&str> {
+            row.cells.iter().map(String::as_str).collect()
+        }
+        let joined = grid.rows.get(index + 1).and_then(|below| with_units_row(&texts(row), &texts(below)));
+        let first_row = index + 1 + usize::from(joined.is_some());
+        Headings { cells: joined.unwrap_or_else(|| row.cells.clone()), first_row }
+    }
 }
 
 /// The layout below a heading: its units may be in a row of their own; without a speed column each block has its speed in a title.
@@ -216,14 +264,10 @@ fn with_heading(
     row: &GridRow,
     mut group: Group,
 ) -> Result<Layout, ImportError> {
-    let mut first_row = index + 1;
-    let names: Vec<&str> = row.cells.iter().map(String::as_str).collect();
-    if let Some(below) = grid.rows.get(first_row) {
-        let units: Vec<&str> = below.cells.iter().map(String::as_str).collect();
-        if let Some(joined) = with_units_row(&names, &units) {
-            group.columns = columns(given, &joined).map_err(|error| wrong(below, error))?;
-            first_row += 1;
-        }
+    let Headings { cells, first_row } = Headings::of(grid, index, row);
+    if first_row > index + 1 {
+        let below = grid.rows.get(index + 1).unwrap_or(row);
+        group.columns = columns(given, &cells).map_err(|error| wrong(below, error))?;
     }
     let title_above = index
         .checked_sub(1)
@@ -245,10 +289,10 @@ fn with_heading(
 }
 
 /// Lines side by side: pairs of flow and pressure ratio (or X and Y, as digitisers write them), each with its speed above.
-fn side_by_side(grid: &Grid, given: &Given, index: usize, row: &GridRow) -> Option<Layout> {
+fn side_by_side(grid: &Grid, given: &Given, index: usize, headings: &[String]) -> Option<Vec<Group>> {
     let letters = |cell: &String| matches!(cell.to_lowercase().as_str(), "x" | "y");
     let filled: Vec<(usize, &String)> =
-        row.cells.iter().enumerate().filter(|(_, cell)| !cell.is_empty()).collect();
+        headings.iter().enumerate().filter(|(_, cell)| !cell.is_empty()).collect();
     let by_letter = filled.len() >= 2 && filled.iter().all(|(_, cell)| letters(cell));
     let quantity = |index: usize, cell: &String| {
         let letter = match cell.to_lowercase().as_str() {
@@ -265,7 +309,7 @@ fn side_by_side(grid: &Grid, given: &Given, index: usize, row: &GridRow) -> Opti
         let Some(column) = quantity(*index, cell) else { continue };
         match groups.last_mut().filter(|group| !group.has(&[column.quantity])) {
             Some(group) => group.columns.push(column),
-            None => groups.push(Group { columns: vec![column], speed_rpm: None, bare_cells: 0 }),
+            None => groups.push(Group { columns: vec![column], ..Group::default() }),
         }
     }
     if groups.len() < 2
@@ -280,10 +324,55 @@ fn side_by_side(grid: &Grid, given: &Given, index: usize, row: &GridRow) -> Opti
         let mut cells = columns.filter_map(|index| above.cells.get(index)).filter(|cell| !cell.is_empty());
         group.speed_rpm = cells.find_map(|cell| speed_in(grid, cell));
     }
-    groups.iter().all(|group| group.speed_rpm.is_some()).then(|| Layout {
-        groups,
-        first_row: index + 1,
-        remarks: Vec::new(),
+    groups.iter().all(|group| group.speed_rpm.is_some()).then_some(groups)
+}
+
+/// One group of columns for each speed, which the headings or the row above them hold; columns without a speed belong to all.
+fn by_speed(grid: &Grid, given: &Given, index: usize, headings: &[String]) -> Option<Vec<Group>> {
+    let above = index.checked_sub(1).and_then(|above| grid.rows.get(above));
+    let (mut shared, mut groups, mut carried) = (Vec::new(), Vec::<Group>::new(), None);
+    for (place, heading) in headings.iter().enumerate() {
+        let title = above.and_then(|row| row.cells.get(place)).filter(|cell| !cell.is_empty());
+        carried = title.map_or(carried, |cell| speed_in(grid, cell));
+        let (name, speed_rpm) = match without_speed(grid, heading) {
+            Some((name, own)) => (name, Some(own)),
+            None => (heading.clone(), carried),
+        };
+        let column = match given.column(place, &name).ok()? {
+            // Speeds alone are the headings of the quantity that a row above names.
+            None if name.is_empty() && speed_rpm.is_some() && names_pressure_ratio(grid, given, index) => {
+                given.with_unit(Column::bare(place, Quantity::PressureRatio)).ok()
+            }
+            known => known,
+        };
+        match (column, speed_rpm) {
+            (None, _) => {}
+            (Some(column), None) => shared.push(column),
+            (Some(column), Some(speed_rpm)) => {
+                match groups.iter_mut().find(|group| group.speed_rpm == Some(speed_rpm)) {
+                    Some(group) => group.columns.push(column),
+                    None => {
+                        let speed_rpm = Some(speed_rpm);
+                        groups.push(Group { columns: vec![column], speed_rpm, ..Group::default() });
+                    }
+                }
+            }
+        }
+    }
+    for group in &mut groups {
+        let of_all =
+            shared.iter().filter(|column| !group.has(&[column.quantity])).cloned().collect::<Vec<_>>();
+        group.shared = of_all.len();
+        group.columns.extend(of_all);
+    }
+    let is_line = |group: &Group| group.is_complete() && group.speed_column().is_none();
+    (groups.len() > 1 && groups.iter().all(is_line)).then_some(groups)
+}
+
+fn names_pressure_ratio(grid: &Grid, given: &Given, index: usize) -> bool {
+    let above = grid.rows.iter().take(index).rev().take(10);
+    above.flat_map(|row| &row.cells).any(|cell| {
+        matches!(given.column(0, cell), Ok(Some(column)) if column.quantity == Quantity::PressureRatio)
     })
 }
 
@@ -315,29 +404,10 @@ pub(crate) fn vane_of_title(grid: &Grid, given: &Given, row: &GridRow) -> Option
     (words.len() <= 5 && words.iter().any(|word| is_vane(word))).then_some(factor * number)
 }
 
-/// The one number of a text with its unit of speed; rpm if it names none.
-fn speed_in(grid: &Grid, text: &str) -> Option<f64> {
-    let words = || {
-        text.split(|c: char| c.is_whitespace() || matches!(c, '=' | ':' | '[' | ']' | '(' | ')'))
-            .filter(|word| !word.is_empty())
-    };
-    let mut speeds = words().filter_map(|word| {
-        let digits = word.find(|c: char| c.is_alphabetic()).unwrap_or(word.len());
-        grid.number(&word[..digits]).map(|value| (value, &word[digits..]))
-    });
-    let (value, unit) = speeds.next()?;
-    if speeds.next().is_some() {
-        return None;
-    }
-    let speed = |unit: &str| header_unit(unit).filter(|found| found.kind == mapper_yaml::units::Kind::Speed);
-    let unit = speed(unit).or_else(|| words().find_map(speed));
-    Some(unit.map_or(value, |unit| unit.unit.to_inside(value))).filter(|rpm| *rpm > 0.0)
-}
-
 /// The layout of a table whose columns are described by their numbers.
 fn numbered(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     let columns = given.numbered().map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
-    let group = Group { columns, speed_rpm: None, bare_cells: 0 };
+    let group = Group { columns, ..Group::default() };
     if !group.is_complete() || group.speed_column().is_none() {
         return Ok(None);
     }
@@ -384,7 +454,7 @@ fn bare(grid: &Grid, given: &Given) -> Result<Option<Layout>, ImportError> {
     let columns = columns.map(|(index, quantity)| given.with_unit(Column::bare(index, quantity)));
     let columns: Result<_, _> = columns.collect();
     let columns = columns.map_err(|error| ImportError::Row { line: 1, source: Box::new(error) })?;
-    let group = Group { columns, speed_rpm: None, bare_cells: row.len() };
+    let group = Group { columns, bare_cells: row.len(), ..Group::default() };
     let mut remarks = vec![ImportRemark::NoHeading];
     if row.len() > order.len() {
         remarks.push(ImportRemark::FurtherColumns { count: row.len() - order.len() });

@@ -50,13 +50,18 @@ pub(crate) fn points<'a>(
     remarks: &mut Vec<ImportRemark>,
 ) -> Result<Vec<Point<'a>>, ImportError> {
     let mut points = Vec::new();
-    let (mut carried, mut extrapolated, mut vane) = (false, 0, None);
+    let (mut carried, mut extrapolated) = (false, 0);
+    // The title of the first block may be above the headings, which may have a row of units.
+    let above = grid.rows.iter().take(layout.first_row).rev().take(3);
+    let mut vane = above.filter_map(|row| layout::vane_of_title(grid, given, row)).next();
     for group in &layout.groups {
         let (mut speed, mut last_speed) = (group.speed_rpm, None);
         for row in grid.rows.iter().skip(layout.first_row).filter(|row| !row.is_comment) {
             let cell = |index: usize| row.cells.get(index).map_or("", String::as_str);
-            let is_empty = group.columns.iter().all(|column| is_missing(cell(column.index)));
-            if is_empty && row.cells.iter().filter(|cell| !cell.is_empty()).count() != 1 {
+            let is_empty = group.own_columns().iter().all(|column| is_missing(cell(column.index)));
+            let is_title =
+                layout.groups.len() == 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
+            if is_empty && !is_title {
                 continue;
             }
             if let Some(position) = layout::vane_of_title(grid, given, row) {

@@ -1,6 +1,7 @@
 //! Sheets of workbooks of Excel.
 
 use crate::table::sheet::grid::{CELL_LIMIT, Grid, GridRow, ROW_LIMIT, some_numbers};
+use crate::table::sheet::speed_heading::without_speed;
 use mapper_core::ImportError;
 use std::io::{Cursor, Read};
 
@@ -19,15 +20,17 @@ pub(crate) fn grid_of_workbook(bytes: &[u8], sheet: Option<&str>) -> Result<Grid
         None => !known.is_hidden,
     };
     // A sheet for each speed line, named after its speed.
-    let is_line = |known: &KnownSheet| {
-        known.name.to_lowercase().contains("rpm") && known.name.contains(|c: char| c.is_ascii_digit())
+    let speed_rpm = |known: &KnownSheet| {
+        let (rest, speed_rpm) = without_speed(&Grid::of_rows(Vec::new()), &known.name)?;
+        (rest.is_empty() || known.name.to_lowercase().contains("rpm")).then_some(speed_rpm)
     };
-    let mut lines: Vec<&mut KnownSheet> =
-        sheets.iter_mut().filter(|known| !known.is_hidden && is_line(known)).filter(has_table).collect();
+    let visible = sheets.iter_mut().filter(|known| !known.is_hidden).filter(has_table);
+    let mut lines: Vec<(f64, &mut KnownSheet)> =
+        visible.filter_map(|known| Some((speed_rpm(known)?, known))).collect();
     if sheet.is_none() && lines.len() > 1 {
-        let title = |name: &String| GridRow { at: 1, cells: vec![name.clone()], is_comment: false };
-        let rows = lines.iter_mut().flat_map(|known| {
-            std::iter::once(title(&known.name)).chain(std::mem::take(&mut known.rows)).collect::<Vec<_>>()
+        let title = |rpm: f64| GridRow { at: 1, cells: vec![format!("{rpm} rpm")], is_comment: false };
+        let rows = lines.iter_mut().flat_map(|(rpm, known)| {
+            std::iter::once(title(*rpm)).chain(std::mem::take(&mut known.rows)).collect::<Vec<_>>()
         });
         return Ok(Grid::of_rows(rows.collect()));
     }

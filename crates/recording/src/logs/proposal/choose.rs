@@ -120,19 +120,22 @@ fn names_of(
     let kind = unit.map(|unit| unit.kind).filter(|kind| *kind != Kind::Frequency);
     // A shaft has a number too.
     let numbers = if kind == Some(Kind::Speed) { Numbers::Usual } else { numbers };
-    channels_of(&numbers.usual(without_number(column)), group, &column.description, kind)
+    channels_of(&numbers.usual(without_number(column, layout)), group, &column.description, kind)
 }
 
 /// A name without the number by which readers distinguish equal names: `Pressure (2)` is not a pressure at station 2.
-fn without_number(column: &Column) -> &str {
-    let numbered = column
-        .name
-        .rsplit_once(" (")
-        .filter(|(_, number)| number.trim_end_matches(')').parse::<usize>().is_ok());
-    match numbered {
-        Some((name, _)) if !column.header.contains(&column.name) => name,
-        _ => &column.name,
-    }
+fn without_number<'a>(column: &'a Column, layout: &Layout) -> &'a str {
+    let by = |mark: &str| {
+        column
+            .name
+            .rsplit_once(mark)
+            .filter(|(_, number)| number.trim_end_matches(')').parse::<usize>().is_ok())
+            .map(|(name, _)| name)
+    };
+    let is_column = |name: &&str| layout.columns.iter().any(|other| other.name == *name);
+    // pandas numbers with a point.
+    let of_reader = by(" (").filter(|_| !column.header.contains(&column.name));
+    of_reader.or_else(|| by(".").filter(is_column)).unwrap_or(&column.name)
 }
 
 /// By so much two sensors at one place may differ in the middle, as a share: wakes and stratification make some per cent.
@@ -177,7 +180,7 @@ fn note_unknown_units(
     for (index, column) in layout.columns.iter().enumerate() {
         let (Some(spelling), None, false) = (&column.unit, units[index], taken[index]) else { continue };
         let group = layout.groups.get(column.group).map_or("", |group| group.name.as_str());
-        let named = channels_of(without_number(column), group, &column.description, None);
+        let named = channels_of(without_number(column, layout), group, &column.description, None);
         let kind = volume_flow_m3_s(spelling).map(|_| Kind::MassFlow);
         let fits = |channel: Channel| kind.is_none_or(|kind| kind == kind_of(channel));
         let Some((channel, _)) = named.iter().find(|(channel, _)| fits(*channel)) else { continue };

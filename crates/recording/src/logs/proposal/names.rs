@@ -1,4 +1,4 @@
-//! What the names of columns say about what was measured, in English, German, French and Spanish.
+//! What the names of columns say about what was measured, in English, German, French, Spanish, Italian, Portuguese, Dutch and Swedish.
 
 use crate::logs::units::kind_of;
 use mapper_core::{CHANNELS, Channel};
@@ -12,28 +12,42 @@ pub(crate) type Weight = u32;
 /// Letters of a name that are looked at.
 const LONGEST: usize = 120;
 
-/// A name in small letters, umlauts written out, accents left out, with `_` for all that is neither letter nor digit.
+/// A name in small letters, umlauts written out, accents left out, with `_` for all that is neither letter nor digit, and between the words of
+/// `compInletTemp`.
 pub(crate) fn plain(text: &str) -> String {
     let mut plain = String::new();
-    for letter in text.to_lowercase().chars().take(LONGEST) {
-        match letter {
-            'ä' => plain.push_str("ae"),
-            'ö' => plain.push_str("oe"),
-            'ü' => plain.push_str("ue"),
-            'ß' => plain.push_str("ss"),
-            'à' | 'á' | 'â' => plain.push('a'),
-            'è' | 'é' | 'ê' => plain.push('e'),
-            'í' | 'î' => plain.push('i'),
-            'ó' | 'ô' => plain.push('o'),
-            'ú' | 'û' => plain.push('u'),
-            'ç' => plain.push('c'),
-            'ñ' => plain.push('n'),
-            letter if letter.is_ascii_alphanumeric() => plain.push(letter),
-            _ if plain.ends_with('_') => {}
-            _ => plain.push('_'),
+    let mut letters = text.chars().take(LONGEST).peekable();
+    let mut was_small = false;
+    while let Some(letter) = letters.next() {
+        if was_small && letter.is_uppercase() && letters.peek().is_some_and(|next| next.is_lowercase()) {
+            plain.push('_');
+        }
+        was_small = letter.is_lowercase();
+        for letter in letter.to_lowercase() {
+            push_plain(&mut plain, letter);
         }
     }
-    plain.trim_matches('_').to_owned()
+    // German compounds: `Eintrittsdruck`.
+    plain.trim_matches('_').replace("eintritts", "eintritt_").replace("austritts", "austritt_")
+}
+
+fn push_plain(plain: &mut String, letter: char) {
+    match letter {
+        'ä' => plain.push_str("ae"),
+        'ö' => plain.push_str("oe"),
+        'ü' => plain.push_str("ue"),
+        'ß' => plain.push_str("ss"),
+        'à' | 'á' | 'â' | 'ã' | 'å' => plain.push('a'),
+        'è' | 'é' | 'ê' => plain.push('e'),
+        'ì' | 'í' | 'î' => plain.push('i'),
+        'ò' | 'ó' | 'ô' | 'õ' => plain.push('o'),
+        'ù' | 'ú' | 'û' => plain.push('u'),
+        'ç' => plain.push('c'),
+        'ñ' => plain.push('n'),
+        letter if letter.is_ascii_alphanumeric() => plain.push(letter),
+        _ if plain.ends_with('_') => {}
+        _ => plain.push('_'),
+    }
 }
 
 /// Patterns of one place: `{q}` stands for the letters of the quantity.
@@ -44,42 +58,54 @@ struct Place {
     patterns: &'static [(Weight, &'static str)],
 }
 
+/// The machines and places in patterns that name the quantity as well: a letter is enough. The words alone say it without.
 const COMPRESSOR: &str =
-    "(c|comp|compr|cmp|compressor|verd|verdichter|v|kompressor|lader|compresseur|compresor)";
-const TURBINE: &str = "(t|tur|turb|turbine|turbina)";
-const IN: &str = "(in|inlet|ein|eintritt|e|suction|entree|entrada|admission|admision)";
-const OUT: &str = "(out|outlet|aus|austritt|a|discharge|sortie|salida)";
-const BEFORE: &str = "(vor|before|upstream|upstream_of|us|pre|avant|amont|antes)";
-const AFTER: &str = "(nach|hinter|after|behind|downstream|downstream_of|ds|post|apres|aval|despues)";
-const HOUSING: &str =
-    "(housing|hsg|casing|wall|skin|metal|wand|geh|gehaeuse|gehause|body|material|carter|carcasa|paroi|pared)";
+    "(c|v|comp|compr|cmp|cmpr|compressor|verd|verdichter|kompressor|lader|compresseur|compresor|compressore)";
+const TURBINE: &str = "(t|tur|turb|turbine|turbina|turbin)";
+const IN: &str = "(e|in|inlet|ein|eintritt|suction|entree|entry|entrada|entrata|ingresso|admission|admision)";
+const OUT: &str = "(a|out|outlet|aus|austritt|discharge|exit|sortie|salida|saida|uscita)";
+const BEFORE: &str = "(v|vor|before|upstream|upstream_of|us|pre|avant|amont|antes|voor|foere|monte)";
+const AFTER: &str =
+    "(n|nach|hinter|after|behind|downstream|downstream_of|ds|post|apres|aval|despues|na|efter|valle)";
+const HOUSING: &str = "(housing|hsg|casing|wall|skin|metal|wand|geh|gehaeuse|gehause|body|material|carter|carcasa|carcassa|paroi|pared)";
+
+/// The alternatives of a pattern that are words, not single letters.
+fn words(alternatives: &str) -> String {
+    let all = alternatives.trim_matches(['(', ')']).split('|');
+    format!("({})", all.filter(|word| word.len() > 1).collect::<Vec<_>>().join("|"))
+}
 
 /// What may stand between a place and a machine.
-const OF: &str = "(dem_|der_|of_|of_the_|du_|de_|de_la_|de_l_|del_)?";
+const OF: &str = "(dem_|der_|of_|of_the_|du_|de_|de_la_|de_l_|del_|do_|da_|della_)?";
 /// What may stand behind a station number: the machine, or that a value is total or static.
 const KIND: &str = "(c|v|l|tot|total|stat|static|st)?";
 
+// Capital letters in braces are words or letters, small ones words alone: `compressore` is not `compressor` and `e`.
 #[rustfmt::skip]
 const PLACES: &[Place] = &[
     Place { temperature: Some(Channel::T1), pressure: Some(Channel::P1), patterns: &[
-        (6, "(^|_){q}_?0?1_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{I}(_|$)"), (6, "(^|_){B}_{D}{C}(_|$)"),
-        (6, "(^|_){C}_?{I}(_|$)"), (3, "^(inlet|intake|ein|ansaug)"), (3, "(^|_){q}_?vv(_|$)"), (3, "ansaug|(^|_)(inlet|intake)(_|$)"),
-        (6, "(^|_){I}_{D}{C}(_|$)"), (6, "(^|_){C}_{q}_{I}(_|$)"), (4, "(^|_)ci{s}(_|$)"), (3, "(^|_){q}_?[12]1(_|$)"),
+        (6, "(^|_){q}_?0?1_?{K}(_|$)"), (6, "(^|_){q}_?{C}(_?{i}|_{I})(_|$)"), (6, "(^|_){B}_{D}{c}(_|$)"),
+        (6, "(^|_){c}(_?{i}|_{I})(_|$)"), (3, "^(inlet|intake|ein|ansaug)"), (3, "(^|_){q}_?vv(_|$)"), (3, "ansaug|(^|_)(inlet|intake)(_|$)"),
+        (6, "(^|_){i}_{D}{C}(_|$)"), (6, "(^|_){C}_{q}_{I}(_|$)"), (4, "(^|_)ci{s}(_|$)"), (3, "(^|_){q}_?[12]1(_|$)"),
+        (6, "(^|_){c}_{b}(_|$)"), (6, "(^|_){q}_?c_?1(_|$)"), (3, "^{q}_{i}$"),
     ]},
     Place { temperature: Some(Channel::T2), pressure: Some(Channel::P2), patterns: &[
-        (6, "(^|_){q}_?0?2_?{K}(_|$)"), (6, "(^|_){q}_?{C}_?{O}(_|$)"), (6, "(^|_){A}_{D}{C}(_|$)"),
-        (6, "(^|_){C}_?{O}(_|$)"), (3, "(^|_){q}_?nv(_|$)"), (3, "boost|ladedruck|ladeluft"), (2, "(^|_)(outlet|discharge)(_|$)"),
-        (6, "(^|_){O}_{D}{C}(_|$)"), (6, "(^|_){C}_{q}_{O}(_|$)"), (4, "(^|_)co{s}(_|$)"), (3, "(^|_){q}_?2[12](_|$)"),
+        (6, "(^|_){q}_?0?2_?{K}(_|$)"), (6, "(^|_){q}_?{C}(_?{o}|_{O})(_|$)"), (6, "(^|_){A}_{D}{c}(_|$)"),
+        (6, "(^|_){c}(_?{o}|_{O})(_|$)"), (3, "(^|_){q}_?nv(_|$)"), (3, "boost|ladedruck|ladeluft"), (2, "(^|_)(outlet|discharge)(_|$)"),
+        (6, "(^|_){o}_{D}{C}(_|$)"), (6, "(^|_){C}_{q}_{O}(_|$)"), (4, "(^|_)c[od]{s}(_|$)"), (3, "(^|_){q}_?2[12](_|$)"),
+        (6, "(^|_){c}_{a}(_|$)"), (6, "(^|_){q}_?c_?2(_|$)"), (3, "^{q}_{o}$"),
     ]},
     Place { temperature: Some(Channel::T3), pressure: Some(Channel::P3), patterns: &[
-        (6, "(^|_){q}_?0?3_?{K}(_|$)"), (6, "(^|_){q}_?1_?t(_|$)"), (6, "(^|_){q}_?{T}_?{I}(_|$)"), (6, "(^|_){B}_{D}{T}(_|$)"),
-        (6, "(^|_){T}_?{I}(_|$)"), (3, "(^|_){q}_?vt(_|$)"),
-        (6, "(^|_){I}_{D}{T}(_|$)"), (6, "(^|_){T}_{q}_{I}(_|$)"), (3, "(^|_)egt|abgas{q}|exhaust_gas_{q}|exhaust_{q}"), (4, "(^|_)ti{s}(_|$)"), (3, "(^|_){q}_?31(_|$)"),
+        (6, "(^|_){q}_?0?3_?{K}(_|$)"), (6, "(^|_){q}_?1_?t(_|$)"), (6, "(^|_){q}_?{T}(_?{i}|_{I})(_|$)"), (6, "(^|_){B}_{D}{t}(_|$)"),
+        (6, "(^|_){t}(_?{i}|_{I})(_|$)"), (3, "(^|_){q}_?vt(_|$)"),
+        (6, "(^|_){i}_{D}{t}(_|$)"), (6, "(^|_){T}_{q}_{I}(_|$)"), (3, "(^|_)egt|abgas{q}|exhaust_gas_{q}|exhaust_{q}|exhaust_manifold"), (4, "(^|_)ti{s}(_|$)"), (3, "(^|_){q}_?31(_|$)"),
+        (6, "(^|_){t}_{b}(_|$)"), (3, "(^|_){q}_t_?1(_|$)"),
     ]},
     Place { temperature: Some(Channel::T4), pressure: Some(Channel::P4), patterns: &[
-        (6, "(^|_){q}_?0?4_?{K}(_|$)"), (6, "(^|_){q}_?2_?t(_|$)"), (6, "(^|_){q}_?{T}_?{O}(_|$)"), (6, "(^|_){A}_{D}{T}(_|$)"),
-        (6, "(^|_){T}_?{O}(_|$)"), (3, "(^|_){q}_?nt(_|$)"),
-        (6, "(^|_){O}_{D}{T}(_|$)"), (6, "(^|_){T}_{q}_{O}(_|$)"), (4, "(^|_)to{s}(_|$)"), (3, "(^|_){q}_?41(_|$)"),
+        (6, "(^|_){q}_?0?4_?{K}(_|$)"), (6, "(^|_){q}_?2_?t(_|$)"), (6, "(^|_){q}_?{T}(_?{o}|_{O})(_|$)"), (6, "(^|_){A}_{D}{t}(_|$)"),
+        (6, "(^|_){t}(_?{o}|_{O})(_|$)"), (3, "(^|_){q}_?nt(_|$)"),
+        (6, "(^|_){o}_{D}{t}(_|$)"), (6, "(^|_){T}_{q}_{O}(_|$)"), (4, "(^|_)to{s}(_|$)"), (3, "(^|_){q}_?41(_|$)"),
+        (6, "(^|_){t}_{a}(_|$)"), (3, "(^|_){q}_t_?2(_|$)"),
     ]},
     // `p_c` and `p_t` say neither before nor after: mostly the pressure that the machine makes, and the one that drives it.
     Place { temperature: None, pressure: Some(Channel::P2), patterns: &[(2, "^{q}_?c$")]},
@@ -117,22 +143,20 @@ fn rows() -> Vec<Row> {
     };
     for place in PLACES {
         for (weight, pattern) in place.patterns {
-            let filled = pattern
-                .replace("{C}", COMPRESSOR)
-                .replace("{T}", TURBINE)
-                .replace("{I}", IN)
-                .replace("{O}", OUT)
-                .replace("{B}", BEFORE)
-                .replace("{A}", AFTER)
-                .replace("{H}", HOUSING)
-                .replace("{D}", OF)
-                .replace("{K}", KIND);
+            let mut filled = pattern.replace("{D}", OF).replace("{K}", KIND).replace("{H}", HOUSING);
+            for (letter, names) in
+                [('C', COMPRESSOR), ('T', TURBINE), ('I', IN), ('O', OUT), ('B', BEFORE), ('A', AFTER)]
+            {
+                filled = filled
+                    .replace(&format!("{{{letter}}}"), names)
+                    .replace(&format!("{{{}}}", letter.to_ascii_lowercase()), &words(names));
+            }
             if let Some(channel) = place.temperature {
                 add(
                     channel,
                     *weight,
                     &filled
-                        .replace("{q}", "(t|tt|temp|temperature|temperatur|temperatura)")
+                        .replace("{q}", "(t|tt|temp|tmp|temperature|temperatur|temperatura|temperatuur)")
                         .replace("{s}", "t"),
                 );
             }
@@ -141,35 +165,35 @@ fn rows() -> Vec<Row> {
                     channel,
                     *weight,
                     &filled
-                        .replace("{q}", "(p|pt|ps|press|pressure|druck|pression|presion)")
+                        .replace("{q}", "(p|pt|ps|press|prs|pressure|druck|pression|presion|pressione|pressao|druk|tryck)")
                         .replace("{s}", "p"),
                 );
             }
         }
     }
-    let flow =
-        "(m|dm|mdot|m_dot|mp|w|flow|massflow|mass_flow|massenstrom|massenfluss|durchsatz|debit|caudal)";
+    let flow = "(m|dm|mdot|m_dot|mp|mf|w|flow|massflow|mass_flow|mass_flow_rate|massenstrom|massenfluss|durchsatz|debit|caudal|portata|vazao|massastroom|floede)";
     for (channel, weight, pattern) in [
         (Channel::ShaftSpeed, 6, "(^|_)n_?(tc|atl|turbo|tl|lader|l|shaft)(_|$)".to_owned()),
         (
             Channel::ShaftSpeed,
             6,
-            "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter|compresseur|arbre|eje).*(speed|drehzahl|rpm)".to_owned(),
+            "(turbo|tc|atl|lader|shaft|rotor|welle|compressor|verdichter|compresseur|arbre|eje).*(speed|spd|drehzahl|rpm)".to_owned(),
         ),
         (
             Channel::ShaftSpeed,
             6,
-            "(speed|drehzahl|rpm|vitesse|regime|velocidad).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor|compresseur|compresor|arbre|eje)".to_owned(),
+            "(speed|drehzahl|rpm|vitesse|regime|velocidad|giri|rotacao|toerental|varvtal).*(turbo|tc|atl|lader|shaft|rotor|welle|verdichter|compressor|compresseur|compresor|arbre|eje)".to_owned(),
         ),
-        (Channel::ShaftSpeed, 4, "^(n|n1|shaft_speed|speed|drehzahl|speed_rpm|rpm|vitesse|regime|velocidad)$".to_owned()),
+        (Channel::ShaftSpeed, 3, "(^|_)(turbo|tc|atl|lader)_(shaft|rotor|welle)(_|$)|^(nh|ng)$".to_owned()),
+        (Channel::ShaftSpeed, 4, "^(n|n1|shaft_speed|rotational_speed|speed|drehzahl|speed_rpm|rpm|vitesse|regime|velocidad|giri|rotacao|toerental|varvtal)$".to_owned()),
         (
             Channel::CompressorFlow,
             6,
-            format!("(^|_){flow}_?(c|comp|compressor|verd|verdichter|v|air|luft|l|compresseur|compresor|aire)(_|$)"),
+            format!("(^|_){flow}_?(c|comp|compressor|verd|verdichter|v|air|luft|l|compresseur|compresor|compressore|aire|aria|ar)(_|$)"),
         ),
-        (Channel::CompressorFlow, 6, format!("(comp|compressor|verd|verdichter|luft|air)_?{flow}(_|$)")),
+        (Channel::CompressorFlow, 6, format!("(comp|compressor|verd|verdichter|luft|lucht|air)_?{flow}(_|$)")),
         (Channel::CompressorFlow, 6, "luftmasse|^maf|^caf(_|$)|airflow|air_flow".to_owned()),
-        (Channel::CompressorFlow, 3, format!("^{flow}(_kg_s)?$")),
+        (Channel::CompressorFlow, 3, format!("^({flow}(_kg_s)?|air|luft|aria|aire)$")),
         (Channel::CompressorFlow, 3, format!("^{flow}_?1$")),
         (Channel::TurbineFlow, 3, format!("^{flow}_?3$")),
         (Channel::TurbineFlow, 7, format!("(^|_){flow}_?(t|turb|turbine|abgas|exh|exhaust|gas)(_|$)")),
@@ -188,17 +212,17 @@ fn rows() -> Vec<Row> {
 }
 
 static SET: LazyLock<Option<Regex>> = LazyLock::new(|| {
-    Regex::new("(^|_)(soll\\w*|set|setpoint|sp|cmd|command|demand|dem|target|w)(_|$)|sollwert").ok()
+    Regex::new("(^|_)(soll\\w*|set|setpoint|sp|cmd|command|demand|dem|target|vorgabe|consigne|consigna|w)(_|$)|sollwert").ok()
 });
 static DERIVED: LazyLock<Option<Regex>> = LazyLock::new(|| {
     Regex::new(
         // A static temperature cannot be measured.
-        "(^|_)(cor|corr|korr|calc|ber|berechnet|model|sim|est|std|stdev|sigma|dev|min|max|raw|roh)(_|$)|(^|_)t_?[0-9]?_?(stat|static)(_|$)",
+        "(^|_)(cor|corr|corrected|korr|korrigiert|red|reduced|reduziert|ideal|isentrop\\w*|calc|ber|berechnet|model|sim|est|std|stdev|sigma|dev|min|max|raw|roh)(_|$)|(^|_)t_?[0-9]?_?(stat|static)(_|$)",
     )
     .ok()
 });
 static OTHER: LazyLock<Option<Regex>> = LazyLock::new(|| {
-    Regex::new("fuel|kraftstoff|egr|agr|(^|_)(engine|motor|crank|erpm|torque|drehmoment|cool\\w*|kuehl\\w*|water|wasser|vgt|vtg)(_|$)|(^|_)p_?b").ok()
+    Regex::new("fuel|kraftstoff|egr|agr|cooler|kuehler|wasser|crankcase|burner|brenner|orifice|blende|venturi|bearing_(housing|temp)|bypass|leak|(intake|inlet)_manifold|saugrohr|(^|_)(engine|eng|motor|crank|erpm|torque|drehmoment|cool\\w*|kuehl\\w*|water|vgt|vtg|cac|llk|dpf|scr|doc)(_|$)|(^|_)p_?b").ok()
 });
 
 fn says(pattern: &LazyLock<Option<Regex>>, text: &str) -> bool {
@@ -220,6 +244,11 @@ fn is_other(name: &str) -> bool {
     says(&OTHER, name)
 }
 
+/// Whether a name speaks of an engine.
+pub(crate) fn speaks_of_engine(name: &str) -> bool {
+    name.split('_').any(|word| matches!(word, "engine" | "eng" | "motor" | "moteur" | "erpm"))
+}
+
 /// Whether a name speaks of the ambient pressure.
 pub(crate) fn is_ambient(name: &str) -> bool {
     ["amb", "baro", "umg", "atm", "luftdruck"].iter().any(|word| name.contains(word))
@@ -227,8 +256,9 @@ pub(crate) fn is_ambient(name: &str) -> bool {
 
 static OF_KIND: LazyLock<Vec<(Kind, Regex)>> = LazyLock::new(|| {
     let patterns = [
-        (Kind::Pressure, "press|druck|presion|(^|_)p(_|[0-9])|baro"),
-        (Kind::Temperature, "temp|(^|_)t(_|[0-9])"),
+        // Not the compressor.
+        (Kind::Pressure, "(^|[^m])press|druck|druk|tryck|presion|(^|_)p(_|[0-9])|baro"),
+        (Kind::Temperature, "temp|(^|_)egt|(^|_)t(_|[0-9])"),
         (Kind::Speed, "speed|drehzahl|rpm|(^|_)n(_|[0-9])"),
     ];
     patterns.into_iter().filter_map(|(kind, pattern)| Some((kind, Regex::new(pattern).ok()?))).collect()
@@ -298,7 +328,7 @@ mod tests {
                     * (usize::from(place.temperature.is_some()) + usize::from(place.pressure.is_some()))
             })
             .sum();
-        assert_eq!(ROWS.len(), places + 15);
+        assert_eq!(ROWS.len(), places + 16);
         assert!(SET.is_some() && DERIVED.is_some() && OTHER.is_some() && OF_KIND.len() == 3);
     }
 

@@ -1,6 +1,6 @@
 //! What the proposed channels say of each other: a compressor raises pressure and temperature, and flow follows speed.
 
-use super::names::plain;
+use super::names::{plain, speaks_of_engine};
 use super::proposed::{Ambient, Certainty, Proposal, ProposedChannel};
 use crate::logs::plausible::STANDARD_ATMOSPHERE_PA;
 use crate::logs::units::{kind_of, unit};
@@ -75,6 +75,13 @@ pub(super) fn judge(proposal: &mut Proposal, layout: &Layout, survey: &Survey) -
         }
     }
     doubt_bare_housings(proposal, layout);
+    if layout.columns.iter().any(|column| speaks_of_engine(&plain(&column.name))) {
+        doubt(
+            proposal,
+            &[Channel::ValveCommand],
+            "the log is of an engine: this may be its throttle or bypass",
+        );
+    }
     let fastest_rpm = running.as_ref().map(|speed| speed.samples().map(|(_, rpm)| rpm).fold(0.0, f64::max));
     if let Some(rpm) = fastest_rpm.filter(|rpm| *rpm < FASTEST_ENGINE_RPM) {
         let message = format!("at most {rpm:.0} rpm: this may be the speed of the engine");

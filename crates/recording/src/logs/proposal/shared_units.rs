@@ -5,7 +5,7 @@ use crate::logs::plausible::{OUTER, STANDARD_ATMOSPHERE_PA, fitting_units};
 use crate::logs::units::kind_of;
 use crate::logs::{Layout, Survey};
 use mapper_core::Channel;
-use mapper_yaml::units::{Kind, Unit};
+use mapper_yaml::units::{Kind, Unit, header_unit};
 use std::f64::consts::PI;
 
 /// Largest ratio of pressures: one stage of a turbocharger reaches 6, where the tip speed of aluminium wheels ends; a third more is margin for
@@ -41,6 +41,9 @@ pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) 
         if common.iter().any(|unit| written.contains(&unit.symbol())) {
             common.retain(|unit| written.contains(&unit.symbol()));
         }
+        if kind == Kind::Temperature && is_imperial(layout) && inlet_is_too_warm(&channels, &common) {
+            common = kind.units().iter().filter(|unit| unit.symbol() == "degF").collect();
+        }
         let [unit] = common.as_slice() else { continue };
         let count = channels.len();
         for proposed in proposal.channels.iter_mut().filter(|proposed| bare(proposed)) {
@@ -56,6 +59,28 @@ pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) 
             });
         }
     }
+}
+
+/// Whether a log writes its other units in the imperial system.
+fn is_imperial(layout: &Layout) -> bool {
+    let imperial = |unit: &str| {
+        header_unit(unit).is_some_and(|found| {
+            matches!(found.unit.symbol(), "psi" | "psia" | "lb/min" | "lb/s" | "inHg" | "inH2O")
+        })
+    };
+    layout.columns.iter().any(|column| column.unit.as_deref().is_some_and(imperial))
+}
+
+/// Inlet of a compressor that no test cell reaches, K. Behind another stage it may be as warm.
+const TOO_WARM_K: f64 = 323.15;
+
+/// Whether the only unit of the temperatures is degC, and the inlet would be too warm in it.
+fn inlet_is_too_warm(channels: &[(Channel, f64, f64)], common: &[&'static Unit]) -> bool {
+    let [unit] = common else { return false };
+    let is_warm = |(channel, low, _): &(Channel, f64, f64)| {
+        *channel == Channel::T1 && unit.to_inside(*low) > TOO_WARM_K
+    };
+    unit.symbol() == "degC" && channels.iter().any(is_warm)
 }
 
 /// Isentropic head over the square of the tip speed: radial wheels take up 0.6 to 0.9 of it by slip and backsweep, and turn 0.5 to

@@ -1,0 +1,56 @@
+//! Tables with a group of columns for each speed line.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use mapper_core::{MapDescription, ReferenceState};
+use mapper_maps::table::read_any_text;
+
+/// Speed, flow, pressure ratio and efficiency of every point.
+fn points(text: &str) -> Vec<[Option<f64>; 4]> {
+    let given = MapDescription { reference: Some(ReferenceState::SAE), ..MapDescription::default() };
+    let map = read_any_text(text, &given).unwrap_or_else(|error| panic!("{error}\n{text}")).map;
+    let of_line = |line: &mapper_core::SpeedLine| {
+        let speed = Some(line.speed_corrected_rpm);
+        let values =
+            |p: &mapper_core::MapPoint| [speed, Some(p.flow_corrected_kg_s), Some(p.pressure_ratio), p.eta];
+        line.points.iter().map(values).collect::<Vec<_>>()
+    };
+    map.lines.iter().flat_map(of_line).collect()
+}
+
+const FOUR: [[f64; 4]; 4] =
+    [[6e4, 0.05, 1.4, 0.7], [6e4, 0.06, 1.3, 0.68], [9e4, 0.06, 1.9, 0.72], [9e4, 0.07, 1.8, 0.71]];
+
+#[test]
+fn speeds_in_the_headings_make_one_map() {
+    let expected: Vec<[Option<f64>; 4]> = FOUR.iter().map(|row| row.map(Some)).collect();
+    for text in [
+        "flow [kg/s],PR@60000,eta@60000,PR@90000,eta@90000\n0.05,1.4,0.7,,\n0.06,1.3,0.68,1.9,0.72\n0.07,,,1.8,0.71\n",
+        "60000 rpm | flow [kg/s],60000 rpm | PR,60000 rpm | eta,90000 rpm | flow [kg/s],90000 rpm | PR,90000 rpm | eta\n\
+         0.05,1.4,0.7,0.06,1.9,0.72\n0.06,1.3,0.68,0.07,1.8,0.71\n",
+        "m_60krpm (g/s);m_90krpm (g/s);PR_60krpm;PR_90krpm;eta_60krpm (%);eta_90krpm (%)\n50;60;1,4;1,9;70;72\n60;70;1,3;1,8;68;71\n",
+        ";60 krpm;;90 krpm;\nMassenstrom;Druckverhältnis;Wirkungsgrad;Druckverhältnis;Wirkungsgrad\nkg/s;-;%;-;%\n\
+         0,05;1,4;70;;\n0,06;1,3;68;1,9;72\n0,07;;;1,8;71\n",
+        "N=60000,,,N=90000,,\nflow,PR,eta,flow,PR,eta\ng/s,-,-,g/s,-,-\n50,1.4,0.7,60,1.9,0.72\n60,1.3,0.68,70,1.8,0.71\n",
+    ] {
+        // Conversions of units round.
+        let rounded = |rows: Vec<[Option<f64>; 4]>| -> Vec<[Option<f64>; 4]> {
+            rows.into_iter()
+                .map(|row| row.map(|value| value.map(|value| (1e9 * value).round() / 1e9)))
+                .collect()
+        };
+        assert_eq!(rounded(points(text)), expected, "{text}");
+    }
+}
+
+/// A matrix of pressure ratios over flow, its speeds as headings.
+#[test]
+fn a_matrix_has_the_quantity_of_its_title() {
+    let text = "Total pressure ratio\nflow [kg/s],60000,90000\n0.05,1.4,\n0.06,1.3,1.9\n0.07,,1.8\n";
+    let expected: Vec<[Option<f64>; 4]> =
+        FOUR.iter().map(|[n, m, ratio, _]| [Some(*n), Some(*m), Some(*ratio), None]).collect();
+    assert_eq!(points(text), expected);
+    let given = MapDescription { reference: Some(ReferenceState::SAE), ..MapDescription::default() };
+    let untitled = text.split_once('\n').unwrap().1;
+    assert!(read_any_text(untitled, &given).is_err(), "it may be of efficiencies");
+}

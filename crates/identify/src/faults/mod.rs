@@ -11,7 +11,7 @@ pub(crate) mod found_fault;
 pub(crate) mod nominal_rig;
 mod places;
 pub(crate) mod possible;
-mod smooth;
+pub(crate) mod smooth;
 
 use crate::IdentifyConfig;
 use crate::faults::balance_rows::{MACHINE, Machine, Rows};

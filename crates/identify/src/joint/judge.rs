@@ -10,10 +10,8 @@ use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
 use mapper_numerics::statistics::{DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, mean, median, rms};
 
-/// Whitened mean square above which a step is doubtful.
+/// Whitened mean square above which a step is doubtful. Its square, and that times the median step's, excludes a step from the shared parameters.
 const DOUBT_SQUARE: f64 = 2.0;
-/// Whitened mean square, and its ratio to the median step's, above which a step is excluded from the shared parameters.
-const EXCLUDE_SQUARE: f64 = 4.0;
 /// Mean square of the sums over [`STRETCH_ROWS`] whitened rows of all steps above which the model itself is doubtful: smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model fits the
 /// rig.
 const SLOW_SQUARE: f64 = 1.3;
@@ -49,7 +47,7 @@ pub(crate) fn exclude(problem: &mut Problem<'_>) -> bool {
         .collect();
     let open = || squares.iter().copied().filter(|square| square.is_finite());
     let Some(middle) = median(open()) else { return false };
-    let limit = EXCLUDE_SQUARE * middle.max(1.0);
+    let limit = DOUBT_SQUARE.powi(2) * middle.max(1.0);
     let mut changed = false;
     // At most a third is excluded: beyond that, the model is wrong, not the steps.
     let bad = open().filter(|square| *square > limit).count();

@@ -6,16 +6,15 @@
 
 use crate::objections::objection::Objection;
 use crate::step_data::commands::begins_with_jump;
+use crate::step_data::samples::slope_per_s;
 use mapper_core::{Channel, Recording, Series, Swapped, Warning};
 use mapper_numerics::statistics::{mean, median};
 
-/// Averaging time before and after a moment.
+/// Averaging time of a level before and after a moment, s; twice as long for a slope. Moments lie a quarter of it apart.
 const LEVEL_S: f64 = 2.0;
-const SLOPE_S: f64 = 4.0;
 /// Range of moments around the jump, s.
 const BEFORE_S: f64 = 10.0;
 const AFTER_S: f64 = 40.0;
-const EVERY_S: f64 = 0.5;
 /// Lag behind the others above which a channel is late, s: a probe of 4 mm and a shaft that runs up make 2 s.
 const LATE_S: f64 = 3.5;
 /// Minimum number of jumps for an average.
@@ -77,12 +76,13 @@ fn housing_jumps(recording: &Recording, jumps_s: &[f64]) -> Option<Objection> {
 
 /// Time after the jumps at which a channel changes most, s; `None` if it does not change.
 fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
-    let moments = ((BEFORE_S + AFTER_S) / EVERY_S) as usize;
+    let every_s = 0.25 * LEVEL_S;
+    let moments = ((BEFORE_S + AFTER_S) / every_s) as usize;
     let mut squares = vec![0.0; moments + 1];
     for jump_s in jumps_s {
         let changes: Vec<f64> = (0..=moments)
             .map(|k| {
-                let moment_s = jump_s - BEFORE_S + k as f64 * EVERY_S;
+                let moment_s = jump_s - BEFORE_S + k as f64 * every_s;
                 change(series, moment_s, slope).unwrap_or(0.0).powi(2)
             })
             .collect();
@@ -93,7 +93,7 @@ fn lag_s(series: &Series, jumps_s: &[f64], slope: bool) -> Option<f64> {
     let (at, largest) = squares.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     // Pure noise has no peak.
     let clear = *largest > 4.0 * mean(&squares)?;
-    clear.then_some(at as f64 * EVERY_S - BEFORE_S)
+    clear.then_some(at as f64 * every_s - BEFORE_S)
 }
 
 /// Change of level or slope at a moment.
@@ -104,12 +104,8 @@ fn change(series: &Series, moment_s: f64, slope: bool) -> Option<f64> {
     }
     let rate = |from_s: f64, to_s: f64| {
         let (t_s, values) = series.slice(from_s, to_s);
-        let (middle_s, middle) = (mean(t_s)?, mean(values)?);
-        let (top, bottom) = t_s.iter().zip(values).fold((0.0, 0.0), |(top, bottom), (t_s, value)| {
-            (top + (t_s - middle_s) * (value - middle), bottom + (t_s - middle_s).powi(2))
-        });
-        (bottom > 0.0).then_some(top / bottom)
+        slope_per_s(t_s, values)
     };
-    let change = rate(moment_s, moment_s + SLOPE_S)? - rate(moment_s - SLOPE_S, moment_s)?;
+    let change = rate(moment_s, moment_s + 2.0 * LEVEL_S)? - rate(moment_s - 2.0 * LEVEL_S, moment_s)?;
     Some(change).filter(|change| change.is_finite())
 }

@@ -16,8 +16,6 @@ use rmpfit::{MPConfig, MPFitter, MPPar, MPResult, MPSide};
 pub(crate) const ETA_BOUNDS: (f64, f64) = (0.05, 2.0);
 /// Search range of the heat-transfer coefficient, W/(m2 K).
 pub(crate) const H_BOUNDS_W_M2K: (f64, f64) = (0.0, 1e5);
-/// Scale of steps and bounds for h near zero, W/(m2 K).
-const DERIVATIVE_STEP_H_W_M2K: f64 = 1e-2;
 
 /// Parameters of eqs. 1-3 in addition to the samples.
 #[derive(Debug, Clone, Copy)]
@@ -191,15 +189,14 @@ impl MPFitter for Problem<'_> {
     }
 }
 
-fn parameter((low, high): (f64, f64), step: f64, rel_step: f64) -> MPPar {
+fn parameter((low, high): (f64, f64)) -> MPPar {
     MPPar {
         limited_low: true,
         limited_up: true,
         limit_low: low,
         limit_up: high,
         side: MPSide::Both,
-        step,
-        rel_step,
+        rel_step: SLOPE_STEP,
         ..MPPar::new()
     }
 }
@@ -216,10 +213,7 @@ pub(crate) fn fit(samples: &Samples, geometry: Geometry) -> Option<Fit> {
         geometry,
         followed: followed.as_ref(),
         config: MPConfig { ftol: 1e-15, xtol: 1e-13, gtol: 1e-14, max_iter: 100, ..MPConfig::new() },
-        parameters: [
-            parameter(ETA_BOUNDS, 0.0, SLOPE_STEP),
-            parameter(H_BOUNDS_W_M2K, DERIVATIVE_STEP_H_W_M2K, 0.0),
-        ],
+        parameters: [parameter(ETA_BOUNDS), parameter(H_BOUNDS_W_M2K)],
     };
     let status = problem.mpfit(&mut parameters).ok()?;
     let [eta, h_w_m2k] = parameters;
@@ -238,7 +232,8 @@ fn judged(
     residual_k: Vec<f64>,
 ) -> Option<Fit> {
     let step_eta = SLOPE_STEP * eta;
-    let step_h = DERIVATIVE_STEP_H_W_M2K.max(SLOPE_STEP * h_w_m2k);
+    // A relative step needs an h above 0.
+    let step_h = SLOPE_STEP * h_w_m2k.max(1.0);
     let mut jacobian = [Vec::with_capacity(samples.len()), Vec::with_capacity(samples.len())];
     for row in rows(samples) {
         let by_eta = (t2_k(geometry, row, eta + step_eta, h_w_m2k)

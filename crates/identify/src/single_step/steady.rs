@@ -6,7 +6,7 @@
 use crate::config::coloured;
 use crate::single_step::dynamic::{Estimate, enough};
 use crate::step_data::cleaning::without_spikes;
-use crate::step_data::samples::Samples;
+use crate::step_data::samples::{Samples, slope_per_s};
 use crate::step_outcome::findings::Findings;
 use crate::{IdentifyConfig, step_outcome::interval_width};
 use mapper_core::{Channel, EstimateUncertainty, EtaSignal, NoCompression, Recording, Warning, Window};
@@ -119,17 +119,6 @@ fn lag_k(samples: &Samples, trend: &Samples, config: &IdentifyConfig) -> f64 {
     let (Some(flow_kg_s), Some(t2_k)) = (mean(&samples.flow_kg_s), mean(&samples.t2_k)) else { return 0.0 };
     let tau_s = time_constant_s(config.probe_diameter_m, config.outlet_diameter_m, flow_kg_s, t2_k);
     slope_per_s(&trend.t_s, &trend.t2_k).map_or(0.0, |slope_k_s| tau_s * slope_k_s)
-}
-
-/// Least-squares slope of a column, 1/s; `None` without two finite samples.
-fn slope_per_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
-    let usable = || t_s.iter().zip(values).filter(|(_, value)| value.is_finite());
-    let count = usable().count() as f64;
-    let (mean_t, mean) = usable().fold((0.0, 0.0), |(t, v), (a, b)| (t + a / count, v + b / count));
-    let (top, bottom) = usable().fold((0.0, 0.0), |(top, bottom), (t, value)| {
-        (top + (t - mean_t) * (value - mean), bottom + (t - mean_t) * (t - mean_t))
-    });
-    (bottom > 0.0).then(|| top / bottom)
 }
 
 /// Noise from the scatter of the samples' own efficiencies (or the declared noise if larger), and offsets and gains one sensor at a time. Also

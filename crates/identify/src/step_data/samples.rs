@@ -107,6 +107,17 @@ impl Samples {
     }
 }
 
+/// Least-squares slope of a column, 1/s; `None` without two finite samples.
+pub(crate) fn slope_per_s(t_s: &[f64], values: &[f64]) -> Option<f64> {
+    let usable = || t_s.iter().zip(values).filter(|(_, value)| value.is_finite());
+    let count = usable().count() as f64;
+    let (mean_t, mean) = usable().fold((0.0, 0.0), |(t, v), (a, b)| (t + a / count, v + b / count));
+    let (top, bottom) = usable().fold((0.0, 0.0), |(top, bottom), (t, value)| {
+        (top + (t - mean_t) * (value - mean), bottom + (t - mean_t) * (t - mean_t))
+    });
+    (bottom > 0.0).then(|| top / bottom)
+}
+
 /// A channel at given times: its own samples if the times agree, otherwise interpolated over short gaps, NaN elsewhere.
 fn aligned(series: Option<&Series>, t_s: &[f64]) -> Vec<f64> {
     let (Some(series), Some(first_s), Some(last_s)) = (series, t_s.first(), t_s.last()) else {

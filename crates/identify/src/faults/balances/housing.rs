@@ -15,13 +15,11 @@ use crate::IdentifyConfig;
 use crate::config::coloured;
 use crate::faults::balance_rows::{Rows, common, own};
 use crate::faults::end_readings::{CHANNELS, MAX_STEPS, PerChannel, Readings, span_s};
-use crate::step_data::samples::Samples;
-use mapper_core::{Channel, Recording, StepKind, StepMarker, Window};
+use crate::step_data::samples::{Samples, slope_per_s};
+use mapper_core::{Channel, Recording, StepKind, StepMarker, Window, WindowRule};
 use mapper_numerics::statistics::{MIN_VALUES, mean};
 use mapper_physics::rig::sensor_fault::FaultKind;
 
-/// Start of the evaluation after the step's start, s: speed, flow and probe have settled.
-const AFTER_S: f64 = 10.0;
 /// Length of a part over which the housing's slope is taken, s.
 const PART_S: f64 = 18.0;
 /// Maximum number of parts of a step.
@@ -34,8 +32,6 @@ const LACKS_W: f64 = 10.0;
 const UNEVEN_K: f64 = 0.35;
 /// The same for the part that develops over the run as it warms up, K: a housing of two walls makes up to 3 K.
 const UNEVEN_DRIFT_K: f64 = 1.0;
-/// Reference temperature of Tc and T4, so that the constants stay small, K.
-const AROUND_K: f64 = 330.0;
 /// Heat capacity of the housing, J/K, its loss, W/K and W, and alpha_A: the range of turbochargers, one standard deviation each.
 const ANY_CAPACITY_J_K: f64 = 3e3;
 const ANY_LOSS_W_K: f64 = 50.0;
@@ -71,7 +67,7 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
         .zip(used)
         .map(|(step, used)| {
             if *used {
-                parts(recording, step.start_s + AFTER_S, step.end_s, config, most)
+                parts(recording, step.start_s + WindowRule::EARLIEST_S, step.end_s, config, most)
             } else {
                 Vec::new()
             }
@@ -88,9 +84,11 @@ pub(crate) fn rows(recording: &Recording, config: &IdentifyConfig, used: &[bool]
     let (first_s, last_s) = span_s(recording)?;
     let run_ratio = |part: &Part| (part.middle_s - first_s) / (last_s - first_s);
     let column = |of: &dyn Fn(&Part) -> f64| parts.iter().map(|part| of(part)).collect::<Vec<f64>>();
+    // Losses count from the mean, so that the constants stay small.
+    let middle_k = mean(parts.iter().map(|part| part.tc_k))?;
     let any = [
         (column(&|part| part.slope_k_s), ANY_CAPACITY_J_K),
-        (column(&|part| part.tc_k - AROUND_K), ANY_LOSS_W_K),
+        (column(&|part| part.tc_k - middle_k), ANY_LOSS_W_K),
         (column(&|_| 1.0), ANY_LOSS_W),
         (column(&|part| part.conductance_w_k * (part.tc_k - part.t1_k)), ANY_SHARE),
         (column(&|part| part.conductance_w_k * part.carried_on_k()), ANY_SHARE),
@@ -158,15 +156,11 @@ fn parts(recording: &Recording, start_s: f64, end_s: f64, config: &IdentifyConfi
         let (middle_s, tc_k, t1_k) = (of(&samples.t_s)?, of(&samples.tc_k)?, of(&samples.t1_k)?);
         let t2_k = of(&samples.t2_k)?;
         let capacity_w_k = of(&samples.flow_kg_s)? * config.air.heat_capacity_j_kgk(t1_k);
-        let (top, bottom) = range.clone().fold((0.0, 0.0), |(top, bottom), i| {
-            let since_s = samples.t_s[i] - middle_s;
-            (top + since_s * samples.tc_k[i], bottom + since_s * since_s)
-        });
         let conductance_w_k = capacity_w_k * (1.0 - kept) / kept;
         // d((1 - kept)/kept) = -d kept/kept^2.
         let conductance_error_w_k = capacity_w_k * error / (kept * kept);
-        let slope_k_s = top / bottom;
-        (slope_k_s.is_finite() && conductance_error_w_k.is_finite()).then_some(Part {
+        let slope_k_s = slope_per_s(&samples.t_s[range.clone()], &samples.tc_k[range.clone()])?;
+        conductance_error_w_k.is_finite().then_some(Part {
             slope_k_s,
             t1_k,
             t2_k,

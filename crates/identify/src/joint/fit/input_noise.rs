@@ -12,6 +12,7 @@ use crate::joint::step_model::model::Setting;
 use crate::joint::step_model::parameters::{PROBE_MM2, SHARED, SharedVector};
 use crate::joint::step_model::rows::{Row, StepRows};
 use crate::joint::step_model::smoothing::Smoother;
+use crate::single_step::probe::follow;
 use mapper_core::Channel;
 use mapper_numerics::coloured_noise::memory;
 use rand::SeedableRng;
@@ -53,12 +54,7 @@ pub(crate) fn explained(problem: &Problem<'_>, steps: &[StepRows], config: &Iden
             let noise = smoother.apply(&draw(&t_s, rows, config, sigma_k, &mut rng));
             for (sum, lags) in sums.iter_mut().zip(&lags) {
                 // The first reading is a parameter of the step.
-                let mut reading = noise.first().copied().unwrap_or(0.0);
-                let mut readings = vec![reading];
-                for (lag, pair) in lags.iter().zip(noise.windows(2)) {
-                    reading = lag.next(reading, pair[0], pair[1]);
-                    readings.push(reading);
-                }
+                let mut readings = follow(lags, noise.first().copied().unwrap_or(0.0), &noise);
                 member.whitening.apply(&mut readings);
                 *sum += readings.iter().map(|r| r * r).sum::<f64>();
             }

@@ -24,9 +24,6 @@ pub(crate) const ROUGHLY: f64 = 1e-4;
 /// The same for the last fit: noise-free recordings resolve less than any standard error.
 pub(crate) const FULLY: f64 = 0.0;
 
-/// Spread of the efficiencies about a surface without information, fraction.
-pub(crate) const NO_SURFACE_SIGMA: f64 = 1e3;
-
 /// One step in the fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Member<'a> {
@@ -381,7 +378,7 @@ impl Problem<'_> {
     /// The problem at its minimum without the efficiency surface: the information of the steps and shared parameters alone.
     pub(crate) fn without_a_surface(&self) -> Option<Self> {
         let mut free = self.clone();
-        free.surface_sigma = NO_SURFACE_SIGMA;
+        free.surface_sigma = f64::INFINITY;
         free.active[SURFACE..].fill(false);
         for (index, _, slab_sigma, _) in REFINEMENTS {
             free.priors[index].sigma = slab_sigma;

@@ -2,7 +2,7 @@
 
 use crate::joint::fit::inlet;
 use crate::joint::fit::input_noise_spline::Explained;
-use crate::joint::fit::solve::{Member, NO_SURFACE_SIGMA, Problem};
+use crate::joint::fit::solve::{Member, Problem};
 use crate::joint::step_model::model::{Course, Setting};
 use crate::joint::step_model::parameters::{
     ALPHA, BAROMETER, BENDS, ETA, EXPONENT, FIRST_READING, FLOW_GAIN, GAIN_CHANNELS, GAINS, HUMIDITY, INLET,
@@ -36,7 +36,7 @@ pub(crate) const START_S: f64 = 3.0;
 pub(crate) const START_WITH_NOISE_S: f64 = 2.0;
 /// Expected spread of the points' efficiencies about the surface, fraction: maps are not polynomials. The recordings of
 /// `benches/identification.py` have 0.0006, those of a machine with a map that drops steeply at choke 0.005.
-const SURFACE_SIGMA: f64 = 1e-3;
+pub(crate) const SURFACE_SIGMA: f64 = 1e-3;
 /// Relative error of the surface's effect on a prediction: surfaces through a few points bend differently from maps.
 const SHAPE_ERROR_RATIO: f64 = 0.03;
 /// Expected spread of the points' h about the law, ratio. The recordings of `benches/identification.py` have 0.0022 to 0.003.
@@ -199,7 +199,7 @@ pub(crate) fn problem<'a>(
 
     let members =
         steps.iter().map(|step| member(step, alone.get(step.position), &scale, mean_eta, config)).collect();
-    let surface_sigma = if shaped { 0.005 } else { NO_SURFACE_SIGMA };
+    let surface_sigma = if shaped { 0.005 } else { f64::INFINITY };
     Some(Problem {
         setting,
         members,

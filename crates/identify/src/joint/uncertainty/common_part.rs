@@ -3,9 +3,6 @@
 use mapper_inference::mixture::MIN_WEIGHT;
 use nalgebra::DMatrix;
 
-/// Maximum number of common errors that describe a covariance.
-const MAX: usize = 8;
-
 /// Change of each quantity per standard deviation of each common error.
 ///
 /// `covariance` is that of the quantities, `own_variances` the part of its diagonal that no other quantity shares. The common remainder is
@@ -24,7 +21,7 @@ pub(crate) fn common_part(covariance: &DMatrix<f64>, own_variances: &[f64], erro
     let eigen = rest.symmetric_eigen();
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let leading = order.iter().take(MAX).filter(|k| eigen.eigenvalues[**k] > MIN_WEIGHT * trace);
+    let leading = order.iter().filter(|k| eigen.eigenvalues[**k] > MIN_WEIGHT * trace);
     let mut changes = none;
     for k in leading {
         let vector = eigen.eigenvectors.column(*k);

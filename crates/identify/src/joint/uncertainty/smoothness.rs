@@ -7,10 +7,11 @@
 //! keep their declared spread; on a flat one they lose about half of it. All quantities correlated with the efficiencies are corrected too.
 
 use crate::faults::balances::efficiency::{FittedEfficiencies, FittedHeat};
-use crate::faults::end_readings::CHANNELS;
-use crate::faults::end_readings::MAX_STEPS;
+use crate::faults::end_readings::{CHANNELS, MAX_STEPS};
+use crate::faults::smooth::ANY_ROUGHNESS;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, Problem};
+use crate::joint::fit::start::SURFACE_SIGMA;
 use crate::joint::step_model::parameters::{FLOW_GAIN, LOCAL, OFFSET_CHANNELS, OFFSETS, SURFACE};
 use crate::joint::step_model::rows::StepRows;
 use crate::joint::step_model::surface::{SLOW_LOSS, SurfaceScale};
@@ -29,8 +30,8 @@ const AMPLITUDES: [f64; 3] = [0.05, 0.1, 0.2];
 const SPEED_LENGTHS: [f64; 4] = [0.7, 1.0, 1.4, 2.0];
 /// The same over flow at equal speed.
 const FLOW_LENGTHS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 2.0];
-/// Deviation from any smooth function, fraction.
-const ROUGHNESSES: [f64; 2] = [1e-3, 4e-3];
+/// Deviation from any smooth function, fraction: of machines in simulation, and of a measured map.
+const ROUGHNESSES: [f64; 2] = [SURFACE_SIGMA, ANY_ROUGHNESS];
 /// Mean of efficiencies and its standard deviation, fraction: an uninformative prior.
 const MEAN: (f64, f64) = (0.65, 1.0);
 /// Number of points above which the weights come from a subset: the cost grows with the cube.

@@ -1,14 +1,13 @@
 //! Checks of a joint fit: of each step, and of the model as a whole.
 
 use crate::IdentifyConfig;
-use crate::joint::fit::refinements::Refinements;
-use crate::joint::fit::solve::{Member, Problem, ROUGHLY};
-use crate::joint::step_model::parameters::{ALPHA, ETA, LN_COEFFICIENT, LN_DEVIATION, LN_DIRECTION};
+use crate::joint::fit::solve::{Member, Problem};
+use crate::joint::step_model::parameters::{ETA, LN_DEVIATION};
 use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
 use crate::step_outcome::findings::Findings;
 use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
-use mapper_numerics::statistics::{DOUBT_SIGMAS, EXCLUDE_SIGMAS, HINT_SIGMAS, mean, median, rms};
+use mapper_numerics::statistics::{HINT_SIGMAS, mean, median, rms};
 
 /// Whitened mean square above which a step is doubtful. Its square, and that times the median step's, excludes a step from the shared parameters.
 const DOUBT_SQUARE: f64 = 2.0;
@@ -94,12 +93,7 @@ pub(crate) fn judge_step(
 }
 
 /// Arguments against the model as a whole.
-pub(crate) fn doubts(
-    problem: &Problem<'_>,
-    smoothed: &Smoothed,
-    refinements: Option<&Refinements>,
-    config: &IdentifyConfig,
-) -> Vec<ModelDoubt> {
+pub(crate) fn doubts(problem: &Problem<'_>, smoothed: &Smoothed, config: &IdentifyConfig) -> Vec<ModelDoubt> {
     let mut doubts = Vec::new();
     let slow: Vec<f64> = problem
         .members
@@ -122,42 +116,5 @@ pub(crate) fn doubts(
     if above > 0 {
         doubts.push(ModelEvidence::Eta { points: above, max_eta: HIGHEST_EFFICIENCY });
     }
-    if smoothed.strain > DOUBT_SIGMAS {
-        doubts.push(ModelEvidence::Bend { offset_ratio: smoothed.strain });
-    }
-    doubts.extend(split_doubt(problem, refinements));
     doubts.into_iter().map(|evidence| ModelDoubt { evidence }).collect()
-}
-
-/// Fits steps with rising T2 and steps with falling T2 separately: their shared parameters must agree.
-fn split_doubt(problem: &Problem<'_>, refinements: Option<&Refinements>) -> Option<ModelEvidence> {
-    let rises = |member: &Member<'_>| match (member.measured_k.first(), member.measured_k.last()) {
-        (Some(first), Some(last)) => last > first,
-        _ => false,
-    };
-    let half = |rising: bool| {
-        let mut half = problem.clone();
-        half.members.retain(|member| member.shares && rises(member) == rising);
-        // A half carries less information than the whole: parameters neutral for the whole are not searched for again.
-        for index in refinements.map_or(&[][..], |refinements| &refinements.indices) {
-            half.active[*index] &= refinements.is_some_and(|found| found.probability(*index) > 0.5);
-        }
-        if half.members.len() < 4 {
-            return None;
-        }
-        half.minimise(ROUGHLY)?;
-        let covariance = half.covariance()?;
-        Some((half.shared, covariance))
-    };
-    let ((up, up_covariance), (down, down_covariance)) = (half(true)?, half(false)?);
-    [LN_COEFFICIENT, ALPHA, LN_DIRECTION].into_iter().find_map(|index| {
-        let (a, b) = (up_covariance.error_of(index)?, down_covariance.error_of(index)?);
-        let (difference, sigma) = (up[index] - down[index], a.hypot(b));
-        (difference.abs() > EXCLUDE_SIGMAS * sigma).then(|| ModelEvidence::Directions {
-            parameter: crate::joint::step_model::parameters::symbol(index),
-            rising: up[index],
-            falling: down[index],
-            sigmas: difference.abs() / sigma,
-        })
-    })
 }

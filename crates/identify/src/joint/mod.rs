@@ -15,7 +15,7 @@ pub(crate) mod uncertainty;
 use crate::faults::balances::efficiency::FittedEfficiencies;
 use crate::joint::fit::refinements::{Gain, Refinements};
 use crate::joint::fit::solve::{Covariance, FULLY, Problem, ROUGHLY};
-use crate::joint::step_model::parameters::{FLOW_GAIN, INLET, OFFSETS, PROBE_MM2, SHARED};
+use crate::joint::step_model::parameters::{INLET, PROBE_MM2, SHARED};
 use crate::joint::uncertainty::smoothness::{Judged, Smoothed};
 use crate::single_step::dynamic::Estimate;
 use crate::step_data::end_state::EndState;
@@ -26,7 +26,7 @@ use mapper_core::{
     EstimateUncertainty, FitFailure, JointSettings, LeftOut, Recording, ThermalModel, Verdict, Warning,
     Window, confidence_interval_95,
 };
-use mapper_numerics::statistics::{DOUBT_SIGMAS, rms};
+use mapper_numerics::statistics::rms;
 
 /// Number of fits before the last one.
 const ROUNDS: usize = 3;
@@ -179,27 +179,14 @@ impl<'a> Attempt<'a> {
             let member = problem.members.get_mut(*index)?;
             (member.shares, member.barred) = (false, true);
         }
-        let Fitted { covariance, refined, inlet_sigma, resting } = fitted(&mut problem, steps, config)?;
+        let Fitted { covariance, refined, resting } = fitted(&mut problem, steps, config)?;
+        let known = refined.as_ref().map(|(refinements, gain)| (refinements, gain));
         let smoothed =
-            |problem: &Problem<'_>, covariance: &Covariance, refined: &Option<(Refinements, Gain)>| {
-                let refined = refined.as_ref().map(|(refinements, gain)| (refinements, gain));
-                uncertainty::smoothness::smoothed(problem, covariance, refined, steps, config.reference)
-            };
-        let mut found = smoothed(&problem, &covariance, &refined);
-        if found.strain > DOUBT_SIGMAS {
-            // The declaration is wrong: the offsets then get the spread that they show.
-            let strain = found.strain;
-            for prior in &mut problem.priors[OFFSETS..FLOW_GAIN] {
-                prior.sigma *= strain;
-            }
-            let refinements = refined.as_ref().map(|(refinements, _)| refinements.clone());
-            let (strained, gain) = self::covariance(&mut problem, refinements.as_ref(), inlet_sigma)?;
-            found = smoothed(&problem, &strained, &refinements.zip(gain));
-            found.strain = strain;
-        }
+            uncertainty::smoothness::smoothed(&problem, &covariance, known, steps, config.reference);
         let refinements = refined.as_ref().map(|(refinements, _)| refinements);
-        let thermal = thermal_model::thermal_model(&problem, &covariance, &found, refinements, steps, config);
-        Some(Attempt { problem, covariance, smoothed: found, thermal, resting, left_out: None })
+        let thermal =
+            thermal_model::thermal_model(&problem, &covariance, &smoothed, refinements, steps, config);
+        Some(Attempt { problem, covariance, smoothed, thermal, resting, left_out: None })
     }
 
     /// The fit without the region of the map that disagrees most, if any.
@@ -234,8 +221,6 @@ struct Fitted {
     covariance: Covariance,
     /// `None` without parameters with a prior to search for.
     refined: Option<(Refinements, Gain)>,
-    /// Remaining uncertainty of h before the wheel.
-    inlet_sigma: Option<f64>,
     /// Dependence of the efficiencies on the declaration, fraction.
     resting: f64,
 }
@@ -265,7 +250,7 @@ fn fitted(
         }
         None => 0.0,
     };
-    Some(Fitted { covariance, refined: refinements.zip(gain), inlet_sigma, resting })
+    Some(Fitted { covariance, refined: refinements.zip(gain), resting })
 }
 
 /// The covariance of a problem at the mean of the mixture, including the uncertainty from the mixture and the inlet model; and the regression

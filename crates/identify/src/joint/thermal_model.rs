@@ -76,7 +76,7 @@ pub(crate) fn thermal_model(
             .map(|(i, channel)| (*channel, of(OFFSETS + i, &|x| x)))
             .collect(),
         entangled,
-        doubts: judge::doubts(problem, smoothed, refinements, config),
+        doubts: judge::doubts(problem, smoothed, config),
     }
 }
 

@@ -59,8 +59,6 @@ pub(crate) struct Smoothed {
     pub(crate) common: [Vec<Vec<f64>>; 2],
     /// Shift and resulting standard error of each shared parameter that was fitted or propagated.
     pub(crate) shared: Vec<(f64, f64)>,
-    /// Shift of the offsets, in declared standard deviations.
-    pub(crate) strain: f64,
     /// Sources of the uncertainty of each point's efficiency and of its ln h.
     pub(crate) budgets: Vec<[Vec<BudgetRow>; 2]>,
 }
@@ -190,7 +188,6 @@ fn judged(
     solved: &[Solved],
 ) -> Smoothed {
     let shared: Vec<Quantity> = (0..covariance.fitted.len()).map(|row| of_shared(covariance, row)).collect();
-    let carried = (0..covariance.fitted.len()).filter(|row| is_offset(covariance.fitted[*row]));
     // Errors from offsets and assumptions, before and after.
     let biased: Vec<usize> = (0..covariance.fitted.len())
         .filter(|row| (OFFSETS..SURFACE).contains(&covariance.fitted[*row]))
@@ -242,7 +239,6 @@ fn judged(
         .map(&judge)
         .map(|judged| (judged.value, judged.uncertainty.combined_standard_error()))
         .collect();
-    let strain = carried.map(|row| shared[row].0.powi(2) / covariance.shared[(row, row)]).sum::<f64>().sqrt();
     let (eta, ln_h) = (parallel::map(etas, judge), parallel::map(ln_hs, judge));
     let best = solved.iter().max_by(|a, b| a.weight.total_cmp(&b.weight));
     let common = [(etas, &eta), (ln_hs, &ln_h)].map(|(quantities, judged)| {
@@ -254,7 +250,7 @@ fn judged(
         }
         changes
     });
-    Smoothed { eta, ln_h, common, shared, strain, budgets: Vec::new() }
+    Smoothed { eta, ln_h, common, shared, budgets: Vec::new() }
 }
 
 /// The budgets of all points, in the units of the quantities.

@@ -6,10 +6,10 @@ use nalgebra::{DMatrix, DVector};
 /// A model whose whitened residuals depend on unknowns. Its cost is their sum of squares and that of the unknowns' distances from their
 /// priors, in standard deviations.
 pub trait Model {
-    /// What the model gives for values of the unknowns.
+    /// Result of the model for values of the unknowns.
     type Point;
 
-    /// What it gives there; `None` where it has no answer.
+    /// The result at these values; `None` if the model has none.
     fn at(&self, unknowns: &DVector<f64>) -> Option<Self::Point>;
 
     /// The cost of a point.
@@ -18,27 +18,27 @@ pub trait Model {
     /// The normal equations there, with slopes that are taken over a small part of the way or over a large one.
     fn normal(&mut self, unknowns: &DVector<f64>, point: &Self::Point, reach: Reach) -> Normal;
 
-    /// How far each unknown may move, down (at most 0) and up, in one iteration.
+    /// Largest change of each unknown in one iteration: down (at most 0) and up.
     fn room(&self, unknowns: &DVector<f64>) -> Vec<(f64, f64)>;
 
-    /// Called at each point that is accepted: a model may estimate its noise again there.
+    /// Called at each accepted point, for example to estimate the noise again.
     fn accept(&mut self, _: &Self::Point) {}
 }
 
-/// Over how much of the way slopes are taken.
+/// Distance over which slopes are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reach {
     /// For a smooth cost.
     Fine,
-    /// For a cost with small steps, which the fine slope does not see past.
+    /// For a cost with small steps, which hide the slope at a fine distance.
     Coarse,
 }
 
 /// Distance from a point to the runs from which slopes are taken, in the coordinates' units: rounding and curvature are both small there.
 pub const FINE: f64 = 0.02;
-/// The same past small steps.
+/// The same for a cost with small steps.
 const COARSE: f64 = 0.2;
-/// Furthest that an unknown moves in one iteration, in its unit: models bend.
+/// Largest change of an unknown in one iteration, in its unit: models are nonlinear.
 const MAX_MOVE: f64 = 2.0;
 
 impl Reach {
@@ -53,15 +53,15 @@ pub fn room_within(low: f64, high: f64, at: f64) -> (f64, f64) {
     ((low - at).clamp(-MAX_MOVE, 0.0), (high - at).clamp(0.0, MAX_MOVE))
 }
 
-/// What an iteration has to promise in the cost, if the end is compared with others: evidence of a hundredth is none.
+/// Minimum predicted decrease of the cost for another iteration, if the end is compared with others: a hundredth of evidence is negligible.
 pub const ENOUGH: f64 = 0.02;
 
 /// When a descent ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Until {
-    /// Points at which slopes are taken, at most; at the last of them nothing is moved any more.
+    /// Maximum number of points at which slopes are taken; the last one is the end.
     pub iterations: usize,
-    /// An iteration that promises less than this in the cost is not made.
+    /// Minimum predicted decrease of the cost for another iteration.
     pub enough: f64,
 }
 
@@ -70,11 +70,11 @@ pub struct Until {
 pub struct End<Point> {
     /// The unknowns.
     pub unknowns: DVector<f64>,
-    /// What the model gives there.
+    /// Result of the model there.
     pub point: Point,
     /// The normal equations there.
     pub normal: Normal,
-    /// What one more iteration would promise in the cost: more than was asked for where no step along the slopes led down.
+    /// Predicted decrease of the cost by one more iteration; above the requested one if no step along the slopes decreases the cost.
     pub promised: f64,
 }
 
@@ -82,7 +82,7 @@ pub struct End<Point> {
 const TRIES: usize = 5;
 const SHORTER: f64 = 0.35;
 
-/// Goes down from where the unknowns stand, and from what the model gives there.
+/// Minimises the cost from these unknowns, with the result of the model there.
 pub fn descend<M: Model>(
     model: &mut M,
     mut unknowns: DVector<f64>,
@@ -123,13 +123,13 @@ pub fn descend<M: Model>(
 pub struct Normal {
     /// Precision of the unknowns, priors included.
     pub matrix: DMatrix<f64>,
-    /// What pulls at each of them.
+    /// Half the slope of the cost, downwards, for each of them.
     pub pull: DVector<f64>,
 }
 
 impl Normal {
-    /// The step to the least cost within the room of each unknown, and what it promises: what would leave its room furthest is held at its end, and
-    /// the others are solved for again.
+    /// The step to the minimum cost within the room of each unknown, and the predicted decrease. The unknown that would leave its room furthest is
+    /// fixed at its end, and the others are solved again.
     pub fn step(&self, room: &[(f64, f64)]) -> Option<(DVector<f64>, f64)> {
         let mut held: Vec<Option<f64>> = vec![None; room.len()];
         for _ in 0..=room.len() {

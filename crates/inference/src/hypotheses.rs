@@ -15,26 +15,26 @@ use mapper_numerics::ROUNDING;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::collections::BTreeMap;
 
-/// Most members of an explanation: bounds the search. Judgement.
+/// Maximum number of members of an explanation: bounds the search. Judgement.
 pub const MAX_MEMBERS: usize = 4;
-/// Most changes of the explanation on the way to the best: each member is found, replaced and taken back once. If every family is one
-/// hypothesis the search ends by itself, since each change makes the set more probable.
+/// Maximum number of changes of the explanation: each member is added, replaced and removed once. If every family is one hypothesis, the
+/// search ends by itself, since each change makes the set more probable.
 const MAX_CHANGES: usize = 4 * MAX_MEMBERS;
 /// Sets from which the search starts, in addition to the empty one: bounds its time. Judgement.
 const MAX_STARTS: usize = 6;
 
-/// Residuals with what may move them.
+/// Residuals and their sensitivities to the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Balance {
     /// One for each row.
     pub residual: DVector<f64>,
     /// Covariance of the rows without any of the parameters, rows x rows, positive definite.
     pub covariance: DMatrix<f64>,
-    /// By how much each parameter moves the residuals, rows x parameters.
+    /// Sensitivities of the residuals to the parameters, rows x parameters.
     pub columns: DMatrix<f64>,
 }
 
-/// What all balances together say of the parameters: precision and pull of one Gaussian likelihood.
+/// Gaussian likelihood of the parameters from all balances: its precision, and its precision times its mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Likelihood {
     precision: DMatrix<f64>,
@@ -46,18 +46,18 @@ pub struct Likelihood {
 pub struct Hypothesis {
     /// Its family: hypotheses of which at most one is a member.
     pub family: usize,
-    /// One standard deviation beforehand, if it is a member.
+    /// Prior standard deviation if it is a member.
     pub sigma: f64,
-    /// ln of the probability beforehand that it is a member.
+    /// ln of the prior probability that it is a member.
     pub ln_prior: f64,
     /// Whether it is never below zero.
     pub at_least_zero: bool,
 }
 
-/// What is known of the parameters beforehand, in the order of the balances' columns.
+/// Priors of the parameters, in the order of the balances' columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Priors {
-    /// One standard deviation of the parameters that always differ from zero: the first columns.
+    /// Standard deviations of the parameters that always differ from zero: the first columns.
     pub always: Vec<f64>,
     /// The columns after them.
     pub hypotheses: Vec<Hypothesis>,
@@ -95,7 +95,7 @@ pub struct Member {
 /// The most probable explanation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Explanation {
-    /// Empty where nothing is wrong.
+    /// Empty if no hypothesis is needed.
     pub members: Vec<Member>,
     /// ln of its probability over that of the empty one.
     pub ln_odds: f64,
@@ -135,7 +135,7 @@ impl Likelihood {
         Some(())
     }
 
-    /// What is known of the other parameters where the first ones are as declared: they are integrated out.
+    /// Likelihood of the other parameters, with the first ones, as declared, integrated out.
     pub(crate) fn given(&self, always: &[f64]) -> Option<Likelihood> {
         if always.is_empty() {
             return Some(self.clone());

@@ -2,9 +2,9 @@
 
 /// Cells of the density for one standard deviation: the interval then errs by less than a hundredth of it.
 const CELLS_PER_SIGMA: f64 = 16.0;
-/// Most cells between the lowest and the highest centre: bounds the effort where the centres are far apart.
+/// Maximum number of cells between the lowest and the highest centre: bounds the effort if the centres are far apart.
 const MAX_CELLS: f64 = 4096.0;
-/// Standard deviations beyond which a normal density is left out: 6e-7 of it.
+/// Standard deviations beyond which a normal density is neglected: 6e-7 of it.
 const REACH_SIGMAS: f64 = 5.0;
 
 /// Coverage of the intervals of results.
@@ -12,7 +12,7 @@ pub const COVERAGE: f64 = 0.95;
 /// A parameter is identified if its interval is narrower than this share of its prior's; otherwise the prior dominates. Judgement.
 pub const IDENTIFIED_RATIO: f64 = 0.7;
 
-/// Shortest interval that holds `coverage` of the mixture of normal distributions about `centres` (weight, value), each with the
+/// Shortest interval that contains `coverage` of the mixture of normal distributions about `centres` (weight, value), each with the
 /// standard deviation `sigma`. `None` without centres, or where a number is not finite.
 pub fn shortest(centres: &[(f64, f64)], sigma: f64, coverage: f64) -> Option<(f64, f64)> {
     let (low, high) = centres

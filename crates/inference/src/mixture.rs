@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Draws of each set: means and probabilities are then within some thousandths of sums over a grid, as the test shows.
 const DRAWS: usize = 128;
-/// Weight of a set below which it is not drawn from: what it could add to a 95 % interval is a fiftieth of what lies beyond it.
+/// Minimum weight of a set that is drawn from: a fiftieth of the probability outside a 95 % interval.
 pub const MIN_WEIGHT: f64 = 1e-3;
 /// Bases of the Halton sequence, one for each parameter.
 const BASES: [usize; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
@@ -26,7 +26,7 @@ pub struct Parameter {
     pub low: f64,
     /// Highest value.
     pub high: f64,
-    /// What small errors of the model pass for, one standard deviation. Counts in the evidence.
+    /// Change that small errors of the model can mimic, one standard deviation. Counts in the evidence.
     pub model_error: f64,
     /// Standard deviation of the normal prior under which the Gaussian was found; infinite for none.
     pub fitted_under_sigma: f64,
@@ -41,12 +41,12 @@ pub struct Draw {
     pub values: DVector<f64>,
 }
 
-/// What the parameters may be.
+/// Posterior of the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mixture {
     /// Draws of all sets.
     pub draws: Vec<Draw>,
-    /// Draws of the set of all parameters by itself: what follows if none is neutral.
+    /// Draws of the set of all parameters: the posterior if none is neutral.
     pub all_free: Vec<Draw>,
     /// Probability of each parameter to differ from neutral.
     pub off_neutral: Vec<f64>,
@@ -120,7 +120,7 @@ struct Likelihood {
 }
 
 impl Likelihood {
-    /// Takes the prior of the fit out again.
+    /// Removes the prior of the fit.
     fn of(mean: &DVector<f64>, covariance: &DMatrix<f64>, parameters: &[Parameter]) -> Option<Self> {
         let mut precision = covariance.clone().cholesky()?.inverse();
         let pull = &precision * mean;
@@ -174,7 +174,7 @@ impl Likelihood {
         Some(0.5 * pull.dot(&mean) + ln_volume - prior + inside.max(f64::MIN_POSITIVE).ln())
     }
 
-    /// Draws of a set, put to the others.
+    /// Appends draws of a set.
     fn draw(
         &self,
         free: &[usize],
@@ -320,7 +320,7 @@ mod tests {
         assert!((one.mean().unwrap() - other.mean().unwrap()).norm() < 1e-12);
     }
 
-    /// A finding within the model's error speaks for nothing, one far beyond it is certain.
+    /// An estimate within the model's error is no evidence; one far beyond it is certain.
     #[test]
     fn the_error_of_the_model_counts_in_the_evidence() {
         let off = |found: f64, model_error: f64| {
@@ -331,7 +331,7 @@ mod tests {
         assert!(off(0.02, 0.0) > 0.999 && off(0.02, 0.025) < 0.3 && off(0.2, 0.025) > 0.999);
     }
 
-    /// Two parameters that are found for certain make a third one likelier than it is alone.
+    /// Two parameters that certainly differ from neutral make a third one more probable.
     #[test]
     fn what_differs_in_one_respect_is_likelier_to_differ_in_another() {
         let third = |others: f64| {

@@ -1,8 +1,8 @@
-//! The search for the most probable set of causes where each set takes a fit of a nonlinear model.
+//! The search for the most probable set of causes if each set needs a fit of a nonlinear model.
 //!
-//! Fits are costly, and a straight line from a fit says cheaply what one more cause would add. So every set that differs from the best one
-//! by one more cause or by another cause in the place of a member is judged by the straight line first, and the sets that promise most are
-//! fitted. The search ends where none of them is more probable. [`crate::hypotheses`] does the same where the line is exact.
+//! Fits are costly; linearisation about a fit predicts cheaply what one more cause would add. The search therefore predicts every set that
+//! differs from the best one by one more cause, or by another cause in the place of a member, and fits the most promising sets. It ends if
+//! none of them is more probable. [`crate::hypotheses`] does the same for a linear model.
 
 use mapper_numerics::parallel;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,13 +17,13 @@ pub trait Causes: Sync {
     /// The causes of a fit, ascending.
     fn members(&self, fit: &Self::Fit) -> Vec<usize>;
 
-    /// What a cause is a form of: at most one form is a member, as a drift with another onset is.
+    /// The family of a cause: at most one cause of a family is a member, for example drifts with different onsets.
     fn family(&self, cause: usize) -> usize;
 
     /// ln of the probability of a fit, but for a constant that all have in common.
     fn ln_odds(&self, fit: &Self::Fit) -> f64;
 
-    /// Gain that each further cause promises in addition to a fit, linearised.
+    /// Predicted gain of each further cause in addition to a fit, linearised.
     fn offers(&self, base: &Self::Fit) -> Vec<Offer<Self::Start>>;
 
     /// Start for the fit of a set that has one cause less.
@@ -41,20 +41,20 @@ pub trait Causes: Sync {
 pub struct Offer<Start> {
     /// The cause.
     pub cause: usize,
-    /// By how much ln of the odds is promised to grow.
+    /// Predicted growth of ln of the odds.
     pub ln_gain: f64,
     /// Start of the fit.
     pub start: Start,
 }
 
-/// How far a search goes.
+/// Limits of a search.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Most members of a set.
+    /// Maximum number of members of a set.
     pub members: usize,
     /// Single causes from which the search starts.
     pub starts: usize,
-    /// Sets that are fitted in each round at most.
+    /// Maximum number of sets fitted in each round.
     pub fits: usize,
     /// A set is fitted where it promises at most this much less than the best so far has, ln of odds: lines are not exact.
     pub slack: f64,
@@ -71,7 +71,7 @@ impl<Fit> Default for Known<Fit> {
 }
 
 impl<Fit: Clone + Send + Sync> Known<Fit> {
-    /// Keeps a fit, unless one of the same causes is more probable.
+    /// Stores a fit, unless one of the same causes is more probable.
     pub fn keep<C: Causes<Fit = Fit>>(&mut self, causes: &C, fit: Fit) {
         let members = causes.members(&fit);
         let better = |known: &Fit| causes.ln_odds(known) >= causes.ln_odds(&fit);

@@ -9,13 +9,14 @@ use crate::step_outcome::interval_width;
 use mapper_core::{EstimateUncertainty, LeftOut, ModelDoubt, ModelEvidence, PoorFit, Warning};
 use mapper_numerics::statistics::{HINT_SIGMAS, mean, median, rms};
 
-/// Whitened mean square above which a step is doubtful. Its square, and that times the median step's, excludes a step from the shared parameters.
+/// Whitened mean square above which a step is doubtful. Its square times the median step's mean square (at least 1) excludes a step from the
+/// shared parameters.
 const DOUBT_SQUARE: f64 = 2.0;
-/// Mean square of the sums over [`STRETCH_ROWS`] whitened rows of all steps above which the model itself is doubtful: smoothed inputs and fitted parameters reduce it from 1 to about 0.8 if the model fits the
-/// rig.
+/// Mean square of the sums over [`SEGMENT_ROWS`] whitened rows of all steps above which the model itself is doubtful: smoothed inputs and
+/// fitted parameters reduce it from 1 to about 0.8 if the model fits the rig.
 const SLOW_SQUARE: f64 = 1.3;
 /// Rows of a segment, 5 to 10 s: model errors are slower than noise.
-const STRETCH_ROWS: usize = 10;
+const SEGMENT_ROWS: usize = 10;
 /// Scatter of the points about the convection law above which the law does not apply, ratio.
 const LAW_SCATTER_RATIO: f64 = 0.06;
 /// Isentropic efficiency, total to total, above that of any turbocharger compressor (the best stay below 0.85).
@@ -30,11 +31,11 @@ pub(crate) fn mean_square(problem: &Problem<'_>, member: &Member<'_>) -> f64 {
 /// Mean square of segment sums of a step's whitened residual, relative to that of independent residuals.
 fn slow_square(problem: &Problem<'_>, member: &Member<'_>) -> Option<f64> {
     let (residual, _) = problem.residual(member, &problem.shared, &member.local, None);
-    let stretches: Vec<f64> = residual
-        .chunks(STRETCH_ROWS)
-        .map(|stretch| stretch.iter().sum::<f64>().powi(2) / stretch.len() as f64)
+    let segments: Vec<f64> = residual
+        .chunks(SEGMENT_ROWS)
+        .map(|segment| segment.iter().sum::<f64>().powi(2) / segment.len() as f64)
         .collect();
-    mean(&stretches)
+    mean(&segments)
 }
 
 /// Excludes steps that fit far worse than the others from the shared parameters; true if that changed anything.

@@ -21,7 +21,7 @@ const PASSES_FOR_ALPHA: f64 = 0.025;
 const MIN_SURFACE_SIGMA: f64 = 3e-3;
 
 /// Maximum ratio of the distance to its linear estimate: beyond it the linearisation is not valid.
-const LARGEST_STRETCH: f64 = 2.0;
+const MAX_NONLINEARITY: f64 = 2.0;
 
 /// Degree to which h before the wheel follows the inlet's own law.
 pub(crate) fn power_of(convection: InletConvection) -> f64 {
@@ -88,9 +88,9 @@ fn compared(problem: &mut Problem<'_>) -> Option<Option<f64>> {
     let sigma = left.sqrt();
     problem.priors[INLET] = Prior { mean: problem.shared[INLET], sigma };
     problem.active[INLET] = true;
-    let stretched = sigma * stretch(problem, &other, &problem.covariance()?);
+    let curved = sigma * nonlinearity(problem, &other, &problem.covariance()?);
     problem.active[INLET] = false;
-    Some(Some(stretched))
+    Some(Some(curved))
 }
 
 /// Adds the undecided difference between the models to the covariance: how far each quantity moves from one towards the other.
@@ -133,7 +133,7 @@ fn share_of_noise(problem: &Problem<'_>) -> Option<f64> {
 
 /// Ratio of the distance between the two fits to its linear estimate. The dependence is curved because only the product of alpha_A and h is
 /// determined.
-fn stretch(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) -> f64 {
+fn nonlinearity(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) -> f64 {
     let Some(own) = covariance.row_of(INLET) else { return 1.0 };
     let way = other.shared[INLET] - problem.shared[INLET];
     [ALPHA, LN_COEFFICIENT]
@@ -145,7 +145,7 @@ fn stretch(problem: &Problem<'_>, other: &Problem<'_>, covariance: &Covariance) 
         })
         .filter(|ratio| ratio.is_finite())
         .fold(1.0, f64::max)
-        .min(LARGEST_STRETCH)
+        .min(MAX_NONLINEARITY)
 }
 
 /// The problem at its minimum with the other model; `None` if the fit does not converge.

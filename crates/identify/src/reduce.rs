@@ -243,6 +243,7 @@ impl Inputs {
 
     /// The efficiency with the housing of the measurement, or with that of the heat balance, which depends on it a little.
     fn adiabatic_efficiency(&self, machine: &Machine, mut eta: f64) -> Option<f64> {
+        // Each round divides the change by ten or more.
         const MAX_ROUNDS: usize = 50;
         for _ in 0..MAX_ROUNDS {
             let housing = self.housing(machine, eta)?;

@@ -241,19 +241,18 @@ impl Inputs {
         (eta.is_finite() && eta > 0.0 && p2_pa > p1_pa).then_some(eta)
     }
 
-    /// The efficiency with the housing of the measurement, or with that of the heat balance, which depends on it a little.
-    fn adiabatic_efficiency(&self, machine: &Machine, mut eta: f64) -> Option<f64> {
-        const MAX_ROUNDS: usize = 50;
-        for _ in 0..MAX_ROUNDS {
-            let housing = self.housing(machine, eta)?;
-            let excess_k = |eta: f64| self.outputs(machine, eta, &housing).t2_probe_target_k - self.t2_k;
-            let found = root_between(ETA_BOUNDS.0, ETA_BOUNDS.1, 1e-10, excess_k)?;
-            if self.point.tc_k.is_some() || (found - eta).abs() < 1e-9 {
-                return Some(found);
-            }
-            eta = found;
-        }
-        None
+    /// The efficiency with the housing of the measurement, or with that of the heat balance, which depends on it.
+    fn adiabatic_efficiency(&self, machine: &Machine, apparent: f64) -> Option<f64> {
+        let excess_k = |eta: f64| {
+            let housing = self.housing(machine, eta);
+            housing.map_or(f64::NAN, |at| self.outputs(machine, eta, &at).t2_probe_target_k - self.t2_k)
+        };
+        // No balance holds far below the apparent efficiency, where the compressor takes more than the turbine can give.
+        let lowest = match self.point.tc_k {
+            Some(_) => [ETA_BOUNDS.0; 1].to_vec(),
+            None => [0.95, 0.8, 0.6, 0.4].map(|share| (share * apparent).max(ETA_BOUNDS.0)).to_vec(),
+        };
+        lowest.into_iter().find_map(|lowest| root_between(lowest, ETA_BOUNDS.1, 1e-10, excess_k))
     }
 
     /// The state of the machine with its housings at rest; `None` if they find no balance.

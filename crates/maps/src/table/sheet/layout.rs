@@ -201,7 +201,9 @@ fn wrong(row: &GridRow, error: ColumnError) -> ImportError {
 fn is_turbine_title(row: &GridRow) -> bool {
     let text = row.text().to_lowercase();
     let numbers = row.cells.iter().filter(|cell| cell.parse::<f64>().is_ok()).count();
-    numbers == 0
+    // A title may hold a reference state.
+    let is_title = numbers == 0 || text.trim_start().starts_with("turbine map");
+    is_title
         && (text.contains("turbine") || text.contains("turbina"))
         && text.contains("map")
         && !text.contains("compressor")

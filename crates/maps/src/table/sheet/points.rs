@@ -76,7 +76,9 @@ pub(crate) fn points<'a>(
                 speed = Some(title_rpm);
                 continue;
             }
-            if layout::is_heading(given, row) {
+            // Each block may repeat the row of units.
+            let above = layout.first_row.checked_sub(1).and_then(|above| grid.rows.get(above));
+            if layout::is_heading(given, row) || above.is_some_and(|above| above.cells == row.cells) {
                 continue;
             }
             if row.cells.iter().any(|cell| cell == EXTRAPOLATED) {

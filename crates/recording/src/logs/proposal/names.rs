@@ -264,11 +264,16 @@ static OF_KIND: LazyLock<Vec<(Kind, Regex)>> = LazyLock::new(|| {
     patterns.into_iter().filter_map(|(kind, pattern)| Some((kind, Regex::new(pattern).ok()?))).collect()
 });
 
-/// The one kind of quantity that a name speaks of; `None` without one and with several.
+/// The one kind of quantity that a name speaks of, or begins with; `None` without one and with several.
 fn kind_of_name(name: &str) -> Option<Kind> {
-    let mut kinds = OF_KIND.iter().filter(|(_, pattern)| pattern.is_match(name)).map(|(kind, _)| *kind);
-    let kind = kinds.next()?;
-    kinds.next().is_none().then_some(kind)
+    let found = || OF_KIND.iter().filter_map(|(kind, pattern)| Some((*kind, pattern.find(name)?.start())));
+    // The letter in front is the quantity: `T_L_n_Verd` is behind the compressor.
+    let in_front = || found().filter(|(_, start)| *start == 0);
+    let (mut kinds, mut first) = (found(), in_front());
+    match (kinds.next(), kinds.next(), first.next(), first.next()) {
+        (Some((kind, _)), None, ..) | (_, _, Some((kind, _)), None) => Some(kind),
+        _ => None,
+    }
 }
 
 /// The channels that a column may be, by its name, its group and its further description, with their weights.

@@ -51,6 +51,9 @@ pub(super) fn settle(proposal: &mut Proposal, layout: &Layout, survey: &Survey) 
             proposed.certainty = Certainty::Likely;
             proposed.remarks.retain(|_| false);
             proposed.remarks.push(match count {
+                _ if unit.symbol() == "degF" => {
+                    "the log gives no unit; other units are imperial, and in degC the inlet would be warmer than a room".to_owned()
+                }
                 1 => format!("the log gives no unit; {} is the one that is plausible", unit.symbol()),
                 _ => format!(
                     "the log gives no unit; {} is the one in which all {count} columns of the kind are plausible",

@@ -30,7 +30,6 @@ fn recognises(head: &[u8]) -> bool {
     head.trim_start_matches('\u{feff}').starts_with('<') && head.contains("<atfx_file")
 }
 
-/// Values, or a reference to them.
 #[derive(Clone)]
 enum Values {
     Numbers(Vec<f64>),
@@ -52,7 +51,6 @@ impl Instance {
     }
 }
 
-/// The contents of a file.
 #[derive(Default)]
 struct Contents {
     /// Names of binary files by their identifiers.
@@ -266,7 +264,6 @@ struct Binaries<'a> {
     file: &'a LogFile,
     contents: &'a Contents,
     read: HashMap<String, Vec<u8>>,
-    /// Bytes of memory left for values.
     left: u64,
 }
 

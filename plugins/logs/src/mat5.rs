@@ -79,11 +79,9 @@ fn without_common_prefix(table: &mut [NamedColumn]) {
     }
 }
 
-/// Collects the columns of a file.
 #[derive(Default)]
 struct Reader {
     is_big: bool,
-    /// Bytes that may still be unpacked.
     left: u64,
     columns: Vec<NamedColumn>,
     left_out: usize,

@@ -75,7 +75,6 @@ pub(super) struct Program {
     id: u64,
     text: String,
     parameters: Vec<String>,
-    /// Hooks it defines.
     defined: BTreeSet<String>,
 }
 

@@ -15,7 +15,6 @@ const REQUIRED_COLUMNS: [&str; 4] = ["speed_corrected_rpm", "flow_corrected_kg_s
 /// Maximum number of common errors of a point; `mapper` writes up to 13.
 const MAX_COMMON_ERRORS: usize = 64;
 
-/// The `#` lines and the column names.
 struct Head {
     reference: Option<ReferenceState>,
     machine: String,

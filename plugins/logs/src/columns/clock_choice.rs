@@ -88,7 +88,6 @@ impl Candidate {
             && middles.windows(2).all(|pair| pair[0] < pair[1])
     }
 
-    /// Minimum step between two readings, s.
     fn resolution_s(&self) -> f64 {
         let readings: Vec<f64> = self.present().collect();
         readings

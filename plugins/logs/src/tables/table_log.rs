@@ -13,7 +13,6 @@ use std::collections::BTreeMap;
 struct GroupReader {
     group: usize,
     hand: ClockHand,
-    /// Set if the rows are out of order.
     sorter: Option<RowSorter>,
     sources: Vec<usize>,
     values: Vec<f64>,

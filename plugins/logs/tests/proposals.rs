@@ -171,7 +171,7 @@ fn imperial_logs_have_imperial_temperatures() {
     let row = |load: f64| vec![1e5 * load, 14.3, 14.3 + 19.0 * load, 72.0 + load, 73.0 + 200.0 * load];
     let found = proposal(names, row);
     for channel in [Channel::T1, Channel::T2] {
-        let proposed = found.of(channel).unwrap();
+        let proposed = found.entry(channel).unwrap();
         assert_eq!((proposed.unit, proposed.certainty), (Some("degF"), Certainty::Likely), "{channel}");
     }
 }

@@ -15,7 +15,7 @@ pub use description::{
     DESCRIPTION_KEYS, DescriptionError, DescriptionKey, KeyError, description_from_yaml, description_text,
     read_description, set_key, turbine_description_text,
 };
-pub use efficiency_comment::{DEFINITION, efficiency_in_comment};
+pub use efficiency_comment::{DEFINITION_PREFIX, efficiency_in_comment};
 pub use read::{read_any_bytes, read_any_text, read_text, read_workbook};
 pub use read_turbine::{read_turbine_text, read_turbine_workbook, reduced_turbine_point};
 pub use reference::{parse_reference, reference_in_comment, resolve_reference};

@@ -3,7 +3,7 @@
 use crate::table::columns::column::{Column, Machine};
 use crate::table::columns::described_columns::DescribedColumns;
 use crate::table::columns::quantity::Quantity;
-use crate::table::read::{needed, notes, pressure_pa};
+use crate::table::read::{pressure_pa, read_notes, require};
 use crate::table::reference;
 use crate::table::sheet::grid::Grid;
 use crate::table::sheet::layout;
@@ -117,7 +117,7 @@ fn row(
     in_percent: bool,
 ) -> Result<TurbineMapPoint, ImportError> {
     let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.as_stated(value));
-    let needed = |value: Option<f64>, quantity: Quantity| needed(point, quantity, value);
+    let needed = |value: Option<f64>, quantity: Quantity| require(point, quantity, value);
     let root = reference.t_ref_k.sqrt();
     let speed = needed(speed_of(point), Quantity::Speed)?;
     let is_parameter = speed_is_reduced || value(Quantity::ReducedSpeed).is_some();
@@ -144,7 +144,7 @@ fn is_flow(quantity: Quantity) -> bool {
 /// The measured values of a point.
 fn as_measured(point: &Point<'_>, given: &MapDescription) -> Result<MeasuredTurbinePoint, ImportError> {
     let value = |quantity: Quantity| point.of(quantity).map(|(column, value)| column.as_stated(value));
-    let of = |quantity: Quantity, value: Option<f64>| needed(point, quantity, value);
+    let of = |quantity: Quantity, value: Option<f64>| require(point, quantity, value);
     let pressure = |quantity: Quantity| of(quantity, pressure_pa(point, quantity, given)?);
     let measured = MeasuredTurbinePoint {
         line: point.at,

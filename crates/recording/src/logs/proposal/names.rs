@@ -12,10 +12,10 @@ pub(crate) type Weight = u32;
 /// Maximum number of letters of a name that are evaluated.
 const MAX_NAME_LETTERS: usize = 120;
 
-/// A name in small letters, umlauts written out, accents left out, with `_` for all that is neither letter nor digit, and between the words of
+/// The name in lower case, umlauts spelled out, without accents, with `_` for everything but letters and digits and between the words of
 /// `compInletTemp`.
 pub(crate) fn normalise(text: &str) -> String {
-    let mut normalise = String::new();
+    let mut normalised = String::new();
     let mut letters = text.chars().take(MAX_NAME_LETTERS).peekable();
     let mut was_small = false;
     while let Some(letter) = letters.next() {
@@ -24,14 +24,14 @@ pub(crate) fn normalise(text: &str) -> String {
         }
         was_small = letter.is_lowercase();
         for letter in letter.to_lowercase() {
-            push_plain(&mut normalise, letter);
+            push_normalised(&mut normalised, letter);
         }
     }
     // German compounds: `Eintrittsdruck`.
-    normalise.trim_matches('_').replace("eintritts", "eintritt_").replace("austritts", "austritt_")
+    normalised.trim_matches('_').replace("eintritts", "eintritt_").replace("austritts", "austritt_")
 }
 
-fn push_plain(normalise: &mut String, letter: char) {
+fn push_normalised(normalised: &mut String, letter: char) {
     match letter {
         'ä' => normalised.push_str("ae"),
         'ö' => normalised.push_str("oe"),
@@ -45,7 +45,7 @@ fn push_plain(normalise: &mut String, letter: char) {
         'ç' => normalised.push('c'),
         'ñ' => normalised.push('n'),
         letter if letter.is_ascii_alphanumeric() => normalised.push(letter),
-        _ if normalise.ends_with('_') => {}
+        _ if normalised.ends_with('_') => {}
         _ => normalised.push('_'),
     }
 }

@@ -24,7 +24,7 @@ pub fn propose(layout: &Layout, survey: &Survey, nominal: Option<NominalFlows<'_
     if agreement.suspects_numbering {
         let (mut renumbered, agreement) =
             propose_with_numbering(layout, survey, nominal, StationNumbering::GasTurbine);
-        let has_fifth = [Channel::P4, Channel::T4].iter().any(|channel| renumbered.of(*channel).is_some());
+        let has_fifth = [Channel::P4, Channel::T4].iter().any(|channel| renumbered.entry(*channel).is_some());
         if has_fifth && agreement.contradicting == 0 && agreement.agreeing >= 2 {
             physics::remark_stations(&mut renumbered, layout);
             return renumbered;
